@@ -1,0 +1,342 @@
+"""One sweep of a 2-D laser scanner: its beams, and which of them are valid (equations 1-3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["LaserScan", "RangeNoise"]
+
+Array = NDArray[np.float64]
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeNoise:
+    """Noise of one range reading, as standard deviations.
+
+    The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
+    each beam is off by ``bearing``.
+
+    Parameters
+    ----------
+    sigma : float
+        Constant part [m].
+    proportional : float
+        Part that grows with the range [m/m].
+    bearing : float
+        Noise of the bearing [rad].
+    quantum : float
+        Step of the lattice on which ranges are reported [m].
+
+    Raises
+    ------
+    ValueError
+        If a part is negative or not finite.
+
+    Examples
+    --------
+    >>> RangeNoise(sigma=0.03, proportional=0.01).range_variance(4.0)
+    0.0025
+    """
+
+    sigma: float = 0.0
+    proportional: float = 0.0
+    bearing: float = 0.0
+    quantum: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("sigma", "proportional", "bearing", "quantum"):
+            value = _number(f"RangeNoise.{name}", getattr(self, name))
+            if not 0 <= value < math.inf:
+                raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
+            object.__setattr__(self, name, value)
+
+    def range_variance(self, distance: float) -> float:
+        """Variance [m²] of a reading at `distance` [m]."""
+        return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
+
+
+class LaserScan:
+    """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
+
+    A beam is *valid* when its range is finite, positive, at least `range_min` and below
+    `range_max`. Invalid beams (NaN, ±inf, 0, too near, no return) stay where they are and are
+    never filled. Arrays are float64 copies and read-only, and so is the scan.
+
+    Parameters
+    ----------
+    ranges : array_like, shape (n,)
+        Measured distances [m], in order of increasing bearing.
+    angle_min, angle_increment : float
+        Bearing of the first beam and step between beams [rad], counter-clockwise from the
+        x axis of the sensor (equation 1).
+    angles : array_like, shape (n,), optional
+        Bearings [rad] of irregular beams, strictly increasing, instead of `angle_min` and
+        `angle_increment` (which are then the first bearing and the median step).
+    range_min, range_max : float
+        Limits of valid ranges [m]: ``range_min <= r < range_max``.
+    stamp : float
+        Time of the first beam [s].
+    scan_time, time_increment : float
+        Time between scans and between beams [s]; 0 where unknown.
+    frame_id : str
+        Name of the sensor's frame.
+    intensities : array_like, shape (n,), optional
+        Strength of each return, in the sensor's own unit.
+    pose : (x, y, theta), optional
+        Pose of the sensor in the world frame of its log [m, m, rad], where there is one.
+
+    Raises
+    ------
+    ValueError
+        If the fields make no sense together. The message names the field and its value.
+
+    Examples
+    --------
+    >>> scan = LaserScan([1.0, float("nan"), 2.0], angle_min=0.0, angle_increment=0.1)
+    >>> len(scan), scan.valid.tolist()
+    (3, [True, False, True])
+    >>> scan.points[2].round(3).tolist()
+    [1.96, 0.397]
+    """
+
+    ranges: Array
+    angles: Array
+    angle_min: float
+    angle_increment: float
+    #: True where the bearings are ``angle_min + i * angle_increment``.
+    is_regular: bool
+    range_min: float
+    range_max: float
+    stamp: float
+    scan_time: float
+    time_increment: float
+    frame_id: str
+    intensities: Array | None
+    pose: Pose | None
+
+    def __init__(
+        self,
+        ranges: ArrayLike,
+        angle_min: float | None = None,
+        angle_increment: float | None = None,
+        *,
+        angles: ArrayLike | None = None,
+        range_min: float = 0.0,
+        range_max: float = math.inf,
+        stamp: float = 0.0,
+        scan_time: float = 0.0,
+        time_increment: float = 0.0,
+        frame_id: str = "",
+        intensities: ArrayLike | None = None,
+        pose: Pose | None = None,
+    ) -> None:
+        own = self.__dict__
+        own["ranges"] = _vector("ranges", ranges)
+        n = len(own["ranges"])
+        own["is_regular"] = angles is None
+        if angles is None:
+            first, step = _regular_bearings(angle_min, angle_increment, n)
+            bearings = first + step * np.arange(n, dtype=np.float64)
+            bearings.flags.writeable = False
+        elif angle_min is None and angle_increment is None:
+            bearings = _vector("angles", angles, n)
+            first, step = _irregular_bearings(bearings)
+        else:
+            raise ValueError("angles are given together with angle_min or angle_increment")
+        own["angles"], own["angle_min"], own["angle_increment"] = bearings, first, step
+        own["range_min"], own["range_max"] = _limits(range_min, range_max)
+        own["stamp"] = _finite("stamp", stamp)
+        own["scan_time"] = _finite("scan_time", scan_time)
+        own["time_increment"] = _finite("time_increment", time_increment)
+        own["frame_id"] = str(frame_id)
+        own["intensities"] = (
+            None if intensities is None else _vector("intensities", intensities, n)
+        )
+        own["pose"] = None if pose is None else _pose(pose)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
+
+    def __len__(self) -> int:
+        return len(self.ranges)
+
+    def __repr__(self) -> str:
+        return (
+            f"LaserScan({len(self)} beams, {int(self.valid.sum())} valid, "
+            f"{math.degrees(self.angle_min):.1f}° + i·{math.degrees(self.angle_increment):.4f}°, "
+            f"stamp={self.stamp:.3f})"
+        )
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """Whether each beam returned a usable range, shape (n,)."""
+        r = self.ranges
+        valid = (r > 0) & (r >= self.range_min) & (r < self.range_max) & (r < math.inf)
+        valid.flags.writeable = False
+        return valid
+
+    @cached_property
+    def points(self) -> Array:
+        """x = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN where invalid."""
+        r = np.where(self.valid, self.ranges, np.nan)
+        points = np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles)))
+        points.flags.writeable = False
+        return points
+
+    @property
+    def is_full_circle(self) -> bool:
+        """Whether the last beam neighbours the first: n Δφ ≥ 2π - 1.5 Δφ."""
+        n, step = len(self), self.angle_increment
+        if n < 3:
+            return False
+        return bool(self.angles[-1] - self.angles[0] >= 2 * math.pi - 2.5 * step)
+
+    @classmethod
+    def from_message(cls, message: Any, *, pose: Pose | None = None) -> LaserScan:
+        """Make a scan of any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
+
+        Parameters
+        ----------
+        message : object
+            Anything with the fields of the ROS message; ``header`` and ``intensities`` may be
+            missing or empty.
+        pose : (x, y, theta), optional
+            Pose of the sensor, from elsewhere.
+
+        Raises
+        ------
+        ValueError
+            If a field is missing or the fields make no sense together.
+
+        Examples
+        --------
+        >>> from types import SimpleNamespace as Message
+        >>> header = Message(stamp=Message(sec=7, nanosec=500_000_000), frame_id="laser")
+        >>> m = Message(header=header, ranges=[1.0, 1.1], intensities=[], angle_min=0.0,
+        ...             angle_increment=0.1, range_min=0.1, range_max=30.0,
+        ...             scan_time=0.1, time_increment=0.0)
+        >>> LaserScan.from_message(m).stamp
+        7.5
+        """
+        try:
+            header = getattr(message, "header", None)
+            intensities = getattr(message, "intensities", None)
+            has_intensities = intensities is not None and len(intensities) > 0
+            return cls(
+                message.ranges,
+                message.angle_min,
+                message.angle_increment,
+                range_min=message.range_min,
+                range_max=message.range_max,
+                scan_time=message.scan_time,
+                time_increment=message.time_increment,
+                stamp=0.0 if header is None else _stamp_seconds(header.stamp),
+                frame_id="" if header is None else header.frame_id,
+                intensities=intensities if has_intensities else None,
+                pose=pose,
+            )
+        except AttributeError as error:
+            raise ValueError(f"message is no sensor_msgs/LaserScan: {error}") from None
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    raise ValueError(f"{name} is {value!r}, expected a number")
+
+
+def _finite(name: str, value: object) -> float:
+    number = _number(name, value)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {number}, expected a finite number")
+    return number
+
+
+def _vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
+    """Copy `values` into a read-only float64 vector."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind == "c":
+            raise TypeError
+        vector = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
+    if vector.ndim != 1:
+        raise ValueError(f"{name} has shape {vector.shape}, expected one dimension")
+    if length is not None and len(vector) != length:
+        raise ValueError(f"{name} has {len(vector)} values, expected {length}, one for each range")
+    vector.flags.writeable = False
+    return vector
+
+
+def _regular_bearings(first: object, step: object, n: int) -> tuple[float, float]:
+    if first is None or step is None:
+        raise ValueError("angle_min and angle_increment, or angles, must be given")
+    first, step = _finite("angle_min", first), _finite("angle_increment", step)
+    if n > 1 and step <= 0:
+        raise ValueError(f"angle_increment is {step}, expected > 0: beams run counter-clockwise")
+    _check_turn("angle_increment", first, first + (n - 1) * step, step)
+    return first, step
+
+
+def _irregular_bearings(angles: Array) -> tuple[float, float]:
+    n = len(angles)
+    bad = np.flatnonzero(~np.isfinite(angles))
+    if len(bad):
+        raise ValueError(f"angles[{bad[0]}] is {angles[bad[0]]}, expected a finite bearing")
+    steps = np.diff(angles)
+    bad = np.flatnonzero(steps <= 0)
+    if len(bad):
+        i = int(bad[0]) + 1
+        raise ValueError(
+            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
+        )
+    if n == 0:
+        return 0.0, 0.0
+    step = float(np.median(steps)) if n > 1 else 0.0
+    _check_turn("angles", angles[0], angles[-1], step)
+    return float(angles[0]), step
+
+
+def _check_turn(name: str, first: float, last: float, step: float) -> None:
+    # Some drivers repeat the first bearing at the end of the turn, and round their increment.
+    if last - first > 2 * math.pi + 1.5 * step:
+        raise ValueError(
+            f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
+        )
+
+
+def _limits(low: object, high: object) -> tuple[float, float]:
+    range_min, range_max = _number("range_min", low), _number("range_max", high)
+    if not 0 <= range_min < math.inf:
+        raise ValueError(f"range_min is {range_min}, expected a finite number ≥ 0")
+    if not range_max > range_min:
+        raise ValueError(f"range_max is {range_max}, expected more than range_min = {range_min}")
+    return range_min, range_max
+
+
+def _pose(pose: Any) -> Pose:
+    try:
+        x, y, theta = (_finite("pose", value) for value in pose)
+    except TypeError:
+        raise ValueError(f"pose is {pose!r}, expected (x, y, theta)") from None
+    except ValueError:
+        raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
+    return x, y, theta
+
+
+def _stamp_seconds(stamp: Any) -> float:
+    """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
+    if hasattr(stamp, "sec"):
+        return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+    if hasattr(stamp, "secs"):
+        return float(stamp.secs) + 1e-9 * float(stamp.nsecs)
+    return float(stamp)

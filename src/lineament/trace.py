@@ -1,0 +1,68 @@
+"""Every intermediate of one run of a method: for pictures, tests, and the question why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .features import Features
+from .scan import LaserScan
+
+__all__ = ["CANDIDATE", "Trace"]
+
+#: A beam that was examined as a corner: how far it lies from the chord of its piece (equation 14,
+#: [m]), the response of the corner operator there (equation 22), and whether it was taken.
+CANDIDATE = np.dtype(
+    [
+        ("beam", "i4"),
+        ("cluster", "i4"),
+        ("chord_distance", "f8"),
+        ("response", "f8"),
+        ("accepted", "?"),
+    ],
+    align=True,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Every intermediate of one run, by beam of the scan. NaN marks beams that a stage left out.
+
+    Attributes
+    ----------
+    scan : LaserScan
+        What was given.
+    method : str
+        Name of the method.
+    features : Features
+        What came out.
+    filtered : float64 array, shape (n,)
+        Ranges that the detection worked on [m].
+    spacing : float64 array, shape (n,)
+        Distance of each valid beam's filtered point to that of the valid beam before it [m].
+    distance_threshold, density_threshold : float64 array, shape (n,)
+        What the spacing was compared with (equations 10, 11-13) [m]; the second is NaN where it
+        was not asked.
+    clusters : int32 array, shape (n,)
+        Class of each beam, noise as -1.
+    candidates : structured array of dtype `CANDIDATE`
+        Primary corners in the order in which they were examined.
+    threshold : float
+        What their responses were compared with.
+    cuts : int32 array
+        Beams at which clusters were cut into pieces.
+    """
+
+    scan: LaserScan
+    method: str
+    features: Features
+    filtered: NDArray[np.float64]
+    spacing: NDArray[np.float64]
+    distance_threshold: NDArray[np.float64]
+    density_threshold: NDArray[np.float64]
+    clusters: NDArray[np.int32]
+    candidates: NDArray[np.void]
+    threshold: float
+    cuts: NDArray[np.int32]
