@@ -287,6 +287,13 @@ class FeatureBatch:
         return batch_table(self)
 
 
+def noise_row(noise: RangeNoise | None) -> NDArray[np.float64]:
+    """(sigma, proportional, bearing, quantum) as the kernels take them, NaN where not given."""
+    if noise is None:
+        return np.full(4, np.nan)
+    return np.array([noise.sigma, noise.proportional, noise.bearing, noise.quantum])
+
+
 def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
     """Name the four parts of a noise; None if they are NaN (no valid beam to estimate from)."""
     sigma, proportional, bearing, quantum = row.tolist()

@@ -53,7 +53,10 @@ class RangeNoise:
 
     def __post_init__(self) -> None:
         for name in ("sigma", "proportional", "bearing", "quantum"):
-            value = _number(f"RangeNoise.{name}", getattr(self, name))
+            value = getattr(self, name)
+            if type(value) is float and 0 <= value < math.inf:
+                continue
+            value = _number(f"RangeNoise.{name}", value)
             if not 0 <= value < math.inf:
                 raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
             object.__setattr__(self, name, value)
@@ -157,9 +160,7 @@ class LaserScan:
         own["scan_time"] = _finite("scan_time", scan_time)
         own["time_increment"] = _finite("time_increment", time_increment)
         own["frame_id"] = str(frame_id)
-        own["intensities"] = (
-            None if intensities is None else _vector("intensities", intensities, n)
-        )
+        own["intensities"] = None if intensities is None else _vector("intensities", intensities, n)
         own["pose"] = None if pose is None else _pose(pose)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -185,7 +186,7 @@ class LaserScan:
 
     @cached_property
     def points(self) -> Array:
-        """x = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN where invalid."""
+        """X = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN where invalid."""
         r = np.where(self.valid, self.ranges, np.nan)
         points = np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles)))
         points.flags.writeable = False
@@ -248,6 +249,8 @@ class LaserScan:
 
 
 def _number(name: str, value: object) -> float:
+    if type(value) is float:
+        return value  # An isinstance of an abstract class takes a microsecond.
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     raise ValueError(f"{name} is {value!r}, expected a number")

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .block import Block
 from .features import Features
+from .kernels import layout
 from .scan import LaserScan
 
-__all__ = ["CANDIDATE", "Trace"]
+__all__ = ["CANDIDATE", "Trace", "candidate_records"]
 
 #: A beam that was examined as a corner: how far it lies from the chord of its piece (equation 14,
 #: [m]), the response of the corner operator there (equation 22), and whether it was taken.
@@ -66,3 +68,16 @@ class Trace:
     candidates: NDArray[np.void]
     threshold: float
     cuts: NDArray[np.int32]
+
+
+def candidate_records(block: Block, threshold: float) -> NDArray[np.void]:
+    """Candidates of the first row of a block as records."""
+    count = block.counts[0, layout.CANDIDATES]
+    at = block.ints[0, layout.CANDIDATE, :count]
+    records = np.zeros(count, CANDIDATE)
+    records["beam"] = block.ints[0, layout.BEAM, at]
+    records["cluster"] = block.ints[0, layout.LABEL, at]
+    records["chord_distance"] = block.floats[0, layout.CHORD_DISTANCE, :count]
+    records["response"] = block.floats[0, layout.CANDIDATE_RESPONSE, :count]
+    records["accepted"] = records["response"] > threshold
+    return records

@@ -1,0 +1,5 @@
+"""``python -m lineament``."""
+
+from .cli import main
+
+main()

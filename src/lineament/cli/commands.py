@@ -1,0 +1,212 @@
+"""The commands. What they call is imported when they run: ``--help`` has to be quick."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from ..extractor import Extractor
+
+__all__ = ["COMMANDS"]
+
+_LOG = click.argument("log", type=click.Path(path_type=Path))
+_TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
+_KEEP_GOING = click.option(
+    "--keep-going", is_flag=True, help="Leave out what is faulty in a log, and count it."
+)
+_QUIET = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+_SET = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A parameter of the method; may be given again.",
+)
+_NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+
+
+def _default_method(function: Callable[..., Any]) -> Callable[..., Any]:
+    option = click.option("-m", "--method", help="Name of the method.  [default: liu]")
+    return option(function)
+
+
+def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
+    """Make the extractor that the options ask for; what is wrong with them is wrong usage."""
+    from ..extractor import Extractor
+    from ..methods import DEFAULT_METHOD
+    from ..scan import RangeNoise
+
+    try:
+        return Extractor(
+            DEFAULT_METHOD if method is None else method,
+            noise=None if noise is None else RangeNoise(sigma=noise),
+            **dict(_setting(text) for text in settings),
+        )
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise click.UsageError(f"--set {text!r}: expected NAME=VALUE")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value
+
+
+@click.command()
+@click.argument("logs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="File to write, .parquet or .jsonl; for several logs, a folder.",
+)
+@_default_method
+@_SET
+@_NOISE
+@_TOPIC
+@_KEEP_GOING
+@_QUIET
+def extract(
+    logs: tuple[Path, ...],
+    output: Path,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    topic: str | None,
+    keep_going: bool,
+    quiet: bool,
+) -> None:
+    """Extract the features of LOGS into a table."""
+    from ..extraction import extract_log, output_paths
+    from ..output import ENDINGS
+    from .progress import tracker
+
+    if not output.is_dir() and output.suffix.lower() not in ENDINGS:
+        raise click.UsageError(f"{output}: expected a folder or an ending of {', '.join(ENDINGS)}")
+    extractor, track = make_extractor(method, settings, noise), tracker(quiet)
+    for log, path in zip(logs, output_paths(logs, output), strict=True):
+        extraction = extract_log(
+            log,
+            path,
+            extractor,
+            topic=topic,
+            keep_going=keep_going,
+            track=lambda opened: track(opened, opened.path.name, len(opened)),
+        )
+        if not quiet:
+            click.echo(str(extraction))
+
+
+@click.command()
+@_LOG
+@_TOPIC
+@_KEEP_GOING
+@_QUIET
+def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
+    """Tell what LOG holds."""
+    from ..logs import open_log, summarize
+    from .progress import tracker
+
+    opened = open_log(log, topic=topic, keep_going=keep_going)
+    scans = tracker(quiet)(opened, opened.path.name, len(opened))
+    click.echo(str(summarize(opened, scans)))
+
+
+@click.command()
+@_LOG
+@click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Picture to write: .png, .svg or .pdf.",
+)
+@click.option(
+    "-m",
+    "--method",
+    "methods",
+    multiple=True,
+    help="Name of the method; may be given again, side by side.  [default: liu]",
+)
+@_SET
+@_NOISE
+@click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
+@_TOPIC
+@_KEEP_GOING
+def plot(
+    log: Path,
+    index: int,
+    output: Path,
+    methods: tuple[str, ...],
+    settings: tuple[str, ...],
+    noise: float | None,
+    trace: bool,
+    topic: str | None,
+    keep_going: bool,
+) -> None:
+    """Draw a scan of LOG and what is found in it."""
+    from ..logs import open_log
+    from ..methods import DEFAULT_METHOD
+    from ..output.figures import plot_scan, plot_trace
+
+    names = methods or (DEFAULT_METHOD,)
+    extractors = {name: make_extractor(name, settings, noise) for name in names}
+    scan = open_log(log, topic=topic, keep_going=keep_going).scan(index)
+    if trace:
+        plot_trace(extractors[names[0]].trace(scan), output)
+    else:
+        plot_scan(scan, {name: extractor(scan) for name, extractor in extractors.items()}, output)
+
+
+@click.command()
+@_QUIET
+def warmup(quiet: bool) -> None:
+    """Compile and cache the kernels."""
+    from ..warmup import warm_up
+
+    seconds = warm_up()
+    if not quiet:
+        click.echo(f"kernels ready after {seconds:.2f} s")
+
+
+@click.command()
+@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("demo"),
+    show_default=True,
+    help="Folder to write to.",
+)
+@_QUIET
+def demo(log: Path | None, output: Path, quiet: bool) -> None:
+    """Simulate a drive through a building (or take LOG) and make a page of its features."""
+    from ..demo import run_demo
+    from .progress import tracker
+
+    facts = run_demo(output, log, track=tracker(quiet))
+    if not quiet:
+        width = max(len(name) for name, _ in facts)
+        click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
+
+
+COMMANDS = {
+    command.name: command for command in (extract, info, plot, demo, warmup) if command.name
+}

@@ -1,0 +1,57 @@
+"""Progress: a bar on a terminal, a plain line now and then elsewhere, nothing when quiet."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
+__all__ = ["tracker"]
+
+T = TypeVar("T")
+
+#: Seconds between two plain lines, and before the first.
+_PATIENCE = 2.0
+
+
+def tracker(quiet: bool) -> Callable[[Iterable[T], str, int], Iterable[T]]:
+    """Choose how to show progress: ``track(items, about, total)`` gives the items."""
+    if quiet:
+        return lambda items, about, total: items  # noqa: ARG005
+    return _with_bar if sys.stderr.isatty() else _with_lines
+
+
+def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as TimeLeft
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeLeft(),
+    )
+    started, done = time.monotonic(), 0
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(about, total=total, rate="")
+        for item in items:
+            yield item
+            done += 1
+            if done % 32 == 0 or done == total:
+                rate = done / max(time.monotonic() - started, 1e-9)
+                progress.update(task, completed=done, rate=f"{rate:.0f}/s")
+
+
+def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
+    started = told = time.monotonic()
+    for done, item in enumerate(items, 1):
+        yield item
+        now = time.monotonic()
+        if now - told >= _PATIENCE:
+            told, rate = now, done / (now - started)
+            left = max(total - done, 0) / rate
+            line = f"{about}: {done}/{total}, {rate:.0f}/s, {left:.0f} s left"
+            print(line, file=sys.stderr, flush=True)

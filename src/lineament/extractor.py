@@ -1,0 +1,271 @@
+"""`Extractor`: a method with its tables and buffers, over one scan or many."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .block import Block
+from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
+from .methods import DEFAULT_METHOD, Method, get_method
+from .scan import LaserScan, RangeNoise
+from .trace import Trace
+
+__all__ = ["Extractor", "extract", "trace"]
+
+#: Values in a block of a batch: its arrays stay in the second-level cache.
+_BLOCK_VALUES = 4096
+
+
+class Extractor:
+    """Extracts the features of scans by one method.
+
+    It keeps the tables of the last bearings and its buffers from scan to scan, so that a scan
+    costs microseconds. One extractor serves one thread at a time; `batch` makes threads itself.
+
+    Parameters
+    ----------
+    method : str or Method
+        Name of a method (``"liu"``, ``"liu:paper"``), or one made before.
+    noise : RangeNoise, optional
+        Noise of the sensor; estimated from each scan if it is not given.
+    **parameters
+        Parameters of the method that differ from its defaults.
+
+    Raises
+    ------
+    ValueError
+        If the method or a parameter is unknown or out of bounds.
+
+    Examples
+    --------
+    >>> extractor = Extractor("liu", support_radius=5, noise=RangeNoise(sigma=0.01))
+    >>> bearings = np.linspace(-0.5, 0.5, 101)
+    >>> wall = extractor(LaserScan(2.0 / np.cos(bearings), angles=bearings))
+    >>> wall.segments["start"].round(3).tolist(), wall.segments["end"].round(3).tolist()
+    ([[2.0, -1.093]], [[2.0, 1.093]])
+    """
+
+    def __init__(
+        self,
+        method: str | Method = DEFAULT_METHOD,
+        *,
+        noise: RangeNoise | None = None,
+        **parameters: Any,
+    ) -> None:
+        if isinstance(method, str):
+            method = get_method(method, **parameters)
+        elif parameters:
+            raise ValueError("parameters are given together with a method that was made before")
+        self.method = method
+        self.noise = noise
+        self._noise_row = noise_row(noise)
+        self._block: Block | None = None
+        self._scan: LaserScan | None = None
+
+    def __call__(self, scan: LaserScan) -> Features:
+        """Extract the features of one scan."""
+        block = self._block
+        if block is None or self._scan is None or not _same_geometry(scan, self._scan):
+            block = self._block = self._new_block(scan, 1)
+        self._scan = scan
+        block.load(scan.ranges)
+        self.method.run(block)
+        return Features(
+            **block.written(),
+            clusters=np.frombuffer(block.clusters.tobytes(), np.int32),
+            stamp=scan.stamp,
+            frame_id=scan.frame_id,
+            noise=self.noise or noise_of(block.noises[0]),
+        )
+
+    def batch(
+        self,
+        ranges: ArrayLike,
+        *,
+        angle_min: float | None = None,
+        angle_increment: float | None = None,
+        angles: ArrayLike | None = None,
+        range_min: float = 0.0,
+        range_max: float = math.inf,
+        stamps: ArrayLike | None = None,
+        frame_id: str = "",
+        workers: int = 1,
+    ) -> FeatureBatch:
+        """Extract the features of many scans with the same bearings.
+
+        Parameters
+        ----------
+        ranges : array_like, shape (m, n)
+            One scan a row [m].
+        angle_min, angle_increment, angles, range_min, range_max, frame_id
+            As in `LaserScan`, for all rows.
+        stamps : array_like, shape (m,), optional
+            Stamp of each row [s]; 0 if not given.
+        workers : int
+            Threads; the result does not depend on their number.
+
+        Returns
+        -------
+        FeatureBatch
+            ``batch[i]`` equals the features of row i alone.
+
+        Raises
+        ------
+        ValueError
+            If a field makes no sense. The message names it and its value.
+        """
+        rows = _matrix(ranges)
+        m, n = rows.shape
+        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+            raise ValueError(f"workers is {workers!r}, expected a whole number ≥ 1")
+        times = np.zeros(m) if stamps is None else np.array(stamps, dtype=np.float64)
+        if times.shape != (m,):
+            raise ValueError(f"stamps has shape {times.shape}, expected ({m},), one for each row")
+        frame = LaserScan(
+            np.zeros(n),
+            angle_min,
+            angle_increment,
+            angles=angles,
+            range_min=range_min,
+            range_max=range_max,
+            frame_id=frame_id,
+        )
+        parts = [
+            part
+            for worker in _map(workers, partial(self._run_all, frame), _split(rows, workers))
+            for part in worker
+        ]
+        offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
+        for name in TABLES:
+            np.cumsum(np.concatenate([part.counts[name] for part in parts]), out=offsets[name][1:])
+        return FeatureBatch(
+            **{name: np.concatenate([part.records[name] for part in parts]) for name in TABLES},
+            clusters=np.concatenate([part.clusters for part in parts]),
+            offsets=offsets,
+            stamps=times,
+            noises=np.concatenate([part.noises for part in parts]),
+            frame_id=frame.frame_id,
+        )
+
+    def trace(self, scan: LaserScan) -> Trace:
+        """Extract the features of one scan and keep every intermediate of the run."""
+        return self.method.trace(scan, self(scan))
+
+    def _new_block(self, frame: LaserScan, capacity: int) -> Block:
+        return Block(frame, self._noise_row, capacity, self.method.own_arrays(len(frame)))
+
+    def _run_all(self, frame: LaserScan, rows: NDArray[np.float64]) -> list[_Part]:
+        """Run over many rows, a block at a time, in one thread."""
+        m, n = rows.shape
+        capacity = max(1, min(m, _BLOCK_VALUES // max(n, 1)))
+        block = self._new_block(frame, capacity)
+        parts = []
+        for start in range(0, max(m, 1), capacity):
+            block.load(rows[start : start + capacity])
+            self.method.run(block)
+            parts.append(_Part.of(block))
+        return parts
+
+
+class _Part(NamedTuple):
+    """Copies of what one run over a block wrote."""
+
+    records: dict[str, NDArray[np.void]]
+    counts: dict[str, NDArray[np.int64]]
+    clusters: NDArray[np.int32]
+    noises: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, block: Block) -> _Part:
+        m = block.rows
+        counts = np.diff(block.offsets[: m + 1], axis=0)
+        return cls(
+            block.written(),
+            {name: counts[:, k] for k, name in enumerate(TABLES)},
+            block.clusters[:m].copy(),
+            block.noises[:m].copy(),
+        )
+
+
+def extract(
+    scan: LaserScan,
+    *,
+    method: str = DEFAULT_METHOD,
+    noise: RangeNoise | None = None,
+    **parameters: Any,
+) -> Features:
+    """Extract the features of one scan; for many, keep an `Extractor`.
+
+    Parameters
+    ----------
+    scan : LaserScan
+    method : str
+        Name of the method.
+    noise : RangeNoise, optional
+        Noise of the sensor; estimated from the scan if it is not given.
+    **parameters
+        Parameters of the method that differ from its defaults.
+
+    Examples
+    --------
+    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> extract(scan, method="liu", min_points=4)
+    Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
+    """
+    return Extractor(method, noise=noise, **parameters)(scan)
+
+
+def trace(
+    scan: LaserScan,
+    *,
+    method: str = DEFAULT_METHOD,
+    noise: RangeNoise | None = None,
+    **parameters: Any,
+) -> Trace:
+    """Extract the features of one scan and keep every intermediate: why is this line missing?
+
+    Parameters are those of `extract`.
+
+    Examples
+    --------
+    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> trace(scan).spacing.round(2).tolist()
+    [nan, 0.02, 0.02]
+    """
+    return Extractor(method, noise=noise, **parameters).trace(scan)
+
+
+def _same_geometry(a: LaserScan, b: LaserScan) -> bool:
+    if a.range_min != b.range_min or a.range_max != b.range_max or len(a) != len(b):
+        return False
+    if a.is_regular and b.is_regular:
+        return a.angle_min == b.angle_min and a.angle_increment == b.angle_increment
+    return np.array_equal(a.angles, b.angles)
+
+
+def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
+    try:
+        rows = np.asarray(ranges, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("ranges are no matrix of numbers, expected shape (m, n)") from None
+    if rows.ndim != 2:
+        raise ValueError(f"ranges has shape {rows.shape}, expected (m, n): one scan a row")
+    return rows
+
+
+def _split(rows: NDArray[np.float64], parts: int) -> list[NDArray[np.float64]]:
+    return np.array_split(rows, max(1, min(parts, len(rows))))
+
+
+def _map(workers: int, work: Any, items: list[Any]) -> Iterable[Any]:
+    if workers == 1 or len(items) == 1:
+        return map(work, items)
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(work, items))

@@ -1,0 +1,114 @@
+"""Least-squares lines through points, and the covariance of their offset and angle."""
+
+import math
+
+from . import helper
+from .noise import LEAST_SIGMA
+
+#: How a line is fitted (equations 23, 24, and what is better).
+TOTAL, Y_OF_X, WEIGHTED = 0, 1, 2
+
+
+@helper
+def fit_line(x, y, cosines, sines, rho, first, last, noise, kind):
+    """Fit a line to the points `first`..`last` (inclusive, two or more) of known beams.
+
+    Parameters
+    ----------
+    x, y : float64 arrays
+        Points [m].
+    cosines, sines, rho : float64 arrays
+        Bearing and range of each point.
+    first, last : int
+    noise : float64 array, shape (4,)
+        (sigma, proportional, bearing, quantum), see `lineament.RangeNoise`.
+    kind : int
+        TOTAL: least orthogonal distances. Y_OF_X: y = kx + b, or x = ky + b where the points are
+        steeper than 45° (equations 23, 24). WEIGHTED: maximum likelihood by Pfister's weights.
+
+    Returns
+    -------
+    cx, cy : float
+        (Weighted) centroid [m].
+    angle : float
+        Direction from the first to the last point [rad].
+    var_offset, covariance, var_angle : float
+        Of the offset at the centroid along the left normal, and the angle.
+    rms : float
+        Root mean square of the orthogonal distances [m].
+    """
+    cx, cy, angle, weighted = x[first], y[first], 0.0 * x[first], False
+    for iteration in range(3 if kind == WEIGHTED else 1):
+        weighted = iteration > 0
+        cx, cy, angle = _line(x, y, cosines, sines, rho, first, last, noise, angle, weighted, kind)
+    c, s = math.cos(angle), math.sin(angle)
+    if c * (x[last] - x[first]) + s * (y[last] - y[first]) < 0.0:
+        c, s = -c, -s
+        angle += math.pi if angle <= 0.0 else -math.pi
+    # To first order the offset is Σwe/W and the angle Σwte/S, with t along the line from the
+    # centroid, so their covariance is that of these sums, whatever the weights.
+    w_sum, t_sum, oo, oa, aa, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last + 1):
+        dx, dy = x[i] - cx, y[i] - cy
+        t, e = c * dx + s * dy, c * dy - s * dx
+        variance = normal_variance(c * sines[i] - s * cosines[i], rho[i], noise)
+        w = 1.0 / variance if weighted else 1.0
+        squares += e * e
+        w_sum += w
+        t_sum += w * t * t
+        oo += w * w * variance
+        oa += w * w * variance * t
+        aa += w * w * variance * t * t
+    rms = math.sqrt(squares / (last - first + 1))
+    if t_sum == 0.0:
+        # Points that coincide have no direction: any angle is as good.
+        return cx, cy, angle, oo / (w_sum * w_sum), 0.0, math.pi**2 / 12.0, rms
+    return cx, cy, angle, oo / (w_sum * w_sum), oa / (w_sum * t_sum), aa / (t_sum * t_sum), rms
+
+
+@helper
+def _line(x, y, cosines, sines, rho, first, last, noise, angle, weighted, kind):
+    """Centroid and direction of least squares, of orthogonal or axial distances.
+
+    Weighted by the normal variances to a line of direction `angle`, or not at all.
+    """
+    # Sums about the first point, not the far origin, keep their digits.
+    x0, y0 = x[first], y[first]
+    total, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    c, s = math.cos(angle), math.sin(angle)
+    for i in range(first, last + 1):
+        dx, dy, w = x[i] - x0, y[i] - y0, 1.0
+        if weighted:
+            w = 1.0 / normal_variance(c * sines[i] - s * cosines[i], rho[i], noise)
+        total += w
+        sx += w * dx
+        sy += w * dy
+        sxx += w * dx * dx
+        sxy += w * dx * dy
+        syy += w * dy * dy
+    sxx -= sx * sx / total
+    sxy -= sx * sy / total
+    syy -= sy * sy / total
+    cx, cy = x0 + sx / total, y0 + sy / total
+    if kind == Y_OF_X:
+        return cx, cy, math.atan2(sxy, sxx) if sxx >= syy else math.atan2(syy, sxy)
+    return cx, cy, 0.5 * math.atan2(2.0 * sxy, sxx - syy)
+
+
+@helper
+def normal_variance(cosine, rho, noise):
+    """Variance of a point along a line's normal, b = σ_r² cos²ψ + ρ² σ_φ² sin²ψ.
+
+    ψ is the incidence, kept 0.06° short of grazing so that no point gets all the weight.
+    """
+    square = max(cosine * cosine, 1e-6)
+    lateral = noise[2] * rho
+    return range_variance(rho, noise) * square + lateral * lateral * (1.0 - square)
+
+
+@helper
+def range_variance(rho, noise):
+    """σ_r² = σ² + (proportional ρ)² + quantum²/12, at least that of the best scanner."""
+    grown = noise[1] * rho
+    constant = noise[0] * noise[0] + noise[3] * noise[3] * (1.0 / 12.0)
+    return max(constant + grown * grown, LEAST_SIGMA * LEAST_SIGMA)

@@ -1,0 +1,300 @@
+"""From the pieces of scans to their features: fits, corners, breakpoints. For all methods."""
+
+import math
+
+import numpy as np
+
+from . import helper, kernel
+from .layout import (
+    BEAM,
+    BEFORE,
+    CLOSED,
+    COSINE,
+    FIRST,
+    LABEL,
+    LAST,
+    MEASURED_RHO,
+    MEASURED_X,
+    MEASURED_Y,
+    PIECES,
+    POINTS,
+    RESPONSE,
+    SINE,
+)
+from .line_fit import fit_line, range_variance
+from .records import (
+    B_BEAM,
+    B_KIND,
+    B_OCCLUDER,
+    B_POSITION,
+    C_BEAM,
+    C_CONVEX,
+    C_COVARIANCE,
+    C_OPENING,
+    C_POSITION,
+    C_RESPONSE,
+    C_SEGMENTS,
+    GAP,
+    JUMP,
+    KIND_WORDS,
+    S_ANGLE,
+    S_CENTROID,
+    S_CLUSTER,
+    S_COVARIANCE,
+    S_END,
+    S_FIRST,
+    S_LAST,
+    S_POINTS,
+    S_RMS,
+    S_START,
+    SCAN_END,
+)
+
+
+@kernel
+def measure_rows(
+    floats,
+    ints,
+    counts,
+    rows,
+    source,
+    cosines,
+    sines,
+    circular,
+    noises,
+    fit,
+    sharp,
+    reach,
+    gap,
+    segments,
+    segment_ints,
+    corners,
+    corner_ints,
+    breaks,
+    break_ints,
+    clusters,
+    offsets,
+    scratch,
+):
+    """Write the features of each row, one row after the other.
+
+    Parameters
+    ----------
+    floats, ints, counts
+        See `layout`. The lines by point and by piece are read.
+    rows : int
+        Rows in use.
+    source : int
+        Line of the ranges to measure on: RANGE or FILTERED.
+    cosines, sines : float64 arrays, shape (n,)
+    circular : bool
+    noises : float64 array, shape (m, 4)
+    fit : int
+        How lines are fitted, see `line_fit.fit_line`.
+    sharp : bool
+        Whether a corner is the intersection of its lines; else it is its point.
+    reach : float
+        How many spacings an intersection may lie from the point at which the cut was made.
+    gap : float
+        Beams from one class to the next beyond which their break is a gap.
+    segments, corners, breaks : float64 arrays, segment_ints, ... : int32 arrays
+        The tables as words, see `records`; with room for n + 1 features of each kind a row.
+    clusters : int32 array, shape (m, n)
+        Result.
+    offsets : int64 array, shape (m + 1, 4)
+        Where the rows begin in the tables; the first is 0.
+    scratch : float64 array, shape (SCRATCH, n + 1)
+    """
+    x, y, rho = scratch[MEASURED_X], scratch[MEASURED_Y], scratch[MEASURED_RHO]
+    c, s = scratch[COSINE], scratch[SINE]
+    for row in range(rows):
+        beam, label, count = ints[row, BEAM], ints[row, LABEL], counts[row, POINTS]
+        ranges = floats[row, source]
+        for i in range(len(cosines)):
+            clusters[row, i] = -1
+        for i in range(count):
+            b = beam[i]
+            clusters[row, b] = label[i]
+            c[i], s[i], rho[i] = cosines[b], sines[b], ranges[b]
+            x[i], y[i] = rho[i] * c[i], rho[i] * s[i]
+        noise = noises[row]
+        segment, corner = offsets[row, 0], offsets[row, 1]
+        for k in range(counts[row, PIECES]):
+            first, last = ints[row, FIRST, k], ints[row, LAST, k]
+            line = fit_line(x, y, c, s, rho, first, last, noise, fit)
+            _write_segment(
+                x, y, beam, label, first, last, line, segments, segment_ints, segment + k
+            )
+        for k in range(counts[row, PIECES]):
+            before = ints[row, BEFORE, k]
+            if before < 0:
+                continue
+            at = ints[row, FIRST, k]
+            corner_ints[corner, C_BEAM] = beam[at]
+            corner_ints[corner, C_SEGMENTS] = before
+            corner_ints[corner, C_SEGMENTS + 1] = k
+            corners[corner, C_RESPONSE] = floats[row, RESPONSE, k]
+            spacing, before = _local_spacing(x, y, at, count), segment + before
+            _write_opening(segments, before, segment + k, corners, corner_ints, corner)
+            if not sharp or not _intersect(
+                segments, before, segment + k, x[at], y[at], reach * spacing, corners, corner
+            ):
+                variance = range_variance(rho[at], noise)
+                _place_at_beam(x[at], y[at], c[at], s[at], spacing, variance, corners, corner)
+            corner += 1
+        closed = counts[row, CLOSED] != 0
+        offsets[row + 1, 0] = segment + counts[row, PIECES]
+        offsets[row + 1, 1] = corner
+        offsets[row + 1, 2] = offsets[row, 2]
+        offsets[row + 1, 3] = _write_breakpoints(
+            x,
+            y,
+            rho,
+            beam,
+            label,
+            count,
+            closed,
+            circular,
+            gap,
+            len(cosines),
+            breaks,
+            break_ints,
+            offsets[row, 3],
+        )
+
+
+@helper
+def _write_segment(x, y, beam, label, first, last, line, f, i, k):
+    cx, cy, angle, var_offset, covariance, var_angle, rms = line
+    c, s = math.cos(angle), math.sin(angle)
+    along = c * (x[first] - cx) + s * (y[first] - cy)
+    f[k, S_START], f[k, S_START + 1] = cx + along * c, cy + along * s
+    along = c * (x[last] - cx) + s * (y[last] - cy)
+    f[k, S_END], f[k, S_END + 1] = cx + along * c, cy + along * s
+    f[k, S_CENTROID], f[k, S_CENTROID + 1] = cx, cy
+    f[k, S_ANGLE], f[k, S_RMS] = angle, rms
+    f[k, S_COVARIANCE], f[k, S_COVARIANCE + 1] = var_offset, covariance
+    f[k, S_COVARIANCE + 2], f[k, S_COVARIANCE + 3] = covariance, var_angle
+    i[k, S_FIRST], i[k, S_LAST] = beam[first], beam[last]
+    i[k, S_POINTS], i[k, S_CLUSTER] = last - first + 1, label[first]
+
+
+@helper
+def _write_opening(segments, before, after, corners, corner_ints, k):
+    """Angle between the arms of a corner, and which way it points."""
+    turn = segments[after, S_ANGLE] - segments[before, S_ANGLE]
+    if turn > math.pi:
+        turn -= 2.0 * math.pi
+    elif turn < -math.pi:
+        turn += 2.0 * math.pi
+    corners[k, C_OPENING] = math.pi - abs(turn)
+    # Beams run counter-clockwise around the sensor: a right turn points towards it.
+    corner_ints[k, C_CONVEX] = turn < 0.0
+
+
+@helper
+def _intersect(lines, a, b, x, y, near, corners, k):
+    """Put a corner on the intersection of its lines, with Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ.
+
+    The lines then end there. Refused, and False, where that lies farther than `near` from the
+    point (x, y) of the cut: nearly parallel lines meet anywhere.
+    """
+    n1x, n1y = -math.sin(lines[a, S_ANGLE]), math.cos(lines[a, S_ANGLE])
+    n2x, n2y = -math.sin(lines[b, S_ANGLE]), math.cos(lines[b, S_ANGLE])
+    determinant = n1x * n2y - n1y * n2x
+    if abs(determinant) < 1e-6:
+        return False
+    d1 = n1x * lines[a, S_CENTROID] + n1y * lines[a, S_CENTROID + 1]
+    d2 = n2x * lines[b, S_CENTROID] + n2y * lines[b, S_CENTROID + 1]
+    px = (n2y * d1 - n1y * d2) / determinant
+    py = (n1x * d2 - n2x * d1) / determinant
+    if math.sqrt((px - x) * (px - x) + (py - y) * (py - y)) > near:
+        return False
+    corners[k, C_POSITION], corners[k, C_POSITION + 1] = px, py
+    lines[a, S_END], lines[a, S_END + 1] = px, py
+    lines[b, S_START], lines[b, S_START + 1] = px, py
+    s1 = _offset_variance(lines, a, px, py) / (determinant * determinant)
+    s2 = _offset_variance(lines, b, px, py) / (determinant * determinant)
+    covariance = -(n2x * n2y * s1 + n1x * n1y * s2)
+    corners[k, C_COVARIANCE] = n2y * n2y * s1 + n1y * n1y * s2
+    corners[k, C_COVARIANCE + 1], corners[k, C_COVARIANCE + 2] = covariance, covariance
+    corners[k, C_COVARIANCE + 3] = n2x * n2x * s1 + n1x * n1x * s2
+    return True
+
+
+@helper
+def _offset_variance(lines, k, px, py):
+    """Variance of a line's offset at a point: that at its centroid, with the lever arm."""
+    dx, dy = px - lines[k, S_CENTROID], py - lines[k, S_CENTROID + 1]
+    t = math.cos(lines[k, S_ANGLE]) * dx + math.sin(lines[k, S_ANGLE]) * dy
+    return (
+        lines[k, S_COVARIANCE]
+        + 2.0 * t * lines[k, S_COVARIANCE + 1]
+        + t * t * lines[k, S_COVARIANCE + 3]
+    )
+
+
+@helper
+def _local_spacing(x, y, at, count):
+    """The larger of the distances of a point to its neighbours."""
+    spacing = 0.0
+    for k in range(max(at, 1), min(at + 2, count)):
+        dx, dy = x[k] - x[k - 1], y[k] - y[k - 1]
+        spacing = max(spacing, math.sqrt(dx * dx + dy * dy))
+    return spacing
+
+
+@helper
+def _place_at_beam(x, y, c, s, spacing, along, corners, k):
+    """Put a corner on its point: off by up to half a spacing, and by the noise along the beam."""
+    across = spacing * spacing / 12.0
+    corners[k, C_POSITION], corners[k, C_POSITION + 1] = x, y
+    corners[k, C_COVARIANCE] = across + along * c * c
+    corners[k, C_COVARIANCE + 1] = along * c * s
+    corners[k, C_COVARIANCE + 2] = along * c * s
+    corners[k, C_COVARIANCE + 3] = across + along * s * s
+
+
+@helper
+def _write_breakpoints(
+    x, y, rho, beam, label, count, closed, circular, gap, beams, floats, ints, k
+):
+    """One between each two neighbouring classes, and at the ends of a scan that has ends."""
+    first, before = np.int64(-1), np.int64(-1)
+    for i in range(count):
+        if label[i] < 0:
+            continue
+        if before < 0:
+            first = i
+        elif label[i] != label[before]:
+            _write_break(x, y, rho, beam, before, i, gap, beams, floats, ints, k)
+            k += 1
+        before = i
+    if before < 0 or closed:
+        return k
+    if circular:
+        _write_break(x, y, rho, beam, before, first, gap, beams, floats, ints, k)
+        return k + 1
+    none, end = np.int64(-1), np.int64(SCAN_END)
+    _write_mark(x, y, first, none, beam[first], end, none, floats, ints, k)
+    _write_mark(x, y, before, beam[before], none, end, none, floats, ints, k + 1)
+    return k + 2
+
+
+@helper
+def _write_break(x, y, rho, beam, before, after, gap, beams, floats, ints, k):
+    """Of a jump the nearer side occludes. Over many missing beams a surface may go on unseen."""
+    near = before if rho[before] <= rho[after] else after
+    is_gap = (beam[after] - beam[before]) % beams > gap
+    kind = GAP if is_gap else JUMP
+    occluder = -1 if is_gap else beam[near]
+    _write_mark(x, y, near, beam[before], beam[after], kind, occluder, floats, ints, k)
+
+
+@helper
+def _write_mark(x, y, at, beam_before, beam_after, kind, occluder, floats, ints, k):
+    floats[k, B_POSITION], floats[k, B_POSITION + 1] = x[at], y[at]
+    ints[k, B_BEAM], ints[k, B_BEAM + 1] = beam_before, beam_after
+    ints[k, B_OCCLUDER] = occluder
+    for letter in range(8):
+        ints[k, B_KIND + letter] = KIND_WORDS[kind, letter]

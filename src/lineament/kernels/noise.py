@@ -1,0 +1,96 @@
+"""Range noise of a scan, estimated from the scan itself."""
+
+import math
+
+import numpy as np
+
+from . import helper, kernel, usable
+from .layout import RANGE, SPARE
+
+#: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
+LEAST_SIGMA = 1e-4
+
+
+@kernel
+def noise_rows(floats, rows, range_min, range_max, given, noises, scratch):
+    """Write the noise of each row: as `given`, or, where that is NaN, estimated.
+
+    Parameters
+    ----------
+    floats : float64 array, shape (m, FLOATS, n + 1)
+        RANGE is read.
+    rows : int
+        Rows in use.
+    range_min, range_max : float
+    given : float64 array, shape (4,)
+        (sigma, proportional, bearing, quantum).
+    noises : float64 array, shape (m, 4)
+        Result; NaN for rows without a usable range.
+    scratch : float64 array, shape (SCRATCH, n + 1)
+    """
+    n, spare = floats.shape[2] - 1, scratch[SPARE]
+    for row in range(rows):
+        for part in range(4):
+            noises[row, part] = given[part]
+        if math.isnan(given[0]):
+            sigma = range_sigma(floats[row, RANGE], n, range_min, range_max, spare)
+            noises[row, 0] = sigma
+            for part in range(1, 4):
+                noises[row, part] = 0.0 * sigma
+
+
+@helper
+def range_sigma(ranges, n, range_min, range_max, scratch):
+    """Standard deviation of the range noise [m], from the second differences of neighbours.
+
+    On a smooth surface ρ[i-1] - 2ρ[i] + ρ[i+1] has the variance 6σ², and the median of its size
+    is hardly moved by jumps and corners. Triples do not overlap. Where half of them are exactly
+    zero, the ranges lie on a lattice coarser than the noise, and σ is that of the rounding.
+    """
+    count, any_usable = np.int64(0), False
+    for i in range(1, n - 1, 3):
+        a, b, c = ranges[i - 1], ranges[i], ranges[i + 1]
+        if (
+            usable(a, range_min, range_max)
+            and usable(b, range_min, range_max)
+            and usable(c, range_min, range_max)
+        ):
+            scratch[count] = abs(a - 2.0 * b + c)
+            count += 1
+    if count == 0:
+        for i in range(n):
+            any_usable |= usable(ranges[i], range_min, range_max)
+        return LEAST_SIGMA if any_usable else math.nan
+    sigma = 1.4826 / math.sqrt(6.0) * _median(scratch, count)
+    if sigma >= LEAST_SIGMA:
+        return sigma
+    quantum = math.inf
+    for i in range(count):
+        if LEAST_SIGMA < scratch[i] < quantum:
+            quantum = scratch[i]
+    return max(quantum / math.sqrt(12.0), LEAST_SIGMA) if quantum < math.inf else LEAST_SIGMA
+
+
+@helper
+def _median(values, count):
+    """Upper median of the first `count` values, which it reorders (Hoare's selection)."""
+    low, high, middle = 0, count - 1, count // 2
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            break
+    return values[middle]

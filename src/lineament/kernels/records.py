@@ -1,0 +1,42 @@
+"""Where the fields of feature records lie, so that kernels can write them as plain numbers.
+
+Numba can write records, but takes half a minute to compile it. So a table of records is seen as a
+float64 and an int32 matrix over the same memory, and each field by its column there.
+"""
+
+import numpy as np
+
+from ..features import BREAKPOINT, CORNER, SEGMENT
+
+KIND_NAMES = ("jump", "gap", "scan_end")
+JUMP, GAP, SCAN_END = 0, 1, 2
+#: The kinds of breakpoints as the int32 words of a field of type U8.
+KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
+
+
+def words(records):
+    """See an array of records as its float64 and int32 words."""
+    raw = records.view(np.uint8).reshape(len(records), records.dtype.itemsize)
+    return raw.view(np.float64), raw.view(np.int32)
+
+
+def _float(dtype, name):
+    return dtype.fields[name][1] // 8
+
+
+def _int(dtype, name):
+    return dtype.fields[name][1] // 4
+
+
+S_START, S_END, S_CENTROID, S_ANGLE, S_COVARIANCE, S_RMS = (
+    _float(SEGMENT, name) for name in ("start", "end", "centroid", "angle", "covariance", "rms")
+)
+S_FIRST, S_LAST, S_POINTS, S_CLUSTER = (
+    _int(SEGMENT, name) for name in ("first_beam", "last_beam", "n_points", "cluster")
+)
+C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE = (
+    _float(CORNER, name) for name in ("position", "covariance", "opening", "response")
+)
+C_CONVEX, C_BEAM, C_SEGMENTS = (_int(CORNER, name) for name in ("convex", "beam", "segments"))
+B_POSITION = _float(BREAKPOINT, "position")
+B_BEAM, B_KIND, B_OCCLUDER = (_int(BREAKPOINT, name) for name in ("beam", "kind", "occluder"))

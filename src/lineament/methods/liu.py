@@ -1,0 +1,229 @@
+"""Liu et al. 2023: bilateral filter, adaptive clustering, corner operator, least-squares lines.
+
+Y. Liu, L. Sui, P. Li, L. Zhang, Q. Wu, J. Du, Y. Liu, H. Yu, *Journal of Sensors* 2023, article
+6991467. ``docs/equations.md`` leads from each equation to its function, and tells what was chosen
+where the paper is open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..block import Block
+from ..features import Features, noise_row
+from ..kernels.bilateral import filter_rows
+from ..kernels.clustering import cluster_rows
+from ..kernels.cutting import cut_rows
+from ..kernels.layout import DENSITY_THRESHOLD, DISTANCE_THRESHOLD, FILTERED, RANGE, SPACING
+from ..kernels.measuring import measure_rows
+from ..kernels.noise import noise_rows
+from ..scan import LaserScan
+from ..stages import FITS, RESPONSES
+from ..trace import Trace, candidate_records
+from .checks import check_choice, check_count, check_number
+
+__all__ = ["Liu"]
+
+
+class _Scratch(NamedTuple):
+    filter: NDArray[np.float32]
+    stack: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Liu:
+    """The method of Liu et al. 2023, and its parameters; defaults are the paper's numbers.
+
+    1. *Filter* the ranges bilaterally, against noise points (equations 4-9).
+    2. *Cluster* neighbouring points on distance and density (equations 10-13).
+    3. *Cut* each class at its corners: the point farthest from the chord is a primary corner
+       (14), and a corner if the corner operator responds (15-22); then both sides in turn.
+    4. *Fit* each piece by least squares (23, 24).
+
+    Parameters
+    ----------
+    sigma_d : float
+        Width of the filter along the scan [beams].
+    sigma_r : float
+        Width of the filter in range [m].
+    half_width : int
+        Beams on either side that the filter takes in; not stated in the paper.
+    spacing_scale : float
+        λ of equation 10, not stated: 1/cos of the steepest incidence that holds together (80.4°).
+    noise_floor : float
+        Added to the distance threshold, in standard deviations √2 σ of the spacing of two
+        readings, so that near walls hold together; not in the paper.
+    density_k : float
+        k of T_K = μ_K + k σ_K (equations 11-13), not stated.
+    min_points : int
+        Classes of fewer points are noise; pieces are not shorter either.
+    support_radius : int
+        Beams on either side in the corner operator.
+    threshold : float
+        What the response of a corner exceeds, in the unit of `response`.
+    response : {"tangent", "product", "relative"}
+        Reading of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], or that
+        over Σ|s| [-].
+    fit : {"total", "y_of_x", "weighted"}
+        Orthogonal least squares, the paper's y = kx + b, or maximum likelihood.
+    measure : {"raw", "filtered"}
+        Ranges that lines are fitted to. Detection is always on filtered ones.
+    corner : {"intersection", "beam"}
+        Whether a corner lies where its lines meet, or on its reading.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of bounds. The message names it and its value.
+
+    Examples
+    --------
+    >>> Liu(support_radius=5).threshold
+    0.66
+    >>> Liu.paper().fit
+    'y_of_x'
+    """
+
+    name: ClassVar[str] = "liu"
+    presets: ClassVar[tuple[str, ...]] = ("paper", "scale_free")
+
+    sigma_d: float = 4.0
+    sigma_r: float = 0.3
+    half_width: int = 8
+    spacing_scale: float = 6.0
+    noise_floor: float = 3.0
+    density_k: float = 3.0
+    min_points: int = 3
+    support_radius: int = 6
+    threshold: float = 0.66
+    response: str = "tangent"
+    fit: str = "total"
+    measure: str = "raw"
+    corner: str = "intersection"
+
+    def __post_init__(self) -> None:
+        for name in ("sigma_d", "sigma_r", "spacing_scale"):
+            check_number(name, getattr(self, name))
+        for name in ("noise_floor", "density_k", "threshold"):
+            check_number(name, getattr(self, name), or_equal=True)
+        check_count("half_width", self.half_width, least=0)
+        check_count("min_points", self.min_points, least=2)
+        check_count("support_radius", self.support_radius, least=1)
+        check_choice("response", self.response, RESPONSES)
+        check_choice("fit", self.fit, FITS)
+        check_choice("measure", self.measure, ("raw", "filtered"))
+        check_choice("corner", self.corner, ("intersection", "beam"))
+        for field in fields(self):
+            # Numba compiles anew for an int where it has seen a float.
+            kind = type(field.default)
+            object.__setattr__(self, field.name, kind(getattr(self, field.name)))
+
+    @classmethod
+    def paper(cls, **changes: Any) -> Liu:
+        """Make the paper's literal pipeline: its fits, on filtered ranges, corners on readings."""
+        return cls(
+            **{
+                "noise_floor": 0.0,
+                "fit": "y_of_x",
+                "measure": "filtered",
+                "corner": "beam",
+                **changes,
+            }
+        )
+
+    @classmethod
+    def scale_free(cls, **changes: Any) -> Liu:
+        """Make the reading of the response that does not depend on range, with its own threshold.
+
+        In metres, 0.66 finds right angles only farther than some 3 m, less what the filter takes
+        away. ``docs/equations.md`` tells where the threshold comes from.
+        """
+        return cls(**{"response": "relative", "threshold": 0.3, **changes})
+
+    def own_arrays(self, beams: int) -> _Scratch:
+        """Make scratch for the filter and the search for corners."""
+        return _Scratch(
+            np.empty((5, beams + 2 * self.half_width), np.float32),
+            np.empty((beams + 1, 2), np.int64),
+        )
+
+    def run(self, block: Block) -> None:
+        """Filter, cluster, cut and fit the scans of a block."""
+        own: _Scratch = block.own
+        limits = (block.rows, block.range_min, block.range_max)
+        partition = (block.floats, block.ints, block.counts, block.rows)
+        noise_rows(block.floats, *limits, block.noise, block.noises, block.scratch)
+        filter_rows(
+            block.floats,
+            *limits,
+            self.sigma_d,
+            self.sigma_r,
+            self.half_width,
+            block.circular,
+            own.filter,
+        )
+        cluster_rows(
+            *partition,
+            block.cosines,
+            block.sines,
+            block.step,
+            block.circular,
+            block.noises,
+            self.spacing_scale,
+            self.noise_floor,
+            self.density_k,
+            self.min_points,
+        )
+        cut_rows(
+            *partition,
+            self.support_radius,
+            self.threshold,
+            RESPONSES[self.response],
+            self.min_points,
+            own.stack,
+        )
+        measure_rows(
+            *partition,
+            RANGE if self.measure == "raw" else FILTERED,
+            block.cosines,
+            block.sines,
+            block.circular,
+            block.noises,
+            FITS[self.fit],
+            self.corner == "intersection",
+            float(self.support_radius),
+            self.spacing_scale,
+            *block.segments,
+            *block.corners,
+            *block.breakpoints,
+            block.clusters,
+            block.offsets,
+            block.scratch,
+        )
+
+    def trace(self, scan: LaserScan, features: Features) -> Trace:
+        """Run again on a scan of which these features came, and keep every intermediate.
+
+        `lineament.Extractor.trace` does both.
+        """
+        block = Block(scan, noise_row(features.noise), 1, self.own_arrays(len(scan)))
+        block.load(scan.ranges)
+        self.run(block)
+        candidates = candidate_records(block, self.threshold)
+        return Trace(
+            scan=scan,
+            method=self.name,
+            features=features,
+            filtered=block.floats[0, FILTERED, : len(scan)],
+            spacing=block.by_beam(SPACING),
+            distance_threshold=block.by_beam(DISTANCE_THRESHOLD),
+            density_threshold=block.by_beam(DENSITY_THRESHOLD),
+            clusters=features.clusters,
+            candidates=candidates,
+            threshold=self.threshold,
+            cuts=np.sort(candidates["beam"][candidates["accepted"]]),
+        )

@@ -1,0 +1,84 @@
+"""Whole files or none: write beside the target, then rename."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import LineamentError
+
+__all__ = ["naming_errors", "written_beside"]
+
+
+@contextmanager
+def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary file in the folder of `path` that becomes `path` when all went well.
+
+    Whatever interrupts the block, Ctrl-C included, removes the temporary file and leaves `path` as
+    it was. A run that is killed leaves at most the temporary file, whose name is hidden and ends in
+    ``.part``.
+
+    Parameters
+    ----------
+    path : path-like
+        The target. If it is a link, the file behind it is replaced.
+
+    Yields
+    ------
+    pathlib.Path
+        An empty file to be written to. It must be closed when the block ends.
+
+    Raises
+    ------
+    LineamentError
+        If the folder does not exist or cannot be written to, or `path` is a folder.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> target = Path(tempfile.mkdtemp()) / "a.txt"
+    >>> with written_beside(target) as temporary:
+    ...     _ = temporary.write_text("all of it")
+    ...     target.exists()
+    False
+    >>> target.read_text()
+    'all of it'
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise LineamentError(f"{path}: is a folder, expected the name of a file")
+    if not target.parent.is_dir():
+        raise LineamentError(f"{path}: the folder {target.parent} does not exist")
+    # mkstemp would make the file private to its owner; this one follows the umask.
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    with naming_errors(path):
+        temporary.touch(exist_ok=False)
+    try:
+        yield temporary
+        with naming_errors(path):
+            temporary.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def naming_errors(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Turn an OSError into a LineamentError of one line that names `path`.
+
+    Examples
+    --------
+    >>> with naming_errors("a.parquet"):
+    ...     raise OSError(28, "No space left on device")
+    Traceback (most recent call last):
+    lineament.errors.LineamentError: a.parquet: cannot be written: No space left on device
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
+        raise LineamentError(f"{path}: cannot be written: {reason}") from error

@@ -1,0 +1,219 @@
+"""What the figures are made of: beams, segments, corners, arcs, breakpoints."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import Features
+from ..scan import LaserScan
+from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, FAINT, INK, colors_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+
+def draw_beams(axes: Axes, scan: LaserScan, clusters: NDArray[np.int32]) -> Array:
+    """Points by cluster, noise, invalid beams at the rim, the sensor; gives what must be seen."""
+    valid, points = scan.valid, scan.points
+    known, noise = valid & (clusters >= 0), valid & (clusters < 0)
+    rim = draw_rim(axes, scan)
+    x, y = points.T
+    axes.scatter(x[known], y[known], s=13, c=colors_of(clusters[known]), linewidths=0, zorder=3)
+    if noise.any():
+        axes.plot(
+            x[noise],
+            y[noise],
+            "x",
+            markersize=3.8,
+            color="#868e96",
+            markeredgewidth=0.8,
+            zorder=3,
+            label="noise",
+        )
+    draw_sensor(axes)
+    return np.vstack([points[valid], rim, np.zeros((1, 2))])
+
+
+def draw_sensor(axes: Axes) -> None:
+    """Draw a triangle at the origin that looks along the x axis."""
+    axes.plot(
+        [0],
+        [0],
+        marker=(3, 0, -90),
+        markersize=9,
+        color=INK,
+        linestyle="none",
+        label="sensor",
+        zorder=6,
+    )
+
+
+def draw_rim(axes: Axes, scan: LaserScan) -> Array:
+    """Faint ticks just outside the data, in the directions from which nothing came back."""
+    from matplotlib.collections import LineCollection
+
+    invalid = ~scan.valid
+    if not invalid.any():
+        return np.zeros((0, 2))
+    rim, length = _rim(scan)
+    directions = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))[invalid]
+    ticks = np.stack((rim[invalid, None] * directions, (rim[invalid, None] + length) * directions))
+    axes.add_collection(
+        LineCollection(
+            list(ticks.swapaxes(0, 1)),
+            colors=FAINT,
+            linewidths=0.7,
+            label="no return",
+            zorder=1,
+        ),
+        autolim=False,
+    )
+    ends: Array = ticks[1]
+    return ends
+
+
+def _rim(scan: LaserScan) -> tuple[Array, float]:
+    """Distance of a ring around what each beam's neighbourhood saw, and the length of a tick."""
+    ranges = np.where(scan.valid, scan.ranges, 0.0)
+    if not ranges.any():
+        return np.ones(len(scan)), 0.05
+    gap = 0.05 * float(ranges.max())
+    bins = np.floor(np.degrees(scan.angles) / 8).astype(int)
+    bins -= bins.min()
+    farthest = np.zeros(bins.max() + 3)
+    np.maximum.at(farthest, bins + 1, ranges)
+    # With both neighbours, so that a tick never lies between points.
+    farthest = np.maximum(farthest[1:-1], np.maximum(farthest[:-2], farthest[2:]))
+    known = np.flatnonzero(farthest)
+    outline = np.interp(np.arange(len(farthest)), known, farthest[known])
+    return outline[bins] + gap, 0.6 * gap
+
+
+def draw_segments(axes: Axes, segments: NDArray[np.void]) -> None:
+    """Lines with a short mark across each end."""
+    from matplotlib.collections import LineCollection
+
+    lines = np.stack((segments["start"], segments["end"]), axis=1)
+    lines = lines[np.isfinite(lines).all(axis=(1, 2))]
+    if not len(lines):
+        return
+    axes.add_collection(
+        LineCollection(
+            list(lines), colors=INK, linewidths=1.0, capstyle="round", label="segment", zorder=4
+        ),
+        autolim=False,
+    )
+    for start, end in lines:
+        across = math.degrees(math.atan2(end[1] - start[1], end[0] - start[0]))
+        axes.plot(
+            *np.array([start, end]).T,
+            marker=(2, 0, across),
+            markersize=6,
+            markeredgewidth=1.0,
+            color=INK,
+            linestyle="none",
+            zorder=4,
+        )
+
+
+def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
+    """Markers, with 3 σ ellipses where they can be seen in a plan of some extent [m]."""
+    from matplotlib.patches import Ellipse
+
+    finite = np.isfinite(corners["position"]).all(axis=1)
+    corners = corners[finite]
+    if not len(corners):
+        return
+    axes.plot(
+        *corners["position"].T,
+        marker="D",
+        markersize=5.5,
+        markerfacecolor="none",
+        markeredgecolor=CORNER_COLOR,
+        markeredgewidth=1.4,
+        linestyle="none",
+        label="corner",
+        zorder=5,
+    )
+    label = "3 σ of a corner"
+    for corner in corners[np.isfinite(corners["covariance"]).all(axis=(1, 2))]:
+        variances, axes_of = np.linalg.eigh(corner["covariance"])
+        half = 3 * np.sqrt(np.maximum(variances, 0))
+        if not 0.012 * extent < half[1] < extent:  # hidden by the marker, or no knowledge at all
+            continue
+        axes.add_patch(
+            Ellipse(
+                tuple(corner["position"]),
+                2 * half[1],
+                2 * half[0],
+                angle=math.degrees(math.atan2(axes_of[1, 1], axes_of[0, 1])),
+                facecolor=CORNER_COLOR + "22",
+                edgecolor=CORNER_COLOR,
+                linewidth=0.8,
+                label=label,
+                zorder=4.5,
+            )
+        )
+        label = ""
+
+
+def draw_breakpoints(axes: Axes, breakpoints: NDArray[np.void]) -> None:
+    """Small markers where surfaces end."""
+    positions = breakpoints["position"]
+    positions = positions[np.isfinite(positions).all(axis=1)]
+    if len(positions):
+        axes.plot(
+            *positions.T,
+            marker="o",
+            markersize=3.6,
+            markerfacecolor="white",
+            markeredgecolor=BREAK_COLOR,
+            markeredgewidth=0.9,
+            linestyle="none",
+            label="breakpoint",
+            zorder=4.2,
+        )
+
+
+def draw_arcs(axes: Axes, arcs: NDArray[np.void], scan: LaserScan) -> None:
+    """Draw the part of each circle that was seen and, thinly, the whole of it."""
+    label = "arc"
+    for arc in arcs[np.isfinite(arcs["center"]).all(axis=1) & np.isfinite(arcs["radius"])]:
+        whole = _circle(arc, 0.0, 2 * math.pi)
+        seen = _circle(arc, *_seen_of_arc(arc, scan))
+        axes.plot(*whole, color=ARC_COLOR, linewidth=0.5, linestyle=(0, (2, 3)), zorder=4.05)
+        axes.plot(*seen, color=ARC_COLOR, linewidth=2.0, label=label, zorder=4.1)
+        label = ""
+
+
+def _circle(arc: np.void, first: float, last: float) -> tuple[Array, Array]:
+    turn = np.linspace(first, last, 181)
+    x, y = arc["center"]
+    return x + arc["radius"] * np.cos(turn), y + arc["radius"] * np.sin(turn)
+
+
+def _seen_of_arc(arc: np.void, scan: LaserScan) -> tuple[float, float]:
+    """First and last direction [rad] from the centre to the points of an arc."""
+    first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
+    if not (0 <= first < n and 0 <= last < n):
+        return 0.0, 2 * math.pi
+    beams = np.arange(first, last + 1 if first <= last else last + n + 1) % n
+    from_center = scan.points[beams[scan.valid[beams]]] - arc["center"]
+    if not len(from_center):
+        return 0.0, 2 * math.pi
+    angles = np.unwrap(np.arctan2(from_center[:, 1], from_center[:, 0]))
+    return float(angles.min()), float(angles.max())
+
+
+def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float) -> None:
+    """All features of a scan, over its beams."""
+    draw_arcs(axes, features.arcs, scan)
+    draw_segments(axes, features.segments)
+    draw_breakpoints(axes, features.breakpoints)
+    draw_corners(axes, features.corners, extent)

@@ -1,0 +1,228 @@
+"""Pictures of what was found: one scan by many methods, one run stage by stage, a whole log."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import TABLES, Features
+from ..scan import LaserScan, Pose
+from . import canvas, drawing, stages
+from .canvas import CORNER_COLOR, INK, count
+from .labels import label_points
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..trace import Trace
+
+__all__ = ["plot_map", "plot_scan", "plot_trace"]
+
+_PANEL = 5.6  # width of a panel [inch]
+
+
+def plot_scan(
+    scan: LaserScan, features_by_method: Mapping[str, Features], path: str | os.PathLike[str]
+) -> None:
+    """Draw what some methods found in one scan, one panel a method, side by side.
+
+    Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
+    data tell where nothing came back. The number beside a corner is its response.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan.
+    features_by_method : mapping of str to Features
+        Title of each panel, and what to draw in it.
+    path : path-like
+        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    LineamentError
+        If the ending is not known or the file cannot be written.
+    ValueError
+        If there is no method, or features do not have the scan's number of beams.
+    """
+    canvas.check_ending(path)
+    if not features_by_method:
+        raise ValueError("features_by_method is empty, expected at least one method")
+    for method, features in features_by_method.items():
+        _check_beams(scan, features.clusters, method)
+    columns = min(len(features_by_method), 3)
+    rows = math.ceil(len(features_by_method) / columns)
+    height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), _PANEL)
+    figure = canvas.new_figure(_PANEL * columns, (height + 0.9) * rows + 0.3)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in panels[len(features_by_method) :]:
+        axes.remove()
+    for axes, (method, features) in zip(panels, features_by_method.items(), strict=False):
+        shown = drawing.draw_beams(axes, scan, features.clusters)
+        canvas.style_plane(axes, method, _counts(features), shown)
+        drawing.draw_features(axes, features, scan, _extent(axes))
+    _legend(figure)
+    canvas.settle(figure)
+    for axes, features in zip(panels, features_by_method.values(), strict=False):
+        texts = [f"{response:.3g}" for response in features.corners["response"]]
+        label_points(axes, features.corners["position"], texts, scan.points[scan.valid])
+    canvas.save(figure, path)
+
+
+def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
+    """Draw the stages of one run: filter, spacing against its thresholds, classes, corners.
+
+    Parameters
+    ----------
+    trace : Trace
+        Every intermediate of the run.
+    path : path-like
+        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    LineamentError
+        If the ending is not known or the file cannot be written.
+    ValueError
+        If the classes do not have the scan's number of beams.
+    """
+    canvas.check_ending(path)
+    scan, candidates = trace.scan, trace.candidates
+    _check_beams(scan, trace.clusters, trace.method)
+    height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), 6.2)
+    figure = canvas.new_figure(13, 4.0 + height + 1.0)
+    panels = figure.subplots(2, 2, height_ratios=[3.2, height])
+    stages.draw_filter(panels[0, 0], trace)
+    stages.draw_spacing(panels[0, 1], trace)
+
+    shown = drawing.draw_beams(panels[1, 0], scan, trace.clusters)
+    n_classes = len(np.unique(trace.clusters[trace.clusters >= 0]))
+    n_noise = int((scan.valid & (trace.clusters < 0)).sum())
+    about = f"{count(n_classes, 'class', 'classes')} · {count(n_noise, 'noise point')}"
+    canvas.style_plane(panels[1, 0], "c  Classes", about, shown)
+
+    positions = stages.draw_candidates(panels[1, 1], trace)
+    n_accepted = int(candidates["accepted"].sum())
+    about = (
+        f"{count(len(candidates), 'candidate')} · {n_accepted} accepted · "
+        f"threshold {trace.threshold:.4g} · {count(len(trace.features.segments), 'segment')}"
+    )
+    canvas.style_plane(panels[1, 1], "d  Corners", about, shown)
+    for axes in panels.ravel():
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(
+                fontsize=8,
+                loc="upper left",
+                bbox_to_anchor=(0, -0.13 if axes in panels[0] else -0.1),
+                ncols=5,
+                frameon=False,
+                borderaxespad=0,
+                handletextpad=0.4,
+            )
+    canvas.settle(figure)
+    texts = [f"{response:.3g}" for response in candidates["response"]]
+    label_points(panels[1, 1], positions, texts, scan.points[scan.valid])
+    canvas.save(figure, path)
+
+
+def plot_map(
+    posed: Iterable[tuple[Pose, Features]], path: str | os.PathLike[str], title: str = "Map"
+) -> None:
+    """Draw the segments and corners of many scans in the world, with the way of the sensor.
+
+    Parameters
+    ----------
+    posed : iterable of ((x, y, theta), Features)
+        Pose of the sensor in the world [m, m, rad], and what was found there, in its own frame.
+    path : path-like
+        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+    title : str
+        Title of the picture.
+
+    Raises
+    ------
+    LineamentError
+        If the ending is not known or the file cannot be written.
+    """
+    from matplotlib.collections import LineCollection
+
+    canvas.check_ending(path)
+    way, lines, corners = _in_the_world(posed)
+    shown = np.vstack([lines.reshape(-1, 2), corners, way])
+    figure = canvas.new_figure(9, canvas.plane_size(shown, 9) + 1.3)
+    axes = figure.subplots()
+    # Walls that were seen often come out dark, what was seen once stays faint.
+    alpha = float(np.clip(60 / max(len(way), 1), 0.08, 0.9))
+    about = (
+        f"{count(len(way), 'scan')} · {count(len(lines), 'segment')} · "
+        f"{count(len(corners), 'corner')}"
+    )
+    canvas.style_plane(axes, title, about, shown)
+    axes.add_collection(LineCollection(list(lines), colors=INK, linewidths=0.9, alpha=alpha))
+    axes.plot([], [], color=INK, linewidth=1.2, label="segments")  # for the legend, not faint
+    x, y = corners.T
+    axes.plot(x, y, "o", markersize=2.2, color=CORNER_COLOR, alpha=max(alpha, 0.2), mew=0, zorder=3)
+    axes.plot([], [], "o", markersize=4, color=CORNER_COLOR, label="corners")
+    axes.plot(*way.T, color="#0969da", linewidth=1.3, label="way of the sensor", zorder=4)
+    if len(way):
+        axes.plot(*way[0], "o", color="#0969da", markersize=6, mec="white", label="start", zorder=5)
+    _legend(figure)
+    canvas.save(figure, path)
+
+
+def _in_the_world(
+    posed: Iterable[tuple[Pose, Features]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners (k, 2); only what is finite."""
+    way, lines, corners = [np.zeros((0, 2))], [np.zeros((0, 2, 2))], [np.zeros((0, 2))]
+    for pose, features in posed:
+        with np.errstate(invalid="ignore"):  # what is not finite is not drawn
+            moved = features.transform(*pose)
+        way.append(np.array([pose[:2]], dtype=np.float64))
+        lines.append(np.stack((moved.segments["start"], moved.segments["end"]), axis=1))
+        corners.append(moved.corners["position"])
+    line, corner = np.concatenate(lines), np.concatenate(corners)
+    return (
+        np.concatenate(way),
+        line[np.isfinite(line).all(axis=(1, 2))],
+        corner[np.isfinite(corner).all(axis=1)],
+    )
+
+
+def _check_beams(scan: LaserScan, clusters: NDArray[np.int32], method: str) -> None:
+    if len(clusters) != len(scan):
+        raise ValueError(f"{method}: clusters of {len(clusters)} beams, the scan has {len(scan)}")
+
+
+def _extent(axes: Axes) -> float:
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    return max(x1 - x0, y1 - y0)
+
+
+def _legend(figure: Figure) -> None:
+    """One legend for all panels, below them."""
+    handles: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(str(label), handle)
+    figure.legend(
+        handles=list(handles.values()),
+        labels=list(handles),
+        loc="outside lower center",
+        ncols=8,
+        fontsize=9,
+        frameon=False,
+    )
+
+
+def _counts(features: Features) -> str:
+    n_clusters = len(np.unique(features.clusters[features.clusters >= 0]))
+    counts = [count(len(getattr(features, name)), name[:-1]) for name in TABLES]
+    return " · ".join([*counts, count(n_clusters, "cluster")])

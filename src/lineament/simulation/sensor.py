@@ -1,0 +1,261 @@
+"""Scanners: their beams, and what stands between a true range and a reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array, LaserScan, Pose, RangeNoise
+from .raycast import cast_rays
+from .worlds import World
+
+__all__ = ["SENSORS", "Sensor"]
+
+#: Share of the beams across an occlusion edge that blend both depths: the others are won by one.
+_BLEND_SHARE = 0.5
+#: Least step in depth of an occlusion edge: in metres, and in widths of the footprint. Smaller
+#: ones are corners and walls at grazing incidence, whose depth has no gap.
+_EDGE_STEP = 0.05
+_EDGE_WIDTHS = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A 2-D laser scanner that stands still while it sweeps.
+
+    Parameters
+    ----------
+    name : str
+        Short name of the scanner.
+    n_beams : int
+        Number of beams.
+    angle_min, angle_increment : float
+        Bearing of the first beam and step between beams [rad], counter-clockwise.
+    range_min, range_max : float
+        Limits of ranges that are reported [m]: ``range_min <= r < range_max``.
+    noise : RangeNoise
+        Noise of a reading; all four parts are applied.
+    dropout : float
+        Probability that a beam returns nothing.
+    outlier : float
+        Probability of a false return, uniform between `range_min` and the true range.
+    mixed_pixel : float
+        Divergence of the beam, full width [rad]. Where its two edges meet different surfaces with
+        a step in depth between, half of the readings are a blend of both depths.
+    rate : float
+        Scans a second [Hz].
+
+    Raises
+    ------
+    ValueError
+        If a field makes no sense. The message names it and its value.
+
+    Examples
+    --------
+    >>> from lineament.simulation import room
+    >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
+    >>> scan
+    LaserScan(481 beams, 481 valid, -80.0° + i·0.3333°, stamp=0.000)
+    >>> round(float(scan.ranges[240]), 1)
+    3.0
+    """
+
+    name: str
+    n_beams: int
+    angle_min: float
+    angle_increment: float
+    range_min: float = 0.0
+    range_max: float = math.inf
+    noise: RangeNoise = field(default_factory=RangeNoise)
+    dropout: float = 0.0
+    outlier: float = 0.0
+    mixed_pixel: float = 0.0
+    rate: float = 10.0
+
+    def __post_init__(self) -> None:
+        last = self.angle_min + (self.n_beams - 1) * self.angle_increment
+        requirements = (
+            ("n_beams", self.n_beams >= 1, "at least 1"),
+            ("angle_min", math.isfinite(self.angle_min), "a finite bearing"),
+            ("angle_increment", self.angle_increment > 0, "more than 0"),
+            ("n_beams", last - self.angle_min < 2 * math.pi, "less than once around"),
+            ("range_min", 0 <= self.range_min < math.inf, "finite and ≥ 0"),
+            ("range_max", self.range_max > self.range_min, "more than range_min"),
+            ("dropout", 0 <= self.dropout <= 1, "a probability"),
+            ("outlier", 0 <= self.outlier <= 1, "a probability"),
+            ("mixed_pixel", 0 <= self.mixed_pixel < math.pi, "a width of 0 … π"),
+            ("rate", 0 < self.rate < math.inf, "finite and more than 0"),
+        )
+        for name, holds, expected in requirements:
+            if not holds:
+                raise ValueError(f"Sensor.{name} is {getattr(self, name)}, expected {expected}")
+
+    @property
+    def angles(self) -> Array:
+        """Bearings of the beams in the sensor frame [rad], shape (n,)."""
+        return self.angle_min + self.angle_increment * np.arange(self.n_beams, dtype=np.float64)
+
+    def ideal(self, world: World, pose: Pose) -> tuple[Array, NDArray[np.int32]]:
+        """Return the true ranges and surfaces of all beams, whatever their length.
+
+        Parameters
+        ----------
+        world : World
+            What there is to see.
+        pose : (x, y, theta)
+            Pose of the sensor in the world frame [m, m, rad].
+
+        Returns
+        -------
+        ranges : ndarray, shape (n,)
+            Distances [m], inf where nothing is met; neither limits nor noise are applied.
+        surface : ndarray of int32, shape (n,)
+            Number of the surface that each beam meets, -1 for none.
+
+        Examples
+        --------
+        >>> from lineament.simulation import room
+        >>> ranges, surface = SENSORS["paper"].ideal(room(), (0.0, 0.0, 0.0))
+        >>> round(float(ranges[240]), 6), int(surface[240])
+        (3.0, 1)
+        """
+        return cast_rays(world, pose, self.angles)
+
+    def scan(
+        self, world: World, pose: Pose, rng: np.random.Generator, stamp: float = 0.0
+    ) -> LaserScan:
+        """Simulate one sweep.
+
+        In order: each beam leaves with an error of bearing; it may blend two depths; it may be
+        cut short; noise is added; the reading is rounded to the lattice; it may be lost.
+
+        Parameters
+        ----------
+        world : World
+            What there is to see.
+        pose : (x, y, theta)
+            Pose of the sensor in the world frame [m, m, rad]; becomes the scan's.
+        rng : numpy.random.Generator
+            Source of all randomness. As many numbers are drawn whatever the world and the
+            settings, so that two sensors can be compared on the same draws.
+        stamp : float
+            Time of the scan [s].
+
+        Returns
+        -------
+        LaserScan
+            With the bearings as the sensor believes them; inf where nothing returned, or at a
+            distance beyond the limits.
+
+        Examples
+        --------
+        >>> from lineament.simulation import room
+        >>> rng = np.random.default_rng(0)
+        >>> SENSORS["rplidar"].scan(room(), (0.0, 1.0, 0.5), rng, stamp=2.0).pose
+        (0.0, 1.0, 0.5)
+        """
+        normal = rng.standard_normal((2, self.n_beams))
+        uniform = rng.random((5, self.n_beams))
+        ranges = self._footprint(world, pose, self.noise.bearing * normal[0], uniform[:2])
+        ranges = self._cut_short(ranges, uniform[2:4])
+        ranges = self._measure(ranges, normal[1])
+        lost = (ranges < self.range_min) | (ranges >= self.range_max)
+        ranges[lost | (uniform[4] < self.dropout)] = np.inf
+        return LaserScan(
+            ranges,
+            self.angle_min,
+            self.angle_increment,
+            range_min=self.range_min,
+            range_max=self.range_max,
+            stamp=stamp,
+            scan_time=1.0 / self.rate,
+            frame_id="laser",
+            pose=pose,
+        )
+
+    def _footprint(self, world: World, pose: Pose, error: Array, uniform: Array) -> Array:
+        """Ranges along the beams' axes, blended where a footprint spans two depths."""
+        axis = self.angles + error
+        if self.mixed_pixel == 0:
+            return cast_rays(world, pose, axis)[0]
+        half = self.mixed_pixel / 2
+        beams = np.concatenate((axis, axis - half, axis + half))
+        ranges, surface = (a.reshape(3, -1) for a in cast_rays(world, pose, beams))
+        near, far = ranges[1:].min(axis=0), ranges[1:].max(axis=0)
+        step = np.maximum(_EDGE_STEP, _EDGE_WIDTHS * self.mixed_pixel * near)
+        # Light that does not come back in time cannot blend.
+        edge = (surface[1] != surface[2]) & (far > near + step) & (far < self.range_max)
+        blends = edge & (uniform[0] < _BLEND_SHARE)
+        mixed: Array = ranges[0].copy()
+        mixed[blends] = near[blends] + uniform[1, blends] * (far[blends] - near[blends])
+        return mixed
+
+    def _cut_short(self, ranges: Array, uniform: Array) -> Array:
+        """Replace some ranges by false returns on the way."""
+        # The way of a beam that meets nothing ends where the scanner stops listening.
+        end = np.minimum(ranges, self.range_max)
+        cut = (uniform[0] < self.outlier) & (end > self.range_min) & (end < math.inf)
+        short = ranges.copy()
+        short[cut] = self.range_min + uniform[1, cut] * (end[cut] - self.range_min)
+        return short
+
+    def _measure(self, ranges: Array, normal: Array) -> Array:
+        """Add the noise of the range, then round to the lattice."""
+        finite = np.isfinite(ranges)
+        distance = np.where(finite, ranges, 0.0)
+        deviation = np.hypot(self.noise.sigma, self.noise.proportional * distance)
+        reading = distance + deviation * normal
+        if self.noise.quantum > 0:
+            reading = np.round(reading / self.noise.quantum) * self.noise.quantum
+        return np.where(finite, reading, np.inf)
+
+
+def _preset(
+    name: str,
+    n_beams: int,
+    first_degrees: float,
+    step_degrees: float,
+    range_min: float,
+    range_max: float,
+    **others: Any,
+) -> Sensor:
+    first, step = math.radians(first_degrees), math.radians(step_degrees)
+    return Sensor(name, n_beams, first, step, range_min, range_max, **others)
+
+
+_PRESETS = (
+    # The experiments of Liu et al. 2023: range noise alone.
+    _preset("paper", 481, -80.0, 160.0 / 480, 0.0, 30.0, noise=RangeNoise(sigma=0.01), rate=10.0),
+    # Hokuyo UTM-30LX: 270°, time of flight.
+    _preset(
+        "utm30lx", 1081, -135.0, 0.25, 0.1, 30.0,
+        noise=RangeNoise(sigma=0.01, quantum=0.001), rate=40.0,
+        mixed_pixel=0.004, dropout=0.002, outlier=0.0005,
+    ),
+    # SICK LMS 200 class: 180°, a wide beam, readings in centimetres.
+    _preset(
+        "lms361", 361, -90.0, 0.5, 0.0, 80.0,
+        noise=RangeNoise(sigma=0.01, quantum=0.01), rate=37.5,
+        mixed_pixel=0.0044, dropout=0.001, outlier=0.0002,
+    ),
+    # Slamtec RPLIDAR class: a full turn by triangulation, noise in proportion to the range.
+    _preset(
+        "rplidar", 720, -180.0, 0.5, 0.15, 12.0,
+        noise=RangeNoise(sigma=0.002, proportional=0.007, quantum=0.00025), rate=10.0,
+        mixed_pixel=0.003, dropout=0.02, outlier=0.002,
+    ),
+    # LDROBOT LD19: a full turn, time of flight, few beams.
+    _preset(
+        "ld19", 455, -180.0, 360.0 / 455, 0.02, 12.0,
+        noise=RangeNoise(sigma=0.01, quantum=0.001), rate=10.0,
+        mixed_pixel=0.006, dropout=0.01, outlier=0.001,
+    ),
+)  # fmt: skip
+
+#: Scanners of several kinds, by name. Beams and limits are the data sheets'; divergence, drop-outs
+#: and false returns are of the size that such scanners show indoors.
+SENSORS: dict[str, Sensor] = {sensor.name: sensor for sensor in _PRESETS}
