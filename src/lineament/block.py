@@ -68,7 +68,7 @@ class Block:
         self._ranges[: self.rows] = ranges
 
     def written(self) -> dict[str, NDArray[np.void]]:
-        """Copies of the records that the last run wrote, by the name of their table."""
+        """Copy the records that the last run wrote, by the name of their table."""
         counts = self.offsets[self.rows].tolist()
         # By way of bytes: numpy copies records field by field, several times slower.
         return {

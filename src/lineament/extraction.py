@@ -147,17 +147,17 @@ def output_paths(
     >>> str(output_paths(["a.log.gz"], "features.jsonl")[0])
     'features.jsonl'
     """
-    logs = [Path(log) for log in logs]
+    sources = [Path(log) for log in logs]
     target = Path(output)
     if not target.is_dir():
-        if len(logs) > 1:
-            raise LineamentError(f"{target}: is no folder, expected one for {len(logs)} logs")
+        if len(sources) > 1:
+            raise LineamentError(f"{target}: is no folder, expected one for {len(sources)} logs")
         return [target]
-    paths = [target / f"{log.name.split('.')[0]}.parquet" for log in logs]
+    paths = [target / f"{log.name.split('.')[0]}.parquet" for log in sources]
     for k, path in enumerate(paths):
         if path in paths[:k]:
             raise LineamentError(
-                f"{path}: would hold both {logs[paths.index(path)]} and {logs[k]}; "
+                f"{path}: would hold both {sources[paths.index(path)]} and {sources[k]}; "
                 "extract them into different folders"
             )
     return paths

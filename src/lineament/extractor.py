@@ -229,9 +229,9 @@ def trace(
     noise: RangeNoise | None = None,
     **parameters: Any,
 ) -> Trace:
-    """Extract the features of one scan and keep every intermediate: why is this line missing?
+    """Extract the features of one scan and keep every intermediate.
 
-    Parameters are those of `extract`.
+    It answers why a line is missing. Parameters are those of `extract`.
 
     Examples
     --------

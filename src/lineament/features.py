@@ -155,7 +155,7 @@ class Features:
         shift = np.array([x, y])
 
         def moved(points: NDArray[np.float64]) -> NDArray[np.float64]:
-            return points @ rotation.T + shift
+            return np.asarray(points @ rotation.T + shift)
 
         segments, corners = self.segments.copy(), self.corners.copy()
         arcs, breakpoints = self.arcs.copy(), self.breakpoints.copy()

@@ -329,7 +329,8 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
         block.offsets,
         block.scratch,
     )
-    return block.written()["segments"][0]
+    line: np.void = block.written()["segments"][0]
+    return line
 
 
 def _block(scan: LaserScan) -> Block:

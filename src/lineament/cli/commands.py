@@ -197,7 +197,7 @@ def warmup(quiet: bool) -> None:
 )
 @_QUIET
 def demo(log: Path | None, output: Path, quiet: bool) -> None:
-    """Simulate a drive through a building (or take LOG) and make a page of its features."""
+    """Make a page of a simulated drive, or of LOG."""
     from ..demo import run_demo
     from .progress import tracker
 

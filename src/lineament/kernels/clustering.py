@@ -85,7 +85,8 @@ def cluster_rows(
                 count += 1
             place(ranges, cosines, sines, beam, count, rho, x, y)
         counts[row, POINTS], counts[row, CLOSED] = count, closed
-        _drop_small(label, count, min_points)
+        # The first point of a closed class, which stands at its end again, counts once.
+        _drop_small(label, count, min_points + closed)
 
 
 @helper
@@ -113,10 +114,10 @@ def _spacings(x, y, rho, count, scaled_step, floor, spacing, threshold):
 
 @helper
 def _classes(spacing, t_d, t_k, count, density_k, circular, label):
-    """Number the classes in `label`.
+    """Write the class of each point to `label`.
 
-    Returns their number, and the point at which the last begins if it goes on in the first (and
-    then has its number), else -1.
+    Returns the number of classes, and the point at which the last begins if it goes on in the
+    first (and then has its number), else -1.
     """
     current, start, members = -1, 0, 0
     total, squares = 0.0, 0.0

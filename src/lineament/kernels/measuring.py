@@ -236,10 +236,11 @@ def _offset_variance(lines, k, px, py):
 
 @helper
 def _local_spacing(x, y, at, count):
-    """The larger of the distances of a point to its neighbours."""
+    """Tell the larger of the distances of a point to its neighbours."""
     spacing = 0.0
-    for k in range(max(at, 1), min(at + 2, count)):
-        dx, dy = x[k] - x[k - 1], y[k] - y[k - 1]
+    # A corner at the first point is that of a closed class, whose last point is its first again.
+    for k in (at - 1 if at > 0 else count - 2, at + 1):
+        dx, dy = x[k] - x[at], y[k] - y[at]
         spacing = max(spacing, math.sqrt(dx * dx + dy * dy))
     return spacing
 

@@ -41,7 +41,7 @@ def noise_rows(floats, rows, range_min, range_max, given, noises, scratch):
 
 @helper
 def range_sigma(ranges, n, range_min, range_max, scratch):
-    """Standard deviation of the range noise [m], from the second differences of neighbours.
+    """Estimate the range noise [m] from the second differences of neighbours.
 
     On a smooth surface ρ[i-1] - 2ρ[i] + ρ[i+1] has the variance 6σ², and the median of its size
     is hardly moved by jumps and corners. Triples do not overlap. Where half of them are exactly

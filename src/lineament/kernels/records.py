@@ -5,6 +5,7 @@ float64 and an int32 matrix over the same memory, and each field by its column t
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..features import BREAKPOINT, CORNER, SEGMENT
 
@@ -14,7 +15,7 @@ JUMP, GAP, SCAN_END = 0, 1, 2
 KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
 
 
-def words(records):
+def words(records: NDArray[np.void]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """See an array of records as its float64 and int32 words."""
     raw = records.view(np.uint8).reshape(len(records), records.dtype.itemsize)
     return raw.view(np.float64), raw.view(np.int32)

@@ -6,8 +6,8 @@ import os
 import stat
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from itertools import islice
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar
 

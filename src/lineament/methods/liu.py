@@ -119,7 +119,7 @@ class Liu:
         check_choice("corner", self.corner, ("intersection", "beam"))
         for field in fields(self):
             # Numba compiles anew for an int where it has seen a float.
-            kind = type(field.default)
+            kind: type[Any] = type(field.default)
             object.__setattr__(self, field.name, kind(getattr(self, field.name)))
 
     @classmethod
@@ -142,7 +142,7 @@ class Liu:
         In metres, 0.66 finds right angles only farther than some 3 m, less what the filter takes
         away. ``docs/equations.md`` tells where the threshold comes from.
         """
-        return cls(**{"response": "relative", "threshold": 0.3, **changes})
+        return cls(**{"response": "relative", "threshold": 0.25, **changes})
 
     def own_arrays(self, beams: int) -> _Scratch:
         """Make scratch for the filter and the search for corners."""
@@ -195,7 +195,7 @@ class Liu:
             block.noises,
             FITS[self.fit],
             self.corner == "intersection",
-            float(self.support_radius),
+            0.5 * self.support_radius,
             self.spacing_scale,
             *block.segments,
             *block.corners,

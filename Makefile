@@ -1,0 +1,52 @@
+# make demo: simulate a drive, extract its features, make a page.   make demo LOG=path: of your log.
+# make test: everything that is checked.                            make bench: the README's figures.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test lint types tests coverage wheel bench figures clean
+
+demo: .venv/ready
+	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
+
+test: lint types tests coverage wheel
+
+.venv/ready: requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+lint: .venv/ready
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+types: .venv/ready
+	$(BIN)/mypy
+
+# Numba sees a change in a kernel's own file, but not in those that it calls: compile anew.
+tests: .venv/ready
+	find src -name '*.nb[ic]' -delete
+	$(BIN)/python -m pytest --durations=5
+
+coverage: .venv/ready
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m 'not slow'
+	$(BIN)/coverage report --fail-under=95 --skip-covered
+
+# The wheel is pure, and runs in an environment that has nothing else.
+wheel: .venv/ready
+	rm -rf dist build/empty
+	$(BIN)/python -m build --no-isolation --quiet
+	$(PYTHON) -m venv build/empty
+	build/empty/bin/python -m pip install --quiet --constraint requirements.lock dist/lineament-*-py3-none-any.whl
+	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
+
+bench: .venv/ready
+	$(BIN)/python benchmarks/speed.py
+
+figures: .venv/ready
+	$(BIN)/python benchmarks/response_readings.py
+
+clean:
+	rm -rf .venv dist build demo .coverage
+	find src -name '*.nb[ic]' -delete

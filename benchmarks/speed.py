@@ -1,0 +1,157 @@
+"""The figures of the README's speed table. Run: make bench."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import lineament as ln
+from lineament.extraction import extract_log
+from lineament.simulation import SENSORS, building, drive
+
+DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
+
+
+def median_seconds(call: Callable[[], object], least: float = 0.2, repetitions: int = 7) -> float:
+    """Median over repetitions of the mean time of a call, each at least `least` seconds."""
+    call()
+    started = time.perf_counter()
+    call()
+    loops = max(1, round(least / max(time.perf_counter() - started, 1e-7)))
+    times = []
+    for _ in range(repetitions):
+        started = time.perf_counter()
+        for _ in range(loops):
+            call()
+        times.append((time.perf_counter() - started) / loops)
+    return statistics.median(times)
+
+
+def scans_of(sensor: str) -> list[ln.LaserScan]:
+    world, waypoints = building()
+    return list(drive(world, waypoints, SENSORS[sensor], rate=0.4, seed=11))
+
+
+def speed_of_method(method: str, sensor: str) -> tuple[int, float, float, float]:
+    """Beams; µs a scan in the kernels and through the call; gain of a second thread."""
+    scans = scans_of(sensor)
+    extractor, first = ln.Extractor(method), scans[0]
+    rows = np.array([scan.ranges for scan in scans] * 20)
+
+    def batch(workers: int) -> object:
+        return extractor.batch(
+            rows,
+            angle_min=first.angle_min,
+            angle_increment=first.angle_increment,
+            range_min=first.range_min,
+            range_max=first.range_max,
+            workers=workers,
+        )
+
+    block = extractor._new_block(first, len(scans))
+    block.load(rows[: len(scans)])
+    kernels = median_seconds(lambda: extractor.method.run(block)) / len(scans)
+    call = median_seconds(lambda: [extractor(scan) for scan in scans]) / len(scans)
+    # In turns, so that a change of the machine's speed meets both.
+    ratios = []
+    for _ in range(9):
+        one = median_seconds(lambda: batch(1), least=0.0, repetitions=1)
+        ratios.append(one / median_seconds(lambda: batch(2), least=0.0, repetitions=1))
+    return len(first), 1e6 * kernels, 1e6 * call, statistics.median(ratios)
+
+
+def seconds_of(*arguments: str, **environment: str) -> float:
+    """Median wall time of a fresh process."""
+    times = []
+    for _ in range(5):
+        started = time.perf_counter()
+        subprocess.run(
+            [sys.executable, *arguments],
+            env={**os.environ, **environment},
+            check=True,
+            capture_output=True,
+        )
+        times.append(time.perf_counter() - started)
+    return statistics.median(times)
+
+
+def warmup_seconds(cache: str) -> float:
+    said = subprocess.run(
+        [sys.executable, "-m", "lineament", "warmup"],
+        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    return float(said.split()[-2])
+
+
+def start_up() -> list[tuple[str, str]]:
+    first, cached = [], []
+    for _ in range(3):
+        with tempfile.TemporaryDirectory() as cache:
+            first.append(warmup_seconds(cache))
+            cached.append(statistics.median(warmup_seconds(cache) for _ in range(5)))
+    return [
+        ("first compile", f"{statistics.median(first):.1f} s"),
+        ("cached start, import of numba included", f"{statistics.median(cached):.2f} s"),
+        ("`lineament --help`", f"{1e3 * seconds_of('-m', 'lineament', '--help'):.0f} ms"),
+    ]
+
+
+def throughput() -> list[tuple[str, str]]:
+    log = DATA / "carmen" / "intel-corrected.log.gz"
+    if not log.exists():
+        return [("Intel log to Parquet", f"not measured: no {log}")]
+    extractor = ln.Extractor()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "features.parquet"
+        rates = [(e := extract_log(log, out, extractor)).scans / e.seconds for _ in range(8)]
+    return [
+        (
+            "Intel log to Parquet, in a process that has started",
+            f"{statistics.median(rates):.0f} scans/s",
+        ),
+        ("the same, first in its process, kernels cached", f"{rates[0]:.0f} scans/s"),
+    ]
+
+
+def machine() -> str:
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
+        name = lines[0].split(":")[1].strip() if lines else name
+    return (
+        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--method", default="liu")
+    method = parser.parse_args().method
+    print(f"Machine: {machine()}\n")
+    rates = throughput()
+    print("| method | beams | in the kernels | `Extractor.__call__` | `batch`, 2 threads |")
+    print("|---|---|---|---|---|")
+    for sensor in ("paper", "utm30lx"):
+        beams, kernels, call, gain = speed_of_method(method, sensor)
+        print(f"| `{method}` | {beams} | {kernels:.1f} µs | {call:.1f} µs | {gain:.2f} × |")
+    print("\n| | |\n|---|---|")
+    for name, value in [*start_up(), *rates]:
+        print(f"| {name} | {value} |")
+
+
+if __name__ == "__main__":
+    main()

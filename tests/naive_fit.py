@@ -1,0 +1,156 @@
+"""Slow twins of what is measured: lines, corners, breakpoints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def range_variance(rho, noise):
+    s, proportional, _, quantum = noise
+    return np.maximum(s**2 + (proportional * rho) ** 2 + quantum**2 / 12, 1e-8)
+
+
+def normal_variances(angle, bearings, rho, noise):
+    """Variance of each point along the normal of a line: σ_r² cos²ψ + ρ² σ_φ² sin²ψ."""
+    cosine = np.maximum(np.cos(bearings - (angle + math.pi / 2)) ** 2, 1e-6)
+    return range_variance(rho, noise) * cosine + (rho * noise[2]) ** 2 * (1 - cosine)
+
+
+def principal_line(points, weights):
+    """Centroid and direction of least weighted orthogonal distances, by eigenvectors."""
+    centroid = np.average(points, axis=0, weights=weights)
+    centred = points - centroid
+    _, vectors = np.linalg.eigh((centred * weights[:, np.newaxis]).T @ centred)
+    return centroid, math.atan2(vectors[1, 1], vectors[0, 1])
+
+
+def steep_or_flat_line(points):
+    """y = kx + b, or x = ky + b where the points are steeper than 45° (equations 23, 24)."""
+    centroid = points.mean(axis=0)
+    x, y = (points - centroid).T
+    if x @ x >= y @ y:
+        return centroid, math.atan2(np.polyfit(x, y, 1)[0], 1.0)
+    return centroid, math.atan2(1.0, np.polyfit(y, x, 1)[0])
+
+
+def estimate(points, bearings, rho, noise, fit, passes=2):
+    """Centroid, direction from first to last, weights."""
+    weights = np.ones(len(points))
+    if not np.ptp(points, axis=0).any():
+        return points[0], 0.0, weights
+    if fit == "y_of_x":
+        centroid, angle = steep_or_flat_line(points)
+    else:
+        centroid, angle = principal_line(points, weights)
+    for _ in range(passes if fit == "weighted" else 0):
+        weights = 1 / normal_variances(angle, bearings, rho, noise)
+        centroid, angle = principal_line(points, weights)
+    if np.array([math.cos(angle), math.sin(angle)]) @ (points[-1] - points[0]) < 0:
+        angle += math.pi
+    return centroid, math.remainder(angle, 2 * math.pi), weights
+
+
+def fit_line(points, bearings, rho, noise, fit, passes=2):
+    """Line with its covariance: to first order offset = Σwe/W, angle = Σwte/Σwt²."""
+    centroid, angle, _ = estimate(points, bearings, rho, noise, fit, passes)
+    u = np.array([math.cos(angle), math.sin(angle)])
+    t, e = (points - centroid) @ u, (points - centroid) @ [-u[1], u[0]]
+    variances = normal_variances(angle, bearings, rho, noise)
+    weights = 1 / variances if fit == "weighted" else np.ones(len(points))
+    offset_gain = weights / weights.sum()
+    if t.any():
+        gain = np.array([offset_gain, weights * t / (weights @ t**2)])
+        covariance = gain * variances @ gain.T
+    else:
+        # No direction: uniform over half a turn.
+        covariance = np.diag([offset_gain**2 @ variances, math.pi**2 / 12])
+    return {
+        "start": centroid + t[0] * u,
+        "end": centroid + t[-1] * u,
+        "centroid": centroid,
+        "angle": angle,
+        "covariance": covariance,
+        "n_points": len(points),
+        "rms": math.sqrt(np.mean(e**2)),
+    }
+
+
+def jacobian_covariance(bearings, rho, noise, fit):
+    """Covariance of (offset, angle) by moving each range and each bearing, and fitting anew."""
+    range_noise = np.sqrt(range_variance(rho, noise))
+
+    def line(phi, r):
+        points = np.column_stack((r * np.cos(phi), r * np.sin(phi)))
+        # Weights are held at those of the sensor; their own change is of second order.
+        return estimate(points, phi, r, noise, fit, passes=8)
+
+    at, angle, _ = line(bearings, rho)
+
+    def moved(phi, r):
+        centroid, turned, _ = line(phi, r)
+        off = centroid - at
+        turn = math.remainder(turned - angle, 2 * math.pi)
+        return np.array([math.cos(turned) * off[1] - math.sin(turned) * off[0], turn])
+
+    total = np.zeros((2, 2))
+    h = 1e-5
+    for i in range(len(rho)):
+        step = h * (np.arange(len(rho)) == i)
+        by_range = (moved(bearings, rho + step) - moved(bearings, rho - step)) / (2 * h)
+        by_bearing = (moved(bearings + step, rho) - moved(bearings - step, rho)) / (2 * h)
+        total += np.outer(by_range, by_range) * range_noise[i] ** 2
+        total += np.outer(by_bearing, by_bearing) * noise[2] ** 2
+    return total
+
+
+def offset_variance(line, point):
+    lever = (point - line["centroid"]) @ [math.cos(line["angle"]), math.sin(line["angle"])]
+    return np.array([1.0, lever]) @ line["covariance"] @ [1.0, lever]
+
+
+def intersection(a, b, near, reach):
+    """Where two lines meet, Σ = A⁻¹ diag A⁻ᵀ; None if that is not within `reach` of a point."""
+    normals = np.array([[-math.sin(k["angle"]), math.cos(k["angle"])] for k in (a, b)])
+    if abs(np.linalg.det(normals)) < 1e-6:
+        return None
+    offsets = [n @ k["centroid"] for n, k in zip(normals, (a, b), strict=True)]
+    point = np.linalg.solve(normals, offsets)
+    if np.linalg.norm(point - near) > reach:
+        return None
+    inverse = np.linalg.inv(normals)
+    spread = np.diag([offset_variance(a, point), offset_variance(b, point)])
+    return point, inverse @ spread @ inverse.T
+
+
+def corner_at_beam(bearing, rho, spacing, noise):
+    along = np.array([math.cos(bearing), math.sin(bearing)])
+    covariance = np.eye(2) * spacing**2 / 12
+    return rho * along, covariance + np.outer(along, along) * range_variance(rho, noise)
+
+
+def opening_and_side(before, after):
+    """Angle between the arms, and whether the corner points at the sensor: a right turn."""
+    turn = math.remainder(after - before, 2 * math.pi)
+    return math.pi - abs(turn), turn < 0
+
+
+def breakpoints(scan, found, rho, points, gap):
+    """(beams, position, kind, occluder) where surfaces end."""
+    if not found.classes or found.closed:
+        return []
+    ends = [(members[0], members[-1]) for members in found.classes]
+    breaks = []
+    following = ends[1:] + (ends[:1] if scan.is_full_circle else [])
+    for (_, a), (b, _) in zip(ends, following, strict=False):
+        near = a if rho[a] <= rho[b] else b
+        if (b - a) % len(scan) > gap:
+            breaks.append(((a, b), points[near], "gap", -1))
+        else:
+            breaks.append(((a, b), points[near], "jump", near))
+    if not scan.is_full_circle:
+        first, last = ends[0][0], ends[-1][1]
+        breaks.append(((-1, first), points[first], "scan_end", -1))
+        breaks.append(((last, -1), points[last], "scan_end", -1))
+    return breaks

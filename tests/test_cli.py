@@ -1,0 +1,354 @@
+"""The real commands, over a matrix of inputs: what they write, say and return."""
+
+import gzip
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import lineament as ln
+from lineament.cli import run
+from lineament.logs import save_npz
+
+
+def wall_scans(count, beams=61):
+    """Scans of a wall that comes nearer, each with its own stamp and pose."""
+    bearings = np.linspace(-0.5, 0.5, beams)
+    return [
+        ln.LaserScan(
+            (3.0 - 0.01 * k) / np.cos(bearings),
+            angle_min=-0.5,
+            angle_increment=1.0 / (beams - 1),
+            range_max=30.0,
+            stamp=10.0 + 0.1 * k,
+            pose=(0.01 * k, 0.0, 0.0),
+        )
+        for k in range(count)
+    ]
+
+
+def flaser(ranges, stamp=1.0):
+    values = " ".join(f"{r:.2f}" for r in ranges)
+    return f"FLASER {len(ranges)} {values} 0 0 0 0 0 0 {stamp} robot {stamp}\n"
+
+
+@pytest.fixture
+def npz(tmp_path):
+    path = tmp_path / "wall.npz"
+    save_npz(path, wall_scans(7))
+    return path
+
+
+@pytest.fixture
+def carmen(tmp_path):
+    path = tmp_path / "wall.log.gz"
+    with gzip.open(path, "wt") as file:
+        file.writelines(flaser(np.full(181, 2.0 + k), k) for k in range(4))
+    return path
+
+
+def test_extract_writes_the_features_of_each_scan(npz, tmp_path, capsys):
+    out = tmp_path / "features.parquet"
+    assert run(["extract", str(npz), "-o", str(out)]) == 0
+    table = pq.read_table(out)
+    expected = [ln.extract(scan) for scan in ln.open_log(npz)]
+    segments = table.filter(np.array(table["kind"].to_pylist()) == "segment")
+    assert segments["scan"].to_pylist() == list(range(7))
+    assert segments["stamp"].to_pylist() == [f.stamp for f in expected]
+    assert segments["x"].to_pylist() == [f.segments["centroid"][0, 0] for f in expected]
+    said = capsys.readouterr().out
+    assert "7 scans" in said
+    assert "0.0 % of beams invalid" in said
+    assert "7 segments, 0 corners, 0 arcs, 14 breakpoints" in said
+    assert "scans/s" in said
+
+
+def test_extract_jsonl_holds_what_to_dict_gives(npz, tmp_path):
+    out = tmp_path / "features.jsonl"
+    assert run(["extract", str(npz), "-o", str(out), "-q", "--set", "min_points=4"]) == 0
+    lines = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
+    extractor = ln.Extractor("liu", min_points=4)
+    assert lines == [
+        {"scan": k, **extractor(scan).to_dict()} for k, scan in enumerate(ln.open_log(npz))
+    ]
+
+
+def test_quiet_says_nothing(npz, tmp_path, capfd):
+    assert run(["extract", str(npz), "-o", str(tmp_path / "f.parquet"), "--quiet"]) == 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_several_logs_go_into_a_folder(npz, carmen, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    other = tmp_path / "other.npz"
+    save_npz(other, wall_scans(2))
+    assert run(["extract", str(npz), str(other), "-q", "-o", str(folder)]) == 0
+    assert sorted(p.name for p in folder.iterdir()) == ["other.parquet", "wall.parquet"]
+    assert run(["extract", str(npz), str(carmen), "-q", "-o", str(folder)]) == 1
+
+
+def test_options_of_method_and_noise_arrive(npz, tmp_path):
+    out = tmp_path / "f.jsonl"
+    arguments = ["-m", "liu:paper", "--noise", "0.02", "--set", "response=relative"]
+    assert run(["extract", str(npz), "-o", str(out), "-q", *arguments]) == 0
+    first = json.loads(out.read_text(encoding="utf-8").splitlines()[0])
+    assert first["noise"]["sigma"] == 0.02
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["extract", "{dir}/none.log", "-o", "{dir}/f.parquet"], 1, "none.log: there is no such"),
+        (["extract", "{dir}", "-o", "{dir}/f.parquet"], 1, "is a directory"),
+        (["extract", "{dir}/empty.log", "-o", "{dir}/f.parquet"], 1, "empty.log: is empty"),
+        (["extract", "{dir}/text.log", "-o", "{dir}/f.parquet"], 1, "text.log: is no"),
+        (["extract", "{dir}/short.log", "-o", "{dir}/f.parquet"], 1, "short.log:2: "),
+        (["extract", "{dir}/cut.log.gz", "-o", "{dir}/f.parquet"], 1, "cut.log.gz:"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/no/f.parquet"], 1, "/no does not exist"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.xls"], 2, "f.xls: expected a folder or"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f"], 2, "expected a folder or an ending"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "-m", "lui"], 2, "'lui'"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "-m", "liu:x"], 2, "'liu:x'"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "a=1"], 2, "'a'"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "a"], 2, "NAME=VALUE"),
+        (
+            ["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "sigma_d=wide"],
+            2,
+            "sigma_d is 'wide', expected a number",
+        ),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--noise", "-1"], 2, "--noise"),
+        (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--topic", "x"], 1, "topic 'x'"),
+        (["extract", "-o", "{dir}/f.parquet"], 2, "LOGS"),
+        (["extract", "{dir}/wall.npz"], 2, "--output"),
+        (["info", "{dir}/none.log"], 1, "none.log: there is no such"),
+        (["info", "{dir}/other.npz"], 1, "other.npz: expected the key"),
+        (["plot", "{dir}/wall.npz", "--scan", "7", "-o", "{dir}/p.png"], 1, "has no scan 7"),
+        (["plot", "{dir}/wall.npz", "--scan", "-1", "-o", "{dir}/p.png"], 1, "has no scan -1"),
+        (["plot", "{dir}/wall.npz", "-o", "{dir}/p.gif"], 1, "p.gif"),
+        (["plot", "{dir}/wall.npz", "-o", "{dir}/p.png", "-m", "x"], 2, "'x'"),
+        (["demo", "{dir}/none.log", "-o", "{dir}/demo"], 1, "none.log"),
+        (["demo", "-o", "{dir}/wall.npz"], 1, "cannot make this folder"),
+        (["nonsense"], 2, "nonsense"),
+        (["extract", "--nonsense"], 2, "--nonsense"),
+    ],
+)
+@pytest.mark.usefixtures("npz")
+def test_bad_input_gets_one_clear_line(arguments, status, words, tmp_path, capsys):
+    whole = gzip.compress("".join(flaser(np.full(181, 2.0), k) for k in range(99)).encode())
+    (tmp_path / "cut.log.gz").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "empty.log").touch()
+    (tmp_path / "text.log").write_text("It was a dark and stormy night.\n" * 9)
+    (tmp_path / "short.log").write_text(flaser([2.0] * 181) + "FLASER 181 2.0 2.0\n")
+    np.savez(tmp_path / "other.npz", radius=np.ones(3))
+    before = sorted(tmp_path.rglob("*"))
+    assert run([text.format(dir=tmp_path) for text in arguments]) == status
+    output, errors = capsys.readouterr()
+    assert words in errors
+    assert errors.count("\n") == 1
+    assert "Traceback" not in errors
+    assert output == ""
+    left = set(tmp_path.rglob("*")) - set(before)
+    assert left <= {tmp_path / "demo"}
+
+
+def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsys):
+    log, out = tmp_path / "broken.log", tmp_path / "f.jsonl"
+    good = [flaser([2.0] * 181, k) for k in range(3)]
+    log.write_text(good[0] + "FLASER 181 1 2 3\n" + good[1] + "FLASER x\n" + good[2])
+    assert run(["extract", str(log), "-o", str(out)]) == 1
+    assert not out.exists()
+    capsys.readouterr()
+    assert run(["extract", str(log), "-o", str(out), "--keep-going"]) == 0
+    stamps = [json.loads(line)["stamp"] for line in out.read_text().splitlines()]
+    assert stamps == [0.0, 1.0, 2.0]
+    said = capsys.readouterr().out
+    assert "2 lines skipped" in said
+    assert "broken.log:2" in said
+
+
+def test_info_tells_what_a_person_wants_to_know(npz, capsys):
+    assert run(["info", str(npz)]) == 0
+    said = capsys.readouterr().out
+    for words in ("7", "61", "10 Hz", "100.0 % valid", "poses"):
+        assert words in said
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, ending):
+    one, two, trace = (tmp_path / f"{name}.{ending}" for name in ("one", "two", "trace"))
+    base = ["plot", str(npz), "--scan", "3"]
+    assert run([*base, "-o", str(one)]) == 0
+    assert run([*base, "-o", str(two), "-m", "liu", "-m", "liu:paper"]) == 0
+    assert run([*base, "-o", str(trace), "--trace"]) == 0
+    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    for path in (one, two, trace):
+        assert path.read_bytes().startswith(starts[ending])
+    assert len({path.read_bytes() for path in (one, two, trace)}) == 3
+
+
+def test_warmup_says_how_long(capsys):
+    assert run(["warmup"]) == 0
+    assert capsys.readouterr().out.startswith("kernels ready after ")
+
+
+def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
+    folder = tmp_path / "deep" / "demo"
+    assert run(["demo", str(npz), "-o", str(folder)]) == 0
+    assert {p.name for p in folder.iterdir()} == {
+        "features.parquet",
+        "index.html",
+        "map.png",
+        "scan.png",
+        "trace.png",
+    }
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert str(folder / "index.html") in capsys.readouterr().out
+
+
+def test_demo_of_a_log_without_poses_has_no_map(tmp_path):
+    log = tmp_path / "still.npz"
+    save_npz(log, [ln.LaserScan(np.full(61, 2.0), -0.5, 1 / 60)] * 2)
+    assert run(["demo", str(log), "-q", "-o", str(tmp_path / "demo")]) == 0
+    assert not (tmp_path / "demo" / "map.png").exists()
+
+
+@pytest.mark.slow
+def test_demo_simulates_a_drive_of_its_own(tmp_path):
+    assert run(["demo", "-q", "-o", str(tmp_path)]) == 0
+    log = ln.open_log(tmp_path / "drive.npz")
+    assert len(log) > 100
+    table = pq.read_table(tmp_path / "features.parquet")
+    assert set(table["scan"].to_pylist()) == set(range(len(log)))
+    assert {"segment", "corner", "breakpoint", "cluster"} <= set(table["kind"].to_pylist())
+
+
+def start(*arguments, **options):
+    return subprocess.Popen(
+        [sys.executable, "-m", "lineament", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def test_help_version_and_status_of_the_real_program():
+    for arguments, status in ((["--help"], 0), (["--version"], 0), ([], 2), (["x"], 2)):
+        process = start(*arguments)
+        out, errors = process.communicate(timeout=60)
+        assert process.returncode == status
+        assert "Traceback" not in errors
+        assert ("Commands:" in out + errors) == (arguments in (["--help"], []))
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; from lineament.cli import run; run(['--help']); "
+        "print(sorted({'numba', 'numpy', 'pyarrow', 'matplotlib', 'rich'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_import_and_logs_need_no_numba_pyarrow_matplotlib():
+    code = (
+        "import sys, lineament as ln, lineament.logs, lineament.output; ln.LaserScan([1.0], 0, 1); "
+        "print(sorted({'numba', 'pyarrow', 'matplotlib', 'rosbags'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_killed_run_leaves_no_half_file(how, tmp_path):
+    log, out = tmp_path / "long.log", tmp_path / "f.jsonl"
+    line = flaser(np.linspace(2.0, 3.0, 181))
+    with log.open("w") as file:
+        for _ in range(60_000):
+            file.write(line)
+    out.write_text("of the run before")
+    process = start("extract", log, "-o", out)
+    # Killed when it is under way: something stands beside the output.
+    deadline = time.monotonic() + 60
+    while len(list(tmp_path.iterdir())) < 3 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(how)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == (130 if how == signal.SIGINT else -how)
+    assert out.read_text() == "of the run before"
+    if how == signal.SIGINT:
+        assert errors.splitlines()[-1] == "lineament: stopped"
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["f.jsonl", "long.log"]
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_log(tmp_path):
+    code = (
+        "import resource, sys; from lineament.cli import run; status = run(sys.argv[1:]); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(status)"
+    )
+    line, peaks = flaser(np.linspace(2.0, 3.0, 181)), []
+    for scans in (3_000, 30_000):
+        log = tmp_path / f"{scans}.log"
+        log.write_text(line * scans)
+        arguments = ["extract", log, "-q", "-o", tmp_path / f"{scans}.parquet"]
+        done = subprocess.run(
+            [sys.executable, "-c", code, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        peaks.append(int(done.stdout))
+    assert peaks[1] < 1.15 * peaks[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["intel", "csail", "aces", "acapulco"])
+def test_real_logs_from_file_to_table(name, data_dir, tmp_path):
+    log, out = data_dir / "carmen" / f"{name}-corrected.log.gz", tmp_path / "f.parquet"
+    assert run(["extract", str(log), "-q", "-o", str(out)]) == 0
+    table = pq.read_table(out)
+    scans = {"intel": 910, "csail": 406, "aces": 440, "acapulco": 861}[name]
+    assert set(table["scan"].to_pylist()) == set(range(scans))
+    rms = np.array([value for value in table["rms"].to_pylist() if value is not None])
+    assert len(rms) > 5 * scans
+    assert np.isfinite(rms).all()
+
+
+def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys):
+    from lineament.cli import progress
+
+    assert list(progress.tracker(quiet=True)(range(3), "x", 3)) == [0, 1, 2]
+    clock = iter(np.arange(0.0, 100.0, 1.5))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    assert list(progress.tracker(quiet=False)(range(4), "reading", 4)) == [0, 1, 2, 3]
+    assert capsys.readouterr().err.splitlines() == [
+        "reading: 2/4, 1/s, 3 s left",
+        "reading: 4/4, 1/s, 0 s left",
+    ]
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="pseudo-terminals are not everywhere")
+def test_progress_bar_on_a_real_terminal(npz):
+    main, terminal = os.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lineament", "info", str(npz)],
+        stdout=subprocess.PIPE,
+        stderr=terminal,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "100"},
+    )
+    process.communicate(timeout=60)
+    os.close(terminal)
+    shown = os.read(main, 65536).decode()
+    os.close(main)
+    assert "wall.npz" in shown
+    assert "7/7" in shown

@@ -1,0 +1,494 @@
+"""Worlds, ray casting, sensors and drives: against hand-worked cases, a slow twin, statistics."""
+
+import math
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lineament.scan import RangeNoise
+from lineament.simulation import (
+    SENSORS,
+    Sensor,
+    World,
+    building,
+    cast_rays,
+    drive,
+    drive_poses,
+    room,
+)
+
+INF = math.inf
+#: Statistics are held to this many standard deviations of their own: a chance of 7e-6 each.
+SIGMAS = 4.5
+
+
+def naive_cast(world, pose, angle):
+    """Cast one ray: every wall by a linear system, every circle by the quadratic formula."""
+    x, y, theta = pose
+    u = np.array([math.cos(theta + angle), math.sin(theta + angle)])
+    best, best_surface = INF, -1
+    for i, (x1, y1, x2, y2) in enumerate(world.segments):
+        system = np.column_stack((u, [x1 - x2, y1 - y2]))
+        if abs(np.linalg.det(system)) < 1e-14:
+            continue
+        distance, share = np.linalg.solve(system, [x1 - x, y1 - y])
+        if 0 <= share <= 1 and 1e-9 < distance < best:
+            best, best_surface = distance, i
+    for i, (cx, cy, r) in enumerate(world.circles):
+        b = u[0] * (x - cx) + u[1] * (y - cy)
+        c = (x - cx) ** 2 + (y - cy) ** 2 - r**2
+        if b * b < c:
+            continue
+        for distance in (-b - math.sqrt(b * b - c), -b + math.sqrt(b * b - c)):
+            if 1e-9 < distance < best:
+                best, best_surface = distance, len(world.segments) + i
+    return best, best_surface
+
+
+def distance_to_walls(world, points):
+    """Distance of every point to the nearest surface, by projection."""
+    p, q = world.segments[:, :2], world.segments[:, 2:]
+    along = q - p
+    share = ((points[:, None] - p) * along).sum(axis=2) / (along**2).sum(axis=1)
+    foot = p + np.clip(share, 0, 1)[:, :, None] * along
+    walls = np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1)
+    if len(world.circles) == 0:
+        return walls
+    centres = np.linalg.norm(points[:, None] - world.circles[:, :2], axis=2)
+    return np.minimum(walls, np.abs(centres - world.circles[:, 2]).min(axis=1))
+
+
+def ring_sensor(n_beams=2000, **settings):
+    """Make a full turn without noise but that of `settings`."""
+    return Sensor("ring", n_beams, -math.pi, 2 * math.pi / n_beams, **settings)
+
+
+def drum(radius):
+    """Make a round room: every true range from its centre is the radius."""
+    return World([], [[0, 0, radius]])
+
+
+# Worlds
+
+
+def test_world_keeps_read_only_copies():
+    walls = np.array([[0.0, 0, 1, 0]])
+    world = World(walls)
+    walls[:] = 9
+    assert world.segments.tolist() == [[0, 0, 1, 0]]
+    assert world.circles.shape == (0, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        world.segments[0, 0] = 1
+    with pytest.raises(AttributeError):
+        world.segments = walls
+
+
+@pytest.mark.parametrize(
+    ("segments", "circles", "message"),
+    [
+        ([[0, 0, 1, 0], [1, 2, 1, 2]], (), r"segments\[1\] .* no length"),
+        ([[0, 0, 1]], (), r"segments has shape \(1, 3\)"),
+        ([0, 0, 1, 1], (), r"segments has shape \(4,\)"),
+        ([[0, 0, 1, math.nan]], (), "segments holds a value that is not finite"),
+        ([["a", 0, 1, 1]], (), "segments is no table"),
+        ([], [[0, 0, 0]], r"circles\[0\] has radius 0"),
+        ([], [[0, 0, -1]], r"circles\[0\] has radius -1"),
+    ],
+)
+def test_world_refuses(segments, circles, message):
+    with pytest.raises(ValueError, match=message):
+        World(segments, circles)
+
+
+def test_polygons_are_open_or_closed():
+    triangle = [(0, 0), (1, 0), (0, 1), (0, 0)]
+    world = World.of_polygons([triangle, [(5, 5), (6, 5)]], circles=[[9, 9, 1]])
+    assert world.segments.tolist() == [[0, 0, 1, 0], [1, 0, 0, 1], [0, 1, 0, 0], [5, 5, 6, 5]]
+    assert world.n_surfaces == 5
+    assert World.of_polygons([]).n_surfaces == 0
+
+
+@pytest.mark.parametrize(
+    ("polygon", "message"),
+    [([(0, 0)], "1 vertices"), ([(0, 0), (0, 0)], "no length"), ([(0, 0, 0)], "shape")],
+)
+def test_polygons_refused(polygon, message):
+    with pytest.raises(ValueError, match=message):
+        World.of_polygons([polygon])
+
+
+@pytest.mark.parametrize("world", [room(), building()[0]], ids=["room", "building"])
+def test_walls_meet_only_at_their_ends(world):
+    ends = Counter(map(tuple, world.segments.reshape(-1, 2).tolist()))
+    assert set(ends.values()) == {2}
+    for i, wall in enumerate(world.segments):
+        others = World(np.delete(world.segments, i, axis=0), world.circles)
+        dx, dy = wall[2:] - wall[:2]
+        length = math.hypot(dx, dy)
+        hit, _ = cast_rays(others, (wall[0], wall[1], math.atan2(dy, dx)), [0.0])
+        assert hit[0] >= length - 1e-9
+    assert (distance_to_walls(World(world.segments), world.circles[:, :2])
+            > world.circles[:, 2]).all()  # fmt: skip
+
+
+def test_building_encloses_its_way():
+    world, waypoints = building()
+    for x, y in waypoints:
+        ranges, surface = cast_rays(world, (x, y, 0), np.linspace(-3.1, 3.1, 400))
+        assert np.isfinite(ranges).all()
+        assert (surface >= 0).all()
+
+
+# Ray casting
+
+
+WALL = World([[2, -1, 2, 1]])
+CIRCLE = World([], [[3, 0, 1]])
+CORNER = World.of_polygons([[(2, -2), (2, 2), (-2, 2)]])
+TWO = World([[4, -1, 4, 1], [2, -1, 2, 1]], [[6, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("world", "pose", "angle", "distance", "surface"),
+    [
+        pytest.param(WALL, (0, 0, 0), 0, 2, 0, id="frontal"),
+        pytest.param(WALL, (0, 0, 0), math.atan(0.5), math.sqrt(5), 0, id="its end"),
+        pytest.param(WALL, (0, 0, 0), math.atan(0.5) + 1e-9, INF, -1, id="past its end"),
+        pytest.param(WALL, (0, 0, 0), math.pi, INF, -1, id="behind"),
+        pytest.param(WALL, (5, 0, 0), math.pi, 3, 0, id="from the other side"),
+        pytest.param(WALL, (0, 0, math.pi / 2), -math.pi / 2, 2, 0, id="turned sensor"),
+        pytest.param(WALL, (1, 0.5, 0), 0, 1, 0, id="moved sensor"),
+        pytest.param(World([[0, 1, 5, 1]]), (0, 0, 0), 0, INF, -1, id="parallel"),
+        pytest.param(World([[1, 0, 5, 0]]), (0, 0, 0), 0, INF, -1, id="edge-on"),
+        pytest.param(World([[0, 0, 0, 1]]), (0, 0.5, 0), 0, INF, -1, id="on a wall"),
+        pytest.param(World([[0, 0, 1, 1], [2, 0, 2, 1]]), (0.5, 0.5, 0), 0, 1.5, 1,
+                     id="on a wall, the next is met"),
+        pytest.param(CORNER, (0, 0, 0), math.pi / 4, math.sqrt(8), 0, id="corner"),
+        pytest.param(CIRCLE, (0, 0, 0), 0, 2, 0, id="circle"),
+        pytest.param(CIRCLE, (0, 1, 0), 0, 3, 0, id="tangent"),
+        pytest.param(CIRCLE, (0, 1 + 1e-12, 0), 0, INF, -1, id="past the tangent"),
+        pytest.param(CIRCLE, (3, 0, 0), 1.2, 1, 0, id="within a circle"),
+        pytest.param(CIRCLE, (2, 0, 0), 0, 2, 0, id="on a circle, inwards"),
+        pytest.param(CIRCLE, (2, 0, 0), math.pi, INF, -1, id="on a circle, outwards"),
+        pytest.param(CIRCLE, (6, 0, 0), 0, INF, -1, id="circle behind"),
+        pytest.param(TWO, (0, 0, 0), 0, 2, 1, id="nearest of three"),
+        pytest.param(TWO, (3, 0, 0), 0, 1, 0, id="nearest of two"),
+        pytest.param(TWO, (4.5, 0, 0), 0, 0.5, 2, id="circle after two walls"),
+        pytest.param(World([]), (0, 0, 0), 0, INF, -1, id="empty world"),
+    ],
+)  # fmt: skip
+def test_hand_worked(world, pose, angle, distance, surface):
+    ranges, surfaces = cast_rays(world, pose, [angle])
+    assert ranges[0] == pytest.approx(distance, rel=1e-12)
+    assert surfaces[0] == surface
+    assert surfaces.dtype == np.int32
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_as_naive_on_random_worlds(seed):
+    rng = np.random.default_rng(seed)
+    circles = np.column_stack((rng.uniform(-5, 5, (5, 2)), rng.uniform(0.1, 2, 5)))
+    world = World(rng.uniform(-5, 5, (12, 4)), circles[: seed % 3 * 2])
+    pose = tuple(rng.uniform(-4, 4, 3))
+    # More than one block of beams, and not a multiple of it.
+    angles = rng.uniform(-math.pi, math.pi, 1100)
+    ranges, surface = cast_rays(world, pose, angles)
+    expected = [naive_cast(world, pose, angle) for angle in angles]
+    assert surface.tolist() == [s for _, s in expected]
+    np.testing.assert_allclose(ranges, [r for r, _ in expected], rtol=1e-9)
+
+
+def test_nothing_slips_through_a_corner():
+    polygon = [(0, 0), (7, 0.3), (8.1, 3.3), (7.7, 6.1), (0.3, 5.9), (0, 0)]  # convex
+    world = World.of_polygons([polygon])
+    vertices = np.array(polygon[:-1])
+    for x, y in np.random.default_rng(3).uniform((1, 1), (5.5, 5), (300, 2)):
+        bearings = np.arctan2(vertices[:, 1] - y, vertices[:, 0] - x)
+        ranges, _ = cast_rays(world, (x, y, 0), bearings)
+        distances = np.hypot(*(vertices - (x, y)).T)
+        np.testing.assert_allclose(ranges, distances, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("pose", "angles"), [((0, 0), [0]), ((0, 0, INF), [0]), ((0, 0, 0), [[0]]), ((0, 0, 0), [INF])]
+)
+def test_cast_refuses(pose, angles):
+    with pytest.raises(ValueError, match="expected"):
+        cast_rays(WALL, pose, angles)
+
+
+def test_no_beams():
+    ranges, surface = cast_rays(WALL, (0, 0, 0), [])
+    assert ranges.shape == surface.shape == (0,)
+
+
+# Sensors
+
+
+@pytest.mark.parametrize(
+    ("noise", "radius"),
+    [
+        (RangeNoise(sigma=0.02), 4.0),
+        (RangeNoise(proportional=0.01), 7.0),
+        (RangeNoise(sigma=0.01, proportional=0.005, quantum=0.02), 3.0),
+        (RangeNoise(bearing=0.1), 5.0),  # no effect: the room is round
+    ],
+)
+def test_noise_is_as_stated(noise, radius):
+    sensor, rng = ring_sensor(noise=noise), np.random.default_rng(11)
+    readings = np.concatenate([sensor.scan(drum(radius), (0, 0, 0), rng).ranges for _ in range(20)])
+    expected = math.sqrt(noise.range_variance(radius))
+    n = len(readings)
+    assert abs(readings.mean() - radius) <= SIGMAS * expected / math.sqrt(n) + 1e-12
+    assert abs(readings.std() - expected) <= SIGMAS * expected / math.sqrt(2 * n) + 1e-12
+
+
+def test_bearing_noise_shows_on_an_oblique_wall():
+    sensor = Sensor("oblique", 101, 0.7, 0.001, noise=RangeNoise(bearing=0.002))
+    wall = World([[2, -50, 2, 50]])
+    truth, _ = sensor.ideal(wall, (0, 0, 0))
+    rng = np.random.default_rng(5)
+    scans = np.array([sensor.scan(wall, (0, 0, 0), rng).ranges for _ in range(300)])
+    # dρ/dφ = ρ tan φ on the wall ρ cos φ = 2.
+    errors = (scans - truth) / (truth * np.tan(sensor.angles))
+    # The second order adds about σ² (1 + 2 tan² φ) / 2, far below the interval.
+    assert errors.std() == pytest.approx(0.002, rel=SIGMAS / math.sqrt(2 * errors.size))
+
+
+@pytest.mark.parametrize("quantum", [0.001, 0.01, 0.25])
+def test_quantised_ranges_lie_on_the_lattice(quantum):
+    sensor = ring_sensor(noise=RangeNoise(sigma=0.03, quantum=quantum))
+    steps = sensor.scan(room(), (0, 0, 0.2), np.random.default_rng(1)).ranges / quantum
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+
+
+def test_share_of_dropouts():
+    sensor, rng = ring_sensor(dropout=0.03), np.random.default_rng(2)
+    lost = np.concatenate([~sensor.scan(drum(2), (0, 0, 0), rng).valid for _ in range(20)])
+    assert abs(lost.mean() - 0.03) < SIGMAS * math.sqrt(0.03 * 0.97 / len(lost))
+
+
+def test_outliers_are_short_and_uniform():
+    sensor, rng = ring_sensor(outlier=0.1, range_min=1.0), np.random.default_rng(2)
+    ranges = np.concatenate([sensor.scan(drum(3), (0, 0, 0), rng).ranges for _ in range(20)])
+    false = ranges[ranges < 3 - 1e-9]
+    assert abs(len(false) / len(ranges) - 0.1) < SIGMAS * math.sqrt(0.1 * 0.9 / len(ranges))
+    assert false.min() >= 1.0
+    assert abs(false.mean() - 2.0) < SIGMAS * 2 / math.sqrt(12 * len(false))
+
+
+def test_outliers_where_nothing_is_met():
+    rng = np.random.default_rng(2)
+    near = ring_sensor(outlier=0.5, range_max=10.0).scan(World([]), (0, 0, 0), rng)
+    assert near.valid.mean() == pytest.approx(0.5, abs=0.06)
+    assert not ring_sensor(outlier=0.5).scan(World([]), (0, 0, 0), rng).valid.any()
+
+
+@pytest.mark.parametrize(("range_min", "range_max"), [(0.0, 2.5), (2.5, 30.0)])
+def test_limits(range_min, range_max):
+    sensor = ring_sensor(range_min=range_min, range_max=range_max)
+    truth, _ = sensor.ideal(room(), (0, 0, 0))
+    ranges = sensor.scan(room(), (0, 0, 0), np.random.default_rng(0)).ranges
+    within = (truth >= range_min) & (truth < range_max)
+    assert within.any()
+    assert not within.all()
+    np.testing.assert_array_equal(ranges, np.where(within, truth, INF))
+
+
+def test_mixed_pixels_only_across_occlusion_edges():
+    divergence = 0.01
+    sensor, pose = ring_sensor(mixed_pixel=divergence), (0.3, 0.2, 0.1)
+    plain = replace(sensor, mixed_pixel=0.0)
+    truth, _ = plain.ideal(room(), pose)
+    rng = np.random.default_rng(4)
+    scans = np.array([sensor.scan(room(), pose, rng).ranges for _ in range(40)])
+    moved = np.abs(scans - truth) > 1e-12
+
+    # The silhouette of the box, whose walls are the last four.
+    corners = room().segments[4:, :2] - pose[:2]
+    bearings = np.arctan2(corners[:, 1], corners[:, 0]) - pose[2]
+    off_edge = np.abs(sensor.angles[:, None] - (bearings.min(), bearings.max()))
+    across = (off_edge < divergence / 2).any(axis=1)
+    assert across.sum() >= 4
+    assert moved.any(axis=0)[across].all()
+    assert not moved[:, ~across].any()
+    # About half of the readings across an edge are blends, and they lie between its depths.
+    n = 40 * across.sum()
+    assert abs(moved[:, across].mean() - 0.5) < SIGMAS * 0.5 / math.sqrt(n)
+    for edge in off_edge.T:
+        blends = scans[:, edge < divergence / 2]
+        depths = truth[edge < divergence]
+        assert np.ptp(depths) > 0.5
+        assert (blends > depths.min() - 0.05).all()
+        assert (blends < depths.max() + 0.05).all()
+    np.testing.assert_array_equal(plain.scan(room(), pose, rng).ranges, truth)
+
+
+def test_nothing_blends_with_no_return():
+    sensor = ring_sensor(mixed_pixel=0.02)
+    truth, _ = sensor.ideal(CIRCLE, (0, 0, 0))
+    scan = sensor.scan(CIRCLE, (0, 0, 0), np.random.default_rng(0))
+    np.testing.assert_array_equal(scan.ranges, truth)
+
+
+def test_scan_has_the_sensor_s_fields():
+    sensor = SENSORS["utm30lx"]
+    scan = sensor.scan(room(), (0.5, -0.2, 1.0), np.random.default_rng(0), stamp=12.5)
+    assert (scan.stamp, scan.pose, scan.frame_id) == (12.5, (0.5, -0.2, 1.0), "laser")
+    assert (scan.range_min, scan.range_max, scan.scan_time) == (0.1, 30.0, 1 / 40)
+    np.testing.assert_array_equal(scan.angles, sensor.angles)
+
+
+def test_same_seed_same_scan():
+    def ranges(sensor, seed):
+        return sensor.scan(room(), (0, 0, 0), np.random.default_rng(seed)).ranges
+
+    sensor = SENSORS["rplidar"]
+    np.testing.assert_array_equal(ranges(sensor, 3), ranges(sensor, 3))
+    assert (ranges(sensor, 3) != ranges(sensor, 4)).mean() > 0.8
+    # The draws of one effect do not shift those of another.
+    all_return = ranges(replace(sensor, dropout=0.0), 3)
+    some = ranges(sensor, 3)
+    np.testing.assert_array_equal(some[some < INF], all_return[some < INF])
+    assert (some == INF).any()
+
+
+@pytest.mark.parametrize(
+    ("name", "n_beams", "first", "last", "full"),
+    [
+        ("paper", 481, -80, 80, False),
+        ("utm30lx", 1081, -135, 135, False),
+        ("lms361", 361, -90, 90, False),
+        ("rplidar", 720, -180, 179.5, True),
+        ("ld19", 455, -180, 180 - 360 / 455, True),
+    ],
+)
+def test_presets(name, n_beams, first, last, full):
+    sensor = SENSORS[name]
+    scan = sensor.scan(room(), (0, 0, 0), np.random.default_rng(0))
+    assert sensor.name == name
+    assert len(scan) == n_beams
+    assert np.degrees(scan.angles[[0, -1]]) == pytest.approx([first, last])
+    assert scan.is_full_circle == full
+    assert scan.valid.mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_beams": 0},
+        {"n_beams": 482 * 3},
+        {"angle_min": math.nan},
+        {"angle_increment": 0.0},
+        {"range_min": -1.0},
+        {"range_max": 0.0},
+        {"dropout": 1.1},
+        {"outlier": -0.1},
+        {"mixed_pixel": -1e-3},
+        {"rate": 0.0},
+    ],
+)
+def test_sensor_refuses(change):
+    with pytest.raises(ValueError, match=rf"Sensor\.{next(iter(change))} is "):
+        replace(SENSORS["paper"], **change)
+
+
+# Drives
+
+
+def test_building_drive_is_free_of_collisions_and_passes_the_waypoints():
+    world, waypoints = building()
+    stamps, poses = drive_poses(waypoints, speed=0.6, rate=20)
+    assert distance_to_walls(world, poses[:, :2]).min() > 0.25
+    step = 0.6 / 20
+    for waypoint in waypoints:
+        assert np.hypot(*(poses[:, :2] - waypoint).T).min() <= step / 2 + 1e-9
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= step + 1e-9
+    turns = np.abs(np.angle(np.exp(1j * np.diff(poses[:, 2]))))
+    assert turns.max() <= 1.0 / 20 + 1e-9
+    np.testing.assert_allclose(np.diff(stamps), 1 / 20)
+
+
+def test_poses_by_hand():
+    # 2 m at 0.5 m/s, a right turn of 90° at 45°/s, 1 m.
+    waypoints = [(0, 0), (0, 2), (0, 2), (1, 2)]
+    stamps, poses = drive_poses(waypoints, speed=0.5, turn_rate=math.pi / 4, rate=1)
+    assert stamps.tolist() == list(range(9))
+    north, half = math.pi / 2, math.pi / 4
+    expected = [(0, 0, north), (0, 0.5, north), (0, 1, north), (0, 1.5, north), (0, 2, north),
+                (0, 2, half), (0, 2, 0), (0.5, 2, 0), (1, 2, 0)]  # fmt: skip
+    np.testing.assert_allclose(poses, expected, atol=1e-12)
+
+
+def test_turns_go_the_short_way_and_headings_are_wrapped():
+    # From heading 153° to -153°: 53° through west, not 306° through east.
+    stamps, poses = drive_poses([(0, 0), (-2, 1), (-4, 0)], speed=100, turn_rate=0.1, rate=10)
+    assert stamps[-1] == pytest.approx(2 * math.atan(0.5) / 0.1, abs=0.2)
+    assert (np.abs(poses[:, 2]) >= math.pi - math.atan(0.5) - 1e-9).all()
+    assert (poses[:, 2] <= math.pi).all()
+    assert (poses[:, 2] < 0).any()
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "settings"),
+    [
+        ([(0, 0)], {}),
+        ([(1, 1), (1, 1)], {}),
+        ([(0, 0, 0), (1, 1, 1)], {}),
+        ([(0, 0), (1, INF)], {}),
+        ([(0, 0), (1, 0)], {"speed": 0}),
+        ([(0, 0), (1, 0)], {"turn_rate": -1}),
+        ([(0, 0), (1, 0)], {"rate": math.nan}),
+        ([(0, 0), (1, 0)], {"seed": -1}),
+    ],
+)
+def test_drive_refuses_at_once(waypoints, settings):
+    with pytest.raises(ValueError, match=r"waypoints|expected"):
+        drive(room(), waypoints, SENSORS["paper"], **settings)
+
+
+def test_drive_has_the_stamps_and_poses_that_were_promised():
+    way = [(-2, 0), (0, 0), (0, 1)]
+    scans = list(drive(room(), way, SENSORS["paper"], speed=0.5, rate=2))
+    stamps, poses = drive_poses(way, speed=0.5, rate=2)
+    assert [scan.stamp for scan in scans] == stamps.tolist()
+    assert [scan.pose for scan in scans] == [tuple(pose) for pose in poses.tolist()]
+    n_default = sum(1 for _ in drive(room(), way, SENSORS["lms361"], speed=2))
+    assert n_default == len(drive_poses(way, speed=2, rate=37.5)[0])
+
+
+def test_drive_is_determined_by_its_seed():
+    def ranges(seed, way):
+        scans = drive(room(), way, SENSORS["ld19"], seed=seed, rate=2)
+        return np.array([scan.ranges for scan in scans])
+
+    way = [(-2, 0), (0, 0)]
+    first = ranges(1, way)
+    np.testing.assert_array_equal(first, ranges(1, way))
+    assert (first != ranges(2, way)).any(axis=1).all()
+    # The same start gives the same scans, whatever follows.
+    longer = ranges(1, [*way, (0, 1)])
+    np.testing.assert_array_equal(longer[: len(first)], first)
+
+
+def test_walls_seen_on_a_drive_stay_in_place():
+    world, waypoints = building()
+    scans = drive(world, waypoints, SENSORS["utm30lx"], speed=2, turn_rate=4, rate=1)
+    for scan in scans:
+        x, y, theta = scan.pose
+        c, s = math.cos(theta), math.sin(theta)
+        points = scan.points[scan.valid] @ np.array([[c, s], [-s, c]]) + (x, y)
+        off = distance_to_walls(world, points) > 5 * 0.01
+        assert off.mean() < 0.03  # mixed pixels and outliers
+
+
+def test_import_is_light():
+    code = (
+        "import sys, lineament.simulation; "
+        "sys.exit(any(m in sys.modules for m in ('numba', 'pyarrow', 'matplotlib')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
