@@ -19,9 +19,10 @@ RING = full_circle()
 def features() -> Features:
     rng = np.random.default_rng(1)
     ranges = room(RING, BOX) + 0.01 * rng.normal(size=len(RING))
-    ranges[100:140] = np.nan
+    ranges[100:140] += 1.0  # a niche: corners, jumps
     scan = scan_of(ranges, RING, stamp=2.5, frame_id="laser")
-    found = ln.extract(scan, method="liu", noise=NOISE, response="relative", threshold=0.25)
+    settings = {"response": "relative", "threshold": 0.25, "sigma_d": 1.0}
+    found = ln.extract(scan, method="liu", noise=NOISE, **settings)
     assert min(len(found.segments), len(found.corners), len(found.breakpoints)) > 0
     # The method finds no arcs: one by hand.
     arcs = np.zeros(1, ARC)

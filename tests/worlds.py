@@ -128,5 +128,5 @@ def degenerate_scans() -> dict[str, LaserScan]:
         "ring off centre": scan_of(2.0 + 0.3 * np.cos(ring - 1.0), ring),
         "three beams around": scan_of(np.full(3, 2.0), full_circle(3)),
         "ten beams around": scan_of(np.full(10, 2.0), full_circle(10)),
-        "irregular": LaserScan(wall(irregular, 2.0, 20.0), angles=irregular),
+        "irregular": LaserScan(wall(irregular, 2.0, 20.0) + noise[:200], angles=irregular),
     }

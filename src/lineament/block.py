@@ -69,12 +69,14 @@ class Block:
 
     def written(self) -> dict[str, NDArray[np.void]]:
         """Copy the records that the last run wrote, by the name of their table."""
+        tables = {}
         counts = self.offsets[self.rows].tolist()
-        # By way of bytes: numpy copies records field by field, several times slower.
-        return {
-            name: np.frombuffer(records[:count].tobytes(), records.dtype) if count else _NONE[name]
-            for (name, records), count in zip(self._records.items(), counts, strict=True)
-        }
+        for (name, records), count in zip(self._records.items(), counts, strict=True):
+            # By way of bytes: numpy copies records field by field, several times slower.
+            tables[name] = (
+                np.frombuffer(records[:count].tobytes(), records.dtype) if count else _NONE[name]
+            )
+        return tables
 
     def by_beam(self, line: int) -> Array:
         """Spread a line of floats of the first row, by usable beam, over all beams; else NaN."""

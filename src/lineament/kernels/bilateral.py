@@ -37,7 +37,7 @@ def filter_rows(
     product, weighted = scratch[3], scratch[4]
     # Unusable beams stand so far off that their weight is nothing.
     away = F(-1e4 * sigma_r)
-    scale = F(0.5 / (sigma_r * sigma_r))
+    scale = F(0.5 / (32.0 * sigma_r * sigma_r))
     for row in range(rows):
         ranges, filtered = floats[row, RANGE], floats[row, FILTERED]
         for i in range(n):
@@ -54,10 +54,10 @@ def filter_rows(
             # w = exp(-k²/2σ_d²) exp(-d²/2σ_r²) and w d of all pairs `k` apart (equation 8).
             for i in range(last):
                 d = r[i + k] - r[i]
-                u = scale * d * d
-                # exp(-u) = exp(-u/32)^32, the root by its series: within 2e-7 of exp for every u.
-                t = (u if u < F(40.0) else F(40.0)) * F(1.0 / 32.0)
-                e = F(1.0) - t * (F(1.0) - t * (F(0.5) - t * (F(1.0 / 6.0) - t * F(1.0 / 24.0))))
+                # exp(-u) = exp(-u/32)^32, the root by its series: within 6e-6 of exp for every u.
+                t = scale * d * d
+                t = t if t < F(1.25) else F(1.25)
+                e = F(1.0) - t * (F(1.0) - t * (F(0.5) - t * F(1.0 / 6.0)))
                 e = e * e
                 e = e * e
                 e = e * e

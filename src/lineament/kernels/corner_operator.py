@@ -116,17 +116,20 @@ def farthest_from_chord(x, y, first, last, margin):
     point, distance : int, float
         -1 and 0 where there is none.
     """
-    cx, cy = x[last] - x[first], y[last] - y[first]
+    if last - first < 2 * margin:
+        return -1, 0.0
+    x0, y0 = x[first], y[first]
+    cx, cy = x[last] - x0, y[last] - y0
     chord = math.sqrt(cx * cx + cy * cy)
     best, point = -1.0, -1
-    for i in range(first + margin, last - margin + 1):
-        px, py = x[i] - x[first], y[i] - y[first]
+    # Slices, as numba need not look for negative indices where a loop begins at 0.
+    x, y = x[first + margin : last - margin + 1], y[first + margin : last - margin + 1]
+    for i in range(len(x)):
+        px, py = x[i] - x0, y[i] - y0
         d = abs(cx * py - cy * px) if chord > 0.0 else px * px + py * py
         if d > best:
             best, point = d, i
-    if point < 0:
-        return -1, 0.0
-    return point, best / chord if chord > 0.0 else math.sqrt(best)
+    return first + margin + point, best / chord if chord > 0.0 else math.sqrt(best)
 
 
 @helper

@@ -31,5 +31,5 @@ POINTS, CLOSED, PIECES, CANDIDATES = 0, 1, 2, 3
 COUNTS = 4
 
 # Lines of scratch, shared by all rows: what is measured, by point.
-MEASURED_X, MEASURED_Y, MEASURED_RHO, COSINE, SINE, SPARE = 0, 1, 2, 3, 4, 5
-SCRATCH = 6
+MEASURED_X, MEASURED_Y, MEASURED_RHO, SPARE = 0, 1, 2, 3
+SCRATCH = 4

@@ -2,23 +2,23 @@
 
 import math
 
-from . import helper
+from . import helper, sums
 from .noise import LEAST_SIGMA
 
 #: How a line is fitted (equations 23, 24, and what is better).
 TOTAL, Y_OF_X, WEIGHTED = 0, 1, 2
 
 
-@helper
-def fit_line(x, y, cosines, sines, rho, first, last, noise, kind):
-    """Fit a line to the points `first`..`last` (inclusive, two or more) of known beams.
+@sums
+def fit_line(x, y, rho, first, last, noise, kind):
+    """Fit a line to the points `first`..`last` (inclusive, two or more).
 
     Parameters
     ----------
     x, y : float64 arrays
         Points [m].
-    cosines, sines, rho : float64 arrays
-        Bearing and range of each point.
+    rho : float64 array
+        Range of each point [m].
     first, last : int
     noise : float64 array, shape (4,)
         (sigma, proportional, bearing, quantum), see `lineament.RangeNoise`.
@@ -37,21 +37,24 @@ def fit_line(x, y, cosines, sines, rho, first, last, noise, kind):
     rms : float
         Root mean square of the orthogonal distances [m].
     """
-    cx, cy, angle, weighted = x[first], y[first], 0.0 * x[first], False
+    # Slices, as numba need not look for negative indices where a loop begins at 0.
+    span = slice(first, last + 1)
+    x, y, rho = x[span], y[span], rho[span]
+    cx, cy, angle, weighted = x[0], y[0], 0.0 * x[0], False
     for iteration in range(3 if kind == WEIGHTED else 1):
         weighted = iteration > 0
-        cx, cy, angle = _line(x, y, cosines, sines, rho, first, last, noise, angle, weighted, kind)
+        cx, cy, angle = _line(x, y, rho, noise, angle, weighted, kind)
     c, s = math.cos(angle), math.sin(angle)
-    if c * (x[last] - x[first]) + s * (y[last] - y[first]) < 0.0:
+    if c * (x[-1] - x[0]) + s * (y[-1] - y[0]) < 0.0:
         c, s = -c, -s
         angle += math.pi if angle <= 0.0 else -math.pi
     # To first order the offset is Σwe/W and the angle Σwte/S, with t along the line from the
     # centroid, so their covariance is that of these sums, whatever the weights.
     w_sum, t_sum, oo, oa, aa, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(first, last + 1):
+    for i in range(len(x)):
         dx, dy = x[i] - cx, y[i] - cy
         t, e = c * dx + s * dy, c * dy - s * dx
-        variance = normal_variance(c * sines[i] - s * cosines[i], rho[i], noise)
+        variance = normal_variance(c * y[i] - s * x[i], rho[i], noise)
         w = 1.0 / variance if weighted else 1.0
         squares += e * e
         w_sum += w
@@ -59,27 +62,27 @@ def fit_line(x, y, cosines, sines, rho, first, last, noise, kind):
         oo += w * w * variance
         oa += w * w * variance * t
         aa += w * w * variance * t * t
-    rms = math.sqrt(squares / (last - first + 1))
+    rms = math.sqrt(squares / len(x))
     if t_sum == 0.0:
         # Points that coincide have no direction: any angle is as good.
         return cx, cy, angle, oo / (w_sum * w_sum), 0.0, math.pi**2 / 12.0, rms
     return cx, cy, angle, oo / (w_sum * w_sum), oa / (w_sum * t_sum), aa / (t_sum * t_sum), rms
 
 
-@helper
-def _line(x, y, cosines, sines, rho, first, last, noise, angle, weighted, kind):
+@sums
+def _line(x, y, rho, noise, angle, weighted, kind):
     """Centroid and direction of least squares, of orthogonal or axial distances.
 
     Weighted by the normal variances to a line of direction `angle`, or not at all.
     """
     # Sums about the first point, not the far origin, keep their digits.
-    x0, y0 = x[first], y[first]
+    x0, y0 = x[0], y[0]
     total, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     c, s = math.cos(angle), math.sin(angle)
-    for i in range(first, last + 1):
+    for i in range(len(x)):
         dx, dy, w = x[i] - x0, y[i] - y0, 1.0
         if weighted:
-            w = 1.0 / normal_variance(c * sines[i] - s * cosines[i], rho[i], noise)
+            w = 1.0 / normal_variance(c * y[i] - s * x[i], rho[i], noise)
         total += w
         sx += w * dx
         sy += w * dy
@@ -96,14 +99,15 @@ def _line(x, y, cosines, sines, rho, first, last, noise, angle, weighted, kind):
 
 
 @helper
-def normal_variance(cosine, rho, noise):
+def normal_variance(distance, rho, noise):
     """Variance of a point along a line's normal, b = σ_r² cos²ψ + ρ² σ_φ² sin²ψ.
 
-    ψ is the incidence, kept 0.06° short of grazing so that no point gets all the weight.
+    cos ψ is the distance of the origin from the line over the range; ψ is kept 0.06° short of
+    grazing so that no point gets all the weight.
     """
-    square = max(cosine * cosine, 1e-6)
-    lateral = noise[2] * rho
-    return range_variance(rho, noise) * square + lateral * lateral * (1.0 - square)
+    square = rho * rho
+    near = max(distance * distance, 1e-6 * square)
+    return range_variance(rho, noise) * near / square + noise[2] * noise[2] * (square - near)
 
 
 @helper

@@ -9,7 +9,6 @@ from .layout import (
     BEAM,
     BEFORE,
     CLOSED,
-    COSINE,
     FIRST,
     LABEL,
     LAST,
@@ -19,7 +18,6 @@ from .layout import (
     PIECES,
     POINTS,
     RESPONSE,
-    SINE,
 )
 from .line_fit import fit_line, range_variance
 from .records import (
@@ -106,7 +104,6 @@ def measure_rows(
     scratch : float64 array, shape (SCRATCH, n + 1)
     """
     x, y, rho = scratch[MEASURED_X], scratch[MEASURED_Y], scratch[MEASURED_RHO]
-    c, s = scratch[COSINE], scratch[SINE]
     for row in range(rows):
         beam, label, count = ints[row, BEAM], ints[row, LABEL], counts[row, POINTS]
         ranges = floats[row, source]
@@ -115,13 +112,13 @@ def measure_rows(
         for i in range(count):
             b = beam[i]
             clusters[row, b] = label[i]
-            c[i], s[i], rho[i] = cosines[b], sines[b], ranges[b]
-            x[i], y[i] = rho[i] * c[i], rho[i] * s[i]
+            r = ranges[b]
+            x[i], y[i], rho[i] = r * cosines[b], r * sines[b], r
         noise = noises[row]
         segment, corner = offsets[row, 0], offsets[row, 1]
         for k in range(counts[row, PIECES]):
             first, last = ints[row, FIRST, k], ints[row, LAST, k]
-            line = fit_line(x, y, c, s, rho, first, last, noise, fit)
+            line = fit_line(x, y, rho, first, last, noise, fit)
             _write_segment(
                 x, y, beam, label, first, last, line, segments, segment_ints, segment + k
             )
@@ -140,7 +137,7 @@ def measure_rows(
                 segments, before, segment + k, x[at], y[at], reach * spacing, corners, corner
             ):
                 variance = range_variance(rho[at], noise)
-                _place_at_beam(x[at], y[at], c[at], s[at], spacing, variance, corners, corner)
+                _place_at_beam(x[at], y[at], rho[at], spacing, variance, corners, corner)
             corner += 1
         closed = counts[row, CLOSED] != 0
         offsets[row + 1, 0] = segment + counts[row, PIECES]
@@ -246,9 +243,9 @@ def _local_spacing(x, y, at, count):
 
 
 @helper
-def _place_at_beam(x, y, c, s, spacing, along, corners, k):
+def _place_at_beam(x, y, rho, spacing, variance, corners, k):
     """Put a corner on its point: off by up to half a spacing, and by the noise along the beam."""
-    across = spacing * spacing / 12.0
+    across, along, c, s = spacing * spacing / 12.0, variance, x / rho, y / rho
     corners[k, C_POSITION], corners[k, C_POSITION + 1] = x, y
     corners[k, C_COVARIANCE] = across + along * c * c
     corners[k, C_COVARIANCE + 1] = along * c * s

@@ -1,0 +1,253 @@
+"""Method liu: whole runs equal those of the slow twin; the paper's numbers; scenes by hand."""
+
+from __future__ import annotations
+
+import math
+
+import naive
+import numpy as np
+import pytest
+from equality import assert_same_features, assert_same_run
+from worlds import (
+    BOX,
+    NOISE,
+    degenerate_scans,
+    fan,
+    full_circle,
+    random_scan,
+    room,
+    scan_of,
+    vertex,
+    wall,
+)
+
+from lineament import Extractor, LaserScan, RangeNoise, open_log, stages
+
+DEGENERATE = degenerate_scans()
+EXTRACTORS = {
+    "default": Extractor("liu"),
+    "paper": Extractor("liu:paper", threshold=0.3),
+    "scale free": Extractor("liu:scale_free", noise=RangeNoise(0.0, 0.01, 0.002, 0.01)),
+    "weighted": Extractor(
+        "liu:scale_free", fit="weighted", noise=RangeNoise(0.01, 0.001, 0.001), min_points=5
+    ),
+    "product": Extractor(
+        "liu", response="product", threshold=0.05, support_radius=3, half_width=3, min_points=4
+    ),
+    "at beams": Extractor("liu", threshold=0.3, corner="beam", min_points=2, noise=NOISE),
+}
+
+
+@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
+@pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=EXTRACTORS)
+def test_degenerate_scans_equal_the_slow_twin(extractor, scan):
+    assert_same_run(scan, extractor)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=EXTRACTORS)
+def test_random_scans_equal_the_slow_twin(extractor, seed):
+    assert_same_run(random_scan(seed), extractor)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=EXTRACTORS)
+def test_many_random_scans_equal_the_slow_twin(extractor):
+    corners = segments = 0
+    for seed in range(100, 200):
+        twin = assert_same_run(random_scan(seed), extractor)
+        corners += len(twin["corners"])
+        segments += len(twin["segments"])
+    assert min(corners, segments) > 100  # Else nothing was compared.
+
+
+@pytest.mark.slow
+def test_whole_chain_of_the_twin_on_its_own():
+    """Also the twin's own exact filter leads to the same partition and lines."""
+    extractor = EXTRACTORS["scale free"]
+    noise = (0.0, 0.01, 0.002, 0.01)
+    for seed in range(200, 230):
+        scan = random_scan(seed)
+        twin = naive.liu(scan, extractor.method, noise)
+        for corner in twin["corners"]:
+            beam = corner["beam"]
+            near = extractor(scan).corners
+            corner["response"] = near["response"][near["beam"] == beam][0]  # Good to 1e-4 only.
+        assert_same_features(extractor(scan), twin)
+
+
+def real_scans(data_dir):
+    for name in ("fr079_graph", "jackal_static_data", "jackal_mocap_02171554"):
+        with np.load(data_dir / "truth" / f"{name}.npz") as file:
+            for ranges in file["ranges"][::120]:
+                yield LaserScan(
+                    ranges,
+                    float(file["angle_min"]),
+                    float(file["angle_increment"]),
+                    range_max=float(file["range_max"]),
+                )
+    for name in ("intel", "aces"):
+        for i, scan in enumerate(open_log(data_dir / "carmen" / f"{name}-corrected.log.gz")):
+            if i % 40 == 0:
+                yield scan
+            if i > 500:
+                break
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["default", "paper", "scale free", "weighted"])
+def test_recorded_scans_equal_the_slow_twin(data_dir, name):
+    extractor = EXTRACTORS[name]
+    twins = [assert_same_run(scan, extractor) for scan in real_scans(data_dir)]
+    assert len(twins) > 30
+    assert sum(len(twin["segments"]) for twin in twins) > 300
+
+
+# The table of the four readings at a true vertex: r = 6, Δφ = 1/3°.
+
+TABLE = [
+    (90, 1, 0.24, 0.05, 0.69),
+    (90, 2, 0.47, 0.19, 0.69),
+    (90, 4, 0.95, 0.76, 0.69),
+    (90, 6, 1.43, 1.72, 0.69),
+    (120, 4, 0.53, 0.25, 0.47),
+]
+
+
+@pytest.mark.parametrize(("opening", "distance", "tangent", "product", "relative"), TABLE)
+def test_response_at_a_true_vertex(opening, distance, tangent, product, relative):
+    angles = fan(10)
+    points = naive.polar(vertex(angles, distance, opening, convex=True), angles)
+    at = len(points) // 2
+    for reading, expected in (("tangent", tangent), ("product", product), ("relative", relative)):
+        found = stages.corner_response(points, response=reading)
+        assert found[at] == pytest.approx(expected, rel=0.03, abs=0.005)
+        assert found.argmax() == at
+        assert found[at] == pytest.approx(naive.response(points, at, 6, reading), rel=1e-9)
+
+
+# Scenes by hand
+
+
+def sharp(**changes):
+    """A filter so narrow that vertices stay where they are."""
+    settings = {"sigma_d": 0.5, "half_width": 1, "threshold": 0.3, "response": "relative"}
+    return Extractor("liu", **{"noise": NOISE, **settings, **changes})
+
+
+@pytest.mark.parametrize("opening", [60, 90, 135])
+@pytest.mark.parametrize("convex", [True, False])
+def test_vertex_is_found_with_its_side_and_opening(opening, convex):
+    angles = fan(25)
+    scan = scan_of(vertex(angles, 3.0, opening, convex=convex), angles)
+    features = sharp()(scan)
+    (corner,) = features.corners
+    np.testing.assert_allclose(corner["position"], (3.0, 0.0), atol=5e-3)
+    assert corner["opening"] == pytest.approx(math.radians(opening), abs=0.01)
+    assert corner["convex"] == convex
+    assert abs(corner["beam"] - len(angles) // 2) <= 1
+    assert corner["segments"].tolist() == [0, 1]
+    first, second = features.segments
+    assert first["end"].tolist() == second["start"].tolist() == corner["position"].tolist()
+    assert first["last_beam"] == second["first_beam"] == corner["beam"]
+
+
+@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
+@pytest.mark.parametrize("preset", ["liu", "liu:paper"])
+def test_wall_has_its_ends_and_no_nan(normal, preset):
+    angles = math.radians(normal) + fan(30)
+    ranges = wall(angles, 2.0, normal)
+    (line,) = Extractor(preset, noise=NOISE)(scan_of(ranges, angles)).segments
+    points = naive.polar(ranges, angles)
+    atol = 1e-9 if preset == "liu" else 0.02
+    np.testing.assert_allclose(line["start"], points[0], atol=atol)
+    np.testing.assert_allclose(line["end"], points[-1], atol=atol)
+    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
+    assert line["n_points"] == len(angles)
+    assert np.isfinite(line["covariance"]).all()
+
+
+def test_one_missing_beam_does_not_end_a_segment():
+    angles = fan(30)
+    ranges = wall(angles, 2.0, 10.0)
+    ranges[60] = np.nan
+    features = Extractor("liu", noise=NOISE)(scan_of(ranges, angles))
+    (line,) = features.segments
+    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
+    assert line["n_points"] == len(angles) - 1
+    assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
+
+
+def test_walls_on_either_side_of_a_doorway_are_not_bridged():
+    angles = fan(40)
+    ranges = wall(angles, 2.0, 0.0)
+    door = abs(angles) < math.radians(12)
+    for behind in (np.nan, np.inf, 5.0):
+        ranges[door] = behind
+        features = Extractor("liu", noise=NOISE)(scan_of(ranges, angles))
+        on_wall = [s for s in features.segments if abs(s["centroid"][0] - 2.0) < 0.1]
+        assert len(on_wall) == 2
+        for line in features.segments:
+            assert line["first_beam"] > np.flatnonzero(door)[0] - 1 or (
+                line["last_beam"] < np.flatnonzero(door)[0]
+            )
+        kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
+        assert features.breakpoints["kind"].tolist()[:-2] == kinds
+
+
+def test_breakpoints_tell_who_occludes():
+    ranges = np.array([2.0] * 20 + [4.0] * 20 + [3.0] * 20)
+    scan = LaserScan(ranges, 0.0, 0.01)
+    features = Extractor("liu", noise=NOISE, sigma_d=0.5)(scan)
+    first, second, start, end = features.breakpoints
+    assert (first["beam"].tolist(), str(first["kind"]), first["occluder"]) == ([19, 20], "jump", 19)
+    np.testing.assert_allclose(first["position"], scan.points[19], rtol=1e-12)
+    assert (second["beam"].tolist(), second["occluder"]) == ([39, 40], 40)
+    np.testing.assert_allclose(second["position"], scan.points[40], rtol=1e-12)
+    assert (start["beam"].tolist(), start["occluder"]) == ([-1, 0], -1)
+    assert (end["beam"].tolist(), end["kind"]) == ([59, -1], "scan_end")
+    np.testing.assert_allclose(end["position"], scan.points[59], rtol=1e-12)
+
+
+def test_gap_over_many_missing_beams_has_no_occluder():
+    for missing, kind in ((5, "jump"), (6, "gap"), (20, "gap")):
+        ranges = np.array([2.0] * 20 + [np.nan] * missing + [4.0] * 20)
+        (point, *_) = Extractor("liu", noise=NOISE)(LaserScan(ranges, 0.0, 0.01)).breakpoints
+        assert point["kind"] == kind
+        assert point["beam"].tolist() == [19, 20 + missing]
+        assert point["occluder"] == (19 if kind == "jump" else -1)
+
+
+def test_closed_room_has_a_ring_of_corners():
+    angles = full_circle(1440)
+    features = sharp()(scan_of(room(angles, BOX), angles))
+    corners, segments = features.corners, features.segments
+    assert len(corners) == len(segments) == 4
+    assert len(features.breakpoints) == 0
+    assert not corners["convex"].any()
+    np.testing.assert_allclose(corners["opening"], math.pi / 2, atol=0.01)
+    expected = {(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)}
+    for x, y in expected:
+        assert np.hypot(*(corners["position"] - (x, y)).T).min() < 0.01
+    for corner in corners:
+        before, after = segments[corner["segments"]]
+        assert before["last_beam"] == after["first_beam"] == corner["beam"]
+    assert sorted(corners["segments"][:, 1]) == [0, 1, 2, 3]
+    assert (segments["first_beam"] > segments["last_beam"]).sum() == 1  # One over the seam.
+
+
+def test_class_over_the_seam_keeps_its_line_whole():
+    angles = full_circle(1440)
+    ranges = np.where(abs(angles) > 2.6, wall(angles, 2.0, 180.0), 6.0)
+    features = Extractor("liu", noise=NOISE, sigma_d=0.5)(scan_of(ranges, angles))
+    (line,) = [s for s in features.segments if abs(s["centroid"][0] + 2.0) < 0.01]
+    assert line["first_beam"] > line["last_beam"]
+    assert line["n_points"] == (abs(angles) > 2.6).sum()
+    assert len(features.breakpoints) == 2
+
+
+def test_ring_without_corners_has_no_straight_piece():
+    angles = full_circle()
+    features = Extractor("liu")(scan_of(np.full(len(angles), 2.0), angles))
+    assert (len(features.segments), len(features.corners), len(features.breakpoints)) == (0, 0, 0)
+    assert (features.clusters == 0).all()
