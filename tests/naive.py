@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
-from naive_fit import breakpoints, corner_at_beam, fit_line, intersection, opening_and_side
+from naive_fit import along, breakpoints, corner_at_beam, fit_line, intersection, opening_and_side
 
 LEAST_SIGMA = 1e-4
 
@@ -41,7 +42,7 @@ def bilateral(scan, sigma_d=4.0, sigma_r=0.3, half_width=8):
 
 
 def sigma(scan):
-    """Range noise by the upper median of second differences; None where nothing is valid."""
+    """Range noise by the lower median of second differences; None where nothing is valid."""
     ok, r = valid(scan), scan.ranges
     if not any(ok):
         return None
@@ -53,7 +54,7 @@ def sigma(scan):
     if not sizes:
         return LEAST_SIGMA
     # The median of |N(0, s)| is 0.6745 s; s² = (1 + 4 + 1) σ².
-    value = 1.4826 * sizes[len(sizes) // 2] / math.sqrt(6)
+    value = 1.4826 * sizes[(len(sizes) - 1) // 2] / math.sqrt(6)
     if value >= LEAST_SIGMA:
         return value
     lattice = [size for size in sizes if size > LEAST_SIGMA]
@@ -202,7 +203,17 @@ def pieces_of(n_points, corners, closed):
     if closed and not inner:
         return []
     ends = [0, *inner, n_points - 1]
-    return [(a, b, a in corners) for a, b in zip(ends, ends[1:], strict=False)]
+    return [(a, b, a in corners) for a, b in pairwise(ends)]
+
+
+def fitted(method, own, corner_before, corner_after):
+    """Beams of a piece that its line is fitted to: those next to corners are left out."""
+    if method.corner == "beam":
+        return own
+    core = own[method.corner_trim :] if corner_before else own
+    if corner_after and method.corner_trim:
+        core = core[: -method.corner_trim]
+    return core if len(core) >= 3 else own
 
 
 def liu(scan, method, noise=None, filtered=None):
@@ -236,10 +247,15 @@ def liu(scan, method, noise=None, filtered=None):
         candidates += [(beams[i], distance, value) for i, distance, value in examined]
         strong = {i: value for i, _, value in examined if value > method.threshold}
         base, pieces = len(segments), pieces_of(len(beams), strong, found.closed)
-        for first, last, _ in pieces:
+        for k, (first, last, is_corner) in enumerate(pieces):
             own = beams[first : last + 1]
-            line = fit_line(points[own], scan.angles[own], measured[own], noise, method.fit)
+            # After the last piece comes the first again, or nothing.
+            after = pieces[k + 1] if k + 1 < len(pieces) else pieces[0] if found.closed else None
+            core = fitted(method, own, is_corner, after is not None and after[2])
+            line = fit_line(points[core], scan.angles[core], measured[core], noise, method.fit)
             line |= {"first_beam": own[0], "last_beam": own[-1], "cluster": label}
+            line |= {"start": along(line, points[own[0]]), "end": along(line, points[own[-1]])}
+            line["n_points"] = len(own)
             segments.append(line)
         for k, (first, _, is_corner) in enumerate(pieces):
             if is_corner:

@@ -63,6 +63,8 @@ def fit_line(points, bearings, rho, noise, fit, passes=2):
     if t.any():
         gain = np.array([offset_gain, weights * t / (weights @ t**2)])
         covariance = gain * variances @ gain.T
+        if fit == "weighted":
+            covariance[[0, 1], [1, 0]] = 0.0  # independent at the centroid of these weights
     else:
         # No direction: uniform over half a turn.
         covariance = np.diag([offset_gain**2 @ variances, math.pi**2 / 12])
@@ -75,6 +77,12 @@ def fit_line(points, bearings, rho, noise, fit, passes=2):
         "n_points": len(points),
         "rms": math.sqrt(np.mean(e**2)),
     }
+
+
+def along(line, point):
+    """The point of a line nearest to `point`."""
+    u = np.array([math.cos(line["angle"]), math.sin(line["angle"])])
+    return line["centroid"] + ((point - line["centroid"]) @ u) * u
 
 
 def jacobian_covariance(bearings, rho, noise, fit):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -15,7 +16,7 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
 from lineament.output import canvas, figures, labels
-from lineament.trace import CANDIDATE, Trace
+from lineament.tracing import CANDIDATE, Trace
 
 CORNER_RGB = np.array([0xD1, 0x24, 0x2F]) / 255
 
@@ -224,4 +225,4 @@ scan, features = room()
 plot_scan(scan, {{"liu": features}}, {str(tmp_path / "a.png")!r})
 sys.exit("matplotlib.pyplot" in sys.modules)
 """
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=sys.path[0])
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parent)

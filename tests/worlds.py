@@ -56,7 +56,9 @@ def random_scan(seed: int, n: int | None = None) -> LaserScan:
     rng = np.random.default_rng(seed)
     n = int(rng.integers(60, 400)) if n is None else n
     full = rng.random() < 0.4
-    angles = full_circle(n) if full else rng.uniform(-3, 0) + rng.uniform(0.002, 0.015) * np.arange(n)
+    angles = rng.uniform(-3, 0) + rng.uniform(0.002, 0.015) * np.arange(n)
+    if full:
+        angles = full_circle(n)
     ranges = np.empty(n)
     if rng.random() < 0.5:
         spread = np.linspace(0, 360, int(rng.integers(3, 7)), endpoint=False)
@@ -73,7 +75,7 @@ def random_scan(seed: int, n: int | None = None) -> LaserScan:
             start = stop
     ranges += rng.choice([1e-3, 0.01, 0.03]) * rng.normal(size=n)
     if rng.random() < 0.2:
-        ranges = np.round(ranges, 2)
+        ranges = np.round(ranges, 2) + 1e-7 * rng.normal(size=n)  # A lattice, but without ties.
     for _ in range(int(rng.integers(0, 4))):
         at = int(rng.integers(0, n))
         ranges[at : at + int(rng.integers(1, 12))] = rng.choice([np.nan, np.inf, 0.0, -1.0, 60.0])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .features import FeatureBatch, Features
     from .logs import open_log
     from .scan import LaserScan, RangeNoise
-    from .trace import Trace
+    from .tracing import Trace
 
 _HOME = {
     "Extractor": "extractor",
@@ -32,7 +32,7 @@ _HOME = {
     "LineamentError": "errors",
     "LogError": "errors",
     "RangeNoise": "scan",
-    "Trace": "trace",
+    "Trace": "tracing",
     "extract": "extractor",
     "open_log": "logs",
     "trace": "extractor",

@@ -15,7 +15,7 @@ from .block import Block
 from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
 from .scan import LaserScan, RangeNoise
-from .trace import Trace
+from .tracing import Trace
 
 __all__ = ["Extractor", "extract", "trace"]
 
@@ -146,7 +146,7 @@ class Extractor:
         for name in TABLES:
             np.cumsum(np.concatenate([part.counts[name] for part in parts]), out=offsets[name][1:])
         return FeatureBatch(
-            **{name: np.concatenate([part.records[name] for part in parts]) for name in TABLES},
+            **{name: _joined([part.records[name] for part in parts]) for name in TABLES},
             clusters=np.concatenate([part.clusters for part in parts]),
             offsets=offsets,
             stamps=times,
@@ -248,6 +248,11 @@ def _same_geometry(a: LaserScan, b: LaserScan) -> bool:
     if a.is_regular and b.is_regular:
         return a.angle_min == b.angle_min and a.angle_increment == b.angle_increment
     return np.array_equal(a.angles, b.angles)
+
+
+def _joined(tables: list[NDArray[np.void]]) -> NDArray[np.void]:
+    # By way of bytes, as in `Block.written`: the padding between the fields is copied, too.
+    return np.frombuffer(b"".join(table.tobytes() for table in tables), tables[0].dtype)
 
 
 def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:

@@ -188,7 +188,7 @@ class Features:
         >>> import lineament as ln
         >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
         >>> ln.extract(scan).to_arrow()["kind"].to_pylist()
-        ['segment', 'breakpoint', 'breakpoint']
+        ['segment', 'breakpoint', 'breakpoint', 'cluster']
         """
         from .tables import features_table
 

@@ -111,7 +111,6 @@ class LaserScan:
     """
 
     ranges: Array
-    angles: Array
     angle_min: float
     angle_increment: float
     #: True where the bearings are ``angle_min + i * angle_increment``.
@@ -147,14 +146,12 @@ class LaserScan:
         own["is_regular"] = angles is None
         if angles is None:
             first, step = _regular_bearings(angle_min, angle_increment, n)
-            bearings = first + step * np.arange(n, dtype=np.float64)
-            bearings.flags.writeable = False
         elif angle_min is None and angle_increment is None:
-            bearings = _vector("angles", angles, n)
-            first, step = _irregular_bearings(bearings)
+            own["angles"] = _vector("angles", angles, n)
+            first, step = _irregular_bearings(own["angles"])
         else:
             raise ValueError("angles are given together with angle_min or angle_increment")
-        own["angles"], own["angle_min"], own["angle_increment"] = bearings, first, step
+        own["angle_min"], own["angle_increment"] = first, step
         own["range_min"], own["range_max"] = _limits(range_min, range_max)
         own["stamp"] = _finite("stamp", stamp)
         own["scan_time"] = _finite("scan_time", scan_time)
@@ -177,10 +174,17 @@ class LaserScan:
         )
 
     @cached_property
+    def angles(self) -> Array:
+        """Bearing of each beam [rad], shape (n,)."""
+        angles = self.angle_min + self.angle_increment * np.arange(len(self), dtype=np.float64)
+        angles.flags.writeable = False
+        return angles
+
+    @cached_property
     def valid(self) -> NDArray[np.bool_]:
         """Whether each beam returned a usable range, shape (n,)."""
         r = self.ranges
-        valid = (r > 0) & (r >= self.range_min) & (r < self.range_max) & (r < math.inf)
+        valid = (r > 0) & (r >= self.range_min) & (r < self.range_max)
         valid.flags.writeable = False
         return valid
 
@@ -198,7 +202,8 @@ class LaserScan:
         n, step = len(self), self.angle_increment
         if n < 3:
             return False
-        return bool(self.angles[-1] - self.angles[0] >= 2 * math.pi - 2.5 * step)
+        span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
+        return span >= 2 * math.pi - 2.5 * step
 
     @classmethod
     def from_message(cls, message: Any, *, pose: Pose | None = None) -> LaserScan:
@@ -311,7 +316,7 @@ def _irregular_bearings(angles: Array) -> tuple[float, float]:
 
 def _check_turn(name: str, first: float, last: float, step: float) -> None:
     # Some drivers repeat the first bearing at the end of the turn, and round their increment.
-    if last - first > 2 * math.pi + 1.5 * step:
+    if last - first > 2 * math.pi + min(1.5 * step, 0.1):
         raise ValueError(
             f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
         )

@@ -34,7 +34,7 @@ from .kernels.measuring import measure_rows
 from .kernels.noise import noise_rows
 from .methods.checks import check_choice, check_count, check_number
 from .scan import LaserScan, RangeNoise
-from .trace import candidate_records
+from .tracing import candidate_records
 
 __all__ = [
     "FITS",
@@ -81,7 +81,7 @@ def bilateral_filter(
     --------
     >>> scan = LaserScan([2.0, 2.1, 2.0, 5.0], angle_min=0.0, angle_increment=0.01)
     >>> bilateral_filter(scan).round(3).tolist()
-    [2.032, 2.035, 2.032, 5.0]
+    [2.033, 2.035, 2.033, 5.0]
     """
     check_number("sigma_d", sigma_d)
     check_number("sigma_r", sigma_r)
@@ -108,7 +108,7 @@ def estimate_noise(scan: LaserScan) -> RangeNoise | None:
     --------
     >>> rng = np.random.default_rng(1)
     >>> ranges = 3.0 + rng.normal(0.0, 0.02, 3000)
-    >>> estimate_noise(LaserScan(ranges, angle_min=0.0, angle_increment=0.001)).sigma.round(3)
+    >>> round(estimate_noise(LaserScan(ranges, 0.0, 0.001)).sigma, 2)
     0.02
     """
     block = _block(scan)
@@ -214,7 +214,7 @@ def corner_response(
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
     >>> corner_response(right_angle).round(2).tolist()[4:9]
-    [0.31, 0.51, 0.71, 0.51, 0.31]
+    [0.35, 0.51, 0.71, 0.51, 0.35]
     """
     xy = _points(points)
     check_count("support_radius", support_radius, least=1)
@@ -250,7 +250,7 @@ def primary_corners(
 
     Returns
     -------
-    structured array of dtype `lineament.trace.CANDIDATE`
+    structured array of dtype `lineament.tracing.CANDIDATE`
         The candidates in the order of their examination; ``beam`` counts the given points.
 
     Examples
@@ -320,6 +320,7 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
         block.noises,
         FITS[fit],
         False,
+        0,
         1.0,
         1.0,
         *block.segments,

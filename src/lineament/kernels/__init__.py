@@ -25,4 +25,4 @@ sums = njit(
 @helper
 def usable(r, range_min, range_max):
     """Whether a range is finite, positive, at least `range_min` and below `range_max`."""
-    return (r > 0.0) & (r >= range_min) & (r < range_max) & (r < 1e300)
+    return (r > 0.0) & (r >= range_min) & (r < range_max)

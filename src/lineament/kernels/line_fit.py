@@ -62,6 +62,8 @@ def fit_line(x, y, rho, first, last, noise, kind):
         oo += w * w * variance
         oa += w * w * variance * t
         aa += w * w * variance * t * t
+    if weighted:
+        oa = 0.0  # At their own centroid these are independent, but for the last iteration.
     rms = math.sqrt(squares / len(x))
     if t_sum == 0.0:
         # Points that coincide have no direction: any angle is as good.
@@ -105,7 +107,7 @@ def normal_variance(distance, rho, noise):
     cos ψ is the distance of the origin from the line over the range; ψ is kept 0.06° short of
     grazing so that no point gets all the weight.
     """
-    square = rho * rho
+    square = max(rho * rho, 1e-300)  # Not 0 for the least of ranges.
     near = max(distance * distance, 1e-6 * square)
     return range_variance(rho, noise) * near / square + noise[2] * noise[2] * (square - near)
 

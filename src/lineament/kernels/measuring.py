@@ -62,6 +62,7 @@ def measure_rows(
     noises,
     fit,
     sharp,
+    trim,
     reach,
     gap,
     segments,
@@ -91,6 +92,9 @@ def measure_rows(
         How lines are fitted, see `line_fit.fit_line`.
     sharp : bool
         Whether a corner is the intersection of its lines; else it is its point.
+    trim : int
+        Points next to a corner that are left out of the fits: the cut may be a beam or two off,
+        so that they lie on the other wall.
     reach : float
         How many spacings an intersection may lie from the point at which the cut was made.
     gap : float
@@ -118,7 +122,8 @@ def measure_rows(
         segment, corner = offsets[row, 0], offsets[row, 1]
         for k in range(counts[row, PIECES]):
             first, last = ints[row, FIRST, k], ints[row, LAST, k]
-            line = fit_line(x, y, rho, first, last, noise, fit)
+            a, b = _clear_of_corners(ints[row, BEFORE], counts[row, PIECES], k, first, last, trim)
+            line = fit_line(x, y, rho, a, b, noise, fit)
             _write_segment(
                 x, y, beam, label, first, last, line, segments, segment_ints, segment + k
             )
@@ -158,6 +163,15 @@ def measure_rows(
             break_ints,
             offsets[row, 3],
         )
+
+
+@helper
+def _clear_of_corners(before, pieces, k, first, last, trim):
+    """Leave out the points of a piece next to its corners, if enough are left for a line."""
+    after = 0 if k + 1 == pieces else k + 1
+    a = first + trim if before[k] >= 0 else first
+    b = last - trim if before[after] == k else last
+    return (a, b) if b - a >= 2 else (first, last)
 
 
 @helper

@@ -9,6 +9,8 @@ from .layout import RANGE, SPARE
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
 LEAST_SIGMA = 1e-4
+#: No scanner reports its ranges in coarser steps [m].
+COARSEST_QUANTUM = 0.15
 
 
 @kernel
@@ -66,15 +68,16 @@ def range_sigma(ranges, n, range_min, range_max, scratch):
         return sigma
     quantum = math.inf
     for i in range(count):
-        if LEAST_SIGMA < scratch[i] < quantum:
+        # What is coarser than any lattice is a jump.
+        if LEAST_SIGMA < scratch[i] < min(quantum, COARSEST_QUANTUM):
             quantum = scratch[i]
     return max(quantum / math.sqrt(12.0), LEAST_SIGMA) if quantum < math.inf else LEAST_SIGMA
 
 
 @helper
 def _median(values, count):
-    """Upper median of the first `count` values, which it reorders (Hoare's selection)."""
-    low, high, middle = 0, count - 1, count // 2
+    """Lower median of the first `count` values, which it reorders (Hoare's selection)."""
+    low, high, middle = 0, count - 1, (count - 1) // 2
     while low < high:
         pivot = values[(low + high) // 2]
         i, j = low, high

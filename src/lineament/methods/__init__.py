@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ..block import Block
     from ..features import Features
     from ..scan import LaserScan
-    from ..trace import Trace
+    from ..tracing import Trace
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method"]
 
@@ -36,7 +36,7 @@ class Method(Protocol):
         """Run again on a scan of which these features came, and keep every intermediate."""
 
 
-def get_method(name: str, **parameters: Any) -> Method:
+def get_method(name: str, /, **parameters: Any) -> Method:
     """Make a method by name.
 
     Parameters
@@ -57,7 +57,7 @@ def get_method(name: str, **parameters: Any) -> Method:
     5
     >>> get_method("lui")
     Traceback (most recent call last):
-    ValueError: method 'lui' is unknown, expected one of: liu, liu:paper
+    ValueError: method 'lui' is unknown, expected one of: liu, liu:paper, liu:scale_free
     """
     base, _, preset = str(name).partition(":")
     cls = _method_class(base) if base in METHODS else None

@@ -23,7 +23,7 @@ from ..kernels.measuring import measure_rows
 from ..kernels.noise import noise_rows
 from ..scan import LaserScan
 from ..stages import FITS, RESPONSES
-from ..trace import Trace, candidate_records
+from ..tracing import Trace, candidate_records
 from .checks import check_choice, check_count, check_number
 
 __all__ = ["Liu"]
@@ -74,6 +74,9 @@ class Liu:
         Ranges that lines are fitted to. Detection is always on filtered ones.
     corner : {"intersection", "beam"}
         Whether a corner lies where its lines meet, or on its reading.
+    corner_trim : int
+        Readings next to a corner, itself included, that the fits leave out where lines meet: the
+        filter moves cuts by a beam or two, and these would pull the lines towards each other.
 
     Raises
     ------
@@ -104,6 +107,7 @@ class Liu:
     fit: str = "total"
     measure: str = "raw"
     corner: str = "intersection"
+    corner_trim: int = 2
 
     def __post_init__(self) -> None:
         for name in ("sigma_d", "sigma_r", "spacing_scale"):
@@ -112,6 +116,7 @@ class Liu:
             check_number(name, getattr(self, name), or_equal=True)
         check_count("half_width", self.half_width, least=0)
         check_count("min_points", self.min_points, least=2)
+        check_count("corner_trim", self.corner_trim, least=0)
         check_count("support_radius", self.support_radius, least=1)
         check_choice("response", self.response, RESPONSES)
         check_choice("fit", self.fit, FITS)
@@ -195,6 +200,7 @@ class Liu:
             block.noises,
             FITS[self.fit],
             self.corner == "intersection",
+            self.corner_trim if self.corner == "intersection" else 0,
             0.5 * self.support_radius,
             self.spacing_scale,
             *block.segments,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..trace import Trace
+    from ..tracing import Trace
 
 __all__ = ["plot_map", "plot_scan", "plot_trace"]
 

@@ -13,7 +13,7 @@ from .canvas import CORNER_COLOR, FAINT, INK, count
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..trace import Trace
+    from ..tracing import Trace
 
 
 def draw_filter(axes: Axes, trace: Trace) -> None:

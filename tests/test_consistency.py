@@ -1,0 +1,130 @@
+"""Covariances tell the errors that there are, and lines are as good as the bound (Monte Carlo)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from worlds import NOISE, STEP, fan, room, vertex, wall
+
+from lineament import Extractor
+
+SIGMA = NOISE.sigma
+#: Name: bearings, distance and normal [degrees] of the wall.
+WALLS = {
+    "frontal": (fan(20), 2.0, 0.0),
+    "grazing": (fan(9), 1.0, 70.0),
+    "vertical": (fan(20) + math.pi / 2, 2.0, 90.0),
+}
+
+
+def features_of(truth, angles, runs, seed, **settings):
+    noise = SIGMA * np.random.default_rng(seed).normal(size=(runs, len(angles)))
+    extractor = Extractor("liu:scale_free", noise=NOISE, **settings)
+    return extractor.batch(truth + noise, angle_min=float(angles[0]), angle_increment=STEP)
+
+
+def line_errors(segments, distance, normal_deg):
+    """(offset at the centroid along the left normal, angle) of each line, less the truth."""
+    alpha = math.radians(normal_deg)
+    # Seen from inside, beams run along the normal turned left by 90°.
+    turn = segments["angle"] - (alpha + math.pi / 2)
+    turn = np.angle(np.exp(1j * turn))
+    left = -np.array([math.cos(alpha), math.sin(alpha)])
+    return np.column_stack((segments["centroid"] @ left + distance, turn))
+
+
+def mean_nees(errors, covariances):
+    return np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors).mean()
+
+
+def assert_consistent(errors, covariances):
+    """The mean of n squares of k normal errors lies within k ± 1.96 √(2k/n)."""
+    n, k = errors.shape
+    assert mean_nees(errors, covariances) == pytest.approx(k, abs=1.96 * math.sqrt(2 * k / n))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fit", ["weighted", "total"])
+@pytest.mark.parametrize("name", WALLS)
+def test_covariance_of_lines(name, fit):
+    angles, distance, normal = WALLS[name]
+    batch = features_of(wall(angles, distance, normal), angles, 1500, 5, fit=fit)
+    lines = batch.segments
+    assert len(lines) == 1500
+    assert (lines["n_points"] == len(angles)).all()
+    errors = line_errors(lines, distance, normal)
+    assert_consistent(errors, lines["covariance"])
+    for k in range(2):
+        assert_consistent(errors[:, k : k + 1], lines["covariance"][:, k : k + 1, k : k + 1])
+
+
+def bound(angles, distance, normal_deg):
+    """Cramér-Rao: standard deviations of the offset at the centroid, and of the angle."""
+    psi = angles - math.radians(normal_deg)
+    t, w = distance * np.tan(psi), 1 / (SIGMA * np.cos(psi)) ** 2
+    centred = t - np.average(t, weights=w)
+    return 1 / math.sqrt(w.sum()), 1 / math.sqrt(w @ centred**2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WALLS)
+def test_weighted_lines_reach_the_bound(name):
+    angles, distance, normal = WALLS[name]
+    batch = features_of(wall(angles, distance, normal), angles, 4000, 6, fit="weighted")
+    errors = line_errors(batch.segments, distance, normal)
+    rmse = np.sqrt((errors**2).mean(axis=0))
+    np.testing.assert_allclose(rmse, bound(angles, distance, normal), rtol=0.05)
+
+
+@pytest.mark.slow
+def test_plain_lines_do_not_reach_it_at_grazing_incidence():
+    """Else the test before could not fail."""
+    angles, distance, normal = WALLS["grazing"]
+    limit = bound(angles, distance, normal)[1]
+    rmse = {}
+    for fit in ("weighted", "total", "y_of_x"):
+        batch = features_of(wall(angles, distance, normal), angles, 2000, 7, fit=fit)
+        errors = line_errors(batch.segments, distance, normal)
+        rmse[fit] = math.sqrt((errors[:, 1] ** 2).mean())
+    assert rmse["total"] > 1.05 * limit
+    assert rmse["weighted"] < rmse["total"]
+    assert rmse["weighted"] < rmse["y_of_x"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fit", ["weighted", "total"])
+@pytest.mark.parametrize("convex", [True, False])
+def test_covariance_of_a_corner(fit, convex):
+    """The vertex lies on a beam: a reading shared by both walls pulls at them otherwise."""
+    angles = fan(25)
+    batch = features_of(vertex(angles, 2.83, 90, convex=convex), angles, 3000, 8, fit=fit)
+    one = [f for f in batch if len(f.segments) == 2 and len(f.corners) == 1]
+    assert len(one) > 2900
+    corners = np.concatenate([f.corners for f in one])
+    assert (corners["convex"] == convex).all()
+    errors = corners["position"] - (2.83, 0.0)
+    assert_consistent(errors, corners["covariance"])
+    assert np.sqrt((errors**2).mean(axis=0)).max() < 0.003
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fit", ["weighted", "total"])
+@pytest.mark.parametrize("distances", [(2.0, 2.2), (2.0, 2.5), (2.83, 2.7)])
+def test_covariance_of_a_corner_between_beams(fit, distances):
+    """The filter moves the cut; the readings next to it must not pull at the lines."""
+    angles, normals = fan(25), (40.0, -50.0)
+    walls = list(zip(distances, normals, strict=True))
+    batch = features_of(room(angles, walls), angles, 1500, 9, fit=fit)
+    one = [f for f in batch if len(f.segments) == 2 and len(f.corners) == 1]
+    assert len(one) > 1400
+    corners = np.concatenate([f.corners for f in one])
+    directions = np.radians(normals)
+    across = np.column_stack((np.cos(directions), np.sin(directions)))
+    errors = corners["position"] - np.linalg.solve(across, distances)
+    nees = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(corners["covariance"]), errors)
+    # The median of χ² with 2 degrees of freedom. The mean is a little above 2: now and then the
+    # cut is further off than the readings that are left out.
+    assert np.median(nees) == pytest.approx(2 * math.log(2), abs=0.15)
+    assert 1.7 < nees.mean() < 2.8

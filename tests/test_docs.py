@@ -1,0 +1,53 @@
+"""The documents name what there is."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import lineament as ln
+from lineament import stages
+from lineament.cli.commands import COMMANDS
+from lineament.methods import METHODS
+from lineament.methods.liu import Liu
+
+ROOT = Path(__file__).parent.parent
+SOURCE = ROOT / "src" / "lineament"
+
+
+def test_equations_lead_to_functions_in_their_files():
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    places = re.findall(r"`([\w.]+)`(?:, `(\w+)`)? → `([\w/]+\.py)`", text)
+    assert len(places) >= 12
+    for first, second, file in places:
+        code = (SOURCE / file).read_text(encoding="utf-8")
+        for name in filter(None, (first.split(".")[-1], second)):
+            assert re.search(rf"\bdef {name}\(", code), f"{name} is not in {file}"
+    for name in re.findall(r"`stages\.(\w+)`", text):
+        assert name in stages.__all__
+
+
+def test_equations_state_the_defaults():
+    text = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
+    for name, value in re.findall(r"`(\w+) = ([\d.]+)`", text):
+        assert getattr(Liu(), name) == float(value)
+    for name in re.findall(r"`(\w+)=\"?\w*\"?`", text):
+        assert name in {field.name for field in fields(Liu)}
+
+
+def test_readme_names_methods_commands_and_public_names():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name in METHODS:
+        assert f"| `{name}`" in text
+    for command in re.findall(r"^lineament (\w+)", text, re.MULTILINE):
+        assert command in COMMANDS
+    for name in re.findall(r"\bln\.(\w+)", text):
+        assert hasattr(ln, name)
+    for target in re.findall(r"\]\(([\w/.]+)\)", text):
+        assert (ROOT / target).exists()
+
+
+def test_every_public_name_resolves_and_is_documented():
+    for name in ln.__all__:
+        value = getattr(ln, name)
+        assert isinstance(value, str) or value.__doc__
+    assert set(ln.__all__) <= set(dir(ln))

@@ -1,0 +1,307 @@
+"""Extractor: one scan or many, any order, any threads; invariances; hostile scans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import BOX, NOISE, STEP, degenerate_scans, full_circle, random_scan, room, scan_of
+
+import lineament as ln
+from lineament import Extractor, LaserScan
+from lineament.features import TABLES
+
+DEGENERATE = degenerate_scans()
+PRESETS = ("liu", "liu:paper", "liu:scale_free")
+
+
+def same(a, b):
+    """Whether two features are equal bit for bit (but for the padding of records)."""
+    tables = all(
+        getattr(a, name)[field].tobytes() == getattr(b, name)[field].tobytes()
+        for name, dtype in TABLES.items()
+        for field in dtype.names
+    )
+    return tables and a.clusters.tobytes() == b.clusters.tobytes()
+
+
+def scans_alike(n=20, seed=0):
+    """Scans of one scanner: the same bearings."""
+    angles = full_circle(360)
+    rng = np.random.default_rng(seed)
+    rows = [room(angles + turn, BOX) for turn in rng.uniform(-3, 3, n)]
+    rows = np.array(rows) + 0.01 * rng.normal(size=(n, 360))
+    rows[rng.random(rows.shape) < 0.03] = np.nan
+    rows[3:5, 50:90] = 0.7
+    rows[7] = np.nan
+    return angles, rows
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("noise", [None, NOISE])
+def test_batch_equals_single_scans_whatever_the_threads(name, noise):
+    angles, rows = scans_alike(40)
+    given = {"angle_min": float(angles[0]), "angle_increment": 2 * math.pi / 360}
+    limits = {"range_min": 0.2, "range_max": 5.0}
+    extractor = Extractor(name, noise=noise, sigma_d=0.5)
+    singles = [extractor(LaserScan(row, **given, **limits)) for row in rows]
+    assert sum(len(f.corners) for f in singles) > 20
+    for workers in (1, 2, 3, 64):
+        batch = extractor.batch(rows, **given, **limits, workers=workers, stamps=range(40))
+        assert len(batch) == 40
+        assert all(same(a, b) for a, b in zip(batch, singles, strict=True))
+        assert [f.noise for f in batch] == [f.noise for f in singles]
+        assert batch.stamps.tolist() == list(range(40))
+
+
+def test_order_of_scans_and_reuse_do_not_matter():
+    scans = [*DEGENERATE.values(), *(random_scan(k) for k in range(10))]
+    for name in PRESETS:
+        kept = Extractor(name)
+        once = [kept(scan) for scan in scans]
+        again = [kept(scan) for scan in reversed(scans)][::-1]
+        fresh = [Extractor(name)(scan) for scan in scans]
+        for a, b, c in zip(once, again, fresh, strict=True):
+            assert same(a, b)
+            assert same(a, c)
+
+
+def test_results_do_not_change_with_the_next_scan():
+    extractor = Extractor("liu")
+    first = extractor(random_scan(3))
+    before = first.segments.tobytes(), first.clusters.tobytes()
+    extractor(LaserScan(random_scan(3).ranges[::-1], angles=random_scan(3).angles))
+    extractor(random_scan(4))
+    assert (first.segments.tobytes(), first.clusters.tobytes()) == before
+
+
+def test_change_of_bearings_and_limits_is_noticed():
+    ranges = np.full(60, 2.0)
+    extractor = Extractor("liu", noise=NOISE)
+
+    def start(**fields):
+        return extractor(LaserScan(ranges, **fields)).segments["start"]
+
+    for first in (0.0, 1.0):
+        found = start(angle_min=first, angle_increment=0.01)
+        assert np.arctan2(found[0, 1], found[0, 0]) == pytest.approx(first, abs=0.01)
+    assert len(start(angle_min=1.0, angle_increment=0.01, range_max=2.0)) == 0
+    assert len(start(angle_min=1.0, angle_increment=0.01, range_min=2.5)) == 0
+    assert len(start(angle_min=1.0, angle_increment=0.01)) == 1
+    irregular = np.linspace(2.0, 2.5, 60) + 1e-3 * np.sin(np.arange(60))
+    found = start(angles=irregular)
+    assert np.arctan2(found[0, 1], found[0, 0]) == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"ranges": [1.0, 2.0]}, r"ranges has shape \(2,\), expected \(m, n\)"),
+        ({"ranges": [["a"]]}, "ranges are no matrix"),
+        ({"workers": 0}, "workers is 0"),
+        ({"workers": 1.5}, r"workers is 1\.5"),
+        ({"workers": True}, "workers is True"),
+        ({"stamps": [1.0]}, r"stamps has shape \(1,\), expected \(2,\)"),
+        ({"angle_min": None}, "angle_min and angle_increment, or angles"),
+        ({"angle_increment": -1.0}, r"angle_increment is -1\.0"),
+        ({"range_max": 0.0}, r"range_max is 0\.0"),
+        ({"angles": [0.0]}, "angles are given together"),
+    ],
+)
+def test_batch_refuses(changes, message):
+    given = {"ranges": [[1.0] * 3] * 2, "angle_min": 0.0, "angle_increment": 0.1, **changes}
+    with pytest.raises(ValueError, match=message):
+        Extractor("liu").batch(**given)
+
+
+def test_empty_and_invalid_scans_give_no_features():
+    for name in ("zero beams", "all invalid", "two of nothing"):
+        for preset in PRESETS:
+            features = Extractor(preset)(DEGENERATE[name])
+            assert all(len(getattr(features, table)) == 0 for table in TABLES)
+            assert (features.clusters == -1).all()
+            assert len(features.clusters) == len(DEGENERATE[name])
+            assert features.noise is None
+
+
+def test_features_carry_stamp_frame_and_noise():
+    scan = LaserScan([2.0] * 30, 0.0, 0.01, stamp=4.5, frame_id="front")
+    features = ln.extract(scan, method="liu", noise=NOISE)
+    assert (features.stamp, features.frame_id, features.noise) == (4.5, "front", NOISE)
+    assert ln.extract(scan, method="liu").noise.sigma > 0
+
+
+# Invariances
+
+
+@pytest.mark.parametrize("turn", [0.5, -2.0, 3.0, 100.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_turned_bearings_turn_the_features(turn, seed):
+    scan = random_scan(seed)
+    turned = LaserScan(
+        scan.ranges, angles=scan.angles + turn, range_min=scan.range_min, range_max=scan.range_max
+    )
+    extractor = Extractor("liu:scale_free", noise=NOISE, sigma_d=1.0)
+    found, expected = extractor(turned), extractor(scan).transform(0.0, 0.0, turn)
+    assert len(found.segments) > 0
+    assert_same_features(found, expected)
+
+
+def assert_same_features(found, expected, atol=1e-9):
+    for name, dtype in TABLES.items():
+        a, b = getattr(found, name), getattr(expected, name)
+        assert len(a) == len(b)
+        for field in dtype.names:
+            if field == "angle":
+                np.testing.assert_allclose(np.exp(1j * a[field]), np.exp(1j * b[field]), atol=atol)
+            elif a[field].dtype.kind == "f":
+                # A corner of nearly parallel lines is as far off as they are alike.
+                rtol = 1e-6 if name == "corners" else 1e-9
+                np.testing.assert_allclose(a[field], b[field], rtol, atol * 10)
+            else:
+                np.testing.assert_array_equal(a[field], b[field])
+    np.testing.assert_array_equal(found.clusters, expected.clusters)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_twice_the_world_gives_twice_the_features(seed):
+    scan = random_scan(seed)
+    noise = {"noise": ln.RangeNoise(sigma=0.01)}
+    twice = {"noise": ln.RangeNoise(sigma=0.02), "sigma_r": 0.6}
+    limits = {"range_min": 2 * scan.range_min, "range_max": 2 * scan.range_max}
+    large = LaserScan(2 * scan.ranges, angles=scan.angles, **limits)
+    small = LaserScan(
+        scan.ranges, angles=scan.angles, range_min=scan.range_min, range_max=scan.range_max
+    )
+    a = Extractor("liu:scale_free", **noise)(small)
+    b = Extractor("liu:scale_free", **twice)(large)
+    assert len(a.segments) == len(b.segments) > 0
+    for name in ("start", "end", "centroid", "rms"):
+        np.testing.assert_allclose(b.segments[name], 2 * a.segments[name], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(b.segments["angle"], a.segments["angle"], atol=1e-12)
+    units = np.array([[4.0, 2.0], [2.0, 1.0]])
+    np.testing.assert_allclose(
+        b.segments["covariance"], units * a.segments["covariance"], 1e-6, 1e-15
+    )
+    np.testing.assert_allclose(b.corners["position"], 2 * a.corners["position"], rtol=1e-9)
+    np.testing.assert_allclose(b.corners["response"], a.corners["response"], rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_missing_beams_at_the_ends_change_nothing_but_indices(seed):
+    rng = np.random.default_rng(seed)
+    ranges = np.repeat(rng.uniform(1, 5, 6), 20) + 0.01 * rng.normal(size=120)
+    plain = LaserScan(ranges, 0.0, STEP)
+    padded = LaserScan([np.nan] * 9 + ranges.tolist() + [np.inf] * 5, -9 * STEP, STEP)
+    extractor = Extractor("liu", noise=NOISE)
+    a, b = extractor(plain), extractor(padded)
+    assert b.clusters[9:-5].tolist() == a.clusters.tolist()
+    assert (b.clusters[:9] == -1).all()
+    shifted = {"segments": ("first_beam", "last_beam"), "corners": ("beam",)}
+    for table, names in shifted.items():
+        for name in names:
+            assert (getattr(b, table)[name] == getattr(a, table)[name] + 9).all()
+    for name in ("start", "end", "angle", "covariance", "rms"):
+        np.testing.assert_allclose(b.segments[name], a.segments[name], rtol=1e-9, atol=1e-12)
+    assert b.breakpoints["kind"].tolist() == a.breakpoints["kind"].tolist()
+
+
+def test_deterministic_bit_for_bit():
+    for seed in range(5):
+        scan = random_scan(seed)
+        assert same(Extractor("liu")(scan), Extractor("liu")(scan))
+    angles = full_circle()
+    scan = scan_of(room(angles, BOX), angles)
+    assert same(Extractor("liu")(scan), Extractor("liu")(scan))
+
+
+# Hostile scans
+
+NASTY = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1e-9, 0.05, 0.1, 30.0, 29.999, 1e9, 1e-300]
+reading = st.one_of(
+    st.sampled_from(NASTY),
+    st.floats(0.1, 40.0),
+    st.sampled_from([2.0, 2.0, 2.01, 5.0]),
+)
+
+
+def assert_sound(features, scan, min_points):
+    n = len(scan)
+    for name, dtype in TABLES.items():
+        table = getattr(features, name)
+        for field in dtype.names:
+            if table[field].dtype.kind == "f":
+                assert np.isfinite(table[field]).all(), (name, field)
+    for table in (features.segments, features.corners):
+        assert (table["covariance"].diagonal(axis1=1, axis2=2) > 0).all()
+        determinant = np.linalg.det(table["covariance"])
+        size = table["covariance"].diagonal(axis1=1, axis2=2).prod(axis=1)
+        assert (determinant > -1e-9 * size).all()
+    segments, corners = features.segments, features.corners
+    for field in ("first_beam", "last_beam"):
+        assert ((segments[field] >= 0) & (segments[field] < n)).all()
+        assert scan.valid[segments[field]].all()
+    assert (segments["n_points"] >= min_points).all()
+    assert (segments["rms"] >= 0).all()
+    assert (features.clusters[segments["first_beam"]] == segments["cluster"]).all()
+    assert (features.clusters[segments["last_beam"]] == segments["cluster"]).all()
+    for corner in corners:
+        before, after = corner["segments"]
+        assert 0 <= before < len(segments)
+        assert 0 <= after < len(segments)
+        assert segments["last_beam"][before] == corner["beam"] == segments["first_beam"][after]
+        assert 0 <= corner["opening"] <= math.pi
+    for point in features.breakpoints:
+        known = point["beam"][point["beam"] >= 0]
+        assert scan.valid[known].all()
+        assert len(known) == (1 if point["kind"] == "scan_end" else 2)
+        assert (point["occluder"] in known) == (point["kind"] == "jump")
+    assert (features.clusters[~scan.valid] == -1).all()
+    assert_contiguous(features.clusters, scan)
+
+
+def assert_contiguous(clusters, scan):
+    valid = clusters[scan.valid]
+    changes = np.flatnonzero(np.diff(valid)) + 1
+    runs = [int(part[0]) for part in np.split(valid, changes) if len(part)]
+    runs = [label for label in runs if label >= 0]
+    if scan.is_full_circle and len(runs) > 1 and runs[0] == runs[-1]:
+        runs = runs[:-1]  # Over the seam.
+    assert runs == list(range(len(runs)))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    ranges=st.lists(reading, max_size=60),
+    preset=st.sampled_from(PRESETS),
+    full=st.booleans(),
+    limited=st.booleans(),
+    given=st.booleans(),
+    least=st.integers(2, 6),
+    fit=st.sampled_from(["total", "y_of_x", "weighted"]),
+)
+def test_hostile_scans_give_sound_features(ranges, preset, full, limited, given, least, fit):
+    limits = {"range_min": 0.05, "range_max": 30.0} if limited else {}
+    step = 2 * math.pi / max(len(ranges), 1) if full else 0.01
+    scan = LaserScan(ranges, -math.pi, step, **limits)
+    noise = NOISE if given else None
+    features = Extractor(preset, noise=noise, min_points=least, fit=fit)(scan)
+    assert_sound(features, scan, least)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", PRESETS)
+def test_many_random_scans_give_sound_features(preset):
+    extractor = Extractor(preset, threshold=0.1)
+    for seed in range(1000, 1400):
+        scan = random_scan(seed)
+        assert_sound(extractor(scan), scan, 3)
+
+
+@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_degenerate_scans_give_sound_features(preset, scan):
+    assert_sound(Extractor(preset)(scan), scan, 3)
