@@ -38,7 +38,8 @@ wheel: .venv/ready
 	rm -rf dist build/empty
 	$(BIN)/python -m build --no-isolation --quiet
 	$(PYTHON) -m venv build/empty
-	build/empty/bin/python -m pip install --quiet --constraint requirements.lock dist/lineament-*-py3-none-any.whl
+	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
+	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
 	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
 
 bench: .venv/ready

@@ -7,7 +7,7 @@ import contextlib
 import numpy as np
 import pytest
 
-from lineament import LaserScan, LogError
+from lineament import LaserScan, LineamentError, LogError
 from lineament.logs import open_log, save_npz
 
 GOOD = {"ranges": np.ones((4, 3)), "angle_min": 0.0, "angle_increment": 0.1}
@@ -82,10 +82,10 @@ def test_what_cannot_be_saved_leaves_nothing(tmp_path, scans, extra, problem):
 
 
 def test_nowhere_to_save(tmp_path):
-    with pytest.raises(LogError, match="cannot be written"):
+    with pytest.raises(LineamentError, match="does not exist"):
         save_npz(tmp_path / "missing" / "a.npz", [scan()])
     (tmp_path / "folder").mkdir()
-    with pytest.raises(LogError, match="cannot be written"):
+    with pytest.raises(LineamentError, match="is a folder"):
         save_npz(tmp_path / "folder", [scan()])
     assert [file.name for file in tmp_path.iterdir()] == ["folder"]
 

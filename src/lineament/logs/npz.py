@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..atomic import naming_errors, written_beside
 from ..errors import LogError
 from ..scan import LaserScan
 from .base import Head, Log
@@ -175,7 +175,7 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
     ValueError
         If there are no scans, bearings differ, only some scans have intensities, or an extra
         key is one of the log's own or holds objects.
-    LogError
+    LineamentError
         If the file cannot be written.
 
     Examples
@@ -194,20 +194,8 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
         arrays[key] = np.asarray(value)
         if arrays[key].dtype.hasobject:
             raise ValueError(f"extra key {key} holds objects, expected numbers or text")
-    target = Path(path)
-    temporary = None
-    try:
-        with tempfile.NamedTemporaryFile(
-            dir=target.parent, prefix=f".{target.name}.", delete=False
-        ) as file:
-            temporary = Path(file.name)
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-        temporary.replace(target)
-    except OSError as error:
-        raise LogError(target, f"cannot be written: {error.strerror or error}") from None
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
+    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
 def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:

@@ -6,8 +6,8 @@ import os
 from importlib import import_module
 from pathlib import Path
 
+from ..atomic import written_beside
 from ..errors import LineamentError
-from .atomic import written_beside
 from .writer import Writer
 
 __all__ = ["ENDINGS", "Writer", "open_writer", "written_beside"]

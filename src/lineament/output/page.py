@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
+from ..atomic import naming_errors, written_beside
 from ..errors import LineamentError
-from .atomic import naming_errors, written_beside
 
 __all__ = ["write_page"]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from ..atomic import naming_errors, written_beside
 from ..features import Features
-from .atomic import naming_errors, written_beside
 
 __all__ = ["Writer"]
 
