@@ -11,8 +11,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numba
 import numpy as np
 
 import lineament as ln
@@ -42,11 +44,42 @@ def scans_of(sensor: str) -> list[ln.LaserScan]:
     return list(drive(world, waypoints, SENSORS[sensor], rate=0.4, seed=11))
 
 
+def arithmetic(n: int) -> float:
+    """Work that needs nothing but a processor: what threads can gain at all, here and now."""
+    total = 0.0
+    for i in range(n):
+        total += (i * 0.5) % 3.0
+    return total
+
+
+def gain_of_two(one: Callable[[], object], two: Callable[[], object]) -> float:
+    """Median ratio of the times of two calls, in turns: the machine's moods meet both."""
+    ratios = []
+    for _ in range(15):
+        times = []
+        for call in (one, two):
+            started = time.perf_counter()
+            call()
+            times.append(time.perf_counter() - started)
+        ratios.append(times[0] / times[1])
+    return statistics.median(ratios)
+
+
+def gain_of_the_machine() -> float:
+    compiled = numba.njit(nogil=True)(arithmetic)
+    compiled(1)
+    with ThreadPoolExecutor(2) as pool:
+        return gain_of_two(
+            lambda: compiled(20_000_000), lambda: list(pool.map(compiled, [10_000_000] * 2))
+        )
+
+
 def speed_of_method(method: str, sensor: str) -> tuple[int, float, float, float]:
     """Beams; µs a scan in the kernels and through the call; gain of a second thread."""
     scans = scans_of(sensor)
     extractor, first = ln.Extractor(method), scans[0]
-    rows = np.array([scan.ranges for scan in scans] * 20)
+    ranges = np.array([scan.ranges for scan in scans])
+    rows = np.tile(ranges, (round(6e6 / ranges.size), 1))
 
     def batch(workers: int) -> object:
         return extractor.batch(
@@ -59,15 +92,11 @@ def speed_of_method(method: str, sensor: str) -> tuple[int, float, float, float]
         )
 
     block = extractor._new_block(first, len(scans))
-    block.load(rows[: len(scans)])
+    block.load(ranges)
     kernels = median_seconds(lambda: extractor.method.run(block)) / len(scans)
     call = median_seconds(lambda: [extractor(scan) for scan in scans]) / len(scans)
-    # In turns, so that a change of the machine's speed meets both.
-    ratios = []
-    for _ in range(9):
-        one = median_seconds(lambda: batch(1), least=0.0, repetitions=1)
-        ratios.append(one / median_seconds(lambda: batch(2), least=0.0, repetitions=1))
-    return len(first), 1e6 * kernels, 1e6 * call, statistics.median(ratios)
+    gain = gain_of_two(lambda: batch(1), lambda: batch(2))
+    return len(first), 1e6 * kernels, 1e6 * call, gain
 
 
 def seconds_of(*arguments: str, **environment: str) -> float:
@@ -148,6 +177,7 @@ def main() -> None:
     for sensor in ("paper", "utm30lx"):
         beams, kernels, call, gain = speed_of_method(method, sensor)
         print(f"| `{method}` | {beams} | {kernels:.1f} µs | {call:.1f} µs | {gain:.2f} × |")
+    print(f"| arithmetic alone | | | | {gain_of_the_machine():.2f} × |")
     print("\n| | |\n|---|---|")
     for name, value in [*start_up(), *rates]:
         print(f"| {name} | {value} |")

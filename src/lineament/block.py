@@ -40,6 +40,7 @@ class Block:
 
     def __init__(self, frame: LaserScan, noise: Array, capacity: int, own: Any = None) -> None:
         n = len(frame)
+        self.frame, self.capacity = frame, capacity
         self.rows = 0
         self.beams = n
         self.cosines, self.sines = np.cos(frame.angles), np.sin(frame.angles)
@@ -62,21 +63,39 @@ class Block:
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
         self._ranges = self.floats[:, layout.RANGE, :n]
 
+    def fits(self, scan: LaserScan) -> bool:
+        """Whether a scan has the bearings and range limits that the block was made for."""
+        frame = self.frame
+        if scan.range_min != frame.range_min or scan.range_max != frame.range_max:
+            return False
+        if scan.is_regular and frame.is_regular:
+            return (
+                len(scan) == self.beams
+                and scan.angle_min == frame.angle_min
+                and scan.angle_increment == frame.angle_increment
+            )
+        return np.array_equal(scan.angles, frame.angles)
+
     def load(self, ranges: Array) -> None:
         """Take in the ranges of some scans, shape (m, n), or of one, shape (n,)."""
         self.rows = 1 if ranges.ndim == 1 else len(ranges)
         self._ranges[: self.rows] = ranges
 
+    def raw(self) -> dict[str, bytes]:
+        """Copy the records that the last run wrote, as bytes, by the name of their table."""
+        counts = self.offsets[self.rows].tolist()
+        # Numpy would copy records field by field, several times slower, and not their padding.
+        return {
+            name: records[:count].tobytes() if count else b""
+            for (name, records), count in zip(self._records.items(), counts, strict=True)
+        }
+
     def written(self) -> dict[str, NDArray[np.void]]:
         """Copy the records that the last run wrote, by the name of their table."""
-        tables = {}
-        counts = self.offsets[self.rows].tolist()
-        for (name, records), count in zip(self._records.items(), counts, strict=True):
-            # By way of bytes: numpy copies records field by field, several times slower.
-            tables[name] = (
-                np.frombuffer(records[:count].tobytes(), records.dtype) if count else _NONE[name]
-            )
-        return tables
+        return {
+            name: np.frombuffer(raw, TABLES[name]) if raw else _NONE[name]
+            for name, raw in self.raw().items()
+        }
 
     def by_beam(self, line: int) -> Array:
         """Spread a line of floats of the first row, by usable beam, over all beams; else NaN."""

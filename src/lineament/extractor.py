@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .batching import block_capacity, run_batch
 from .block import Block
 from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
@@ -18,9 +16,6 @@ from .scan import LaserScan, RangeNoise
 from .tracing import Trace
 
 __all__ = ["Extractor", "extract", "trace"]
-
-#: Values in a block of a batch: its arrays stay in the second-level cache.
-_BLOCK_VALUES = 4096
 
 
 class Extractor:
@@ -67,14 +62,13 @@ class Extractor:
         self.noise = noise
         self._noise_row = noise_row(noise)
         self._block: Block | None = None
-        self._scan: LaserScan | None = None
+        self._workers: list[Block] = []
 
     def __call__(self, scan: LaserScan) -> Features:
         """Extract the features of one scan."""
         block = self._block
-        if block is None or self._scan is None or not _same_geometry(scan, self._scan):
+        if block is None or not block.fits(scan):
             block = self._block = self._new_block(scan, 1)
-        self._scan = scan
         block.load(scan.ranges)
         self.method.run(block)
         return Features(
@@ -137,20 +131,16 @@ class Extractor:
             range_max=range_max,
             frame_id=frame_id,
         )
-        parts = [
-            part
-            for worker in _map(workers, partial(self._run_all, frame), _split(rows, workers))
-            for part in worker
-        ]
+        found = run_batch(rows, self._blocks_of(frame, max(1, min(workers, m))), self.method.run)
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
-        for name in TABLES:
-            np.cumsum(np.concatenate([part.counts[name] for part in parts]), out=offsets[name][1:])
+        for k, name in enumerate(TABLES):
+            np.cumsum(found.counts[:, k], out=offsets[name][1:])
         return FeatureBatch(
-            **{name: _joined([part.records[name] for part in parts]) for name in TABLES},
-            clusters=np.concatenate([part.clusters for part in parts]),
+            **found.records,
+            clusters=found.clusters,
             offsets=offsets,
             stamps=times,
-            noises=np.concatenate([part.noises for part in parts]),
+            noises=found.noises,
             frame_id=frame.frame_id,
         )
 
@@ -158,40 +148,17 @@ class Extractor:
         """Extract the features of one scan and keep every intermediate of the run."""
         return self.method.trace(scan, self(scan))
 
+    def _blocks_of(self, frame: LaserScan, workers: int) -> list[Block]:
+        """Give each worker a block; those of the last batch, where they fit."""
+        # New memory costs more to touch than to fill, above all from several threads at once.
+        kept = [block for block in self._workers if block.fits(frame)]
+        capacity = block_capacity(len(frame))
+        made = [self._new_block(frame, capacity) for _ in range(workers - len(kept))]
+        self._workers = [*kept, *made]
+        return self._workers[:workers]
+
     def _new_block(self, frame: LaserScan, capacity: int) -> Block:
         return Block(frame, self._noise_row, capacity, self.method.own_arrays(len(frame)))
-
-    def _run_all(self, frame: LaserScan, rows: NDArray[np.float64]) -> list[_Part]:
-        """Run over many rows, a block at a time, in one thread."""
-        m, n = rows.shape
-        capacity = max(1, min(m, _BLOCK_VALUES // max(n, 1)))
-        block = self._new_block(frame, capacity)
-        parts = []
-        for start in range(0, max(m, 1), capacity):
-            block.load(rows[start : start + capacity])
-            self.method.run(block)
-            parts.append(_Part.of(block))
-        return parts
-
-
-class _Part(NamedTuple):
-    """Copies of what one run over a block wrote."""
-
-    records: dict[str, NDArray[np.void]]
-    counts: dict[str, NDArray[np.int64]]
-    clusters: NDArray[np.int32]
-    noises: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, block: Block) -> _Part:
-        m = block.rows
-        counts = np.diff(block.offsets[: m + 1], axis=0)
-        return cls(
-            block.written(),
-            {name: counts[:, k] for k, name in enumerate(TABLES)},
-            block.clusters[:m].copy(),
-            block.noises[:m].copy(),
-        )
 
 
 def extract(
@@ -242,19 +209,6 @@ def trace(
     return Extractor(method, noise=noise, **parameters).trace(scan)
 
 
-def _same_geometry(a: LaserScan, b: LaserScan) -> bool:
-    if a.range_min != b.range_min or a.range_max != b.range_max or len(a) != len(b):
-        return False
-    if a.is_regular and b.is_regular:
-        return a.angle_min == b.angle_min and a.angle_increment == b.angle_increment
-    return np.array_equal(a.angles, b.angles)
-
-
-def _joined(tables: list[NDArray[np.void]]) -> NDArray[np.void]:
-    # By way of bytes, as in `Block.written`: the padding between the fields is copied, too.
-    return np.frombuffer(b"".join(table.tobytes() for table in tables), tables[0].dtype)
-
-
 def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
     try:
         rows = np.asarray(ranges, dtype=np.float64)
@@ -263,14 +217,3 @@ def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
     if rows.ndim != 2:
         raise ValueError(f"ranges has shape {rows.shape}, expected (m, n): one scan a row")
     return rows
-
-
-def _split(rows: NDArray[np.float64], parts: int) -> list[NDArray[np.float64]]:
-    return np.array_split(rows, max(1, min(parts, len(rows))))
-
-
-def _map(workers: int, work: Any, items: list[Any]) -> Iterable[Any]:
-    if workers == 1 or len(items) == 1:
-        return map(work, items)
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(work, items))
