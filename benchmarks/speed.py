@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import platform
 import statistics
@@ -42,6 +43,42 @@ def median_seconds(call: Callable[[], object], least: float = 0.2, repetitions: 
 def scans_of(sensor: str) -> list[ln.LaserScan]:
     world, waypoints = building()
     return list(drive(world, waypoints, SENSORS[sensor], rate=0.4, seed=11))
+
+
+def reference_filter(r, weights, sums, w, half_width, sigma_d, scale):  # type: ignore[no-untyped-def]
+    """A bilateral filter in float64, by exp(-u) ≈ (1 - t + t²/2)^64, t = min(u, 48)/64.
+
+    It takes 2.6 µs for 481 beams and 8 offsets on the machine from which the aims come: what it
+    takes here tells how the two machines compare.
+    """
+    for k in range(1, half_width + 1):
+        closeness = math.exp(-0.5 * (k / sigma_d) ** 2)
+        for i in range(len(r) - k):
+            d = r[i + k] - r[i]
+            u = scale * d * d
+            t = (u if u < 48.0 else 48.0) * (1.0 / 64.0)
+            e = 1.0 - t * (1.0 - 0.5 * t)
+            e = e * e
+            e = e * e
+            e = e * e
+            e = e * e
+            e = e * e
+            w[i] = closeness * e * e
+        for i in range(len(r) - k):
+            weights[i] += w[i]
+            sums[i] += w[i] * r[i + k]
+        for i in range(len(r) - k):
+            weights[i + k] += w[i]
+            sums[i + k] += w[i] * r[i]
+
+
+def reference_microseconds() -> float:
+    compiled = numba.njit(nogil=True, error_model="numpy")(reference_filter)
+    ranges = 3.0 + np.random.default_rng(0).normal(0.0, 0.01, 481)
+    scratch = [np.zeros(481) for _ in range(3)]
+    full = median_seconds(lambda: compiled(ranges, *scratch, 8, 4.0, 0.5 / 0.3**2))
+    call = median_seconds(lambda: compiled(ranges, *scratch, 0, 4.0, 0.5 / 0.3**2))
+    return 1e6 * (full - call)
 
 
 def arithmetic(n: int) -> float:
@@ -134,6 +171,7 @@ def start_up() -> list[tuple[str, str]]:
     return [
         ("first compile", f"{statistics.median(first):.1f} s"),
         ("cached start, import of numba included", f"{statistics.median(cached):.2f} s"),
+        ("float64 filter for reference (2.6 µs elsewhere)", f"{reference_microseconds():.1f} µs"),
         ("`lineament --help`", f"{1e3 * seconds_of('-m', 'lineament', '--help'):.0f} ms"),
     ]
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from .errors import LineamentError
 from .extractor import Extractor
 from .features import TABLES
@@ -117,7 +119,7 @@ def extract_log(
             writer.write(features)
             scans += 1
             beams += len(scan)
-            valid += int(scan.valid.sum())
+            valid += int(np.count_nonzero(scan.valid))
             for name in TABLES:
                 found[name] += len(getattr(features, name))
     return Extraction(

@@ -262,6 +262,8 @@ def _number(name: str, value: object) -> float:
 
 
 def _finite(name: str, value: object) -> float:
+    if type(value) is float and math.isfinite(value):
+        return value
     number = _number(name, value)
     if not math.isfinite(number):
         raise ValueError(f"{name} is {number}, expected a finite number")
@@ -274,7 +276,7 @@ def _vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
         given = np.asarray(values)
         if given.dtype.kind == "c":
             raise TypeError
-        vector = np.array(given, dtype=np.float64)
+        vector = given.astype(np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
     if vector.ndim != 1:

@@ -32,6 +32,8 @@ _KNOWN = re.compile(
     rb"(?m)^[ \t]*(?:PARAM|SYNC|ODOM|NEFF|TRUEPOS|[FR]LASER|LASER[345]|RAWLASER\d|ROBOTLASER\d"
     rb"|VERTEX2|EDGE2)[ \t]"
 )
+#: The bulk of the lines of most logs, known by their beginning, which is quicker.
+_OFTEN = (b"ODOM ", b"NEFF ", b"EDGE2 ", b"VERTEX2 ")
 _LASER_MAX = re.compile(rb"(?:robot|laser)_(front|rear)_?laser_max$")
 _PARAM_TOPIC = {b"front": "FLASER", b"rear": "RLASER"}
 
@@ -134,6 +136,8 @@ class CarmenLog(Log):
         numbers = _Numbers()
         range_max = dict.fromkeys(_TOPICS, DEFAULT_RANGE_MAX)
         for number, line in self._lines():
+            if line.startswith(_OFTEN):
+                continue
             name = _message(line)
             if name in self._wanted:
                 try:
