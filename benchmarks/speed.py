@@ -89,17 +89,23 @@ def arithmetic(n: int) -> float:
     return total
 
 
-def gain_of_two(one: Callable[[], object], two: Callable[[], object]) -> float:
-    """Median ratio of the times of two calls, in turns: the machine's moods meet both."""
-    ratios = []
-    for _ in range(15):
-        times = []
-        for call in (one, two):
+def in_turns(
+    one: Callable[[], object], two: Callable[[], object], rounds: int
+) -> list[list[float]]:
+    """Times of two calls, one after the other: the machine's moods meet both."""
+    times: list[list[float]] = [[], []]
+    for _ in range(rounds):
+        for call, taken in zip((one, two), times, strict=True):
             started = time.perf_counter()
             call()
-            times.append(time.perf_counter() - started)
-        ratios.append(times[0] / times[1])
-    return statistics.median(ratios)
+            taken.append(time.perf_counter() - started)
+    return times
+
+
+def gain_of_two(one: Callable[[], object], two: Callable[[], object]) -> float:
+    """Ratio of the median times of two calls."""
+    first, second = in_turns(one, two, 15)
+    return statistics.median(first) / statistics.median(second)
 
 
 def gain_of_the_machine() -> float:
@@ -111,8 +117,14 @@ def gain_of_the_machine() -> float:
         )
 
 
-def speed_of_method(method: str, sensor: str) -> tuple[int, float, float, float]:
-    """Beams; µs a scan in the kernels and through the call; gain of a second thread."""
+def microseconds(times: list[float], scans: int) -> str:
+    """Median time of a scan, and that of the best tenth."""
+    best, *_ = statistics.quantiles(times, n=10)
+    return f"{1e6 * statistics.median(times) / scans:.1f} ({1e6 * best / scans:.1f}) µs"
+
+
+def speed_of_method(method: str, sensor: str) -> tuple[int, str, str, float]:
+    """Beams; time of a scan in the kernels and through the call; gain of a second thread."""
     scans = scans_of(sensor)
     extractor, first = ln.Extractor(method), scans[0]
     ranges = np.array([scan.ranges for scan in scans])
@@ -130,10 +142,14 @@ def speed_of_method(method: str, sensor: str) -> tuple[int, float, float, float]
 
     block = extractor._new_block(first, len(scans))
     block.load(ranges)
-    kernels = median_seconds(lambda: extractor.method.run(block)) / len(scans)
-    call = median_seconds(lambda: [extractor(scan) for scan in scans]) / len(scans)
+    kernels, call = (
+        microseconds(times, len(scans))
+        for times in in_turns(
+            lambda: extractor.method.run(block), lambda: [extractor(scan) for scan in scans], 1500
+        )
+    )
     gain = gain_of_two(lambda: batch(1), lambda: batch(2))
-    return len(first), 1e6 * kernels, 1e6 * call, gain
+    return len(first), kernels, call, gain
 
 
 def seconds_of(*arguments: str, **environment: str) -> float:
@@ -211,10 +227,10 @@ def main() -> None:
     print(f"Machine: {machine()}\n")
     rates = throughput()
     print("| method | beams | in the kernels | `Extractor.__call__` | `batch`, 2 threads |")
-    print("|---|---|---|---|---|")
+    print("|---|---|---|---|---|")  # times: median (best tenth)
     for sensor in ("paper", "utm30lx"):
         beams, kernels, call, gain = speed_of_method(method, sensor)
-        print(f"| `{method}` | {beams} | {kernels:.1f} µs | {call:.1f} µs | {gain:.2f} × |")
+        print(f"| `{method}` | {beams} | {kernels} | {call} | {gain:.2f} × |")
     print(f"| arithmetic alone | | | | {gain_of_the_machine():.2f} × |")
     print("\n| | |\n|---|---|")
     for name, value in [*start_up(), *rates]:
