@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..features import TABLES, Features
 from ..scan import LaserScan, Pose
-from . import canvas, drawing, stages
+from . import canvas, drawing, stage_panels
 from .canvas import CORNER_COLOR, INK, count
 from .labels import label_points
 
@@ -99,8 +99,8 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
     height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), 6.2)
     figure = canvas.new_figure(13, 4.0 + height + 1.0)
     panels = figure.subplots(2, 2, height_ratios=[3.2, height])
-    stages.draw_filter(panels[0, 0], trace)
-    stages.draw_spacing(panels[0, 1], trace)
+    stage_panels.draw_filter(panels[0, 0], trace)
+    stage_panels.draw_spacing(panels[0, 1], trace)
 
     shown = drawing.draw_beams(panels[1, 0], scan, trace.clusters)
     n_classes = len(np.unique(trace.clusters[trace.clusters >= 0]))
@@ -108,7 +108,7 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
     about = f"{count(n_classes, 'class', 'classes')} · {count(n_noise, 'noise point')}"
     canvas.style_plane(panels[1, 0], "c  Classes", about, shown)
 
-    positions = stages.draw_candidates(panels[1, 1], trace)
+    positions = stage_panels.draw_candidates(panels[1, 1], trace)
     n_accepted = int(candidates["accepted"].sum())
     about = (
         f"{count(len(candidates), 'candidate')} · {n_accepted} accepted · "
