@@ -77,6 +77,11 @@ def assert_same_features(features, twin, rtol=1e-7, atol=1e-9):
                         record["covariance"] / np.outer(scale, scale),
                         atol=1e-6,
                     )
+            elif name == "convex":
+                # Arms that lie upon each other open to neither side.
+                opens = table["opening"] > 1e-9
+                expected = np.array([record["convex"] for record in records], bool)
+                assert table["convex"][opens].tolist() == expected[opens].tolist()
             else:
                 equal(table, records, name)
     assert len(features.breakpoints) == len(twin["breakpoints"])

@@ -214,11 +214,29 @@ def test_nothing_slips_through_a_corner():
 
 
 @pytest.mark.parametrize(
-    ("pose", "angles"), [((0, 0), [0]), ((0, 0, INF), [0]), ((0, 0, 0), [[0]]), ((0, 0, 0), [INF])]
+    ("pose", "angles"),
+    [
+        ((0, 0), [0]),
+        ((0, 0, INF), [0]),
+        ((0, 0, 0), [[0]]),
+        ((0, 0, 0), [INF]),
+        (np.zeros((2, 3)), [0]),
+        (np.zeros((2, 3)), [0, 0, 0]),
+    ],
 )
 def test_cast_refuses(pose, angles):
     with pytest.raises(ValueError, match="expected"):
         cast_rays(WALL, pose, angles)
+
+
+def test_each_beam_may_have_its_own_pose():
+    rng = np.random.default_rng(8)
+    world = World(rng.uniform(-5, 5, (12, 4)), [[1, 1, 0.5]])
+    poses, angles = rng.uniform(-2, 2, (1500, 3)), rng.uniform(-3, 3, 1500)
+    ranges, surface = cast_rays(world, poses, angles)
+    for i in range(0, 1500, 7):
+        (alone,), (met,) = cast_rays(world, tuple(poses[i]), angles[[i]])
+        assert (ranges[i], surface[i]) == (alone, met)
 
 
 def test_no_beams():
@@ -362,7 +380,9 @@ def test_same_seed_same_scan():
     [
         ("paper", 481, -80, 80, False),
         ("utm30lx", 1081, -135, 135, False),
+        ("noisy", 481, -80, 80, False),
         ("lms361", 361, -90, 90, False),
+        ("lms181", 181, -90, 90, False),
         ("rplidar", 720, -180, 179.5, True),
         ("ld19", 455, -180, 180 - 360 / 455, True),
     ],
@@ -395,6 +415,78 @@ def test_presets(name, n_beams, first, last, full):
 def test_sensor_refuses(change):
     with pytest.raises(ValueError, match=rf"Sensor\.{next(iter(change))} is "):
         replace(SENSORS["paper"], **change)
+
+
+# Motion
+
+
+def test_poses_of_a_sweep_by_hand():
+    # A full turn of the mirror in 0.1 s, at 1 m/s and a quarter turn: along a quarter of a circle.
+    sensor = ring_sensor(4, rate=10.0)
+    assert sensor.time_increment == pytest.approx(0.025)
+    turn_rate = math.pi / 2 / 0.1
+    poses = sensor.sweep((1.0, 2.0, math.pi / 2), (1.0, 0.0, turn_rate))
+    radius = 1.0 / turn_rate
+    turned = turn_rate * 0.025 * np.arange(4)
+    expected = np.column_stack(
+        (1 - radius * (1 - np.cos(turned)), 2 + radius * np.sin(turned), math.pi / 2 + turned)
+    )
+    np.testing.assert_allclose(poses, expected, atol=1e-12)
+    # To the left, without a turn.
+    np.testing.assert_allclose(
+        sensor.sweep((1.0, 2.0, math.pi / 2), (0.0, 2.0, 0.0))[3], (0.85, 2, math.pi / 2)
+    )
+
+
+def test_a_sweep_is_the_sum_of_small_steps():
+    sensor, twist = ring_sensor(200, rate=1.0), np.array([0.7, -0.4, 1.9])
+    x, y, theta = 0.3, -0.2, 2.0
+    n = 400
+    for _ in range(199 * n):
+        dt = sensor.time_increment / n
+        middle = theta + twist[2] * dt / 2
+        x += dt * (twist[0] * math.cos(middle) - twist[1] * math.sin(middle))
+        y += dt * (twist[0] * math.sin(middle) + twist[1] * math.cos(middle))
+        theta += twist[2] * dt
+    last = sensor.sweep((0.3, -0.2, 2.0), tuple(twist))[-1]
+    np.testing.assert_allclose(last, (x, y, theta), atol=1e-8)
+
+
+def test_ranges_are_those_from_where_each_beam_was_taken():
+    sensor, twist = ring_sensor(300, rate=5.0), (1.5, 0.3, -2.0)
+    pose = (-1.0, 0.5, 0.7)
+    scan = sensor.scan(room(), pose, np.random.default_rng(0), stamp=3.0, twist=twist)
+    expected, _ = cast_rays(room(), sensor.sweep(pose, twist), sensor.angles)
+    np.testing.assert_array_equal(scan.ranges, expected)
+    assert (scan.pose, scan.stamp) == (pose, 3.0)
+    assert scan.scan_time == pytest.approx(300 * scan.time_increment)
+    still = sensor.scan(room(), pose, np.random.default_rng(0))
+    assert scan.ranges[0] == still.ranges[0]
+    assert np.abs(scan.ranges - still.ranges).max() > 0.1
+
+
+def test_a_scan_is_undone_by_the_poses_of_its_beams():
+    sensor, twist, pose = SENSORS["utm30lx"], (2.0, 0.0, 3.0), (0.0, 1.0, 0.0)
+    quiet = replace(sensor, noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0)
+    scan = quiet.scan(room(), pose, np.random.default_rng(0), twist=twist)
+    x, y, theta = quiet.sweep(pose, twist)[scan.valid].T
+    bearings, ranges = scan.angles[scan.valid] + theta, scan.ranges[scan.valid]
+    points = np.column_stack((x + ranges * np.cos(bearings), y + ranges * np.sin(bearings)))
+    np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-9)
+
+
+def test_a_sensor_at_rest_draws_the_same_numbers():
+    sensor = SENSORS["rplidar"]
+    still, creeping = (
+        sensor.scan(room(), (0, 0, 0), np.random.default_rng(3), twist=(v, 0.0, 0.0)).ranges
+        for v in (0.0, 1e-15)
+    )
+    np.testing.assert_allclose(still, creeping, atol=1e-9)
+
+
+def test_twist_refused():
+    with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
+        SENSORS["paper"].sweep((0, 0, 0), (1.0, INF, 0.0))
 
 
 # Drives
@@ -473,6 +565,23 @@ def test_drive_is_determined_by_its_seed():
     # The same start gives the same scans, whatever follows.
     longer = ranges(1, [*way, (0, 1)])
     np.testing.assert_array_equal(longer[: len(first)], first)
+
+
+def test_a_drive_moves_with_its_own_velocity():
+    # 2 m at 0.5 m/s, a right turn of 90° at 45°/s, 1 m: as in test_poses_by_hand.
+    way, quarter = [(0, 0), (0, 2), (1, 2)], math.pi / 4
+    sensor = ring_sensor(60)
+    scans = list(drive(drum(9), way, sensor, speed=0.5, turn_rate=quarter, rate=1, moving=True))
+    twists = [(0.5, 0, 0)] * 4 + [(0, 0, -quarter)] * 2 + [(0.5, 0, 0)] * 2 + [(0, 0, 0)]
+    for scan, twist in zip(scans, twists, strict=True):
+        expected, _ = cast_rays(drum(9), sensor.sweep(scan.pose, twist), sensor.angles)
+        np.testing.assert_allclose(scan.ranges, expected)
+
+
+def test_a_drive_stands_still_for_its_scans_unless_it_is_to_move():
+    way = [(-2, 0), (0, 0), (0, 1)]
+    for scan in drive(room(), way, ring_sensor(60), rate=2):
+        np.testing.assert_array_equal(scan.ranges, ring_sensor(60).ideal(room(), scan.pose)[0])
 
 
 def test_walls_seen_on_a_drive_stay_in_place():

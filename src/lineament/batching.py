@@ -62,8 +62,8 @@ def run_batch(
                     lambda k: _run_share(rows, shares[k], blocks[k], run, batch), range(len(blocks))
                 )
             )
-    for name, dtype in TABLES.items():
-        parts = [part for of_share in written for part in of_share[name]]
+    for k, (name, dtype) in enumerate(TABLES.items()):
+        parts = [raw[k] for of_share in written for raw in of_share]
         batch.records[name] = np.frombuffer(b"".join(parts), dtype)
     return batch
 
@@ -74,9 +74,9 @@ def _run_share(
     block: Block,
     run: Callable[[Block], None],
     batch: Batch,
-) -> dict[str, list[bytes]]:
+) -> list[list[bytes]]:
     """Run over some of the rows; arrays go to the batch at once, records are handed back."""
-    written: dict[str, list[bytes]] = {name: [] for name in TABLES}
+    written = []
     own = block.clusters, block.noises
     for start in share[:: block.capacity]:
         part = slice(start, min(start + block.capacity, share.stop))
@@ -84,7 +84,6 @@ def _run_share(
         block.clusters, block.noises = batch.clusters[part], batch.noises[part]
         run(block)
         batch.counts[part] = np.diff(block.offsets[: block.rows + 1], axis=0)
-        for name, raw in block.raw().items():
-            written[name].append(raw)
+        written.append(block.raw())
     block.clusters, block.noises = own
     return written

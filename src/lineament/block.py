@@ -16,15 +16,16 @@ __all__ = ["Block"]
 
 Array = NDArray[np.float64]
 
-_NONE = {name: np.frombuffer(b"", dtype) for name, dtype in TABLES.items()}
+#: The type of each table, and an empty one.
+_TABLES = [(dtype, np.frombuffer(b"", dtype)) for dtype in TABLES.values()]
 
 
 class Block:
     """What goes into the kernels and comes out of them, for up to `capacity` scans.
 
-    A method's ``run`` reads the ranges, the bearings and `noise`; it fills `noises` and the lines
-    of `floats`, `ints` and `counts` (see `kernels.layout`), and at last the tables. `own` is the
-    method's own. All of it is kept from call to call: nothing is allocated for a scan.
+    A method's ``run`` reads the ranges, the bearings and `noise`, and fills `noises` and the tables
+    scan after scan. `floats`, `ints` and `counts` (see `kernels.layout`) are the workspace of one
+    scan; `own` is the method's own. All of it is kept from call to call: nothing is allocated.
 
     Parameters
     ----------
@@ -43,25 +44,20 @@ class Block:
         self.frame, self.capacity = frame, capacity
         self.rows = 0
         self.beams = n
-        self.cosines, self.sines = np.cos(frame.angles), np.sin(frame.angles)
+        self.bearings = np.stack((np.cos(frame.angles), np.sin(frame.angles)))
         self.step, self.circular = frame.angle_increment, frame.is_full_circle
         self.range_min, self.range_max = frame.range_min, frame.range_max
         self.noise, self.own = noise, own
         self.noises = np.empty((capacity, 4))
-        self.floats = np.empty((capacity, layout.FLOATS, n + 1))
-        self.ints = np.empty((capacity, layout.INTS, n + 1), np.int64)
-        self.counts = np.empty((capacity, layout.COUNTS), np.int64)
-        self.scratch = np.empty((layout.SCRATCH, n + 1))
+        self.ranges = np.empty((capacity, n))
+        self.floats = np.empty((layout.FLOATS, n + 1))
+        self.ints = np.empty((layout.INTS, n + 1), np.int64)
+        self.counts = np.empty(layout.COUNTS, np.int64)
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
-        self._records = {
-            name: np.zeros(capacity * (n + 1), dtype) for name, dtype in TABLES.items()
-        }
-        self.segments, self.corners, self.arcs, self.breakpoints = (
-            words(records) for records in self._records.values()
-        )
+        self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
+        self.segments, self.corners, self.arcs, self.breakpoints = map(words, self._records)
         self.clusters = np.empty((capacity, n), np.int32)
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
-        self._ranges = self.floats[:, layout.RANGE, :n]
 
     def fits(self, scan: LaserScan) -> bool:
         """Whether a scan has the bearings and range limits that the block was made for."""
@@ -79,29 +75,33 @@ class Block:
     def load(self, ranges: Array) -> None:
         """Take in the ranges of some scans, shape (m, n), or of one, shape (n,)."""
         self.rows = 1 if ranges.ndim == 1 else len(ranges)
-        self._ranges[: self.rows] = ranges
+        self.ranges[: self.rows] = ranges
 
-    def raw(self) -> dict[str, bytes]:
-        """Copy the records that the last run wrote, as bytes, by the name of their table."""
+    def take(self, row: int) -> None:
+        """Put a scan into the workspace, for kernels that are called one by one."""
+        self.floats[layout.RANGE, : self.beams] = self.ranges[row]
+
+    def raw(self) -> list[bytes]:
+        """Copy the records that the last run wrote, as bytes, in the order of the tables."""
         counts = self.offsets[self.rows].tolist()
         # Numpy would copy records field by field, several times slower, and not their padding.
-        return {
-            name: records[:count].tobytes() if count else b""
-            for (name, records), count in zip(self._records.items(), counts, strict=True)
-        }
+        return [
+            records[:count].tobytes() if count else b""
+            for records, count in zip(self._records, counts, strict=True)
+        ]
 
-    def written(self) -> dict[str, NDArray[np.void]]:
-        """Copy the records that the last run wrote, by the name of their table."""
-        return {
-            name: np.frombuffer(raw, TABLES[name]) if raw else _NONE[name]
-            for name, raw in self.raw().items()
-        }
+    def written(self) -> list[NDArray[np.void]]:
+        """Copy the records that the last run wrote, in the order of the tables."""
+        return [
+            np.frombuffer(raw, dtype) if raw else none
+            for raw, (dtype, none) in zip(self.raw(), _TABLES, strict=True)
+        ]
 
     def by_beam(self, line: int) -> Array:
-        """Spread a line of floats of the first row, by usable beam, over all beams; else NaN."""
+        """Spread a line of the workspace, by usable beam, over all beams; NaN on the others."""
         spread = np.full(self.beams, np.nan)
-        usable = ~np.isnan(self.floats[0, layout.FILTERED, : self.beams])
-        spread[usable] = self.floats[0, line, : int(usable.sum())]
+        usable = ~np.isnan(self.floats[layout.FILTERED, : self.beams])
+        spread[usable] = self.floats[line, : int(usable.sum())]
         if not self.circular and usable.any():
             spread[np.argmax(usable)] = np.nan  # Nothing lies before the first.
         return spread

@@ -71,12 +71,16 @@ class Extractor:
             block = self._block = self._new_block(scan, 1)
         block.load(scan.ranges)
         self.method.run(block)
+        segments, corners, arcs, breakpoints = block.written()
         return Features(
-            **block.written(),
-            clusters=np.frombuffer(block.clusters.tobytes(), np.int32),
-            stamp=scan.stamp,
-            frame_id=scan.frame_id,
-            noise=self.noise or noise_of(block.noises[0]),
+            segments,
+            corners,
+            arcs,
+            np.frombuffer(block.clusters.tobytes(), np.int32),
+            breakpoints,
+            scan.stamp,
+            scan.frame_id,
+            self.noise or noise_of(block.noises[0]),
         )
 
     def batch(

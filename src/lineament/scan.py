@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ __all__ = ["LaserScan", "RangeNoise"]
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
+Distance = TypeVar("Distance", float, Array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +62,8 @@ class RangeNoise:
                 raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
             object.__setattr__(self, name, value)
 
-    def range_variance(self, distance: float) -> float:
-        """Variance [m²] of a reading at `distance` [m]."""
+    def range_variance(self, distance: Distance) -> Distance:
+        """Variance [m²] of a reading at `distance` [m], or of each of an array of them."""
         return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
 
 

@@ -11,13 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from .block import Block
 from .features import noise_of, noise_row
-from .kernels.bilateral import filter_rows
-from .kernels.clustering import cluster_rows
+from .kernels.bilateral import filter_ranges, scratch_shape
+from .kernels.clustering import cluster
 from .kernels.corner_operator import PRODUCT, RELATIVE, TANGENT, response_along
-from .kernels.cutting import cut_rows
+from .kernels.cutting import cut
 from .kernels.layout import (
     BEAM,
     BEFORE,
+    CLASS_FIRST,
+    CLASS_LAST,
+    CLASSES,
     CLOSED,
     FILTERED,
     FIRST,
@@ -25,13 +28,11 @@ from .kernels.layout import (
     LAST,
     PIECES,
     POINTS,
-    RANGE,
     X,
     Y,
 )
 from .kernels.line_fit import TOTAL, WEIGHTED, Y_OF_X
-from .kernels.measuring import measure_rows
-from .kernels.noise import noise_rows
+from .methods import steps
 from .methods.checks import check_choice, check_count, check_number
 from .scan import LaserScan, RangeNoise
 from .tracing import candidate_records
@@ -87,16 +88,18 @@ def bilateral_filter(
     check_number("sigma_r", sigma_r)
     check_count("half_width", half_width, least=0)
     block = _block(scan)
-    scratch = np.empty((5, len(scan) + 2 * half_width), np.float32)
-    filter_rows(
-        *_limited(block),
+    scratch = np.empty(scratch_shape(len(scan), int(half_width)), np.float32)
+    filter_ranges(
+        block.floats,
+        block.range_min,
+        block.range_max,
         float(sigma_d),
         float(sigma_r),
         int(half_width),
         block.circular,
         scratch,
     )
-    return block.floats[0, FILTERED, : len(scan)]
+    return block.floats[FILTERED, : len(scan)]
 
 
 def estimate_noise(scan: LaserScan) -> RangeNoise | None:
@@ -112,7 +115,7 @@ def estimate_noise(scan: LaserScan) -> RangeNoise | None:
     0.02
     """
     block = _block(scan)
-    noise_rows(*_limited(block), block.noise, block.noises, block.scratch)
+    steps.estimate_noise(block, 0)
     return noise_of(block.noises[0])
 
 
@@ -171,22 +174,21 @@ def adaptive_clusters(
             raise ValueError(f"ranges has shape {used.shape}, expected ({n},), one for each beam")
         used[~scan.valid] = np.nan
     block = _block(scan)
-    block.floats[0, FILTERED, :n] = used
-    cluster_rows(
-        *_partition(block),
-        block.cosines,
-        block.sines,
+    block.floats[FILTERED, :n] = used
+    cluster(
+        *_workspace(block),
+        block.bearings,
         block.step,
         block.circular,
-        noise_row(noise or estimate_noise(scan)).reshape(1, -1),
+        noise_row(noise or estimate_noise(scan)),
         float(spacing_scale),
         float(noise_floor),
         float(density_k),
         int(min_points),
     )
-    count = block.counts[0, POINTS]
+    count = block.counts[POINTS]
     labels = np.full(n, -1, np.int32)
-    labels[block.ints[0, BEAM, :count]] = block.ints[0, LABEL, :count]
+    labels[block.ints[BEAM, :count]] = block.ints[LABEL, :count]
     return labels
 
 
@@ -267,13 +269,12 @@ def primary_corners(
     check_choice("response", response, RESPONSES)
     check_count("min_points", min_points, least=2)
     block = _one_class(xy, noise_row(None))
-    cut_rows(
-        *_partition(block),
+    cut(
+        *_workspace(block),
         int(support_radius),
         float(threshold),
         RESPONSES[response],
         int(min_points),
-        np.empty((len(xy) + 1, 2), np.int64),
     )
     return candidate_records(block, float(threshold))
 
@@ -309,43 +310,22 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
     if not xy.any(axis=1).all():
         raise ValueError("points has a point at the origin, expected points that a beam can meet")
     block = _one_class(xy, noise_row(noise or RangeNoise(sigma=1.0)))
-    block.ints[0, [FIRST, LAST, BEFORE], 0] = 0, len(xy) - 1, -1
-    block.counts[0, PIECES] = 1
-    measure_rows(
-        *_partition(block),
-        RANGE,
-        block.cosines,
-        block.sines,
-        block.circular,
-        block.noises,
-        FITS[fit],
-        False,
-        0,
-        1.0,
-        1.0,
-        *block.segments,
-        *block.corners,
-        *block.breakpoints,
-        block.clusters,
-        block.offsets,
-        block.scratch,
-    )
-    line: np.void = block.written()["segments"][0]
+    block.ints[[FIRST, LAST, BEFORE], 0] = 0, len(xy) - 1, -1
+    block.counts[PIECES] = 1
+    steps.measure(block, 0, fit=FITS[fit], sharp=False)
+    line: np.void = block.written()[0][0]
     return line
 
 
 def _block(scan: LaserScan) -> Block:
     block = Block(scan, noise_row(None), 1)
     block.load(scan.ranges)
+    block.take(0)
     return block
 
 
-def _limited(block: Block) -> tuple[Array, int, float, float]:
-    return block.floats, block.rows, block.range_min, block.range_max
-
-
-def _partition(block: Block) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], int]:
-    return block.floats, block.ints, block.counts, block.rows
+def _workspace(block: Block) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    return block.floats, block.ints, block.counts
 
 
 def _one_class(xy: Array, noise: Array) -> Block:
@@ -354,12 +334,14 @@ def _one_class(xy: Array, noise: Array) -> Block:
     # The bearings do not matter but for their sines and cosines; points need not be in order.
     block = Block(LaserScan(rho, 0.0, 1.0 / max(m, 1)), noise, 1)
     block.load(rho)
+    block.take(0)
     with np.errstate(invalid="ignore"):
-        block.cosines, block.sines = _columns(xy / rho[:, np.newaxis])
+        block.bearings[:] = xy.T / rho
     block.noises[0] = noise
-    block.ints[0, BEAM, :m], block.ints[0, LABEL, :m] = np.arange(m), 0
-    block.floats[0, X, :m], block.floats[0, Y, :m] = _columns(xy)
-    block.counts[0, [POINTS, CLOSED]] = m, False
+    block.ints[BEAM, :m], block.ints[LABEL, :m] = np.arange(m), 0
+    block.ints[[CLASS_FIRST, CLASS_LAST], 0] = 0, m - 1
+    block.floats[[X, Y], :m] = xy.T
+    block.counts[[POINTS, CLOSED, CLASSES]] = m, False, min(m, 1)
     return block
 
 

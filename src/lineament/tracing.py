@@ -12,7 +12,7 @@ from .features import Features
 from .kernels import layout
 from .scan import LaserScan
 
-__all__ = ["CANDIDATE", "Trace", "candidate_records"]
+__all__ = ["CANDIDATE", "Trace", "candidate_records", "trace_of"]
 
 #: A beam that was examined as a corner: how far it lies from the chord of its piece (equation 14,
 #: [m]), the response of the corner operator there (equation 22), and whether it was taken.
@@ -70,14 +70,34 @@ class Trace:
     cuts: NDArray[np.int32]
 
 
+def trace_of(
+    block: Block, method: str, scan: LaserScan, features: Features, threshold: float
+) -> Trace:
+    """Make the trace of the scan that a method has just run on, alone in its block."""
+    candidates = candidate_records(block, threshold)
+    return Trace(
+        scan=scan,
+        method=method,
+        features=features,
+        filtered=block.floats[layout.FILTERED, : len(scan)],
+        spacing=block.by_beam(layout.SPACING),
+        distance_threshold=block.by_beam(layout.DISTANCE_THRESHOLD),
+        density_threshold=block.by_beam(layout.DENSITY_THRESHOLD),
+        clusters=features.clusters,
+        candidates=candidates,
+        threshold=threshold,
+        cuts=np.sort(candidates["beam"][candidates["accepted"]]),
+    )
+
+
 def candidate_records(block: Block, threshold: float) -> NDArray[np.void]:
-    """Candidates of the first row of a block as records."""
-    count = block.counts[0, layout.CANDIDATES]
-    at = block.ints[0, layout.CANDIDATE, :count]
+    """Candidates of the last scan of a block as records."""
+    count = block.counts[layout.CANDIDATES]
+    at = block.ints[layout.CANDIDATE, :count]
     records = np.zeros(count, CANDIDATE)
-    records["beam"] = block.ints[0, layout.BEAM, at]
-    records["cluster"] = block.ints[0, layout.LABEL, at]
-    records["chord_distance"] = block.floats[0, layout.CHORD_DISTANCE, :count]
-    records["response"] = block.floats[0, layout.CANDIDATE_RESPONSE, :count]
+    records["beam"] = block.ints[layout.BEAM, at]
+    records["cluster"] = block.ints[layout.LABEL, at]
+    records["chord_distance"] = block.floats[layout.CHORD_DISTANCE, :count]
+    records["response"] = block.floats[layout.CANDIDATE_RESPONSE, :count]
     records["accepted"] = records["response"] > threshold
     return records

@@ -1,7 +1,6 @@
 """Numba functions of arrays. They know no objects, files or methods, and check nothing.
 
-The functions that the methods call work on the rows of a block of scans (see `layout`), so that
-one call serves one scan or many. They allocate nothing.
+Each works on the workspace of one scan (see `layout`) and allocates nothing.
 """
 
 from numba import njit
@@ -20,6 +19,18 @@ sums = njit(
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,
 )
+
+#: For arithmetic whose last digit does not matter: a product and a sum are rounded at once.
+contracted = njit(
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract"},
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+)
+
+#: The least number above 0: no range is 0.
+LEAST_RANGE = 5e-324
 
 
 @helper

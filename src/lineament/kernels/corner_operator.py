@@ -4,7 +4,17 @@ import math
 
 import numpy as np
 
-from . import helper, kernel
+from . import helper, kernel, sums
+from .layout import (
+    CANDIDATE,
+    CANDIDATE_RESPONSE,
+    CHORD_DISTANCE,
+    SPARE,
+    STACK_FIRST,
+    STACK_LAST,
+    X,
+    Y,
+)
 
 #: The readings of the response (equation 22 and the text of Figure 9).
 TANGENT, PRODUCT, RELATIVE = 0, 1, 2
@@ -104,12 +114,13 @@ def _distance_sum(x, y, i, before, after, first, period, closed, origin, ux, uy)
     return total
 
 
-@helper
-def farthest_from_chord(x, y, first, last, margin):
+@sums
+def farthest_from_chord(x, y, first, last, margin, away):
     """Point between `first` and `last` farthest from their chord (equation 14).
 
     Points nearer than `margin` to an end are not taken, so that no piece gets too short. Where
-    the chord has no length (a closed class) the distance is that to its one point.
+    the chord has no length (a closed class) the distance is that to its one point. `away` is
+    scratch.
 
     Returns
     -------
@@ -121,33 +132,23 @@ def farthest_from_chord(x, y, first, last, margin):
     x0, y0 = x[first], y[first]
     cx, cy = x[last] - x0, y[last] - y0
     chord = math.sqrt(cx * cx + cy * cy)
-    best, point = -1.0, -1
     # Slices, as numba need not look for negative indices where a loop begins at 0.
     x, y = x[first + margin : last - margin + 1], y[first + margin : last - margin + 1]
+    best, point = 0.0, 0
     for i in range(len(x)):
         px, py = x[i] - x0, y[i] - y0
         d = abs(cx * py - cy * px) if chord > 0.0 else px * px + py * py
-        if d > best:
-            best, point = d, i
+        away[i] = d
+        best = max(best, d)
+    # First how far, then which: each a loop that does several points at once.
+    while away[point] < best:
+        point += 1
     return first + margin + point, best / chord if chord > 0.0 else math.sqrt(best)
 
 
 @helper
 def primary_corners(
-    x,
-    y,
-    first,
-    last,
-    closed,
-    radius,
-    threshold,
-    reading,
-    min_points,
-    stack,
-    found,
-    far,
-    strong,
-    count,
+    floats, ints, first, last, closed, radius, threshold, reading, min_points, count
 ):
     """Find the corners of one class (steps 5-7), by the farthest point, again and again.
 
@@ -157,7 +158,8 @@ def primary_corners(
 
     Parameters
     ----------
-    x, y : float64 arrays
+    floats, ints
+        See `layout`. X and Y are read, the lines by candidate written.
     first, last : int
         Ends of the class.
     closed : bool
@@ -165,12 +167,6 @@ def primary_corners(
         As in `corner_response`.
     min_points : int
         No piece gets shorter.
-    stack : int64 array, shape (≥ points, 2)
-        Scratch.
-    found : int64 array
-        Candidates in the order in which they were examined.
-    far, strong : float64 arrays
-        Their distances from the chord, and responses.
     count : int
         Candidates of other classes that stand there already.
 
@@ -179,20 +175,23 @@ def primary_corners(
     int
         Candidates that stand there now.
     """
-    stack[0, 0], stack[0, 1] = first, last
-    depth = 1
+    x, y, spare = floats[X], floats[Y], floats[SPARE]
+    waiting_first, waiting_last = ints[STACK_FIRST], ints[STACK_LAST]
+    waiting_first[0], waiting_last[0] = first, last
+    depth = np.int64(1)
     while depth > 0:
         depth -= 1
-        a, b = stack[depth, 0], stack[depth, 1]
-        c, distance = farthest_from_chord(x, y, a, b, min_points - 1)
+        a, b = waiting_first[depth], waiting_last[depth]
+        c, distance = farthest_from_chord(x, y, a, b, min_points - 1, spare)
         if c < 0:
             continue
         response = corner_response(x, y, c, first, last, radius, reading, closed)
-        found[count], far[count], strong[count] = c, distance, response
+        ints[CANDIDATE, count] = c
+        floats[CHORD_DISTANCE, count], floats[CANDIDATE_RESPONSE, count] = distance, response
         count += 1
         if response > threshold:
             # The side before it last, so that it is the next.
-            stack[depth, 0], stack[depth, 1] = c, b
-            stack[depth + 1, 0], stack[depth + 1, 1] = a, c
+            waiting_first[depth], waiting_last[depth] = c, b
+            waiting_first[depth + 1], waiting_last[depth + 1] = a, c
             depth += 2
     return count

@@ -1,4 +1,4 @@
-"""Classes cut into straight pieces at their corners, row by row."""
+"""Classes cut into straight pieces at the corners that the operator finds."""
 
 import math
 
@@ -12,9 +12,11 @@ from .layout import (
     CANDIDATE_RESPONSE,
     CANDIDATES,
     CHORD_DISTANCE,
+    CLASS_FIRST,
+    CLASS_LAST,
+    CLASSES,
     CLOSED,
     FIRST,
-    LABEL,
     LAST,
     PIECES,
     POINTS,
@@ -25,88 +27,70 @@ from .layout import (
 
 
 @kernel
-def cut_rows(floats, ints, counts, rows, radius, threshold, reading, min_points, stack):
-    """Cut the classes of each row at the corners that the operator finds.
+def cut(floats, ints, counts, radius, threshold, reading, min_points):
+    """Cut the classes of a scan at the corners that the operator finds.
 
     Parameters
     ----------
     floats, ints, counts
-        See `layout`. The lines by point are read; those by candidate and by piece are written,
-        CANDIDATES and PIECES.
-    rows : int
-        Rows in use.
+        See `layout`. The lines by point and by class are read; those by candidate and by piece
+        are written, CANDIDATES and PIECES.
     radius, threshold, reading, min_points
         As in `corner_operator.primary_corners`.
-    stack : int64 array, shape (n + 1, 2)
-        Scratch.
     """
-    for row in range(rows):
-        x, y, label = floats[row, X], floats[row, Y], ints[row, LABEL]
-        far, strong = floats[row, CHORD_DISTANCE], floats[row, CANDIDATE_RESPONSE]
-        candidate = ints[row, CANDIDATE]
-        count, closed = counts[row, POINTS], counts[row, CLOSED] != 0
-        found, first = np.int64(0), np.int64(0)
-        if closed and label[0] >= 0:
-            # The point at which a closed class was opened is examined first.
-            candidate[0], far[0] = 0, 0.0
-            strong[0] = corner_response(x, y, first, first, count - 1, radius, reading, closed)
-            found += 1
-        for last in range(count):
-            if last + 1 < count and label[last + 1] == label[first]:
-                continue
-            if label[first] >= 0:
-                found = primary_corners(
-                    x,
-                    y,
-                    first,
-                    last,
-                    closed,
-                    radius,
-                    threshold,
-                    reading,
-                    min_points,
-                    stack,
-                    candidate,
-                    far,
-                    strong,
-                    found,
-                )
-            first = last + 1
-        counts[row, CANDIDATES] = found
-        response = floats[row, RESPONSE]
-        for i in range(count):
-            response[i] = math.nan
-        for k in range(found):
-            if strong[k] > threshold:
-                response[candidate[k]] = strong[k]
-        counts[row, PIECES] = list_pieces(
-            label, count, closed, response, ints[row, FIRST], ints[row, LAST], ints[row, BEFORE]
+    x, y = floats[X], floats[Y]
+    far, strong, candidate = floats[CHORD_DISTANCE], floats[CANDIDATE_RESPONSE], ints[CANDIDATE]
+    count, classes, closed = counts[POINTS], counts[CLASSES], counts[CLOSED] != 0
+    found, first = np.int64(0), np.int64(0)
+    if closed and classes > 0:
+        # The point at which a closed class was opened is examined first.
+        candidate[0], far[0] = 0, 0.0
+        strong[0] = corner_response(x, y, first, first, count - 1, radius, reading, closed)
+        found += 1
+    for c in range(classes):
+        found = primary_corners(
+            floats,
+            ints,
+            ints[CLASS_FIRST, c],
+            ints[CLASS_LAST, c],
+            closed,
+            radius,
+            threshold,
+            reading,
+            min_points,
+            found,
         )
+    counts[CANDIDATES] = found
+    response = floats[RESPONSE]
+    for i in range(count):
+        response[i] = math.nan
+    for k in range(found):
+        if strong[k] > threshold:
+            response[candidate[k]] = strong[k]
+    list_pieces(floats, ints, counts)
 
 
 @helper
-def list_pieces(label, count, closed, response, first, last, before):
-    """List the pieces between the corners: the points whose response is not NaN.
+def list_pieces(floats, ints, counts):
+    """List the pieces of the classes between the corners: the points whose RESPONSE is not NaN.
 
-    Their responses move from their points to the pieces that begin there. Returns the number of
-    pieces.
+    Their responses move from their points to the pieces that begin there.
     """
-    n = np.int64(0)
-    for i in range(count):
-        if label[i] < 0:
-            continue
-        begins = i == 0 or label[i] != label[i - 1]
-        ends = i + 1 == count or label[i + 1] != label[i]
-        is_corner = not begins and not ends and not math.isnan(response[i])
-        if is_corner or ends:
-            last[n] = i
-            n += 1
-        if begins or is_corner:
-            # Never behind its point: there are no more pieces than points before it.
-            first[n], response[n] = i, response[i]
-            before[n] = n - 1 if is_corner else -1
-    if closed and n == 1:
-        return 0  # A ring without corners has no straight piece.
-    if closed and n > 1 and not math.isnan(response[0]):
+    response, first, last, before = floats[RESPONSE], ints[FIRST], ints[LAST], ints[BEFORE]
+    n, opened = np.int64(0), counts[CLOSED] != 0
+    for c in range(counts[CLASSES]):
+        a, b = ints[CLASS_FIRST, c], ints[CLASS_LAST, c]
+        # Never behind its point: there are no more pieces than points before it.
+        first[n], before[n], response[n] = a, -1, response[a]
+        for i in range(a + 1, b):
+            if not math.isnan(response[i]):
+                last[n] = i
+                n += 1
+                first[n], before[n], response[n] = i, n - 1, response[i]
+        last[n] = b
+        n += 1
+    if opened and n == 1:
+        n = 0  # A ring without corners has no straight piece.
+    if opened and n > 1 and not math.isnan(response[0]):
         before[0] = n - 1
-    return n
+    counts[PIECES] = n

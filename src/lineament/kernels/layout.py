@@ -1,8 +1,8 @@
-"""The lines of a block: where its kernels keep what they pass on to each other.
+"""The lines of a scan's workspace: where the kernels keep what they pass on to each other.
 
-A block of m scans of n beams is ``floats`` (m, FLOATS, n + 1), ``ints`` (m, INTS, n + 1) and
-``counts`` (m, COUNTS): a row for each scan, in it a line for each quantity. Two arrays and not
-twenty: numba takes a fifth of a microsecond to pass one.
+The workspace of a scan of n beams is ``floats`` (FLOATS, n + 1), ``ints`` (INTS, n + 1) and
+``counts`` (COUNTS,): a line for each quantity. Three arrays and not twenty: numba takes a fifth of
+a microsecond to pass one. Scans take turns in it, so that it stays in the nearest cache.
 """
 
 # Lines of floats, by beam.
@@ -16,20 +16,22 @@ RESPONSE = 5  # by piece: of the corner at its first point
 SPACING, DISTANCE_THRESHOLD, DENSITY_THRESHOLD = 6, 7, 8  # [m]
 # By candidate, in the order of examination.
 CHORD_DISTANCE, CANDIDATE_RESPONSE = 9, 10
-FLOATS = 11
+# By point: what is measured [m].
+MEASURED_X, MEASURED_Y, MEASURED_RHO = 11, 12, 13
+SPARE = 14  # for whoever needs it, until the next
+FLOATS = 15
 
 # Lines of ints, by point.
 BEAM, LABEL = 0, 1  # beam; class, -1 for noise
+# By class: first and last point.
+CLASS_FIRST, CLASS_LAST = 2, 3
 # By piece: first and last point (a corner belongs to both its pieces), and the piece that a corner
 # at its first point joins it to, or -1.
-FIRST, LAST, BEFORE = 2, 3, 4
-CANDIDATE = 5  # by candidate: its point
-INTS = 6
+FIRST, LAST, BEFORE = 4, 5, 6
+CANDIDATE = 7  # by candidate: its point
+STACK_FIRST, STACK_LAST = 8, 9  # by piece that waits for its search: first and last point
+INTS = 10
 
 # Counts.
-POINTS, CLOSED, PIECES, CANDIDATES = 0, 1, 2, 3
-COUNTS = 4
-
-# Lines of scratch, shared by all rows: what is measured, by point.
-MEASURED_X, MEASURED_Y, MEASURED_RHO, SPARE = 0, 1, 2, 3
-SCRATCH = 4
+POINTS, CLOSED, CLASSES, PIECES, CANDIDATES = 0, 1, 2, 3, 4
+COUNTS = 5

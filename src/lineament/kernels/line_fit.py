@@ -30,8 +30,8 @@ def fit_line(x, y, rho, first, last, noise, kind):
     -------
     cx, cy : float
         (Weighted) centroid [m].
-    angle : float
-        Direction from the first to the last point [rad].
+    c, s : float
+        Direction from the first to the last point, a unit vector.
     var_offset, covariance, var_angle : float
         Of the offset at the centroid along the left normal, and the angle.
     rms : float
@@ -40,14 +40,12 @@ def fit_line(x, y, rho, first, last, noise, kind):
     # Slices, as numba need not look for negative indices where a loop begins at 0.
     span = slice(first, last + 1)
     x, y, rho = x[span], y[span], rho[span]
-    cx, cy, angle, weighted = x[0], y[0], 0.0 * x[0], False
+    cx, cy, c, s, weighted = x[0], y[0], 1.0, 0.0, False
     for iteration in range(3 if kind == WEIGHTED else 1):
         weighted = iteration > 0
-        cx, cy, angle = _line(x, y, rho, noise, angle, weighted, kind)
-    c, s = math.cos(angle), math.sin(angle)
+        cx, cy, c, s = _line(x, y, rho, noise, c, s, weighted, kind)
     if c * (x[-1] - x[0]) + s * (y[-1] - y[0]) < 0.0:
         c, s = -c, -s
-        angle += math.pi if angle <= 0.0 else -math.pi
     # To first order the offset is Σwe/W and the angle Σwte/S, with t along the line from the
     # centroid, so their covariance is that of these sums, whatever the weights.
     w_sum, t_sum, oo, oa, aa, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -64,23 +62,22 @@ def fit_line(x, y, rho, first, last, noise, kind):
         aa += w * w * variance * t * t
     if weighted:
         oa = 0.0  # At their own centroid these are independent, but for the last iteration.
-    rms = math.sqrt(squares / len(x))
+    var_offset, rms = oo / (w_sum * w_sum), math.sqrt(squares / len(x))
     if t_sum == 0.0:
         # Points that coincide have no direction: any angle is as good.
-        return cx, cy, angle, oo / (w_sum * w_sum), 0.0, math.pi**2 / 12.0, rms
-    return cx, cy, angle, oo / (w_sum * w_sum), oa / (w_sum * t_sum), aa / (t_sum * t_sum), rms
+        return cx, cy, c, s, var_offset, 0.0, math.pi**2 / 12.0, rms
+    return cx, cy, c, s, var_offset, oa / (w_sum * t_sum), aa / (t_sum * t_sum), rms
 
 
 @sums
-def _line(x, y, rho, noise, angle, weighted, kind):
+def _line(x, y, rho, noise, c, s, weighted, kind):
     """Centroid and direction of least squares, of orthogonal or axial distances.
 
-    Weighted by the normal variances to a line of direction `angle`, or not at all.
+    Weighted by the normal variances to a line of direction (c, s), or not at all.
     """
     # Sums about the first point, not the far origin, keep their digits.
     x0, y0 = x[0], y[0]
     total, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    c, s = math.cos(angle), math.sin(angle)
     for i in range(len(x)):
         dx, dy, w = x[i] - x0, y[i] - y0, 1.0
         if weighted:
@@ -94,10 +91,22 @@ def _line(x, y, rho, noise, angle, weighted, kind):
     sxx -= sx * sx / total
     sxy -= sx * sy / total
     syy -= sy * sy / total
-    cx, cy = x0 + sx / total, y0 + sy / total
+    c, s = _direction(sxx, sxy, syy, kind)
+    return x0 + sx / total, y0 + sy / total, c, s
+
+
+@helper
+def _direction(sxx, sxy, syy, kind):
+    """Tell the unit vector along a line, from the second moments of its points."""
     if kind == Y_OF_X:
-        return cx, cy, math.atan2(sxy, sxx) if sxx >= syy else math.atan2(syy, sxy)
-    return cx, cy, 0.5 * math.atan2(2.0 * sxy, sxx - syy)
+        u, v = (sxx, sxy) if sxx >= syy else (sxy, syy)
+    else:
+        # That of the larger eigenvalue: at half the angle of (sxx - syy, 2 sxy).
+        difference = sxx - syy
+        reach = abs(difference) + math.sqrt(difference * difference + 4.0 * sxy * sxy)
+        u, v = (reach, 2.0 * sxy) if difference >= 0.0 else (2.0 * sxy, reach)
+    norm = math.sqrt(u * u + v * v)
+    return (u / norm, v / norm) if norm > 0.0 else (1.0, 0.0)
 
 
 @helper

@@ -8,6 +8,9 @@ from . import helper, kernel
 from .layout import (
     BEAM,
     BEFORE,
+    CLASS_FIRST,
+    CLASS_LAST,
+    CLASSES,
     CLOSED,
     FIRST,
     LABEL,
@@ -50,44 +53,40 @@ from .records import (
 
 
 @kernel
-def measure_rows(
+def measure(
     floats,
     ints,
     counts,
-    rows,
+    row,
     source,
-    cosines,
-    sines,
+    bearings,
     circular,
-    noises,
+    noise,
     fit,
     sharp,
     trim,
     reach,
     gap,
     segments,
-    segment_ints,
     corners,
-    corner_ints,
     breaks,
-    break_ints,
     clusters,
     offsets,
-    scratch,
 ):
-    """Write the features of each row, one row after the other.
+    """Write the features of a scan behind those of the scans before it.
 
     Parameters
     ----------
     floats, ints, counts
-        See `layout`. The lines by point and by piece are read.
-    rows : int
-        Rows in use.
+        See `layout`. The lines by point, by class and by piece are read.
+    row : int
+        Which scan of the tables this is.
     source : int
         Line of the ranges to measure on: RANGE or FILTERED.
-    cosines, sines : float64 arrays, shape (n,)
+    bearings : float64 array, shape (2, n)
+        Cosines and sines.
     circular : bool
-    noises : float64 array, shape (m, 4)
+    noise : float64 array, shape (4,)
     fit : int
         How lines are fitted, see `line_fit.fit_line`.
     sharp : bool
@@ -99,70 +98,69 @@ def measure_rows(
         How many spacings an intersection may lie from the point at which the cut was made.
     gap : float
         Beams from one class to the next beyond which their break is a gap.
-    segments, corners, breaks : float64 arrays, segment_ints, ... : int32 arrays
+    segments, corners, breaks : float64 arrays
         The tables as words, see `records`; with room for n + 1 features of each kind a row.
     clusters : int32 array, shape (m, n)
         Result.
     offsets : int64 array, shape (m + 1, 4)
         Where the rows begin in the tables; the first is 0.
-    scratch : float64 array, shape (SCRATCH, n + 1)
     """
-    x, y, rho = scratch[MEASURED_X], scratch[MEASURED_Y], scratch[MEASURED_RHO]
-    for row in range(rows):
-        beam, label, count = ints[row, BEAM], ints[row, LABEL], counts[row, POINTS]
-        ranges = floats[row, source]
-        for i in range(len(cosines)):
-            clusters[row, i] = -1
-        for i in range(count):
-            b = beam[i]
-            clusters[row, b] = label[i]
-            r = ranges[b]
-            x[i], y[i], rho[i] = r * cosines[b], r * sines[b], r
-        noise = noises[row]
-        segment, corner = offsets[row, 0], offsets[row, 1]
-        for k in range(counts[row, PIECES]):
-            first, last = ints[row, FIRST, k], ints[row, LAST, k]
-            a, b = _clear_of_corners(ints[row, BEFORE], counts[row, PIECES], k, first, last, trim)
-            line = fit_line(x, y, rho, a, b, noise, fit)
-            _write_segment(
-                x, y, beam, label, first, last, line, segments, segment_ints, segment + k
-            )
-        for k in range(counts[row, PIECES]):
-            before = ints[row, BEFORE, k]
-            if before < 0:
-                continue
-            at = ints[row, FIRST, k]
-            corner_ints[corner, C_BEAM] = beam[at]
-            corner_ints[corner, C_SEGMENTS] = before
-            corner_ints[corner, C_SEGMENTS + 1] = k
-            corners[corner, C_RESPONSE] = floats[row, RESPONSE, k]
-            spacing, before = _local_spacing(x, y, at, count), segment + before
-            _write_opening(segments, before, segment + k, corners, corner_ints, corner)
-            if not sharp or not _intersect(
-                segments, before, segment + k, x[at], y[at], reach * spacing, corners, corner
-            ):
-                variance = range_variance(rho[at], noise)
-                _place_at_beam(x[at], y[at], rho[at], spacing, variance, corners, corner)
-            corner += 1
-        closed = counts[row, CLOSED] != 0
-        offsets[row + 1, 0] = segment + counts[row, PIECES]
-        offsets[row + 1, 1] = corner
-        offsets[row + 1, 2] = offsets[row, 2]
-        offsets[row + 1, 3] = _write_breakpoints(
-            x,
-            y,
-            rho,
-            beam,
-            label,
-            count,
-            closed,
-            circular,
-            gap,
-            len(cosines),
-            breaks,
-            break_ints,
-            offsets[row, 3],
-        )
+    _place_measured(floats, ints, counts, source, bearings, clusters[row])
+    x, y, rho = floats[MEASURED_X], floats[MEASURED_Y], floats[MEASURED_RHO]
+    segment_ints, corner_ints = segments.view(np.int32), corners.view(np.int32)
+    pieces = counts[PIECES]
+    segment, corner = offsets[row, 0], offsets[row, 1]
+    for k in range(pieces):
+        first, last = ints[FIRST, k], ints[LAST, k]
+        a, b = _clear_of_corners(ints[BEFORE], pieces, k, first, last, trim)
+        line = fit_line(x, y, rho, a, b, noise, fit)
+        _write_segment(x, y, ints, first, last, line, segments, segment_ints, segment + k)
+    for k in range(pieces):
+        before = ints[BEFORE, k]
+        if before < 0:
+            continue
+        at = ints[FIRST, k]
+        corner_ints[corner, C_BEAM] = ints[BEAM, at]
+        corner_ints[corner, C_SEGMENTS] = before
+        corner_ints[corner, C_SEGMENTS + 1] = k
+        corners[corner, C_RESPONSE] = floats[RESPONSE, k]
+        spacing, before = _local_spacing(x, y, at, counts[POINTS]), segment + before
+        _write_opening(segments, before, segment + k, corners, corner_ints, corner)
+        if not sharp or not _intersect(
+            segments, before, segment + k, x[at], y[at], reach * spacing, corners, corner
+        ):
+            variance = range_variance(rho[at], noise)
+            _place_at_beam(x[at], y[at], rho[at], spacing, variance, corners, corner)
+        corner += 1
+    offsets[row + 1, 0] = segment + pieces
+    offsets[row + 1, 1] = corner
+    offsets[row + 1, 2] = offsets[row, 2]
+    offsets[row + 1, 3] = _write_breakpoints(
+        floats,
+        ints,
+        counts,
+        circular,
+        gap,
+        bearings.shape[1],
+        breaks,
+        breaks.view(np.int32),
+        offsets[row, 3],
+    )
+
+
+@helper
+def _place_measured(floats, ints, counts, source, bearings, clusters):
+    """Place the points where they are measured, and spread their labels over the beams."""
+    x, y, rho = floats[MEASURED_X], floats[MEASURED_Y], floats[MEASURED_RHO]
+    ranges, beam, label = floats[source], ints[BEAM], ints[LABEL]
+    cosines, sines = bearings[0], bearings[1]
+    for i in range(len(cosines)):
+        clusters[i] = -1
+    for i in range(counts[POINTS]):
+        b = beam[i]
+        clusters[b] = label[i]
+        r = ranges[b]
+        x[i], y[i], rho[i] = r * cosines[b], r * sines[b], r
 
 
 @helper
@@ -175,19 +173,18 @@ def _clear_of_corners(before, pieces, k, first, last, trim):
 
 
 @helper
-def _write_segment(x, y, beam, label, first, last, line, f, i, k):
-    cx, cy, angle, var_offset, covariance, var_angle, rms = line
-    c, s = math.cos(angle), math.sin(angle)
+def _write_segment(x, y, ints, first, last, line, f, i, k):
+    cx, cy, c, s, var_offset, covariance, var_angle, rms = line
     along = c * (x[first] - cx) + s * (y[first] - cy)
     f[k, S_START], f[k, S_START + 1] = cx + along * c, cy + along * s
     along = c * (x[last] - cx) + s * (y[last] - cy)
     f[k, S_END], f[k, S_END + 1] = cx + along * c, cy + along * s
     f[k, S_CENTROID], f[k, S_CENTROID + 1] = cx, cy
-    f[k, S_ANGLE], f[k, S_RMS] = angle, rms
+    f[k, S_ANGLE], f[k, S_RMS] = math.atan2(s, c), rms
     f[k, S_COVARIANCE], f[k, S_COVARIANCE + 1] = var_offset, covariance
     f[k, S_COVARIANCE + 2], f[k, S_COVARIANCE + 3] = covariance, var_angle
-    i[k, S_FIRST], i[k, S_LAST] = beam[first], beam[last]
-    i[k, S_POINTS], i[k, S_CLUSTER] = last - first + 1, label[first]
+    i[k, S_FIRST], i[k, S_LAST] = ints[BEAM, first], ints[BEAM, last]
+    i[k, S_POINTS], i[k, S_CLUSTER] = last - first + 1, ints[LABEL, first]
 
 
 @helper
@@ -268,45 +265,40 @@ def _place_at_beam(x, y, rho, spacing, variance, corners, k):
 
 
 @helper
-def _write_breakpoints(
-    x, y, rho, beam, label, count, closed, circular, gap, beams, floats, ints, k
-):
+def _write_breakpoints(floats, ints, counts, circular, gap, beams, breaks, break_ints, k):
     """One between each two neighbouring classes, and at the ends of a scan that has ends."""
-    first, before = np.int64(-1), np.int64(-1)
-    for i in range(count):
-        if label[i] < 0:
-            continue
-        if before < 0:
-            first = i
-        elif label[i] != label[before]:
-            _write_break(x, y, rho, beam, before, i, gap, beams, floats, ints, k)
-            k += 1
-        before = i
-    if before < 0 or closed:
+    first, last, classes = ints[CLASS_FIRST], ints[CLASS_LAST], counts[CLASSES]
+    for c in range(1, classes):
+        _write_break(floats, ints, last[c - 1], first[c], gap, beams, breaks, break_ints, k)
+        k += 1
+    if classes == 0 or counts[CLOSED] != 0:
         return k
+    before, after = last[classes - 1], first[0]
     if circular:
-        _write_break(x, y, rho, beam, before, first, gap, beams, floats, ints, k)
+        _write_break(floats, ints, before, after, gap, beams, breaks, break_ints, k)
         return k + 1
     none, end = np.int64(-1), np.int64(SCAN_END)
-    _write_mark(x, y, first, none, beam[first], end, none, floats, ints, k)
-    _write_mark(x, y, before, beam[before], none, end, none, floats, ints, k + 1)
+    _write_mark(floats, after, none, ints[BEAM, after], end, none, breaks, break_ints, k)
+    _write_mark(floats, before, ints[BEAM, before], none, end, none, breaks, break_ints, k + 1)
     return k + 2
 
 
 @helper
-def _write_break(x, y, rho, beam, before, after, gap, beams, floats, ints, k):
+def _write_break(floats, ints, before, after, gap, beams, breaks, break_ints, k):
     """Of a jump the nearer side occludes. Over many missing beams a surface may go on unseen."""
-    near = before if rho[before] <= rho[after] else after
-    is_gap = (beam[after] - beam[before]) % beams > gap
+    near = before if floats[MEASURED_RHO, before] <= floats[MEASURED_RHO, after] else after
+    beam_before, beam_after = ints[BEAM, before], ints[BEAM, after]
+    is_gap = (beam_after - beam_before) % beams > gap
     kind = GAP if is_gap else JUMP
-    occluder = -1 if is_gap else beam[near]
-    _write_mark(x, y, near, beam[before], beam[after], kind, occluder, floats, ints, k)
+    occluder = -1 if is_gap else ints[BEAM, near]
+    _write_mark(floats, near, beam_before, beam_after, kind, occluder, breaks, break_ints, k)
 
 
 @helper
-def _write_mark(x, y, at, beam_before, beam_after, kind, occluder, floats, ints, k):
-    floats[k, B_POSITION], floats[k, B_POSITION + 1] = x[at], y[at]
-    ints[k, B_BEAM], ints[k, B_BEAM + 1] = beam_before, beam_after
-    ints[k, B_OCCLUDER] = occluder
+def _write_mark(floats, at, beam_before, beam_after, kind, occluder, breaks, break_ints, k):
+    breaks[k, B_POSITION] = floats[MEASURED_X, at]
+    breaks[k, B_POSITION + 1] = floats[MEASURED_Y, at]
+    break_ints[k, B_BEAM], break_ints[k, B_BEAM + 1] = beam_before, beam_after
+    break_ints[k, B_OCCLUDER] = occluder
     for letter in range(8):
-        ints[k, B_KIND + letter] = KIND_WORDS[kind, letter]
+        break_ints[k, B_KIND + letter] = KIND_WORDS[kind, letter]

@@ -14,31 +14,27 @@ COARSEST_QUANTUM = 0.15
 
 
 @kernel
-def noise_rows(floats, rows, range_min, range_max, given, noises, scratch):
-    """Write the noise of each row: as `given`, or, where that is NaN, estimated.
+def estimate_noise(floats, range_min, range_max, given, noise):
+    """Write the noise of a scan: as `given`, or, where that is NaN, estimated.
 
     Parameters
     ----------
-    floats : float64 array, shape (m, FLOATS, n + 1)
+    floats : float64 array, shape (FLOATS, n + 1)
         RANGE is read.
-    rows : int
-        Rows in use.
     range_min, range_max : float
     given : float64 array, shape (4,)
         (sigma, proportional, bearing, quantum).
-    noises : float64 array, shape (m, 4)
-        Result; NaN for rows without a usable range.
-    scratch : float64 array, shape (SCRATCH, n + 1)
+    noise : float64 array, shape (4,)
+        Result; NaN for a scan without a usable range.
     """
-    n, spare = floats.shape[2] - 1, scratch[SPARE]
-    for row in range(rows):
-        for part in range(4):
-            noises[row, part] = given[part]
-        if math.isnan(given[0]):
-            sigma = range_sigma(floats[row, RANGE], n, range_min, range_max, spare)
-            noises[row, 0] = sigma
-            for part in range(1, 4):
-                noises[row, part] = 0.0 * sigma
+    for part in range(4):
+        noise[part] = given[part]
+    if math.isnan(given[0]):
+        n = floats.shape[1] - 1
+        sigma = range_sigma(floats[RANGE], n, range_min, range_max, floats[SPARE])
+        noise[0] = sigma
+        for part in range(1, 4):
+            noise[part] = 0.0 * sigma
 
 
 @helper

@@ -1,7 +1,7 @@
 """Where the fields of feature records lie, so that kernels can write them as plain numbers.
 
 Numba can write records, but takes half a minute to compile it. So a table of records is seen as a
-float64 and an int32 matrix over the same memory, and each field by its column there.
+matrix of float64, or of int32, over the same memory, and each field by its column there.
 """
 
 import numpy as np
@@ -15,10 +15,9 @@ JUMP, GAP, SCAN_END = 0, 1, 2
 KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
 
 
-def words(records: NDArray[np.void]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """See an array of records as its float64 and int32 words."""
-    raw = records.view(np.uint8).reshape(len(records), records.dtype.itemsize)
-    return raw.view(np.float64), raw.view(np.int32)
+def words(records: NDArray[np.void]) -> NDArray[np.float64]:
+    """See an array of records as its float64 words, two int32 words each."""
+    return records.view(np.float64).reshape(len(records), records.dtype.itemsize // 8)
 
 
 def _float(dtype, name):

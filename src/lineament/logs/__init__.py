@@ -16,8 +16,9 @@ from .base import Head, Log
 if TYPE_CHECKING:
     from .info import LogInfo, summarize
     from .npz import save_npz
+    from .saving import save_log
 
-__all__ = ["Log", "LogInfo", "open_log", "save_npz", "summarize"]
+__all__ = ["Log", "LogInfo", "open_log", "save_log", "save_npz", "summarize"]
 
 #: Module and class of each reader, in the order in which they look at a file.
 READERS = (
@@ -25,7 +26,7 @@ READERS = (
     ("carmen", "CarmenLog"),
 )
 
-_HOME = {"LogInfo": "info", "summarize": "info", "save_npz": "npz"}
+_HOME = {"LogInfo": "info", "summarize": "info", "save_log": "saving", "save_npz": "npz"}
 
 
 def open_log(

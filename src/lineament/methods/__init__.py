@@ -17,7 +17,16 @@ __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method"]
 DEFAULT_METHOD = "liu"
 
 #: Name of each method, and the class that it is, in the module of the same name.
-METHODS = {"liu": "Liu"}
+METHODS = {
+    "liu": "Liu",
+    "pdbs": "PDBS",
+    "iepf": "IEPF",
+    "split_and_merge": "SplitAndMerge",
+    "line_tracking": "LineTracking",
+    "hough": "Hough",
+    "ransac": "Ransac",
+    "region_growing": "RegionGrowing",
+}
 
 
 class Method(Protocol):
@@ -55,9 +64,9 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     --------
     >>> get_method("liu", support_radius=5).support_radius
     5
-    >>> get_method("lui")
+    >>> get_method("lui")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: method 'lui' is unknown, expected one of: liu, liu:paper, liu:scale_free
+    ValueError: method 'lui' is unknown, expected one of: liu, liu:paper, liu:scale_free, ...
     """
     base, _, preset = str(name).partition(":")
     cls = _method_class(base) if base in METHODS else None

@@ -7,35 +7,32 @@ where the paper is open.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..block import Block
-from ..features import Features, noise_row
-from ..kernels.bilateral import filter_rows
-from ..kernels.clustering import cluster_rows
-from ..kernels.cutting import cut_rows
-from ..kernels.layout import DENSITY_THRESHOLD, DISTANCE_THRESHOLD, FILTERED, RANGE, SPACING
-from ..kernels.measuring import measure_rows
-from ..kernels.noise import noise_rows
-from ..scan import LaserScan
+from ..kernels.bilateral import scratch_shape
+from ..kernels.layout import FILTERED, RANGE
+from ..kernels.liu import extract_rows
 from ..stages import FITS, RESPONSES
-from ..tracing import Trace, candidate_records
+from .base import MethodBase
 from .checks import check_choice, check_count, check_number
+from .steps import budget_scratch
 
 __all__ = ["Liu"]
 
 
 class _Scratch(NamedTuple):
     filter: NDArray[np.float32]
-    stack: NDArray[np.int64]
+    costs: NDArray[np.float64]
+    follow: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Liu:
+class Liu(MethodBase):
     """The method of Liu et al. 2023, and its parameters; defaults are the paper's numbers.
 
     1. *Filter* the ranges bilaterally, against noise points (equations 4-9).
@@ -77,6 +74,8 @@ class Liu:
     corner_trim : int
         Readings next to a corner, itself included, that the fits leave out where lines meet: the
         filter moves cuts by a beam or two, and these would pull the lines towards each other.
+    max_vertices : int
+        Pieces are joined or left out until they have no more vertices; 0 allows any number.
 
     Raises
     ------
@@ -108,6 +107,7 @@ class Liu:
     measure: str = "raw"
     corner: str = "intersection"
     corner_trim: int = 2
+    max_vertices: int = 0
 
     def __post_init__(self) -> None:
         for name in ("sigma_d", "sigma_r", "spacing_scale"):
@@ -117,15 +117,13 @@ class Liu:
         check_count("half_width", self.half_width, least=0)
         check_count("min_points", self.min_points, least=2)
         check_count("corner_trim", self.corner_trim, least=0)
+        check_count("max_vertices", self.max_vertices, least=0)
         check_count("support_radius", self.support_radius, least=1)
         check_choice("response", self.response, RESPONSES)
         check_choice("fit", self.fit, FITS)
         check_choice("measure", self.measure, ("raw", "filtered"))
         check_choice("corner", self.corner, ("intersection", "beam"))
-        for field in fields(self):
-            # Numba compiles anew for an int where it has seen a float.
-            kind: type[Any] = type(field.default)
-            object.__setattr__(self, field.name, kind(getattr(self, field.name)))
+        self._settle_types()
 
     @classmethod
     def paper(cls, **changes: Any) -> Liu:
@@ -150,86 +148,55 @@ class Liu:
         return cls(**{"response": "relative", "threshold": 0.25, **changes})
 
     def own_arrays(self, beams: int) -> _Scratch:
-        """Make scratch for the filter and the search for corners."""
+        """Make scratch for the filter and the budget."""
         return _Scratch(
-            np.empty((5, beams + 2 * self.half_width), np.float32),
-            np.empty((beams + 1, 2), np.int64),
+            np.empty(scratch_shape(beams, self.half_width), np.float32),
+            *budget_scratch(beams, self.max_vertices),
         )
 
     def run(self, block: Block) -> None:
         """Filter, cluster, cut and fit the scans of a block."""
         own: _Scratch = block.own
-        limits = (block.rows, block.range_min, block.range_max)
-        partition = (block.floats, block.ints, block.counts, block.rows)
-        noise_rows(block.floats, *limits, block.noise, block.noises, block.scratch)
-        filter_rows(
-            block.floats,
-            *limits,
+        sharp = self.corner == "intersection"
+        extract_rows(
+            block.ranges,
+            block.rows,
+            block.range_min,
+            block.range_max,
+            block.bearings,
+            block.step,
+            block.circular,
+            block.noise,
             self.sigma_d,
             self.sigma_r,
             self.half_width,
-            block.circular,
-            own.filter,
-        )
-        cluster_rows(
-            *partition,
-            block.cosines,
-            block.sines,
-            block.step,
-            block.circular,
-            block.noises,
             self.spacing_scale,
             self.noise_floor,
             self.density_k,
             self.min_points,
-        )
-        cut_rows(
-            *partition,
             self.support_radius,
             self.threshold,
             RESPONSES[self.response],
-            self.min_points,
-            own.stack,
-        )
-        measure_rows(
-            *partition,
             RANGE if self.measure == "raw" else FILTERED,
-            block.cosines,
-            block.sines,
-            block.circular,
-            block.noises,
             FITS[self.fit],
-            self.corner == "intersection",
-            self.corner_trim if self.corner == "intersection" else 0,
-            0.5 * self.support_radius,
-            self.spacing_scale,
-            *block.segments,
-            *block.corners,
-            *block.breakpoints,
+            sharp,
+            self.corner_trim if sharp else 0,
+            block.floats,
+            block.ints,
+            block.counts,
+            own.follow.shape[1] - 1,
+            own.filter,
+            own.costs,
+            own.follow,
+            block.noises,
+            block.segments,
+            block.corners,
+            block.breakpoints,
             block.clusters,
             block.offsets,
-            block.scratch,
         )
 
-    def trace(self, scan: LaserScan, features: Features) -> Trace:
-        """Run again on a scan of which these features came, and keep every intermediate.
-
-        `lineament.Extractor.trace` does both.
-        """
-        block = Block(scan, noise_row(features.noise), 1, self.own_arrays(len(scan)))
-        block.load(scan.ranges)
-        self.run(block)
-        candidates = candidate_records(block, self.threshold)
-        return Trace(
-            scan=scan,
-            method=self.name,
-            features=features,
-            filtered=block.floats[0, FILTERED, : len(scan)],
-            spacing=block.by_beam(SPACING),
-            distance_threshold=block.by_beam(DISTANCE_THRESHOLD),
-            density_threshold=block.by_beam(DENSITY_THRESHOLD),
-            clusters=features.clusters,
-            candidates=candidates,
-            threshold=self.threshold,
-            cuts=np.sort(candidates["beam"][candidates["accepted"]]),
-        )
+    @property
+    def least_response(self) -> float:
+        """What the response of a candidate exceeds where the first search accepts it."""
+        return self.threshold

@@ -1,6 +1,7 @@
 """Simulated scans: worlds of walls and columns, ray casting, noisy sensors, drives.
 
 Every random draw comes from a seed that is given, so that a simulated log can be made again.
+What there is to find in a scan is told by :func:`truth`.
 
 Examples
 --------
@@ -11,12 +12,18 @@ Examples
 """
 
 from .drive import drive, drive_poses
+from .presets import SENSORS
 from .raycast import cast_rays
-from .sensor import SENSORS, Sensor
+from .recording import WORLDS, sensor_like, simulate_log
+from .scenes import SCENES, scene
+from .sensor import Sensor
+from .truth import truth
 from .worlds import World, building, room
 
 __all__ = [
+    "SCENES",
     "SENSORS",
+    "WORLDS",
     "Sensor",
     "World",
     "building",
@@ -24,4 +31,8 @@ __all__ = [
     "drive",
     "drive_poses",
     "room",
+    "scene",
+    "sensor_like",
+    "simulate_log",
+    "truth",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..scan import Array, LaserScan
-from .sensor import Sensor
+from .sensor import Sensor, Twist
 from .worlds import World
 
 __all__ = ["drive", "drive_poses"]
@@ -51,15 +51,7 @@ def drive_poses(
     >>> poses[2:4].round(3).tolist()
     [[1.0, 0.0, 0.0], [1.0, 0.0, 1.571]]
     """
-    for name, value in (("speed", speed), ("turn_rate", turn_rate), ("rate", rate)):
-        if not 0 < value < math.inf:
-            raise ValueError(f"{name} is {value}, expected a finite number > 0")
-    times, keys = _key_poses(_distinct(waypoints), speed, turn_rate)
-    # A scan that is due at the very end is taken in spite of rounding.
-    n = math.floor(times[-1] * rate + 1e-9) + 1
-    stamps = np.arange(n) / rate
-    poses = np.column_stack([np.interp(stamps, times, keys[:, k]) for k in range(3)])
-    poses[:, 2] = _wrapped(poses[:, 2])
+    stamps, poses, _ = _course(waypoints, speed, turn_rate, rate)
     return stamps, poses
 
 
@@ -72,6 +64,7 @@ def drive(
     turn_rate: float = 1.0,
     seed: int = 0,
     rate: float | None = None,
+    moving: bool = False,
 ) -> Iterator[LaserScan]:
     """Simulate the scans of a sensor that is driven along waypoints.
 
@@ -82,13 +75,16 @@ def drive(
     waypoints : array_like, shape (W, 2)
         Ends of the legs in the world frame [m].
     sensor : Sensor
-        The scanner; it stands still while it sweeps.
+        The scanner.
     speed, turn_rate : float
         Speed along the legs [m/s] and of the turns between them [rad/s].
     seed : int
         Seed of all noise, not negative. Scan i depends on the seed and i alone.
     rate : float, optional
         Scans a second [Hz]; the sensor's own where None.
+    moving : bool
+        Whether the sensor moves while it sweeps, with the velocity that it has at the first beam;
+        else it stands still.
 
     Returns
     -------
@@ -110,13 +106,44 @@ def drive(
     """
     if seed < 0:
         raise ValueError(f"seed is {seed}, expected a number ≥ 0")
-    stamps, poses = drive_poses(waypoints, speed, turn_rate, sensor.rate if rate is None else rate)
+    rate = sensor.rate if rate is None else rate
+    stamps, poses, twists = _course(waypoints, speed, turn_rate, rate)
+    if not moving:
+        twists[:] = 0.0
+    states = zip(stamps.tolist(), map(_triple, poses), map(_triple, twists), strict=True)
     return (
-        sensor.scan(world, (x, y, theta), np.random.default_rng([seed, i]), stamp)
-        for i, (stamp, (x, y, theta)) in enumerate(
-            zip(stamps.tolist(), poses.tolist(), strict=True)
-        )
+        sensor.scan(world, pose, np.random.default_rng([seed, i]), stamp, twist)
+        for i, (stamp, pose, twist) in enumerate(states)
     )
+
+
+def _course(
+    waypoints: ArrayLike, speed: float, turn_rate: float, rate: float
+) -> tuple[Array, Array, Array]:
+    """Stamps (N,), poses (N, 3) and twists (N, 3) at equal steps of time."""
+    for name, value in (("speed", speed), ("turn_rate", turn_rate), ("rate", rate)):
+        if not 0 < value < math.inf:
+            raise ValueError(f"{name} is {value}, expected a finite number > 0")
+    times, keys = _key_poses(_distinct(waypoints), speed, turn_rate)
+    # A scan that is due at the very end is taken in spite of rounding.
+    n = math.floor(times[-1] * rate + 1e-9) + 1
+    stamps = np.arange(n) / rate
+    poses = np.column_stack([np.interp(stamps, times, keys[:, k]) for k in range(3)])
+    poses[:, 2] = _wrapped(poses[:, 2])
+    # Legs begin at the even keys, turns at the odd ones; at the last key the drive is over.
+    key = np.searchsorted(times, stamps, side="right") - 1
+    is_over, is_turn = key == len(times) - 1, key % 2 == 1
+    twists = np.zeros((n, 3))
+    twists[~is_turn, 0] = speed
+    turns = np.sign(np.diff(keys[:, 2], append=keys[-1, 2]))
+    twists[is_turn, 2] = turn_rate * turns[key[is_turn]]
+    twists[is_over] = 0.0
+    return stamps, poses, twists
+
+
+def _triple(row: Array) -> Twist:
+    x, y, theta = row.tolist()
+    return x, y, theta
 
 
 def _distinct(waypoints: ArrayLike) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,7 +17,9 @@ _TOUCHING = 1e-9
 _BLOCK = 12_000
 
 
-def cast_rays(world: World, pose: Pose, angles: ArrayLike) -> tuple[Array, NDArray[np.int32]]:
+def cast_rays(
+    world: World, pose: Pose | Array, angles: ArrayLike
+) -> tuple[Array, NDArray[np.int32]]:
     """Distance along each beam to the nearest surface, and which surface that is.
 
     A beam leaves the sensor o in the direction u = (cos(θ + φ), sin(θ + φ)). With
@@ -35,8 +35,8 @@ def cast_rays(world: World, pose: Pose, angles: ArrayLike) -> tuple[Array, NDArr
     ----------
     world : World
         What there is to meet.
-    pose : (x, y, theta)
-        Pose of the sensor in the world frame [m, m, rad].
+    pose : (x, y, theta) or ndarray, shape (n, 3)
+        Pose of the sensor in the world frame [m, m, rad], or its pose at each beam.
     angles : array_like, shape (n,)
         Bearings φ of the beams in the sensor frame [rad].
 
@@ -51,7 +51,8 @@ def cast_rays(world: World, pose: Pose, angles: ArrayLike) -> tuple[Array, NDArr
     Raises
     ------
     ValueError
-        If the pose is not three finite numbers, or the bearings are no finite vector.
+        If a pose is not three finite numbers, there is not one of them or one a beam, or the
+        bearings are no finite vector.
 
     Notes
     -----
@@ -68,17 +69,19 @@ def cast_rays(world: World, pose: Pose, angles: ArrayLike) -> tuple[Array, NDArr
     bearings = np.asarray(angles, dtype=np.float64)
     if bearings.ndim != 1 or not np.isfinite(bearings).all():
         raise ValueError(f"angles have shape {bearings.shape}, expected a finite vector")
-    if len(pose) != 3 or not all(map(math.isfinite, pose)):
-        raise ValueError(f"pose is {pose!r}, expected three finite numbers")
-    origin = np.array(pose[:2], dtype=np.float64)
-    direction = np.array((np.cos(pose[2] + bearings), np.sin(pose[2] + bearings)))
     n = len(bearings)
+    poses = np.array(pose, dtype=np.float64, ndmin=2)
+    if poses.shape not in ((1, 3), (n, 3)) or not np.isfinite(poses).all():
+        raise ValueError(f"pose is {pose!r:.60}, expected three finite numbers, or {n} times three")
+    heading = poses[:, 2] + bearings
+    direction = np.array((np.cos(heading), np.sin(heading)))
     ranges, surface = np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
     if world.n_surfaces == 0:
         return ranges, surface
     at_a_time = max(16, _BLOCK // world.n_surfaces)
     for first in range(0, n, at_a_time):
         block = slice(first, first + at_a_time)
+        origin = poses[block, :2] if len(poses) > 1 else poses[:, :2]
         towards = _to_walls(world, origin, direction[:, block])
         towards = np.hstack((towards, _to_circles(world, origin, direction[:, block])))
         nearest = towards.argmin(axis=1)
@@ -89,9 +92,14 @@ def cast_rays(world: World, pose: Pose, angles: ArrayLike) -> tuple[Array, NDArr
 
 
 def _to_walls(world: World, origin: Array, direction: Array) -> Array:
-    """Distance along every ray to every wall, shape (n, S); inf where they do not meet."""
+    """Distance along every ray to every wall, shape (n, S); inf where they do not meet.
+
+    There is one origin, shape (1, 2), or one for each ray, (n, 2).
+    """
     ux, uy = direction[:, :, np.newaxis]
-    px, py, qx, qy = (world.segments - np.tile(origin, 2)).T
+    ox, oy = origin.T[:, :, np.newaxis]
+    px, py, qx, qy = world.segments.T
+    px, py, qx, qy = px - ox, py - oy, qx - ox, qy - oy
     side_p = ux * py - uy * px
     side_q = ux * qy - uy * qx
     # The sides differ unless both are 0, where the wall is seen edge-on.
@@ -108,7 +116,8 @@ def _to_walls(world: World, origin: Array, direction: Array) -> Array:
 def _to_circles(world: World, origin: Array, direction: Array) -> Array:
     """Distance along every ray to every circle, shape (n, C); inf where they do not meet."""
     ux, uy = direction[:, :, np.newaxis]
-    cx, cy = (world.circles[:, :2] - origin).T
+    ox, oy = origin.T[:, :, np.newaxis]
+    cx, cy = world.circles[:, 0] - ox, world.circles[:, 1] - oy
     along, across = ux * cx + uy * cy, ux * cy - uy * cx
     square = world.circles[:, 2] ** 2 - across**2
     half_chord = np.sqrt(np.maximum(square, 0.0))

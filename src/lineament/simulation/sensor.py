@@ -1,10 +1,9 @@
-"""Scanners: their beams, and what stands between a true range and a reading."""
+"""Scanners: their beams, their motion, and what stands between a true range and a reading."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,10 @@ from ..scan import Array, LaserScan, Pose, RangeNoise
 from .raycast import cast_rays
 from .worlds import World
 
-__all__ = ["SENSORS", "Sensor"]
+__all__ = ["Sensor", "Twist"]
+
+#: Velocity in the sensor's own frame: forward, to the left [m/s], turn rate [rad/s].
+Twist = tuple[float, float, float]
 
 #: Share of the beams across an occlusion edge that blend both depths: the others are won by one.
 _BLEND_SHARE = 0.5
@@ -25,7 +27,7 @@ _EDGE_WIDTHS = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A 2-D laser scanner that stands still while it sweeps.
+    """A 2-D laser scanner.
 
     Parameters
     ----------
@@ -47,7 +49,7 @@ class Sensor:
         Divergence of the beam, full width [rad]. Where its two edges meet different surfaces with
         a step in depth between, half of the readings are a blend of both depths.
     rate : float
-        Scans a second [Hz].
+        Scans a second [Hz], and turns of its mirror: a beam follows the other by `time_increment`.
 
     Raises
     ------
@@ -56,7 +58,7 @@ class Sensor:
 
     Examples
     --------
-    >>> from lineament.simulation import room
+    >>> from lineament.simulation import SENSORS, room
     >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
     >>> scan
     LaserScan(481 beams, 481 valid, -80.0° + i·0.3333°, stamp=0.000)
@@ -99,6 +101,50 @@ class Sensor:
         """Bearings of the beams in the sensor frame [rad], shape (n,)."""
         return self.angle_min + self.angle_increment * np.arange(self.n_beams, dtype=np.float64)
 
+    @property
+    def time_increment(self) -> float:
+        """Time from a beam to the next [s]: a full turn takes 1/`rate`."""
+        return self.angle_increment / (2 * math.pi * self.rate)
+
+    def sweep(self, pose: Pose, twist: Twist) -> Array:
+        """Return the pose from which each beam is taken by a sensor that moves.
+
+        At constant velocities v = (v_x, v_y) and ω in its own frame, after the time t the sensor
+        has turned by ωt and gone along an arc, whose chord is R(ωt/2) v t sinc(ωt/2).
+
+        Parameters
+        ----------
+        pose : (x, y, theta)
+            Pose at the first beam, in the world frame [m, m, rad].
+        twist : (v_x, v_y, omega)
+            Velocity forward, to the left [m/s], turn rate [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+
+        Raises
+        ------
+        ValueError
+            If the twist is not three finite numbers.
+
+        Examples
+        --------
+        >>> ring = Sensor("ring", 4, 0.0, math.pi / 2, rate=1.0)
+        >>> ring.sweep((0.0, 1.0, math.pi / 2), (2.0, 0.0, 0.0))[:, :2].round(9).tolist()
+        [[0.0, 1.0], [0.0, 1.5], [0.0, 2.0], [0.0, 2.5]]
+        """
+        if len(twist) != 3 or not all(map(math.isfinite, twist)):
+            raise ValueError(f"twist is {twist!r}, expected three finite numbers")
+        x, y, theta = pose
+        forward, left, turn_rate = twist
+        time = self.time_increment * np.arange(self.n_beams)
+        half = turn_rate * time / 2
+        chord = time * np.sinc(half / math.pi)
+        c, s = np.cos(theta + half), np.sin(theta + half)
+        moved = (x + chord * (c * forward - s * left), y + chord * (s * forward + c * left))
+        return np.column_stack((*moved, theta + 2 * half))
+
     def ideal(self, world: World, pose: Pose) -> tuple[Array, NDArray[np.int32]]:
         """Return the true ranges and surfaces of all beams, whatever their length.
 
@@ -118,7 +164,7 @@ class Sensor:
 
         Examples
         --------
-        >>> from lineament.simulation import room
+        >>> from lineament.simulation import SENSORS, room
         >>> ranges, surface = SENSORS["paper"].ideal(room(), (0.0, 0.0, 0.0))
         >>> round(float(ranges[240]), 6), int(surface[240])
         (3.0, 1)
@@ -126,7 +172,12 @@ class Sensor:
         return cast_rays(world, pose, self.angles)
 
     def scan(
-        self, world: World, pose: Pose, rng: np.random.Generator, stamp: float = 0.0
+        self,
+        world: World,
+        pose: Pose,
+        rng: np.random.Generator,
+        stamp: float = 0.0,
+        twist: Twist = (0.0, 0.0, 0.0),
     ) -> LaserScan:
         """Simulate one sweep.
 
@@ -143,7 +194,10 @@ class Sensor:
             Source of all randomness. As many numbers are drawn whatever the world and the
             settings, so that two sensors can be compared on the same draws.
         stamp : float
-            Time of the scan [s].
+            Time of the first beam [s].
+        twist : (v_x, v_y, omega)
+            Velocity of the sensor in its own frame [m/s, m/s, rad/s], constant while it sweeps:
+            each beam is taken from its own pose (see :meth:`sweep`), the first from `pose`.
 
         Returns
         -------
@@ -153,14 +207,15 @@ class Sensor:
 
         Examples
         --------
-        >>> from lineament.simulation import room
+        >>> from lineament.simulation import SENSORS, room
         >>> rng = np.random.default_rng(0)
         >>> SENSORS["rplidar"].scan(room(), (0.0, 1.0, 0.5), rng, stamp=2.0).pose
         (0.0, 1.0, 0.5)
         """
         normal = rng.standard_normal((2, self.n_beams))
         uniform = rng.random((5, self.n_beams))
-        ranges = self._footprint(world, pose, self.noise.bearing * normal[0], uniform[:2])
+        poses = self.sweep(pose, twist) if any(twist) else np.array([pose])
+        ranges = self._footprint(world, poses, self.noise.bearing * normal[0], uniform[:2])
         ranges = self._cut_short(ranges, uniform[2:4])
         ranges = self._measure(ranges, normal[1])
         lost = (ranges < self.range_min) | (ranges >= self.range_max)
@@ -173,26 +228,27 @@ class Sensor:
             range_max=self.range_max,
             stamp=stamp,
             scan_time=1.0 / self.rate,
+            time_increment=self.time_increment,
             frame_id="laser",
             pose=pose,
         )
 
-    def _footprint(self, world: World, pose: Pose, error: Array, uniform: Array) -> Array:
+    def _footprint(self, world: World, poses: Array, error: Array, uniform: Array) -> Array:
         """Ranges along the beams' axes, blended where a footprint spans two depths."""
         axis = self.angles + error
+        ranges, _ = cast_rays(world, poses, axis)
         if self.mixed_pixel == 0:
-            return cast_rays(world, pose, axis)[0]
+            return ranges
         half = self.mixed_pixel / 2
-        beams = np.concatenate((axis, axis - half, axis + half))
-        ranges, surface = (a.reshape(3, -1) for a in cast_rays(world, pose, beams))
-        near, far = ranges[1:].min(axis=0), ranges[1:].max(axis=0)
+        right, surface_right = cast_rays(world, poses, axis - half)
+        left, surface_left = cast_rays(world, poses, axis + half)
+        near, far = np.minimum(right, left), np.maximum(right, left)
         step = np.maximum(_EDGE_STEP, _EDGE_WIDTHS * self.mixed_pixel * near)
         # Light that does not come back in time cannot blend.
-        edge = (surface[1] != surface[2]) & (far > near + step) & (far < self.range_max)
+        edge = (surface_right != surface_left) & (far > near + step) & (far < self.range_max)
         blends = edge & (uniform[0] < _BLEND_SHARE)
-        mixed: Array = ranges[0].copy()
-        mixed[blends] = near[blends] + uniform[1, blends] * (far[blends] - near[blends])
-        return mixed
+        ranges[blends] = near[blends] + uniform[1, blends] * (far[blends] - near[blends])
+        return ranges
 
     def _cut_short(self, ranges: Array, uniform: Array) -> Array:
         """Replace some ranges by false returns on the way."""
@@ -212,50 +268,3 @@ class Sensor:
         if self.noise.quantum > 0:
             reading = np.round(reading / self.noise.quantum) * self.noise.quantum
         return np.where(finite, reading, np.inf)
-
-
-def _preset(
-    name: str,
-    n_beams: int,
-    first_degrees: float,
-    step_degrees: float,
-    range_min: float,
-    range_max: float,
-    **others: Any,
-) -> Sensor:
-    first, step = math.radians(first_degrees), math.radians(step_degrees)
-    return Sensor(name, n_beams, first, step, range_min, range_max, **others)
-
-
-_PRESETS = (
-    # The experiments of Liu et al. 2023: range noise alone.
-    _preset("paper", 481, -80.0, 160.0 / 480, 0.0, 30.0, noise=RangeNoise(sigma=0.01), rate=10.0),
-    # Hokuyo UTM-30LX: 270°, time of flight.
-    _preset(
-        "utm30lx", 1081, -135.0, 0.25, 0.1, 30.0,
-        noise=RangeNoise(sigma=0.01, quantum=0.001), rate=40.0,
-        mixed_pixel=0.004, dropout=0.002, outlier=0.0005,
-    ),
-    # SICK LMS 200 class: 180°, a wide beam, readings in centimetres.
-    _preset(
-        "lms361", 361, -90.0, 0.5, 0.0, 80.0,
-        noise=RangeNoise(sigma=0.01, quantum=0.01), rate=37.5,
-        mixed_pixel=0.0044, dropout=0.001, outlier=0.0002,
-    ),
-    # Slamtec RPLIDAR class: a full turn by triangulation, noise in proportion to the range.
-    _preset(
-        "rplidar", 720, -180.0, 0.5, 0.15, 12.0,
-        noise=RangeNoise(sigma=0.002, proportional=0.007, quantum=0.00025), rate=10.0,
-        mixed_pixel=0.003, dropout=0.02, outlier=0.002,
-    ),
-    # LDROBOT LD19: a full turn, time of flight, few beams.
-    _preset(
-        "ld19", 455, -180.0, 360.0 / 455, 0.02, 12.0,
-        noise=RangeNoise(sigma=0.01, quantum=0.001), rate=10.0,
-        mixed_pixel=0.006, dropout=0.01, outlier=0.001,
-    ),
-)  # fmt: skip
-
-#: Scanners of several kinds, by name. Beams and limits are the data sheets'; divergence, drop-outs
-#: and false returns are of the size that such scanners show indoors.
-SENSORS: dict[str, Sensor] = {sensor.name: sensor for sensor in _PRESETS}

@@ -1,0 +1,55 @@
+"""How good a method is: features found in a scan against the true ones, and against themselves.
+
+`evaluate` scores one scan; scores of many scans add up, so that precision, recall and F1 over
+five hundred scenes come from the sums:
+
+>>> from lineament.evaluation import Scores, evaluate
+>>> import lineament as ln
+>>> scan = ln.LaserScan([2.0] * 9, angle_min=-0.04, angle_increment=0.01)
+>>> features = ln.extract(scan)
+>>> scores = evaluate(features, features) + evaluate(features, features)
+>>> scores.scans, scores.summary()["segment_f1"]
+(2, 1.0)
+
+Found and true features are matched one to one. What has fewer than `MIN_BEAMS` beams in the
+truth is too small to be demanded: missing it is no miss, and what is found there is no mistake.
+"""
+
+from .arcs import ArcScores, arc_scores
+from .beams import MIN_BEAMS
+from .consistency import NormalisedErrors
+from .corners import CornerScores, corner_scores
+from .counts import Counts, Summable
+from .matching import match
+from .partition import PartitionScores, partition_scores
+from .repeatability import Repeatability, Repeats, repeatability
+from .scores import Scores, evaluate
+from .segments import SegmentScores, segment_scores
+from .similarity import SimilarityScores, similarity_errors, similarity_scores
+from .stability import Stability, rotation_stability
+
+__all__ = [
+    "MIN_BEAMS",
+    "ArcScores",
+    "CornerScores",
+    "Counts",
+    "NormalisedErrors",
+    "PartitionScores",
+    "Repeatability",
+    "Repeats",
+    "Scores",
+    "SegmentScores",
+    "SimilarityScores",
+    "Stability",
+    "Summable",
+    "arc_scores",
+    "corner_scores",
+    "evaluate",
+    "match",
+    "partition_scores",
+    "repeatability",
+    "rotation_stability",
+    "segment_scores",
+    "similarity_errors",
+    "similarity_scores",
+]

@@ -1,0 +1,121 @@
+"""Errors in units of a covariance: that of the bound, or the one that came with the feature."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array
+from .counts import Summable, quantile, ratio
+
+__all__ = ["NormalisedErrors"]
+
+#: A covariance whose eigenvalues have a smaller ratio than this has lost all its digits.
+_LEAST_EIGENVALUE = 1e-14
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NormalisedErrors(Summable):
+    """Errors e of k components, as L⁻¹ e with the covariance Σ = L Lᵀ.
+
+    Where Σ is that of the errors, the squares e'Σ⁻¹e are chi-square distributed with k degrees
+    of freedom. With the covariance that a method gives they are its normalised estimation error
+    squared (NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4): `mean_ratio` above `interval`
+    is a method that trusts itself too much, below it one that trusts itself too little. With the
+    Cramér-Rao bound, `over_bound` tells how many times the least possible error there is.
+
+    Attributes
+    ----------
+    whitened : ndarray, shape (m, k)
+        L⁻¹ e of each error.
+    unusable : int
+        Errors left out, as their covariance is not finite or not positive definite.
+
+    Examples
+    --------
+    >>> errors = np.array([[0.02, 0.0], [0.0, 0.03]])
+    >>> normalised = NormalisedErrors.of(errors, np.tile(np.diag([1e-4, 1e-4]), (2, 1, 1)))
+    >>> normalised.squares.round(6).tolist(), round(normalised.mean_ratio, 6)
+    ([4.0, 9.0], 3.25)
+    """
+
+    whitened: Array
+    unusable: int = 0
+
+    @classmethod
+    def none(cls, components: int) -> Self:
+        """Make those of no scan."""
+        return cls(np.empty((0, components)))
+
+    @classmethod
+    def of(cls, errors: Array, covariances: Array) -> Self:
+        """Normalise errors (m, k) by their covariances (m, k, k), in the same units."""
+        finite = np.isfinite(errors).all(axis=1) & np.isfinite(covariances).all(axis=(1, 2))
+        kept, covariances = errors[finite], covariances[finite]
+        eigenvalues = np.linalg.eigvalsh(covariances)
+        definite = eigenvalues[:, 0] > _LEAST_EIGENVALUE * eigenvalues[:, -1]
+        factors = np.linalg.cholesky(covariances[definite])
+        whitened = np.linalg.solve(factors, kept[definite, :, np.newaxis])[:, :, 0]
+        return cls(whitened, len(errors) - len(whitened))
+
+    @property
+    def squares(self) -> NDArray[np.float64]:
+        """e'Σ⁻¹e of each error, shape (m,)."""
+        return np.asarray(np.square(self.whitened).sum(axis=1))
+
+    @property
+    def mean_ratio(self) -> float:
+        """Mean of the squares over k; 1 where the covariance is right, NaN of nothing."""
+        return ratio(float(np.square(self.whitened).sum()), self.whitened.size)
+
+    @property
+    def median_ratio(self) -> float:
+        """Median of the squares over that of chi-square; a few gross errors do not move it."""
+        return quantile(self.squares, 0.5) / _chi_square(0.5, self.whitened.shape[1])
+
+    @property
+    def over_bound(self) -> float:
+        """Root of `mean_ratio`: RMSE ÷ bound."""
+        return math.sqrt(self.mean_ratio)
+
+    @property
+    def over_bound_median(self) -> float:
+        """Root of `median_ratio`."""
+        return math.sqrt(self.median_ratio)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where `mean_ratio` lies with 95 % probability if the covariance is right."""
+        size = self.whitened.size
+        if not size:
+            return math.nan, math.nan
+        return _chi_square(0.025, size) / size, _chi_square(0.975, size) / size
+
+    def bound_summary(self, prefix: str = "") -> dict[str, float]:
+        """List the figures of errors that were divided by the bound."""
+        return {
+            f"{prefix}over_bound": self.over_bound,
+            f"{prefix}over_bound_median": self.over_bound_median,
+        }
+
+    def nees_summary(self) -> dict[str, float]:
+        """List the figures of errors that were divided by a method's own covariance."""
+        low, high = self.interval
+        return {
+            "nees": self.mean_ratio,
+            "nees_low": low,
+            "nees_high": high,
+            "nees_median": self.median_ratio,
+            "nees_unusable": self.unusable,
+        }
+
+
+def _chi_square(probability: float, degrees: int) -> float:
+    """Quantile of the chi-square distribution, that of a gamma distribution of half as many."""
+    from scipy.special import gammaincinv
+
+    return 2.0 * float(gammaincinv(degrees / 2, probability))

@@ -1,0 +1,61 @@
+"""Which of the found features is which of the true ones: one to one, by assignment."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array
+
+__all__ = ["match"]
+
+Indices = NDArray[np.intp]
+
+
+def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
+    """Pair rows with columns one to one: as many pairs as possible, then at the least cost.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (F, T)
+        What it costs to pair row f with column t; finite where it is allowed.
+    allowed : ndarray of bool, shape (F, T)
+        Which pairs lie within the gate.
+
+    Returns
+    -------
+    rows, columns : ndarray of int, shape (P,)
+        The pairs, by increasing row.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, or an allowed pair has no finite cost.
+
+    Examples
+    --------
+    The cheapest pair, 1 with 0, is given up for two pairs:
+
+    >>> cost = np.array([[2.0, 9.0], [1.0, 3.0]])
+    >>> rows, columns = match(cost, np.array([[True, False], [True, True]]))
+    >>> rows.tolist(), columns.tolist()
+    ([0, 1], [0, 1])
+    """
+    if cost.ndim != 2 or cost.shape != allowed.shape:
+        raise ValueError(f"cost has shape {cost.shape}, expected that of allowed, {allowed.shape}")
+    rows, columns = np.flatnonzero(allowed.any(axis=1)), np.flatnonzero(allowed.any(axis=0))
+    if not len(rows):
+        return rows, columns
+    within = allowed[np.ix_(rows, columns)]
+    excess = cost[np.ix_(rows, columns)]
+    excess = excess - excess[within].min()
+    most = excess[within].max()
+    if not np.isfinite(most):
+        raise ValueError(f"cost of an allowed pair is {most} above the least, expected finite")
+    from scipy.optimize import linear_sum_assignment
+
+    # All pairs that there can be cost less than a single one that is not allowed.
+    barred = min(within.shape) * most + 1.0
+    r, c = linear_sum_assignment(np.where(within, excess, barred))
+    kept = within[r, c]
+    return rows[r[kept]], columns[c[kept]]

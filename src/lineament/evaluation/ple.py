@@ -1,0 +1,169 @@
+"""The public benchmark of polyline extraction, with its authors' scores beside one's own.
+
+A. Schaefer, D. Büscher, L. Luft, W. Burgard, *A maximum likelihood approach to extract polylines
+from 2-D laser range scans*, IROS 2018: real scans of seven buildings and simulated ones of random
+polygons, each mapped by polylines with at most 10, 20, … 50 vertices in all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array
+from .ple_data import Benchmark, load_benchmark
+from .ple_maps import MapMaker, benchmark_iepf, iepf_map, method_map, polylines_of
+from .ple_scores import MapScore, cast_map, score_map
+
+__all__ = [
+    "Benchmark",
+    "BenchmarkResult",
+    "MapMaker",
+    "MapScore",
+    "benchmark_iepf",
+    "cast_map",
+    "iepf_map",
+    "load_benchmark",
+    "method_map",
+    "polylines_of",
+    "run_benchmark",
+    "score_map",
+]
+
+#: Scores of one scan and budget, as of `MapScore`.
+_SCORE = np.dtype(
+    [("vertices", "i8"), *((name, "f8") for name in ("rmse", "f", "fnr", "area_error", "iou"))]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BenchmarkResult:
+    """What a method reaches on a benchmark.
+
+    Attributes
+    ----------
+    benchmark : Benchmark
+    method : str
+    scores : structured array, shape (scans, budgets)
+        ``vertices`` used, ``rmse`` [m], ``f``, ``fnr``, ``area_error``, ``iou``; see `MapScore`.
+    """
+
+    benchmark: Benchmark
+    method: str
+    scores: NDArray[np.void]
+
+    def rows(self) -> list[tuple[str, str, list[float]]]:
+        """List (score, method, mean over the scans for each budget): this method, the authors'.
+
+        Scores that the benchmark has no truth for are left out.
+        """
+        rows = []
+        for score in _SCORE.names or ():
+            own = _means(self.scores[score])
+            if np.isnan(own).all():
+                continue
+            rows.append((score, self.method, own))
+            given = self.benchmark.scores.get(score)
+            if given is not None:
+                for k, method in enumerate(self.benchmark.methods):
+                    rows.append((score, method, _means(given[:, k])))
+        return rows
+
+    def to_json(self) -> str:
+        """Write everything as JSON: means beside the authors', and the scores of each scan.
+
+        ``mean[score][method]`` lists the means by budget; ``scans[i]`` lists, by budget,
+        ``max_vertices`` and the scores. What there is no value for is null.
+        """
+        means: dict[str, dict[str, list[float | None]]] = {}
+        for score, method, values in self.rows():
+            means.setdefault(score, {})[method] = [_or_null(value) for value in values]
+        return json.dumps(
+            {
+                "benchmark": self.benchmark.name,
+                "method": self.method,
+                "max_vertices": self.benchmark.max_vertices,
+                "mean": means,
+                "scans": [
+                    [
+                        {"max_vertices": budget}
+                        | {name: _or_null(row[name].item()) for name in _SCORE.names or ()}
+                        for budget, row in zip(self.benchmark.max_vertices, rows, strict=True)
+                    ]
+                    for rows in self.scores
+                ],
+            },
+            indent=1,
+            allow_nan=False,
+        )
+
+
+def run_benchmark(
+    benchmark: Benchmark,
+    method: str | MapMaker,
+    *,
+    name: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> BenchmarkResult:
+    """Map all scans with all budgets, and score the maps.
+
+    Parameters
+    ----------
+    benchmark : Benchmark
+    method : str or MapMaker
+        Name of a method (see `method_map`), or a function of a scan and a number of vertices that
+        makes polylines, such as `iepf_map`.
+    name : str, optional
+        How the result is called; by default the name of the method or function.
+    progress : callable, optional
+        Called after each scan with the numbers of scans done and in all.
+
+    Raises
+    ------
+    ValueError
+        If there is no such method, or a map has more vertices than allowed.
+
+    Examples
+    --------
+    >>> from lineament import LaserScan
+    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> none = np.empty((1, 0, 1))
+    >>> benchmark = Benchmark("wall", (scan,), (2,), (), {"rmse": none, "f": none, "fnr": none})
+    >>> run_benchmark(benchmark, iepf_map).scores["vertices"].tolist()
+    [[2]]
+    """
+    make = method_map(method) if isinstance(method, str) else method
+    if name is None:
+        name = method if isinstance(method, str) else getattr(method, "__name__", repr(method))
+    scores = np.zeros((len(benchmark.scans), len(benchmark.max_vertices)), _SCORE)
+    for i, scan in enumerate(benchmark.scans):
+        outline = None if benchmark.outlines is None else benchmark.outlines[i]
+        for j, budget in enumerate(benchmark.max_vertices):
+            score = score_map(make(scan, budget), scan, outline)
+            if score.vertices > budget:
+                raise ValueError(
+                    f"{name} made a map of {score.vertices} vertices of scan {i}, "
+                    f"expected at most {budget}"
+                )
+            scores[i, j] = astuple(score)
+        if progress is not None:
+            progress(i + 1, len(benchmark.scans))
+    scores.flags.writeable = False
+    return BenchmarkResult(benchmark, name, scores)
+
+
+def _means(values: Array) -> list[float]:
+    """Mean over the scans that have a value, for each budget."""
+    known = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        means: list[float] = (np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)).tolist()
+    return means
+
+
+def _or_null(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,117 @@
+"""Similarity error: how far each point is from the line that was fitted to it (Figure 12)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..features import Features
+from ..scan import Array, LaserScan
+from .beams import beam_masks, beams_of
+from .counts import Summable, quantile, ratio
+
+__all__ = ["SimilarityScores", "similarity_errors", "similarity_scores"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimilarityScores(Summable):
+    """Similarity errors of some scans.
+
+    Attributes
+    ----------
+    errors : ndarray, shape (m,)
+        Distance of each point that belongs to a segment or an arc to it [m].
+    valid : int
+        Valid beams: a method that explains few of them has small errors.
+    """
+
+    errors: Array = field(default_factory=lambda: np.empty(0))
+    valid: int = 0
+
+    @property
+    def mean(self) -> float:
+        """Mean error [m]."""
+        return ratio(float(self.errors.sum()), len(self.errors))
+
+    @property
+    def variance(self) -> float:
+        """Variance of the errors [m²]."""
+        return float(self.errors.var()) if len(self.errors) else math.nan
+
+    @property
+    def maximum(self) -> float:
+        """Largest error [m]."""
+        return quantile(self.errors, 1.0)
+
+    @property
+    def explained(self) -> float:
+        """Share of the valid beams that belong to a segment or an arc."""
+        return ratio(len(self.errors), self.valid)
+
+    def summary(self) -> dict[str, float]:
+        """List all figures by name; those that nothing defines are left out."""
+        names = ("mean", "variance", "maximum", "explained")
+        figures = {f"similarity_{name}": float(getattr(self, name)) for name in names}
+        return {name: value for name, value in figures.items() if math.isfinite(value)}
+
+
+def similarity_errors(scan: LaserScan, features: Features) -> Array:
+    """Distance of each beam's point to its own fitted line or circle.
+
+    Parameters
+    ----------
+    scan : LaserScan
+        The scan, as it was measured.
+    features : Features
+        What was found in it, in its frame.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Distances [m]: to the segment or arc whose beams, `first_beam` to `last_beam`, contain
+        the beam, the nearest of several; NaN where there is none or the beam is not valid.
+
+    Raises
+    ------
+    ValueError
+        If the features are of a scan with another number of beams.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> scan = ln.LaserScan([2.0, 2.0, 2.0, 9.0], angle_min=-0.1, angle_increment=0.1)
+    >>> similarity_errors(scan, ln.extract(scan)).round(4).tolist()
+    [0.0033, 0.0067, 0.0033, nan]
+    """
+    n = len(scan)
+    if len(features.clusters) != n:
+        raise ValueError(f"features are of {len(features.clusters)} beams, expected the scan's {n}")
+    points = np.where(scan.valid[:, np.newaxis], scan.points, 0.0)
+    lines, arcs = features.segments, features.arcs
+    normals = np.stack((-np.sin(lines["angle"]), np.cos(lines["angle"])))
+    to_lines = points @ normals - (lines["centroid"] * normals.T).sum(axis=1)
+    from_center = points[:, np.newaxis] - arcs["center"]
+    to_arcs = np.hypot(from_center[..., 0], from_center[..., 1]) - arcs["radius"]
+    distance = abs(np.hstack((to_lines, to_arcs))).T
+    own = beam_masks(np.vstack((beams_of(lines, n), beams_of(arcs, n))), n) & scan.valid
+    nearest = np.min(distance, axis=0, initial=np.inf, where=own)
+    return np.where(np.isfinite(nearest), nearest, np.nan)
+
+
+def similarity_scores(scan: LaserScan, features: Features) -> SimilarityScores:
+    """Collect the similarity errors of one scan.
+
+    Parameters are those of `similarity_errors`.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> scan = ln.LaserScan([2.0, 2.0, 2.0, 9.0], angle_min=-0.1, angle_increment=0.1)
+    >>> scores = similarity_scores(scan, ln.extract(scan))
+    >>> round(scores.mean, 4), round(scores.maximum, 4), scores.explained
+    (0.0044, 0.0067, 0.75)
+    """
+    errors = similarity_errors(scan, features)
+    return SimilarityScores(errors[~np.isnan(errors)], int(scan.valid.sum()))

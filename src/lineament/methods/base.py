@@ -1,0 +1,65 @@
+"""What the methods share: the run over scans, the trace, the types of their parameters."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, ClassVar
+
+from ..block import Block
+from ..features import Features, noise_row
+from ..scan import LaserScan
+from ..tracing import Trace, trace_of
+from .steps import estimate_noise
+
+__all__ = ["MethodBase"]
+
+
+class MethodBase:
+    """A method that calls its kernels one by one, for one scan after the other.
+
+    Methods are frozen dataclasses that inherit from this, and say in `find` what they do.
+    """
+
+    __slots__ = ()
+
+    name: ClassVar[str]
+    presets: ClassVar[tuple[str, ...]] = ()
+
+    def own_arrays(self, beams: int) -> Any:
+        """Make the arrays that the method needs besides those of a block; none, unless it says."""
+
+    def find(self, block: Block, row: int) -> None:
+        """Find and measure the features of the scan in a block's workspace, whose noise is known.
+
+        `row` tells which of the block's scans it is.
+        """
+        raise NotImplementedError
+
+    def run(self, block: Block) -> None:
+        """Find and measure the features of the scans of a block."""
+        for row in range(block.rows):
+            block.take(row)
+            estimate_noise(block, row)
+            self.find(block, row)
+
+    @property
+    def least_response(self) -> float:
+        """What the response of a candidate exceeds where the first search accepts it."""
+        return 0.0
+
+    def trace(self, scan: LaserScan, features: Features) -> Trace:
+        """Run again on a scan of which these features came, and keep every intermediate.
+
+        Its candidates and cuts are those of the first search, before anything was merged; where
+        none are examined, there are none. `lineament.Extractor.trace` does both.
+        """
+        block = Block(scan, noise_row(features.noise), 1, self.own_arrays(len(scan)))
+        block.load(scan.ranges)
+        self.run(block)
+        return trace_of(block, self.name, scan, features, self.least_response)
+
+    def _settle_types(self) -> None:
+        """Make every parameter of the type of its default, for numba compiles for each type."""
+        for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
+            kind: type[Any] = type(field.default)
+            object.__setattr__(self, field.name, kind(getattr(self, field.name)))

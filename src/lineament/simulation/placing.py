@@ -1,0 +1,162 @@
+"""Where there is room: a floor on which a scanner and obstacles are put without touching."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..scan import Array, Pose
+from .worlds import World
+
+__all__ = ["Floor", "clearance", "is_free", "rectangle"]
+
+#: Least distance of the scanner from every surface [m].
+_KEPT_CLEAR = 0.3
+#: Least distance between an obstacle and every other surface [m].
+_GAP = 0.2
+#: Most circles that cover an elongated box.
+_COVERING = 12
+
+
+class Floor:
+    """A closed outline with a scanner in it, and obstacles that are put where there is room.
+
+    An obstacle is covered by circles; there is room where no surface lies within a gap of them.
+
+    Parameters
+    ----------
+    outline : array_like, shape (V, 2)
+        Vertices of the outline [m], not repeating the first.
+    pose : (x, y, theta)
+        Pose of the scanner [m, m, rad].
+
+    Examples
+    --------
+    >>> floor = Floor(rectangle((0, 0), 6, 4), (1.0, 0.0, 0.0))
+    >>> floor.put_column((-1, 0), 0.4), floor.put_column((-0.5, 0.2), 0.2)
+    (True, False)
+    >>> floor.world
+    World(4 segments, 1 circles)
+    """
+
+    def __init__(self, outline: ArrayLike, pose: Pose) -> None:
+        self.pose = pose
+        self.world = World.of_polygons([_closed(outline)])
+
+    def put_box(self, center: ArrayLike, width: float, depth: float, angle: float = 0.0) -> bool:
+        """Put a box, its width along `angle`; False, and nothing is put, where there is no room.
+
+        Parameters
+        ----------
+        center : array_like, shape (2,)
+            Its centre [m].
+        width, depth : float
+            Its sides [m], the longer first.
+        angle : float
+            Direction of its width [rad].
+        """
+        n = min(_COVERING, math.ceil(width / depth))
+        along = width * ((np.arange(n) + 0.5) / n - 0.5)
+        centers = np.asarray(center) + along[:, np.newaxis] * (math.cos(angle), math.sin(angle))
+        if not self._has_room(centers, math.hypot(width / n, depth) / 2):
+            return False
+        walls = World.of_polygons([_closed(rectangle(center, width, depth, angle))]).segments
+        self.world = World(np.vstack((self.world.segments, walls)), self.world.circles)
+        return True
+
+    def put_column(self, center: ArrayLike, radius: float) -> bool:
+        """Put a round column; False, and nothing is put, where there is no room."""
+        at = np.asarray(center, dtype=np.float64)
+        if not self._has_room(at[np.newaxis], radius):
+            return False
+        columns = np.vstack((self.world.circles, (*at, radius)))
+        self.world = World(self.world.segments, columns)
+        return True
+
+    def _has_room(self, centers: Array, radius: float) -> bool:
+        from_scanner = np.hypot(*(centers - self.pose[:2]).T)
+        return bool(
+            (clearance(self.world, centers) >= radius + _GAP).all()
+            and is_free(self.world, centers).all()
+            and (from_scanner >= radius + _KEPT_CLEAR).all()
+        )
+
+
+def rectangle(center: ArrayLike, width: float, depth: float, angle: float = 0.0) -> Array:
+    """Vertices (4, 2) of a rectangle, counter-clockwise, its width along `angle` [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    halves = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, depth / 2)
+    vertices: Array = np.asarray(center) + halves @ np.array([[c, s], [-s, c]])
+    return vertices
+
+
+def clearance(world: World, points: ArrayLike) -> Array:
+    """Distance of points to the nearest surface.
+
+    Parameters
+    ----------
+    world : World
+        The surfaces.
+    points : array_like, shape (n, 2)
+        Points [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Distances [m]; inf in an empty world.
+
+    Examples
+    --------
+    >>> clearance(World([[2, -1, 2, 1]], [[0, 3, 0.5]]), [(0, 0), (3, 2), (0, 3)]).round(3).tolist()
+    [2.0, 1.414, 0.5]
+    """
+    at = np.asarray(points, dtype=np.float64)[:, np.newaxis]
+    start, along = world.segments[:, :2], world.segments[:, 2:] - world.segments[:, :2]
+    share = ((at - start) * along).sum(axis=2) / (along**2).sum(axis=1)
+    feet = start + np.clip(share, 0, 1)[:, :, np.newaxis] * along
+    to_walls = np.linalg.norm(at - feet, axis=2)
+    to_centers = np.linalg.norm(at - world.circles[:, :2], axis=2)
+    distances = np.hstack((to_walls, np.abs(to_centers - world.circles[:, 2])))
+    nearest: Array = distances.min(axis=1, initial=math.inf)
+    return nearest
+
+
+def is_free(world: World, points: ArrayLike) -> Array:
+    """Whether points lie inside the outline of a world and outside its obstacles.
+
+    They do where a ray meets an odd number of walls, all of which belong to closed outlines.
+
+    Parameters
+    ----------
+    world : World
+        One closed outline, with closed obstacles and round columns in it.
+    points : array_like, shape (n, 2)
+        Points [m], on no surface.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+
+    Examples
+    --------
+    >>> from lineament.simulation import room
+    >>> is_free(room(), [(0, 0), (1.8, -0.8), (0, 2.5)]).tolist()
+    [True, False, False]
+    """
+    at = np.asarray(points, dtype=np.float64)
+    x, y = at[:, 0, np.newaxis], at[:, 1, np.newaxis]
+    px, py, qx, qy = world.segments.T
+    crosses = (py > y) != (qy > y)
+    # Where a wall is level it is not crossed, and its slope not asked for.
+    rise = np.where(py == qy, 1.0, qy - py)
+    met = crosses & (x < px + (y - py) / rise * (qx - px))
+    in_column = np.hypot(x - world.circles[:, 0], y - world.circles[:, 1]) < world.circles[:, 2]
+    free: Array = (met.sum(axis=1) % 2 == 1) & ~in_column.any(axis=1)
+    return free
+
+
+def _closed(vertices: ArrayLike) -> Array:
+    points = np.asarray(vertices, dtype=np.float64)
+    return np.vstack((points, points[:1]))

@@ -1,0 +1,140 @@
+"""Simulated logs: a drive through a building, or a scanner that stands in a scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from ..logs import save_log
+from ..scan import LaserScan, Pose
+from .drive import drive, drive_poses
+from .presets import SENSORS
+from .scenes import SCENES, scene
+from .sensor import Sensor
+from .worlds import World, building, room
+
+__all__ = ["WORLDS", "sensor_like", "simulate_log"]
+
+#: What a log can be recorded in: the storey is driven through, all others are seen from one place.
+WORLDS = ("building", "room", *SCENES)
+
+#: Shows how far the items are.
+Track = Callable[[Any, str, int], Iterable[Any]]
+
+
+def simulate_log(
+    path: str | os.PathLike[str],
+    world: str,
+    sensor: Sensor,
+    *,
+    scans: int | None = None,
+    speed: float = 0.6,
+    rate: float | None = None,
+    seed: int = 0,
+    moving: bool = False,
+    track: Track = lambda items, about, total: items,  # noqa: ARG005
+) -> None:
+    """Record a log of simulated scans, each with its stamp and true pose.
+
+    Parameters
+    ----------
+    path : path-like
+        The log; its ending tells the format, see `lineament.logs.save_log`.
+    world : str
+        "building", driven through from end to end; "room", or a kind of `SCENES`, where the
+        scanner stands still.
+    sensor : Sensor
+        The scanner.
+    scans : int, optional
+        Number of scans; the whole drive where None, 100 where the scanner stands.
+    speed : float
+        Of the drive [m/s].
+    rate : float, optional
+        Scans a second [Hz]; the sensor's own where None.
+    seed : int
+        Of the scene and of all noise, not negative.
+    moving : bool
+        Whether the scanner moves while it sweeps, on a drive.
+    track : callable
+        ``track(scans, about, total)`` gives the scans, and shows how far they are.
+
+    Raises
+    ------
+    ValueError
+        If there is no such world, a number is out of bounds, the scanner cannot move, or the
+        ending is not known.
+    LineamentError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from lineament.logs import open_log
+    >>> from lineament.simulation import SENSORS
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "hall.npz")
+    >>> simulate_log(path, "hall", SENSORS["lms181"], scans=3, seed=5)
+    >>> len(open_log(path)), len({scan.pose for scan in open_log(path)})
+    (3, 1)
+    """
+    if world not in WORLDS:
+        raise ValueError(f"world is {world!r}, expected one of {', '.join(WORLDS)}")
+    if scans is not None and scans < 1:
+        raise ValueError(f"scans is {scans}, expected at least 1")
+    rate = sensor.rate if rate is None else rate
+    if world == "building":
+        plan, way = building()
+        total = len(drive_poses(way, speed=speed, rate=rate)[0])
+        total = total if scans is None else min(scans, total)
+        driven = drive(plan, way, sensor, speed=speed, seed=seed, rate=rate, moving=moving)
+        taken: Iterator[LaserScan] = islice(driven, total)
+    else:
+        if moving:
+            raise ValueError(f"the scanner stands in world {world!r}, moving needs the building")
+        total = 100 if scans is None else scans
+        where = (room(), (0.0, 0.0, 0.0)) if world == "room" else scene(world, seed)
+        taken = _standing(*where, sensor, total, rate, seed)
+    save_log(path, track(taken, "simulating", total))
+
+
+def sensor_like(name: str, *, sigma: float | None = None, **changes: float | None) -> Sensor:
+    """Take a preset of `SENSORS`, and change what is not None.
+
+    Parameters
+    ----------
+    name : str
+        Name of the preset.
+    sigma : float, optional
+        Constant part of the range noise [m].
+    **changes
+        Other fields of `Sensor`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset, or a value makes no sense.
+
+    Examples
+    --------
+    >>> sensor_like("lms181", sigma=0.03, dropout=None).noise
+    RangeNoise(sigma=0.03, proportional=0.0, bearing=0.0, quantum=0.01)
+    """
+    if name not in SENSORS:
+        raise ValueError(f"sensor is {name!r}, expected one of {', '.join(SENSORS)}")
+    sensor = SENSORS[name]
+    noise = sensor.noise if sigma is None else replace(sensor.noise, sigma=sigma)
+    chosen: dict[str, Any] = {key: value for key, value in changes.items() if value is not None}
+    return replace(sensor, noise=noise, **chosen)
+
+
+def _standing(
+    world: World, pose: Pose, sensor: Sensor, scans: int, rate: float, seed: int
+) -> Iterator[LaserScan]:
+    if not rate > 0:
+        raise ValueError(f"rate is {rate}, expected a finite number > 0")
+    for i in range(scans):
+        yield sensor.scan(world, pose, np.random.default_rng([seed, i]), i / rate)

@@ -1,0 +1,213 @@
+"""What is one surface in a world of walls, and what the beams of a scanner meet of it."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array, Pose
+from .sensor import Sensor
+from .worlds import World
+
+__all__ = ["Surfaces", "View"]
+
+#: Ends of walls nearer to each other than this [m] are one vertex.
+_SAME_VERTEX = 1e-3
+#: Walls that turn by less than this [rad] where they meet are one straight surface.
+_STRAIGHT = 1e-3
+#: A beam that meets a wall this near to its end [m] goes through the vertex.
+_THROUGH_VERTEX = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """Straight surfaces, each of one wall or of several end to end, and circles.
+
+    Surfaces are numbered: the straight ones from 0, then the circles.
+
+    Attributes
+    ----------
+    of_world : int64 array, shape (S + C,)
+        Surface to which each wall and circle of the world belongs.
+    walls : ndarray, shape (W, 2, 2)
+        Both ends of each straight surface, in the world frame [m].
+    circles : ndarray, shape (C, 3)
+        The circles ``x y r`` [m].
+    joints : dict of (int, int) to ndarray, shape (k, 2)
+        Vertices at which two straight surfaces meet, in the world frame [m].
+    """
+
+    of_world: NDArray[np.int64]
+    walls: Array
+    circles: Array
+    joints: dict[tuple[int, int], Array]
+
+    @staticmethod
+    @lru_cache(maxsize=16)
+    def of(world: World) -> Surfaces:
+        """Find the surfaces of a world.
+
+        Examples
+        --------
+        >>> surfaces = Surfaces.of(World([[0, 0, 1, 0], [1, 0, 3, 0], [3, 0, 3, 2]]))
+        >>> surfaces.of_world.tolist(), surfaces.walls[0].tolist()
+        ([0, 0, 1], [[0.0, 0.0], [3.0, 0.0]])
+        >>> surfaces.joints[0, 1].tolist()
+        [[3.0, 0.0]]
+        """
+        ends = world.segments.reshape(-1, 2, 2)
+        meetings = _meetings(ends)
+        label = np.arange(len(ends))
+        for i, a, j, b in meetings:
+            if _goes_on(ends[i], a, ends[j], b):
+                label[label == label[j]] = label[i]
+        numbers, label = np.unique(label, return_inverse=True)
+        joints = defaultdict(list)
+        for i, a, j, _ in meetings:
+            if label[i] != label[j]:
+                joints[int(label[i]), int(label[j])].append(ends[i, a])
+        return Surfaces(
+            np.concatenate((label, len(numbers) + np.arange(len(world.circles)))),
+            np.array([_extent(ends[label == k]) for k in range(len(numbers))]).reshape(-1, 2, 2),
+            world.circles,
+            {pair: np.array(vertices) for pair, vertices in joints.items()},
+        )
+
+
+def _meetings(ends: Array) -> list[tuple[int, int, int, int]]:
+    """List (i, a, j, b) where end a of wall i is end b of another wall j; each both ways."""
+    points = ends.reshape(-1, 2)
+    apart = np.abs(points[:, np.newaxis] - points).max(axis=2)
+    first, second = np.nonzero(apart <= _SAME_VERTEX)
+    other = first // 2 != second // 2
+    pairs = zip(first[other].tolist(), second[other].tolist(), strict=True)
+    return [(m // 2, m % 2, n // 2, n % 2) for m, n in pairs]
+
+
+def _goes_on(wall: Array, a: int, other: Array, b: int) -> bool:
+    """Whether `other`, from its end b, goes straight on where `wall` ends at its end a."""
+    into, onwards = wall[a] - wall[1 - a], other[1 - b] - other[b]
+    cross, dot = into[0] * onwards[1] - into[1] * onwards[0], into @ onwards
+    return bool(abs(math.atan2(cross, dot)) < _STRAIGHT)
+
+
+def _extent(ends: Array) -> Array:
+    """Farthest two ends of walls on one line, shape (2, 2)."""
+    points = ends.reshape(-1, 2)
+    along = points @ (ends[0, 1] - ends[0, 0])
+    return points[[along.argmin(), along.argmax()]]
+
+
+class View:
+    """What the beams of a scanner at rest meet, without noise, in its own frame.
+
+    Parameters
+    ----------
+    world : World
+        What there is to see.
+    pose : (x, y, theta)
+        Pose of the sensor in the world frame [m, m, rad].
+    sensor : Sensor
+        Its beams and range limits.
+
+    Attributes
+    ----------
+    bearings, ranges : ndarray, shape (n,)
+        Of the beams [rad, m]; ranges beyond the limits too.
+    surface : int64 array, shape (n,)
+        The surface that each beam meets within the limits, -1 for none.
+    walls : ndarray, shape (W, 2, 2)
+        Ends of the straight surfaces, that of the lesser bearing first [m].
+    circles : ndarray, shape (C, 3)
+        The circles ``x y r`` [m].
+    is_full_circle : bool
+        Whether the last beam neighbours the first, as in `LaserScan`.
+    steps : ndarray, shape (n,)
+        From each beam to the next [rad]: after the last of a full turn the first, else 0.
+    joints : ndarray, shape (n, 2)
+        Vertex between each beam and the next at which the surfaces of both meet; NaN for none.
+    goes_on : bool array, shape (n,)
+        Whether each beam and the next meet the same surface.
+    """
+
+    def __init__(self, world: World, pose: Pose, sensor: Sensor) -> None:
+        surfaces = Surfaces.of(world)
+        self.bearings = sensor.angles
+        self.ranges, met = sensor.ideal(world, pose)
+        valid = (self.ranges >= sensor.range_min) & (self.ranges < sensor.range_max)
+        self.surface = np.full(len(met), -1)
+        self.surface[valid] = surfaces.of_world[met[valid]]
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        self._rotation, self._origin = np.array([[c, -s], [s, c]]), np.array(pose[:2])
+        self.walls = _counter_clockwise(self._to_sensor(surfaces.walls))
+        self.circles = surfaces.circles.copy()
+        self.circles[:, :2] = self._to_sensor(surfaces.circles[:, :2])
+        rest = 2 * math.pi - (sensor.n_beams - 1) * sensor.angle_increment
+        self.is_full_circle = sensor.n_beams >= 3 and rest <= 2.5 * sensor.angle_increment
+        self.steps = np.full(len(met), sensor.angle_increment)
+        self.steps[-1] = rest if self.is_full_circle else 0.0
+        self._joints_of = {
+            pair: self._to_sensor(vertices) for pair, vertices in surfaces.joints.items()
+        }
+        self._settle_vertices()
+        self._look_between()
+
+    def point_on_wall(self, bearing: float, surface: int) -> Array:
+        """Tell where a beam meets the line of a straight surface, shape (2,)."""
+        (px, py), (qx, qy) = self.walls[surface]
+        ux, uy = math.cos(bearing), math.sin(bearing)
+        # As in `cast_rays`, with the sensor at the origin.
+        distance = (px * qy - py * qx) / (ux * (qy - py) - uy * (qx - px))
+        return np.array([distance * ux, distance * uy])
+
+    def bearing_from(self, beam: int, point: Array) -> float:
+        """Bearing of a point as seen from the axis of a beam, in (-π, π] [rad]."""
+        turn = math.atan2(point[1], point[0]) - self.bearings[beam]
+        return math.remainder(turn, 2 * math.pi)
+
+    def _to_sensor(self, points: Array) -> Array:
+        moved: Array = (points - self._origin) @ self._rotation
+        return moved
+
+    def _settle_vertices(self) -> None:
+        """Give a beam through the end of a wall to the wall that its neighbours meet.
+
+        Such a beam meets two walls at the same range, of which one may be hidden but for its end.
+        """
+        before, after = np.roll(self.surface, 1), np.roll(self.surface, -1)
+        alone = (self.surface != before) & (self.surface != after) & (self.surface >= 0)
+        for i in np.flatnonzero(alone).tolist():
+            hit = self.ranges[i] * np.array(
+                [math.cos(self.bearings[i]), math.sin(self.bearings[i])]
+            )
+            for neighbour in (before[i], after[i]):
+                vertices = self._joints_of.get((int(self.surface[i]), int(neighbour)), ())
+                if any(math.dist(vertex, hit) < _THROUGH_VERTEX for vertex in vertices):
+                    self.surface[i] = neighbour
+                    break
+
+    def _look_between(self) -> None:
+        """Find what lies between each beam and the next."""
+        after = np.roll(self.surface, -1)
+        linked = (self.surface >= 0) & (after >= 0) & (self.steps > 0)
+        self.goes_on = linked & (self.surface == after)
+        self.joints = np.full((len(after), 2), np.nan)
+        for i in np.flatnonzero(linked & (self.surface != after)).tolist():
+            pair = int(self.surface[i]), int(after[i])
+            for vertex in self._joints_of.get(pair, ()):
+                turn = self.bearing_from(i, vertex)
+                slack = _SAME_VERTEX / math.hypot(*vertex)
+                if -slack <= turn <= self.steps[i] + slack:
+                    self.joints[i] = vertex
+
+
+def _counter_clockwise(walls: Array) -> Array:
+    """Order the ends of walls by bearing, as seen from the origin."""
+    p, q = walls[:, 0], walls[:, 1]
+    backwards = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] < 0
+    return np.where(backwards[:, np.newaxis, np.newaxis], walls[:, ::-1], walls)

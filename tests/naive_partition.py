@@ -1,0 +1,206 @@
+"""Slow twins of how scans are parted, split and tracked: lists, recursion, a fit at every step."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from naive import Clusters, chord_distances, pieces_of, polar, sigma, valid
+from naive_fit import normal_variances, principal_line, range_variance
+
+from lineament import LaserScan
+from lineament.methods.pdbs import PDBS
+
+
+def untied(scan: LaserScan) -> LaserScan:
+    """Move each range by micrometres, so that no two points of a wall are equally far off it."""
+    ranges = scan.ranges * (1 + 1e-6 * np.random.default_rng(0).normal(size=len(scan)))
+    limits = {"range_min": scan.range_min, "range_max": scan.range_max}
+    if scan.is_regular:
+        return LaserScan(ranges, scan.angle_min, scan.angle_increment, **limits)
+    return LaserScan(ranges, angles=scan.angles, **limits)
+
+
+def noise_of(scan, extractor) -> tuple[float, ...]:
+    noise = extractor.noise
+    if noise is not None:
+        return (noise.sigma, noise.proportional, noise.bearing, noise.quantum)
+    return (sigma(scan) or math.nan, 0.0, 0.0, 0.0)
+
+
+# Parting
+
+
+def clusters_of(method) -> PDBS:
+    """Make the method pdbs that parts scans as another method does."""
+    return PDBS(
+        grazing_angle=method.grazing_angle,
+        max_missing=method.max_missing,
+        min_points=method.min_points,
+    )
+
+
+def threshold(rule, before, rho, step, noise, method):
+    """Distance up to which two readings, `step` apart in bearing, lie on one surface."""
+    if rule == "fixed":
+        return method.distance
+    c1 = math.sqrt(2 * (1 - math.cos(step)))
+    if rule == "dietmayer":
+        return method.c0 + c1 * min(before, rho)
+    if rule == "santos":
+        below = (math.cos(step / 2) - math.sin(step / 2)) / math.tan(method.beta)
+        return method.c0 + c1 * min(before, rho) / below if below > 0 else math.nan
+    if rule == "borges_aldon":
+        opposite = math.sin(method.grazing_angle - step)
+        if opposite <= 0:
+            return math.nan
+        floor = method.noise_factor * math.sqrt(range_variance(before, noise))
+        return before * math.sin(step) / opposite + floor
+    raise AssertionError(rule)
+
+
+def parted(scan, method: PDBS, noise) -> Clusters:
+    """Classes of neighbours by a rule, Lee's by its ratio."""
+    rule = method.rule
+    out, ok, rho, n = Clusters(), valid(scan), scan.ranges, len(scan)
+    points = polar(rho, scan.angles)
+    beams = [i for i in range(n) if ok[i]]
+
+    def joins(before, b):
+        out.spacing[b] = d = float(np.linalg.norm(points[b] - points[before]))
+        if (b - before - 1) % n > method.max_missing:
+            out.distance_threshold[b] = math.nan
+            return False
+        step = (scan.angles[b] - scan.angles[before]) % (2 * math.pi)
+        if rule == "lee":
+            # By the cosine rule, two points of this ratio and this sum.
+            total = rho[b] + rho[before]
+            a, c = total * (1 + method.ratio) / 2, total * (1 - method.ratio) / 2
+            equivalent = math.sqrt(a * a + c * c - 2 * a * c * math.cos(step))
+            out.distance_threshold[b] = equivalent
+            return abs(rho[b] - rho[before]) / total <= method.ratio
+        out.distance_threshold[b] = threshold(rule, rho[before], rho[b], step, noise, method)
+        return d <= out.distance_threshold[b]
+
+    classes = [[beams[0]]] if beams else []
+    for before, b in pairwise(beams):
+        if joins(before, b):
+            classes[-1].append(b)
+        else:
+            classes.append([b])
+    if scan.is_full_circle and beams and joins(beams[-1], beams[0]) and len(beams) >= 3:
+        if len(classes) == 1:
+            out.closed = True
+        else:
+            classes = [classes[-1] + classes[0], *classes[1:-1]]
+    out.classes = [members for members in classes if len(members) >= method.min_points]
+    if out.closed and out.classes:
+        turn = int(np.argmax(rho[beams]))
+        out.classes = [beams[turn:] + beams[: turn + 1]]
+    return out
+
+
+# Splitting
+
+
+def split(scan, found, noise, *, tolerance, min_piece, by_line):
+    """Candidates (beam, distance, excess), and pieces (first beam, last beam, piece before).
+
+    `tolerance` tells that of a range; `by_line` whether the fitted line decides.
+    """
+    points = polar(scan.ranges, scan.angles)
+    candidates, pieces = [], []
+    for beams in found.classes:
+        own, rho = points[beams], scan.ranges[beams]
+        allowed = tolerance(rho)
+        cuts = {}
+
+        def search(a, b, own=own, rho=rho, beams=beams, allowed=allowed, cuts=cuts):
+            margin = min_piece - 1
+            inner = chord_distances(own[a : b + 1])[margin : b - a - margin + 1]
+            if b - a < 2 * margin or len(inner) == 0:
+                return
+            c = a + margin + int(np.argmax(inner))
+            distance = inner[c - a - margin]
+            if by_line:
+                part = slice(a, b + 1)
+                bearings = scan.angles[beams][part]
+                excess = off_line(own[part], bearings, rho[part], noise, allowed[part])
+            else:
+                excess = distance / allowed[c]
+            candidates.append((beams[c], distance, excess))
+            if excess > 1:
+                cuts[c] = excess
+                search(a, c)
+                search(c, b)
+
+        search(0, len(beams) - 1)
+        if found.closed and cuts:
+            over = np.array([own[max(cuts)], own[0], own[min(cuts)]])
+            distance = chord_distances(over)[1]
+            candidates.append((beams[0], distance, distance / allowed[0]))
+            if distance > allowed[0]:
+                cuts[0] = distance / allowed[0]
+        base, own_pieces = len(pieces), pieces_of(len(beams), cuts, found.closed)
+        for k, (first, last, is_corner) in enumerate(own_pieces):
+            before = base + (k - 1) % len(own_pieces) if is_corner else -1
+            pieces.append((beams[first], beams[last], before))
+    return candidates, pieces
+
+
+def off_line(points, bearings, rho, noise, allowed):
+    """Tell by how much of their tolerances two neighbours are off one side of the fitted line."""
+    if not np.ptp(points, axis=0).any():
+        return 0.0
+    centroid, angle = principal_line(points, np.ones(len(points)))
+    for _ in range(2):
+        weights = 1 / normal_variances(angle, bearings, rho, noise)
+        centroid, angle = principal_line(points, weights)
+    off = (points - centroid) @ [-math.sin(angle), math.cos(angle)] / allowed
+    pairs = [min(abs(a), abs(b)) for a, b in pairwise(off) if a * b > 0]
+    return max(pairs, default=0.0)
+
+
+# Tracking
+
+
+def track(scan, found, noise, method):
+    """First and last beam of the lines that grow along the classes."""
+    points = polar(scan.ranges, scan.angles)
+    lines = []
+    for beams in found.classes:
+        begin = 0
+        while begin < len(beams):
+            gained, missed = [], 0
+            for b in beams[begin:]:
+                if len(gained) < 3 or is_predicted(scan, points, gained, b, noise, method):
+                    gained.append(b)
+                    missed = 0
+                    continue
+                missed += 1
+                if missed > method.max_misses:
+                    break
+            length = beams.index(gained[-1], begin) - begin + 1
+            if length >= method.min_piece:
+                lines.append((beams[begin], gained[-1]))
+                begin += length
+            else:
+                begin += 1
+    return lines
+
+
+def is_predicted(scan, points, gained, b, noise, method):
+    own = points[gained]
+    centroid, angle = principal_line(own, np.ones(len(own)))
+    along = np.array([math.cos(angle), math.sin(angle)])
+    normal = np.array([-along[1], along[0]])
+    t = (own - centroid) @ along
+    lever = (points[b] - centroid) @ along
+    bearing_of_normal = abs(normal @ centroid) / scan.ranges[b]
+    cosine2 = max(bearing_of_normal**2, 1e-6)
+    variance = range_variance(scan.ranges[b], noise) * cosine2
+    variance += (scan.ranges[b] * noise[2]) ** 2 * (1 - cosine2)
+    variance *= 1 + 1 / len(own) + (lever**2 / (t @ t) if t @ t > 0 else 0.0)
+    allowed = method.threshold + method.noise_factor * math.sqrt(variance)
+    return abs((points[b] - centroid) @ normal) <= allowed

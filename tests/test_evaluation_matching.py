@@ -1,0 +1,177 @@
+"""What all metrics stand on: assignment, counts, sums, errors in units of a covariance, masks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from handmade import features, segment
+
+from lineament.evaluation import Counts, NormalisedErrors, match
+from lineament.evaluation.beams import (
+    beam_masks,
+    beam_spans,
+    marked_beams,
+    on_small_surfaces,
+    overlap_ratios,
+    shared_beams,
+)
+
+
+def best_by_trying_all(cost, allowed):
+    """(number of pairs, cost) of the best matching, by every order of the columns."""
+    if cost.shape[0] > cost.shape[1]:
+        cost, allowed = cost.T, allowed.T
+    best = (0, 0.0)
+    for columns in itertools.permutations(range(cost.shape[1]), cost.shape[0]):
+        pairs = [(r, c) for r, c in enumerate(columns) if allowed[r, c]]
+        total = sum(cost[p] for p in pairs)
+        if (-len(pairs), total) < (-best[0], best[1]):
+            best = (len(pairs), total)
+    return best
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_match_is_the_best_of_all(seed):
+    rng = np.random.default_rng(seed)
+    shape = rng.integers(0, 6, 2)
+    cost = rng.choice([1e-6, 1.0, 1e6]) * rng.normal(size=shape)
+    allowed = rng.random(shape) < rng.random()
+    rows, columns = match(cost, allowed)
+    assert len(set(rows)) == len(rows) == len(set(columns))
+    assert allowed[rows, columns].all()
+    assert (np.diff(rows) > 0).all()
+    number, least = best_by_trying_all(cost, allowed)
+    assert len(rows) == number
+    assert cost[rows, columns].sum() == pytest.approx(least)
+
+
+def test_match_looks_at_no_cost_outside_the_gate():
+    cost = np.array([[np.nan, 1.0], [np.inf, np.nan]])
+    rows, columns = match(cost, np.isfinite(cost))
+    assert (rows.tolist(), columns.tolist()) == ([0], [1])
+
+
+def test_match_refuses():
+    with pytest.raises(ValueError, match=r"cost has shape \(2, 3\), expected .* \(3, 2\)"):
+        match(np.zeros((2, 3)), np.ones((3, 2), bool))
+    with pytest.raises(ValueError, match="cost of an allowed pair is nan"):
+        match(np.array([[np.nan]]), np.array([[True]]))
+
+
+def test_counts_by_hand():
+    # Four found: 0 and 2 are right, 1 is excused, 3 is wrong. That 2 is excused too is no matter.
+    excused, demanded = np.array([0, 1, 1, 0], bool), np.array([1, 1, 1, 0], bool)
+    counts = Counts.of(np.array([0, 2]), excused, demanded)
+    assert counts == Counts(correct=2, found=3, true=3)
+    assert counts.precision == counts.recall == counts.f1 == 2 / 3
+
+
+@pytest.mark.parametrize(
+    ("counts", "precision", "recall", "f1"),
+    [
+        (Counts(0, 0, 0), math.nan, math.nan, math.nan),
+        (Counts(0, 3, 0), 0.0, math.nan, 0.0),
+        (Counts(0, 0, 3), math.nan, 0.0, 0.0),
+    ],
+)
+def test_counts_of_nothing(counts, precision, recall, f1):
+    found = (counts.precision, counts.recall, counts.f1)
+    np.testing.assert_equal(found, (precision, recall, f1))
+
+
+def test_sums():
+    parts = [Counts(1, 2, 3), Counts(4, 5, 6), Counts(0, 1, 0)]
+    assert Counts.total(parts) == parts[0] + parts[1] + parts[2] == sum(parts, Counts())
+    assert Counts.total(iter(parts)) == Counts(5, 8, 9)
+    assert Counts.total([]) == Counts()
+    with pytest.raises(TypeError):
+        Counts() + 1
+
+
+def test_errors_by_hand():
+    # A covariance with correlation: Σ⁻¹ = [[2, -1], [-1, 1]] for Σ = [[1, 1], [1, 2]].
+    covariances = np.array([[[1.0, 1.0], [1.0, 2.0]], np.eye(2)])
+    normalised = NormalisedErrors.of(np.array([[1.0, 3.0], [3.0, 4.0]]), covariances)
+    np.testing.assert_allclose(normalised.squares, [2 - 2 * 3 + 9, 25])
+    assert normalised.mean_ratio == pytest.approx(30 / 4)
+    assert normalised.over_bound == pytest.approx(math.sqrt(7.5))
+    # The median of chi-square with two degrees of freedom is 2 ln 2.
+    assert normalised.median_ratio == pytest.approx(15 / (2 * math.log(2)))
+    both = normalised + normalised
+    assert both.whitened.shape == (4, 2)
+    assert both.mean_ratio == normalised.mean_ratio
+
+
+def test_interval_is_that_of_the_tables():
+    """χ² with 10 degrees of freedom: 3.247 and 20.483."""
+    low, high = NormalisedErrors(np.zeros((5, 2))).interval
+    assert (10 * low, 10 * high) == (pytest.approx(3.247, abs=1e-3), pytest.approx(20.483, 1e-4))
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_errors_with_their_own_covariance_are_consistent(k):
+    rng = np.random.default_rng(k)
+    root = rng.normal(size=(k, k)) * 10.0 ** rng.uniform(-4, 0, (k, 1))
+    errors = rng.normal(size=(4000, k)) @ root.T
+    normalised = NormalisedErrors.of(errors, np.broadcast_to(root @ root.T, (4000, k, k)))
+    low, high = normalised.interval
+    assert low < normalised.mean_ratio < high
+    assert high - low < 0.1
+    assert normalised.median_ratio == pytest.approx(1, abs=0.07)
+    # Half the deviation that there is: twice the bound, and not consistent.
+    bold = NormalisedErrors.of(errors, np.broadcast_to(root @ root.T / 4, (4000, k, k)))
+    assert bold.over_bound == pytest.approx(2 * normalised.over_bound)
+    assert bold.mean_ratio > high
+
+
+def test_errors_without_a_usable_covariance_are_counted():
+    covariances = np.array([np.eye(2), np.zeros((2, 2)), -np.eye(2), np.ones((2, 2))])
+    covariances = np.vstack((covariances, np.full((1, 2, 2), np.nan), [np.eye(2)]))
+    errors = np.ones((6, 2))
+    errors[5, 0] = np.inf
+    normalised = NormalisedErrors.of(errors, covariances)
+    assert (len(normalised.whitened), normalised.unusable) == (1, 5)
+    assert normalised.mean_ratio == 1
+
+
+def test_errors_of_nothing():
+    none = NormalisedErrors.none(3)
+    assert math.isnan(none.mean_ratio)
+    assert math.isnan(none.over_bound_median)
+    assert all(map(math.isnan, none.interval))
+    assert len(NormalisedErrors.of(np.empty((0, 3)), np.empty((0, 3, 3))).whitened) == 0
+
+
+def walk(first, last, n):
+    beams = {first}
+    while first != last:
+        first = (first + 1) % n
+        beams.add(first)
+    return beams
+
+
+@pytest.mark.parametrize("n", [1, 2, 17])
+def test_spans_are_sets_of_beams(n):
+    rng = np.random.default_rng(0)
+    first, last = rng.integers(0, n, (2, 40))
+    sets = [walk(*ends, n) for ends in zip(first, last, strict=True)]
+    spans = beam_spans(first, last, n)
+    assert [set(np.flatnonzero(mask)) for mask in beam_masks(spans, n)] == sets
+    assert shared_beams(spans, spans, n).tolist() == [[len(a & b) for b in sets] for a in sets]
+    expected = [[len(a & b) / len(a | b) for b in sets] for a in sets]
+    np.testing.assert_allclose(overlap_ratios(spans, spans, n), expected)
+    marks = rng.random(n) < 0.5
+    marked = set(np.flatnonzero(marks))
+    assert marked_beams(spans, marks).tolist() == [len(beams & marked) for beams in sets]
+
+
+def test_small_surfaces_by_hand():
+    small = segment((1, 0), (1, 1), 10, 14)
+    large = segment((1, 0), (1, 1), 15, 20)
+    truth = features(30, segments=[small, large])
+    spans = beam_spans(np.array([10, 10, 10, 5]), np.array([14, 19, 20, 10]), 30)
+    # 5 of 5, 5 of 10, 5 of 11, 1 of 6.
+    assert on_small_surfaces(spans, truth).tolist() == [True, True, False, False]

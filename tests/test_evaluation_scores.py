@@ -1,0 +1,160 @@
+"""All scores together: what must hold for any features."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from handmade import features, random_features, shaken, shuffled
+
+from lineament.evaluation import Counts, Scores, evaluate
+from lineament.simulation import SENSORS
+from lineament.simulation.scenes import SCENES, scene
+from lineament.simulation.truth import truth as truth_of
+
+SEEDS = range(12)
+
+
+def counts_of(scores):
+    return [
+        *scores.corners.counts.values(),
+        scores.segments.counts,
+        scores.arcs.counts,
+        scores.partition.regions,
+        scores.partition.breakpoints,
+    ]
+
+
+def assert_same(one, other):
+    a, b = one.summary(), other.summary()
+    assert a.keys() == b.keys()
+    for name, value in a.items():
+        assert value == pytest.approx(b[name], rel=1e-6, abs=1e-9), name
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_perfect_features_score_one(seed):
+    truth = random_features(seed)
+    scores = evaluate(truth, truth)
+    summary = scores.summary()
+    for name, value in summary.items():
+        if any(word in name for word in ("precision", "recall", "f1", "success", "rand_index")):
+            assert value == 1, name
+        elif any(word in name for word in ("rmse", "error", "over_bound", "fragm", "merg", "end")):
+            assert value == pytest.approx(0, abs=1e-9), name
+    assert {"corner_f1_0.10", "segment_f1", "partition_region_f1"} <= summary.keys()
+    assert scores.segments.counts.true == len(truth.segments)
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_the_truth_of_a_scene_scores_one(kind):
+    true = truth_of(*scene(kind, 1), SENSORS["paper"])
+    summary = evaluate(true, true).summary()
+    shares = {name for name in summary if name.endswith(("precision", "recall", "f1", "success"))}
+    assert {"segment_recall", "partition_success"} <= shares
+    assert {summary[name] for name in shares} == {1.0}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_features_have_no_recall(seed):
+    truth, nothing = random_features(seed), features(200, clusters=np.full(200, -1))
+    summary = evaluate(nothing, truth).summary()
+    recalls = {name: value for name, value in summary.items() if "recall" in name or "f1" in name}
+    assert len(recalls) >= 10
+    assert set(recalls.values()) == {0.0}
+    assert not [name for name in summary if "precision" in name or "rmse" in name]
+    # And in a world without anything, nothing is right.
+    for counts in counts_of(evaluate(truth, nothing))[:5]:
+        assert (counts.correct, counts.true) == (0, 0)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_order_does_not_matter(seed):
+    truth = random_features(seed, least=2)
+    found = shaken(truth, seed)
+    assert_same(evaluate(shuffled(found, 1), shuffled(truth, 2)), evaluate(found, truth))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_frame_does_not_matter(seed):
+    truth = random_features(seed, least=2)
+    found, motion = shaken(truth, seed), (3.0, -2.0, 2.5)
+    moved = evaluate(found.transform(*motion), truth.transform(*motion))
+    assert_same(moved, evaluate(found, truth))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_found_and_true_change_places(seed):
+    """Where nothing is too small, precision is the recall of the exchange."""
+    truth = random_features(seed)
+    found = shaken(truth, seed)
+    found.corners["segments"] = 0
+    there, back = evaluate(found, truth), evaluate(truth, found)
+    for one, other in zip(counts_of(there), counts_of(back), strict=True):
+        assert one == Counts(other.correct, found=other.true, true=other.found)
+    assert there.segments.fragmented == back.segments.merged
+    assert there.segments.merged == back.segments.fragmented
+    assert there.corners.rmse == pytest.approx(back.corners.rmse)
+
+
+def test_small_things_are_not_judged_whatever_is_found():
+    """In a world of small things there is nothing to find, and nothing wrong to be found."""
+    truth = random_features(3)
+    truth.segments["n_points"] = truth.arcs["n_points"] = 5
+    for seed in SEEDS:
+        scores = evaluate(shaken(truth, seed), truth)
+        assert scores.segments.counts == scores.arcs.counts == Counts()
+        assert all(counts.true == 0 for counts in scores.corners.counts.values())
+
+
+def test_scores_add_up():
+    truths = [random_features(seed) for seed in SEEDS]
+    parts = [evaluate(shaken(truth, 1), truth) for truth in truths]
+    total = Scores.total(parts)
+    assert total.scans == len(parts)
+    for k, counts in enumerate(counts_of(total)):
+        assert counts == Counts.total(counts_of(part)[k] for part in parts)
+    assert_same(sum(parts, Scores()), total)
+    squares = np.concatenate([part.corners.consistency.squares for part in parts])
+    assert total.summary()["corner_nees"] == pytest.approx(squares.mean() / 2)
+    assert 0 < total.summary()["corner_rmse"] < 0.1
+
+
+def test_summary_is_json():
+    truth = random_features(0)
+    for scores in (Scores(), evaluate(truth, truth), evaluate(features(200), truth)):
+        summary = scores.summary()
+        assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+        assert all(math.isfinite(value) for value in summary.values())
+
+
+def test_hostile_features_raise_no_warning():
+    truth = random_features(0)
+    broken = shaken(truth, 1)
+    for name, field in (("segments", "centroid"), ("corners", "position"), ("arcs", "radius")):
+        table = getattr(broken, name)
+        table[field][::2] = np.nan
+        table["covariance"][1::2] = np.inf
+    scores = evaluate(broken, truth)
+    assert scores.corners.consistency.unusable == len(scores.corners.errors) > 0
+    json.dumps(scores.summary(), allow_nan=False)
+    empty = features(0)
+    assert evaluate(empty, empty).summary()["scans"] == 1
+
+
+def test_other_scans_are_refused():
+    with pytest.raises(ValueError, match="found is of a scan of 3 beams, expected 200"):
+        evaluate(features(3), random_features(0))
+
+
+def test_import_is_light():
+    code = (
+        "import sys, lineament.evaluation;"
+        "heavy = {'numba', 'scipy', 'pyarrow', 'matplotlib', 'shapely'} & sys.modules.keys();"
+        "sys.exit(f'imported: {heavy}' if heavy else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

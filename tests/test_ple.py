@@ -1,0 +1,340 @@
+"""The public benchmark: its file, scores by hand, the authors' own figures to the last digit."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from lineament import Features, LaserScan
+from lineament.errors import LogError
+from lineament.evaluation.ple import (
+    Benchmark,
+    benchmark_iepf,
+    cast_map,
+    iepf_map,
+    load_benchmark,
+    method_map,
+    polylines_of,
+    run_benchmark,
+    score_map,
+)
+from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT
+
+#: Scans and budgets where two points are equally far but for the authors' rounding, which took the
+#: later one.
+TIED = [(30, 40), (139, 50)]
+
+
+@pytest.fixture(scope="module")
+def real(data_dir):
+    return load_benchmark(data_dir / "benchmark" / "ple_real.npz")
+
+
+@pytest.fixture(scope="module")
+def simulated(data_dir):
+    return load_benchmark(data_dir / "benchmark" / "ple_sim.npz")
+
+
+def authors_iepf(benchmark, score):
+    return benchmark.scores[score][:, benchmark.methods.index("iepf")]
+
+
+@pytest.mark.slow
+def test_the_authors_iepf_comes_out_to_the_last_digit_on_real_scans(real):
+    calls = []
+    result = run_benchmark(real, iepf_map, progress=lambda done, total: calls.append((done, total)))
+    assert calls == [(i, 140) for i in range(1, 141)]
+    for score in ("rmse", "f", "fnr"):
+        close = np.isclose(
+            result.scores[score], authors_iepf(real, score), rtol=0, atol=1e-12, equal_nan=True
+        )
+        off = {(int(i), real.max_vertices[j]) for i, j in np.argwhere(~close)}
+        assert off == (set(TIED) if score == "rmse" else set())
+    means = {row[:2]: row[2] for row in result.rows()}
+    assert np.round(means["rmse", "iepf_map"], 4).tolist() == [1.3572, 0.6577, 0.387, 0.2475, 0.153]
+    assert np.round(means["rmse", "ple+"], 4).tolist() == [0.0811, 0.0635, 0.0471, 0.0352, 0.0254]
+
+
+@pytest.mark.slow
+def test_the_authors_iepf_comes_out_to_the_last_digit_on_simulated_scans(simulated):
+    pytest.importorskip("shapely")
+    result = run_benchmark(simulated, iepf_map)
+    for score in ("rmse", "f", "area_error"):
+        np.testing.assert_allclose(
+            result.scores[score], authors_iepf(simulated, score), rtol=0, atol=1e-12
+        )
+    assert np.isnan(result.scores["fnr"]).all()
+    assert (result.scores["vertices"] == simulated.max_vertices).all()
+    mean = {row[:2]: row[2] for row in result.rows()}["area_error", "iepf_map"]
+    assert np.round(mean, 5).tolist() == [0.03513, 0.01448, 0.01188, 0.01104, 0.01048]
+    # A ∪ B = A + B - A ∩ B, so that the one score bounds the other.
+    assert (result.scores["iou"] <= 1 - result.scores["area_error"] / 2 + 1e-12).all()
+
+
+@pytest.mark.parametrize(("scan", "budget"), TIED)
+def test_where_two_points_tie_the_later_gives_the_authors_figure(real, scan, budget):
+    given = authors_iepf(real, "rmse")[scan, real.max_vertices.index(budget)]
+    points = real.scans[scan].points[real.scans[scan].valid]
+    earlier = benchmark_iepf(points, budget)
+    later = benchmark_iepf(points[::-1], budget)[::-1]
+    assert score_map([earlier], real.scans[scan]).rmse == pytest.approx(given, abs=3e-4)
+    assert score_map([later], real.scans[scan]).rmse == pytest.approx(given, abs=1e-12)
+
+
+def test_iepf_by_hand():
+    points = np.array([[0, 0], [1, 3], [2, 0], [3, 1], [4, 0]], float)
+    assert benchmark_iepf(points, 2).tolist() == [[0, 0], [4, 0]]
+    assert benchmark_iepf(points, 3).tolist() == [[0, 0], [1, 3], [4, 0]]
+    # (2, 0) is 2/√2 off the chord from (1, 3) to (4, 0), (3, 1) on it.
+    assert benchmark_iepf(points, 4).tolist() == [[0, 0], [1, 3], [2, 0], [4, 0]]
+    assert benchmark_iepf(points, 99).tolist() == points.tolist()
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_iepf_of_hardly_any_points(n):
+    assert len(benchmark_iepf(np.ones((n, 2)), 5)) == n
+
+
+def test_iepf_of_one_point_many_times():
+    assert benchmark_iepf(np.ones((6, 2)), 4).tolist() == [[1.0, 1.0]] * 4
+
+
+@pytest.mark.parametrize(("points", "budget"), [(np.ones(4), 3), (np.ones((4, 3)), 3)])
+def test_iepf_refuses_other_shapes(points, budget):
+    with pytest.raises(ValueError, match=r"points has shape \(4,.*expected \(n, 2\)"):
+        benchmark_iepf(points, budget)
+
+
+def test_iepf_refuses_a_budget_without_a_line():
+    with pytest.raises(ValueError, match="max_vertices is 1, expected a whole number ≥ 2"):
+        benchmark_iepf(np.ones((4, 2)), 1)
+
+
+def test_scores_by_hand():
+    # A wall at x = 2 that ends at bearing 0.1, and another behind it, over the seam.
+    wall = np.array([[2.0, -2.0], [2.0, 2.0 * math.tan(0.1)]])
+    back = np.array([[-1.0, 1.0], [-1.0, -1.0]])
+    bearings = np.array([-3.0, -1.0, -0.5, 0.0, 0.2, 3.1])
+    ranges = np.array([1 / math.cos(math.pi - 3.0) + 0.3, np.nan, np.nan, 2.4, 5.0, np.nan])
+    score = score_map([wall, back], LaserScan(ranges, angles=bearings))
+    assert score.vertices == 4
+    assert score.rmse == pytest.approx(math.sqrt((0.3**2 + 0.4**2) / 2))
+    assert score.f == pytest.approx(2 / 3)  # At 0.2 rad a return meets nothing.
+    assert score.fnr == pytest.approx(1 / 3)  # At -0.5 and 3.1 rad there is a wall.
+    assert math.isnan(score.area_error)
+
+
+def test_of_several_walls_the_last_counts():
+    near, far = np.array([[1.0, -1.0], [1.0, 1.0]]), np.array([[3.0, -1.0], [3.0, 1.0]])
+    assert cast_map([near, far], np.zeros(1)).tolist() == [3.0]
+    assert cast_map([far, near], np.zeros(1)).tolist() == [1.0]
+    assert cast_map([np.concatenate((far, near[::-1]))], np.zeros(1)).tolist() == [1.0]
+
+
+def test_a_ray_may_pass_an_end_by_a_milliradian():
+    wall = np.array([[2.0, 0.0], [2.0, 1.0]])
+    mapped = cast_map([wall], np.array([-0.9e-3, -1.1e-3]))
+    assert mapped[0] == pytest.approx(2.0, abs=1e-5)
+    assert math.isnan(mapped[1])
+
+
+def test_a_wall_along_the_ray_is_met_nowhere():
+    assert np.isnan(cast_map([np.array([[1.0, 0.0], [2.0, 0.0]])], np.zeros(1))).all()
+
+
+@pytest.mark.parametrize("polylines", [[], [np.empty((0, 2))], [np.ones((1, 2))]])
+def test_an_empty_map(polylines):
+    pytest.importorskip("shapely")
+    scan = LaserScan([1.0, np.nan], angle_min=0.0, angle_increment=0.1)
+    outline = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    score = score_map(polylines, scan, outline)
+    assert math.isnan(score.rmse)
+    assert (score.f, score.fnr, score.area_error, score.iou) == (0.0, 1.0, 1.0, 0.0)
+
+
+def test_areas_by_hand():
+    pytest.importorskip("shapely")
+    outline = np.array([[2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]])
+    scan = LaserScan([2.0], angle_min=0.0, angle_increment=0.1)
+    right = np.array([[3.0, -2.0], [3.0, 2.0]])
+    left = np.array([[-1.0, 2.0], [-1.0, -2.0]])
+    score = score_map([left, right], scan, outline)
+    assert score.area_error == pytest.approx((20 - 12) / 16)
+    assert score.iou == pytest.approx(12 / 20)
+
+
+def test_a_map_of_points_in_space_is_refused():
+    with pytest.raises(ValueError, match=r"polylines\[0\] has shape \(2, 3\), expected \(k, 2\)"):
+        cast_map([np.ones((2, 3))], np.zeros(1))
+
+
+def features_of(walls, corners, beams=4):
+    """Make features of walls (start, end, first beam, last beam) and corners (a, b) at beams."""
+    segments, joints = np.zeros(len(walls), SEGMENT), np.zeros(len(corners), CORNER)
+    for segment, (start, end, first, last) in zip(segments, walls, strict=True):
+        segment["start"], segment["end"] = start, end
+        segment["centroid"] = (np.array(start) + end) / 2
+        segment["angle"] = math.atan2(end[1] - start[1], end[0] - start[0])
+        segment["first_beam"], segment["last_beam"] = first, last
+    joints["segments"], joints["beam"] = np.reshape(corners, (-1, 2)), beams
+    nothing = np.empty(0, np.int32)
+    return Features(segments, joints, np.empty(0, ARC), nothing, np.empty(0, BREAKPOINT))
+
+
+FAN = LaserScan(np.ones(9), angle_min=-0.4, angle_increment=0.1)
+
+
+def test_segments_joined_at_a_corner_share_its_vertex():
+    walls = [((2.0, -0.5), (2.0, 0.0), 2, 4), ((2.0, 0.0), (3.0, 0.5), 4, 6)]
+    joined = polylines_of(features_of(walls, [(0, 1)]), FAN)
+    assert [len(polyline) for polyline in joined] == [3]
+    np.testing.assert_allclose(joined[0][1], [2.0, 0.0])
+    # The ends go on to the rays at ∓0.2 rad.
+    np.testing.assert_allclose(joined[0][0], [2.0, -2.0 * math.tan(0.2)])
+    apart = polylines_of(features_of(walls, [(-1, 1)]), FAN)
+    assert [len(polyline) for polyline in apart] == [2, 2]
+
+
+def test_lines_that_miss_each_other_meet_midway():
+    walls = [((2.0, -0.5), (2.0, 0.0), 2, 4), ((2.2, 0.0), (3.0, 0.5), 4, 6)]
+    (polyline,) = polylines_of(features_of(walls, [(0, 1)]), FAN)
+    np.testing.assert_allclose(polyline[1], [2.1, 0.0])
+
+
+def test_lines_that_meet_behind_their_beams_meet_at_the_bend():
+    # They meet where x = 2 is continued to y = 4, at 63° and beyond the fan.
+    walls = [((2.0, -0.5), (2.0, 4.0), 2, 4), ((2.0, 4.0), (3.0, 0.5), 4, 6)]
+    (polyline,) = polylines_of(features_of(walls, [(0, 1)]), FAN)
+    np.testing.assert_allclose(polyline[1], [(2.0 + 22.0 / 7.0) / 2, 0.0])
+
+
+def test_a_wall_along_the_rays_keeps_its_ends():
+    walls = [((2.0, 0.001), (3.0, 0.002), 4, 5)]
+    np.testing.assert_allclose(
+        polylines_of(features_of(walls, []), FAN), [[[2.0, 0.001], [3.0, 0.002]]]
+    )
+
+
+def test_a_closed_outline_ends_where_it_begins():
+    around = LaserScan(np.ones(8), angle_min=-math.pi / 4, angle_increment=math.pi / 4)
+    vertices = [(2.0, -2.0), (2.0, 2.0), (-2.0, 2.0), (-2.0, -2.0)]
+    ends = [*vertices, vertices[0]]
+    walls = [(ends[k], ends[k + 1], 2 * k, (2 * k + 2) % 8) for k in range(4)]
+    lone = ((4.0, 0.0), (4.0, 4.0), 1, 2)
+    corners = [(3, 0), (0, 1), (1, 2), (2, 3)]
+    features = features_of([*walls, lone], corners, beams=[0, 2, 4, 6])
+    alone, outline = polylines_of(features, around)
+    np.testing.assert_allclose(alone, [[4.0, 0.0], [4.0, 4.0]], atol=1e-12)
+    np.testing.assert_allclose(outline, [*vertices, vertices[0]])
+
+
+def test_no_segments_no_polylines():
+    assert polylines_of(features_of([], []), FAN) == []
+
+
+def wall_benchmark(scans=2):
+    bearings = np.linspace(-0.5, 0.5, 21)
+    scan = LaserScan(np.where(np.arange(21) == 3, np.nan, 2 / np.cos(bearings)), angles=bearings)
+    given = np.full((scans, 1, 2), 0.25)
+    return Benchmark("wall", (scan,) * scans, (2, 10), ("peer",), dict.fromkeys(("rmse",), given))
+
+
+def test_results_stand_beside_the_authors():
+    result = run_benchmark(wall_benchmark(), lambda scan, _: [scan.points[[0, 20]]], name="chord")
+    rows = {row[:2]: row[2] for row in result.rows()}
+    assert rows["rmse", "peer"] == [0.25, 0.25]
+    assert rows["vertices", "chord"] == [2.0, 2.0]
+    assert rows["f", "chord"] == [1.0, 1.0]
+    assert not any(score in ("area_error", "iou") for score, _ in rows)
+    written = json.loads(result.to_json())
+    assert written["mean"]["rmse"]["peer"] == [0.25, 0.25]
+    assert len(written["scans"]) == 2
+    assert written["scans"][0][1] == {
+        "max_vertices": 10,
+        "vertices": 2,
+        "rmse": pytest.approx(0.0, abs=1e-12),
+        "f": 1.0,
+        "fnr": 0.0,
+        "area_error": None,
+        "iou": None,
+    }
+
+
+def test_a_map_beyond_the_budget_is_refused():
+    with pytest.raises(ValueError, match="chord made a map of 3 vertices of scan 0, expected at m"):
+        run_benchmark(wall_benchmark(), lambda scan, _: [scan.points[:3]], name="chord")
+
+
+def test_unknown_methods_are_refused():
+    with pytest.raises(ValueError, match="method 'lui' is unknown"):
+        run_benchmark(wall_benchmark(), "lui")
+
+
+def test_a_method_of_the_registry():
+    result = run_benchmark(wall_benchmark(), "iepf")
+    assert result.scores["vertices"].tolist() == [[2, 2]] * 2
+    assert result.scores["rmse"].max() < 1e-9
+    assert [len(line) for line in method_map("iepf")(wall_benchmark().scans[0], 10)] == [2]
+
+
+def archive(**changes):
+    """Give the arrays of a whole simulated benchmark of two scans, of which the second is short."""
+    arrays = {
+        "azimuth": np.array([[0.0, 0.1, 0.2], [0.0, 0.5, np.nan]]),
+        "radius": np.array([[1.0, 5.0, 0.5], [5.1, np.inf, np.nan]]),
+        "beams": np.array([3, 2]),
+        "radius_limits": np.array([[1.0, 5.0], [0.0, 5.0]]),
+        "max_vertices": np.array([10, 20]),
+        "methods": np.array(["ple"]),
+        **{key: np.zeros((2, 1, 2)) for key in ("rmse", "f", "fnr", "area_error")},
+        "polygon": np.array([[[1, 1], [2, 1], [1, 2]], [[1, 1], [2, 1], [np.nan, np.nan]]]),
+        "pose": np.array([[1.0, 1.0, math.pi / 2], [0.0, 0.0, 0.0]]),
+    }
+    arrays.update(changes)
+    return {key: array for key, array in arrays.items() if array is not None}
+
+
+def test_what_a_file_holds(tmp_path):
+    np.savez(tmp_path / "a.npz", **archive())
+    benchmark = load_benchmark(tmp_path / "a.npz")
+    assert benchmark.name == "a.npz"
+    # Both limits belong to the range; what lies beyond is no return, and so is infinity.
+    assert [scan.valid.tolist() for scan in benchmark.scans] == [[True, True, False], [False] * 2]
+    assert benchmark.max_vertices == (10, 20)
+    assert benchmark.methods == ("ple",)
+    assert sorted(benchmark.scores) == ["area_error", "f", "fnr", "rmse"]
+    np.testing.assert_allclose(benchmark.outlines[0], [[0, 0], [0, -1], [1, 0]], atol=1e-12)
+    assert benchmark.outlines[1].tolist() == [[1, 1], [2, 1]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"fnr": None}, "has no key fnr, which a benchmark has; found azimuth, radius"),
+        ({"pose": None}, "has no key pose"),
+        ({"beams": np.array([3])}, r"beams has shape \(1,\), expected \(2\)"),
+        ({"beams": np.array([3, 4])}, r"beams\[1\] is 4, expected 0 … 3"),
+        ({"radius": np.ones((2, 4))}, r"radius has shape \(2, 4\), expected \(2, 3\)"),
+        ({"radius_limits": np.ones((2, 3))}, r"radius_limits has shape \(2, 3\), expected \(2, 2"),
+        ({"methods": np.array([1])}, "methods has type int64"),
+        ({"rmse": np.full((2, 1, 2), "a")}, "rmse has type <U1"),
+        ({"azimuth": np.zeros((2, 3))}, r"scan 0: angles\[1\] is 0.0 after 0.0"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(tmp_path, changes, message):
+    np.savez(tmp_path / "a.npz", **archive(**changes))
+    with pytest.raises(LogError, match=message) as error:
+        load_benchmark(tmp_path / "a.npz")
+    assert "\n" not in str(error.value)
+    assert "a.npz" in str(error.value)
+
+
+def test_no_archive_is_refused(tmp_path):
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04 and nothing more")
+    with pytest.raises(LogError, match="is no whole npz archive"):
+        load_benchmark(tmp_path / "a.npz")
+    with pytest.raises(LogError, match=r"b.npz"):
+        load_benchmark(tmp_path / "b.npz")

@@ -1,0 +1,123 @@
+"""Random scenes: what their worlds and poses promise, whatever the seed."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from lineament.simulation import SCENES, World, cast_rays, room, scene, truth
+from lineament.simulation.placing import Floor, clearance, is_free, rectangle
+from lineament.simulation.sensor import Sensor
+
+SEEDS = range(12)
+EVERY = [(kind, seed) for kind in SCENES for seed in SEEDS]
+RING = Sensor("ring", 720, -math.pi, math.pi / 360)
+
+
+def walls_apart(world):
+    """Least distance of each wall from those that it shares no end with."""
+    shares = 0
+    least = math.inf
+    for i, wall in enumerate(world.segments):
+        ends = wall.reshape(2, 2)
+        others = np.array([
+            other for j, other in enumerate(world.segments)
+            if j != i and not (ends[:, None] == other.reshape(2, 2)).all(axis=2).any()
+        ])  # fmt: skip
+        shares += len(world.segments) - 1 - len(others)
+        along = np.linspace(0, 1, 40)[:, np.newaxis]
+        points = (1 - along) * ends[0] + along * ends[1]
+        least = min(least, clearance(World(others), points).min())
+    assert shares == 2 * len(world.segments)
+    return least
+
+
+@pytest.mark.parametrize(("kind", "seed"), EVERY)
+def test_the_scanner_stands_clear_in_a_closed_world(kind, seed):
+    world, pose = scene(kind, seed)
+    assert clearance(world, [pose[:2]])[0] >= 0.3
+    assert is_free(world, [pose[:2]])[0]
+    ranges, _ = cast_rays(world, pose, RING.angles)
+    assert np.isfinite(ranges).all()
+    assert ranges.max() < 25
+    assert all(isinstance(value, float) for value in pose)
+
+
+@pytest.mark.parametrize(("kind", "seed"), EVERY[::3])
+def test_walls_meet_at_their_ends_alone(kind, seed):
+    world, _ = scene(kind, seed)
+    ends = Counter(map(tuple, world.segments.reshape(-1, 2).tolist()))
+    assert set(ends.values()) == {2}
+    assert walls_apart(world) > 0.02  # the thinnest walls are 3 cm thick
+    for i, (x, y, r) in enumerate(world.circles):
+        others = World(world.segments, np.delete(world.circles, i, axis=0))
+        assert clearance(others, [(x, y)])[0] >= r + 0.2 - 1e-9
+        assert is_free(others, [(x, y)])[0]
+
+
+@pytest.mark.parametrize(("kind", "seed"), EVERY[::3])
+def test_the_same_seed_gives_the_same_scene(kind, seed):
+    (world, pose), (again, pose_again) = scene(kind, seed), scene(kind, seed)
+    np.testing.assert_array_equal(world.segments, again.segments)
+    np.testing.assert_array_equal(world.circles, again.circles)
+    assert pose == pose_again
+    assert pose != scene(kind, seed + 1)[1]
+
+
+def test_each_kind_holds_what_it_is_for():
+    found = {}
+    for kind in SCENES:
+        scans = [truth(*scene(kind, seed), RING) for seed in SEEDS]
+        found[kind] = {
+            name: np.mean([len(getattr(scan, name)) for scan in scans])
+            for name in ("segments", "corners", "arcs", "breakpoints")
+        }
+    assert found["room"]["corners"] > 5
+    assert found["star"]["corners"] > 5
+    assert found["corridor"]["breakpoints"] > 3
+    assert found["hall"]["arcs"] > 2
+    assert found["hall"]["corners"] > 4
+    assert found["layers"]["breakpoints"] > 10
+    assert found["grazing"]["segments"] > 10
+
+
+def test_thin_walls_are_met_at_grazing_incidence():
+    incidences = []
+    for seed in SEEDS:
+        world, pose = scene("grazing", seed)
+        for segment in truth(world, pose, RING).segments:
+            x, y = segment["centroid"]
+            incidences.append(abs(math.cos(segment["angle"] - math.atan2(y, x))))
+    assert np.mean(np.array(incidences) > math.cos(math.radians(20))) > 0.3
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "message"),
+    [("cave", 0, "kind is 'cave', expected one of room, star"), ("room", -1, "seed is -1")],
+)
+def test_refused(kind, seed, message):
+    with pytest.raises(ValueError, match=message):
+        scene(kind, seed)
+
+
+def test_clearance_and_freedom_by_hand():
+    points = [(0, 0), (1.8, -0.8), (1.3, -0.8), (2.9, 1.9), (5, 0)]
+    np.testing.assert_allclose(clearance(room(), points), (np.hypot(1.4, 0.5), 0.3, 0.1, 0.1, 2))
+    assert is_free(room(), points).tolist() == [True, False, True, True, False]
+    column = World(room().segments, [[-1, 0, 0.5]])
+    assert clearance(column, [(-1.2, 0)])[0] == pytest.approx(0.3)
+    assert is_free(column, [(-1.2, 0), (-1.6, 0)]).tolist() == [False, True]
+    assert clearance(World([]), [(0, 0)]).tolist() == [math.inf]
+
+
+def test_obstacles_are_put_where_there_is_room_alone():
+    floor = Floor(rectangle((0, 0), 6, 4), (-2.0, 0.0, 0.0))
+    assert not floor.put_box((2.5, 0), 1.5, 0.3)  # in the wall
+    assert not floor.put_box((-2.3, 0.3), 0.3, 0.3)  # on the scanner
+    assert not floor.put_column((9, 9), 0.2)  # outside
+    assert floor.put_box((1, 0), 1.5, 1.5, 0.5)
+    assert not floor.put_column((1, 0), 0.1)  # inside the box
+    assert not floor.put_box((1, 0), 0.3, 0.3)
+    assert floor.put_box((-0.3, -1.5), 2.0, 0.05, 0.1)  # beside the box, longer than its gap
+    assert repr(floor.world) == "World(12 segments, 0 circles)"
