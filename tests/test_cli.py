@@ -193,6 +193,12 @@ def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, ending):
     assert len({path.read_bytes() for path in (one, two, trace)}) == 3
 
 
+def test_warmup_takes_methods(capsys):
+    assert run(["warmup", "-m", "pdbs", "-m", "liu"]) == 0
+    assert run(["warmup", "-m", "lui"]) == 2
+    assert "method 'lui' is unknown" in capsys.readouterr().err
+
+
 def test_warmup_says_how_long(capsys):
     assert run(["warmup"]) == 0
     assert capsys.readouterr().out.startswith("kernels ready after ")

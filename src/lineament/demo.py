@@ -10,9 +10,9 @@ from typing import Any
 from .errors import LineamentError
 from .extraction import extract_log
 from .extractor import Extractor
-from .logs import open_log, save_npz
+from .logs import open_log
 
-__all__ = ["run_demo", "simulate_drive"]
+__all__ = ["run_demo"]
 
 Track = Callable[[Any, str, int], Iterable[Any]]
 
@@ -22,37 +22,6 @@ DEMO_METHODS = ("liu:scale_free", "liu", "liu:paper")
 
 def _untracked(items: Iterable[Any], about: str, total: int) -> Iterable[Any]:  # noqa: ARG001
     return items
-
-
-def simulate_drive(
-    path: str | os.PathLike[str],
-    sensor: str = "utm30lx",
-    *,
-    rate: float = 4.0,
-    seed: int = 1,
-    track: Track = _untracked,
-) -> None:
-    """Record a simulated drive of a scanner through a small building, as an npz log.
-
-    Parameters
-    ----------
-    path : path-like
-        The log.
-    sensor : str
-        A name of `lineament.simulation.SENSORS`.
-    rate : float
-        Scans per second.
-    seed : int
-        Of the noise.
-    track : callable
-        ``track(items, about, total)`` gives the items, and shows how far they are.
-    """
-    from .simulation import SENSORS, building, drive, drive_poses
-
-    world, waypoints = building()
-    scans = drive(world, waypoints, SENSORS[sensor], rate=rate, seed=seed)
-    stamps, _ = drive_poses(waypoints, rate=rate)
-    save_npz(path, track(scans, "simulating", len(stamps)))
 
 
 def run_demo(
@@ -89,8 +58,10 @@ def run_demo(
     except OSError as error:
         raise LineamentError(f"{target}: cannot make this folder: {error.strerror}") from None
     if log is None:
+        from .simulation import SENSORS, simulate_log
+
         log = target / "drive.npz"
-        simulate_drive(log, track=track)
+        simulate_log(log, "building", SENSORS["utm30lx"], rate=4.0, seed=1, track=track)
     summary = extract_log(
         log,
         target / "features.parquet",

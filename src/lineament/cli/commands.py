@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .experiments import bench, compare, reproduce, simulate
+from .options import KEEP_GOING, LOG, QUIET, TOPIC
+
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
 __all__ = ["COMMANDS"]
 
-_LOG = click.argument("log", type=click.Path(path_type=Path))
-_TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
-_KEEP_GOING = click.option(
-    "--keep-going", is_flag=True, help="Leave out what is faulty in a log, and count it."
-)
-_QUIET = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
 _SET = click.option(
     "--set",
     "settings",
@@ -78,9 +75,9 @@ def _setting(text: str) -> tuple[str, Any]:
 @_default_method
 @_SET
 @_NOISE
-@_TOPIC
-@_KEEP_GOING
-@_QUIET
+@TOPIC
+@KEEP_GOING
+@QUIET
 def extract(
     logs: tuple[Path, ...],
     output: Path,
@@ -113,10 +110,10 @@ def extract(
 
 
 @click.command()
-@_LOG
-@_TOPIC
-@_KEEP_GOING
-@_QUIET
+@LOG
+@TOPIC
+@KEEP_GOING
+@QUIET
 def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
     """Tell what LOG holds."""
     from ..logs import open_log, summarize
@@ -128,7 +125,7 @@ def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
 
 
 @click.command()
-@_LOG
+@LOG
 @click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
 @click.option(
     "-o",
@@ -147,8 +144,8 @@ def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
 @_SET
 @_NOISE
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
-@_TOPIC
-@_KEEP_GOING
+@TOPIC
+@KEEP_GOING
 def plot(
     log: Path,
     index: int,
@@ -175,12 +172,22 @@ def plot(
 
 
 @click.command()
-@_QUIET
-def warmup(quiet: bool) -> None:
-    """Compile and cache the kernels."""
+@click.option(
+    "-m",
+    "--method",
+    "methods",
+    multiple=True,
+    help="Name of the method; may be given again.  [default: liu]",
+)
+@QUIET
+def warmup(methods: tuple[str, ...], quiet: bool) -> None:
+    """Compile and cache the kernels of a method."""
     from ..warmup import warm_up
 
-    seconds = warm_up()
+    try:
+        seconds = warm_up(methods)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
     if not quiet:
         click.echo(f"kernels ready after {seconds:.2f} s")
 
@@ -195,7 +202,7 @@ def warmup(quiet: bool) -> None:
     show_default=True,
     help="Folder to write to.",
 )
-@_QUIET
+@QUIET
 def demo(log: Path | None, output: Path, quiet: bool) -> None:
     """Make a page of a simulated drive, or of LOG."""
     from ..demo import run_demo
@@ -207,6 +214,5 @@ def demo(log: Path | None, output: Path, quiet: bool) -> None:
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
-COMMANDS = {
-    command.name: command for command in (extract, info, plot, demo, warmup) if command.name
-}
+_ALL = (extract, info, plot, demo, warmup, compare, reproduce, bench, simulate)
+COMMANDS = {command.name: command for command in _ALL if command.name}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
-__all__ = ["tracker"]
+__all__ = ["telling", "tracker"]
 
 T = TypeVar("T")
 
@@ -55,3 +56,28 @@ def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
             left = max(total - done, 0) / rate
             line = f"{about}: {done}/{total}, {rate:.0f}/s, {left:.0f} s left"
             print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def telling(quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Give a function that shows in a few words what is being done."""
+    if quiet:
+        yield lambda about: None  # noqa: ARG005
+    elif sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status("") as status:
+            yield status.update
+    else:
+        yield _tell_now_and_then(time.monotonic())
+
+
+def _tell_now_and_then(told: float) -> Callable[[str], None]:
+    def tell(about: str) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if now - told >= _PATIENCE:
+            told = now
+            print(about, file=sys.stderr, flush=True)
+
+    return tell

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,8 @@ _METADATA: dict[str, dict[str, Any]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
+#: The endings of pictures.
+PICTURE_ENDINGS = tuple(_METADATA)
 DPI = 150
 
 
@@ -41,7 +44,7 @@ def check_ending(path: str | os.PathLike[str]) -> str:
     ending = Path(path).suffix.lower()
     if ending not in _METADATA:
         told = f"the ending {ending!r} is not known" if ending else "the name has no ending"
-        raise LineamentError(f"{path}: {told}, expected one of {', '.join(_METADATA)}")
+        raise LineamentError(f"{path}: {told}, expected one of {', '.join(PICTURE_ENDINGS)}")
     return ending
 
 
@@ -73,6 +76,21 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
             bbox_inches="tight",
             pad_inches=0.15,
         )
+
+
+def figure_bytes(figure: Figure, dpi: int = DPI) -> bytes:
+    """Give the bytes of a figure as a PNG file, and free its memory."""
+    buffer = io.BytesIO()
+    figure.savefig(
+        buffer,
+        format="png",
+        dpi=dpi,
+        metadata=_METADATA[".png"],
+        bbox_inches="tight",
+        pad_inches=0.15,
+    )
+    figure.clear()
+    return buffer.getvalue()
 
 
 def settle(figure: Figure) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import LaserScan
-from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, FAINT, INK, colors_of
+from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, FAINT, INK, colors_of, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -217,3 +217,22 @@ def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float
     draw_segments(axes, features.segments)
     draw_breakpoints(axes, features.breakpoints)
     draw_corners(axes, features.corners, extent)
+
+
+def draw_errors(axes: Axes, scan: LaserScan, errors: Array) -> None:
+    """Distance of each point from its own line, by bearing, on a scale that all methods share."""
+    known = errors[np.isfinite(errors)]
+    told = (
+        f"similarity error: mean {1e3 * known.mean():.1f} mm, largest {1e3 * known.max():.0f} mm"
+        if len(known)
+        else "no lines, no similarity error"
+    )
+    style(axes, "", told)
+    # A log axis has no place for 0.
+    axes.plot(np.degrees(scan.angles), np.maximum(errors, 2e-4), ".", markersize=3, color=INK)
+    axes.set_yscale("log")
+    axes.set_ylim(1e-4, max(1.0, 1.5 * float(known.max(initial=0.0))))
+    axes.set_xlabel("bearing [°]", fontsize=9, color="#57606a")
+    axes.set_ylabel("error [m]", fontsize=9, color="#57606a")
+    if len(scan) > 1:
+        axes.set_xlim(*np.degrees(scan.angles[[0, -1]]))

@@ -23,14 +23,39 @@ if TYPE_CHECKING:
 
     from ..tracing import Trace
 
-__all__ = ["plot_map", "plot_scan", "plot_trace"]
+__all__ = ["plot_map", "plot_scan", "plot_trace", "scan_figure"]
 
-_PANEL = 5.6  # width of a panel [inch]
+_PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch]
 
 
 def plot_scan(
     scan: LaserScan, features_by_method: Mapping[str, Features], path: str | os.PathLike[str]
 ) -> None:
+    """Draw what some methods found in one scan into a file: see `scan_figure`.
+
+    Parameters
+    ----------
+    scan, features_by_method
+        As of `scan_figure`.
+    path : path-like
+        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    LineamentError
+        If the ending is not known or the file cannot be written.
+    ValueError
+        As `scan_figure`.
+    """
+    canvas.check_ending(path)
+    canvas.save(scan_figure(scan, features_by_method), path)
+
+
+def scan_figure(
+    scan: LaserScan,
+    features_by_method: Mapping[str, Features],
+    errors_by_method: Mapping[str, NDArray[np.float64]] | None = None,
+) -> Figure:
     """Draw what some methods found in one scan, one panel a method, side by side.
 
     Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
@@ -42,38 +67,48 @@ def plot_scan(
         The scan.
     features_by_method : mapping of str to Features
         Title of each panel, and what to draw in it.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+    errors_by_method : mapping of str to ndarray, shape (n,), optional
+        Similarity error of each beam [m], drawn below the panel of the method.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
 
     Raises
     ------
-    LineamentError
-        If the ending is not known or the file cannot be written.
     ValueError
         If there is no method, or features do not have the scan's number of beams.
     """
-    canvas.check_ending(path)
     if not features_by_method:
         raise ValueError("features_by_method is empty, expected at least one method")
     for method, features in features_by_method.items():
         _check_beams(scan, features.clusters, method)
-    columns = min(len(features_by_method), 3)
-    rows = math.ceil(len(features_by_method) / columns)
+    n_methods, has_strips = len(features_by_method), errors_by_method is not None
+    columns = min(n_methods, 3)
+    rows = math.ceil(n_methods / columns)
     height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), _PANEL)
-    figure = canvas.new_figure(_PANEL * columns, (height + 0.9) * rows + 0.3)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(features_by_method) :]:
+    heights = [height + 0.9, _STRIP] if has_strips else [height + 0.9]
+    figure = canvas.new_figure(_PANEL * columns, sum(heights) * rows + 0.3)
+    grid = figure.subplots(
+        len(heights) * rows, columns, squeeze=False, height_ratios=heights * rows
+    )
+    panels, strips = grid[:: len(heights)].ravel(), grid[1 :: len(heights)].ravel()
+    for axes in [*panels[n_methods:], *strips[n_methods:]]:
         axes.remove()
     for axes, (method, features) in zip(panels, features_by_method.items(), strict=False):
         shown = drawing.draw_beams(axes, scan, features.clusters)
         canvas.style_plane(axes, method, _counts(features), shown)
         drawing.draw_features(axes, features, scan, _extent(axes))
+    if errors_by_method is not None:
+        for axes, method in zip(strips, features_by_method, strict=False):
+            drawing.draw_errors(axes, scan, errors_by_method[method])
     _legend(figure)
     canvas.settle(figure)
     for axes, features in zip(panels, features_by_method.values(), strict=False):
-        texts = [f"{response:.3g}" for response in features.corners["response"]]
-        label_points(axes, features.corners["position"], texts, scan.points[scan.valid])
-    canvas.save(figure, path)
+        corners = features.corners[features.corners["response"] != 0]  # as in the truth
+        texts = [f"{response:.3g}" for response in corners["response"]]
+        label_points(axes, corners["position"], texts, scan.points[scan.valid])
+    return figure
 
 
 def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:

@@ -1,0 +1,119 @@
+"""Methods side by side: what the table says, and what is drawn."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament import LineamentError
+from lineament.evaluation.compare import compare_log, compare_scan, write_comparison
+from lineament.evaluation.experiments.methods_compared import region_lines
+from lineament.logs import LogError, save_npz
+from lineament.simulation import SENSORS, room
+
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def step_scan():
+    """Two walls across the view, at 2 m and at 4 m, of five beams each."""
+    bearings = 0.02 * np.arange(10)
+    ranges = np.where(bearings < 0.1, 2.0, 4.0) / np.cos(bearings)
+    return ln.LaserScan(ranges, angle_min=0.0, angle_increment=0.02)
+
+
+@pytest.fixture
+def log(tmp_path):
+    path = tmp_path / "room.npz"
+    rng = np.random.default_rng(0)
+    save_npz(path, [SENSORS["ld19"].scan(room(), (0.1 * i, 0.0, 0.0), rng) for i in range(3)])
+    return path
+
+
+def test_table_counts_and_errors():
+    extractors = {"liu": ln.Extractor("liu"), "pdbs": ln.Extractor("pdbs")}
+    comparison = compare_scan(step_scan(), extractors)
+    table = comparison.table()
+    liu, pdbs = table.rows
+    assert table.columns[:5] == ("method", "segments", "corners", "arcs", "clusters")
+    assert liu[:6] == ("liu", 2, 0, 0, 2, 1.0)
+    assert liu[6] == pytest.approx(0.0, abs=1e-6)  # points on their own lines
+    assert liu[8] > 0
+    assert pdbs[:6] == ("pdbs", 0, 0, 0, 2, 0.0)
+    assert np.isnan(pdbs[6])
+    assert str(table).splitlines()[2].split()[:6] == ["pdbs", "0", "0", "0", "2", "0"]
+
+
+def test_similarity_errors_are_those_of_each_beam():
+    features = ln.extract(step_scan(), method="liu")
+    segments = features.segments.copy()
+    segments["centroid"][0, 0] += 0.5
+    far_off = replace(features, segments=segments)
+    comparison = compare_scan(step_scan(), {"off": lambda scan: far_off})  # noqa: ARG005
+    errors = comparison.results["off"].errors
+    np.testing.assert_allclose(errors[:5], 0.5, atol=1e-6)
+    np.testing.assert_allclose(errors[5:], 0.0, atol=1e-6)
+    assert comparison.table(times=False).columns[-1] == "largest [mm]"
+
+
+def test_log_is_compared_by_all_methods_in_the_order_asked_for(log):
+    assert list(compare_log(log, 1, ["iepf", "liu"]).results) == ["iepf", "liu"]
+    with pytest.raises(LogError, match="expected 0 to 2"):
+        compare_log(log, 7, ["liu"])
+    with pytest.raises(ValueError, match="method 'lui' is unknown"):
+        compare_log(log, 0, ["lui"])
+
+
+@pytest.mark.slow
+def test_default_is_every_method(log):
+    from lineament.methods import METHODS
+
+    comparison = compare_log(log)
+    assert list(comparison.results) == list(METHODS)
+    assert comparison.timed == 3
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.html", "a.svg"])
+def test_files(tmp_path, name):
+    path = tmp_path / name
+    write_comparison(compare_scan(step_scan(), {"pdbs": ln.Extractor("pdbs")}), path)
+    content = path.read_bytes()
+    if name == "a.png":
+        assert content.startswith(PNG)
+    else:
+        assert b"no lines, no similarity error" in content or b"base64,iVBOR" in content
+    if name == "a.html":
+        assert b"<td>pdbs</td>" in content
+        assert b"http" not in content
+
+
+def test_unknown_ending(tmp_path):
+    comparison = compare_scan(step_scan(), {"pdbs": ln.Extractor("pdbs")})
+    with pytest.raises(LineamentError, match=r"\.bmp.*expected one of \.png"):
+        write_comparison(comparison, tmp_path / "a.bmp")
+
+
+def test_empty_scan_is_compared():
+    scan = ln.LaserScan([np.nan] * 4, angle_min=0.0, angle_increment=0.1)
+    comparison = compare_scan(scan, {"pdbs": ln.Extractor("pdbs")})
+    assert comparison.table().rows[0][1:5] == (0, 0, 0, 0)
+    comparison.figure()
+
+
+def test_region_lines_fit_each_cluster():
+    features = region_lines(step_scan(), ln.extract(step_scan(), method="pdbs"))
+    assert features.segments["first_beam"].tolist() == [0, 5]
+    assert features.segments["last_beam"].tolist() == [4, 9]
+    np.testing.assert_allclose(features.segments["centroid"][:, 0], [2.0, 4.0])
+    np.testing.assert_allclose(np.abs(np.sin(features.segments["angle"])), 1.0)
+
+
+def test_region_over_the_seam_is_one_line():
+    bearings = np.radians(np.arange(0, 360, 2.0))
+    ranges = np.full(180, np.nan)
+    seen = np.r_[170:180, 0:10]
+    ranges[seen] = 2.0 / np.cos(bearings[seen])
+    scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=np.radians(2.0))
+    (line,) = region_lines(scan, ln.extract(scan, method="pdbs")).segments
+    assert (line["first_beam"], line["last_beam"], line["n_points"]) == (170, 9, 20)
+    assert line["centroid"][0] == pytest.approx(2.0)
