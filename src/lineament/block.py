@@ -52,7 +52,7 @@ class Block:
         self.ranges = np.empty((capacity, n))
         self.floats = np.empty((layout.FLOATS, n + 1))
         self.ints = np.empty((layout.INTS, n + 1), np.int64)
-        self.counts = np.empty(layout.COUNTS, np.int64)
+        self.counts = np.zeros(layout.COUNTS, np.int64)  # Few methods find arcs.
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
         self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
         self.segments, self.corners, self.arcs, self.breakpoints = map(words, self._records)

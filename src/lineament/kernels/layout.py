@@ -19,7 +19,16 @@ CHORD_DISTANCE, CANDIDATE_RESPONSE = 9, 10
 # By point: what is measured [m].
 MEASURED_X, MEASURED_Y, MEASURED_RHO = 11, 12, 13
 SPARE = 14  # for whoever needs it, until the next
-FLOATS = 15
+# By point: what its range counts, ρ²/σ² [-].
+WEIGHT = 15
+# By piece: χ² of its line, that of one line through it and the piece before, what that is more
+# than their own (inf without a neighbour before), and its line a x + b y = 1 [1/m].
+COST, JOINT_COST, RISE, LINE_A, LINE_B = 16, 17, 18, 19, 20
+# By arc: centre and radius [m], root mean square [m], χ², what lines cost more, and the six
+# covariances [m²].
+ARC_X, ARC_Y, ARC_R, ARC_RMS, ARC_COST, ARC_GAIN = 21, 22, 23, 24, 25, 26
+ARC_XX, ARC_XY, ARC_XR, ARC_YY, ARC_YR, ARC_RR = 27, 28, 29, 30, 31, 32
+FLOATS = 33
 
 # Lines of ints, by point.
 BEAM, LABEL = 0, 1  # beam; class, -1 for noise
@@ -30,8 +39,9 @@ CLASS_FIRST, CLASS_LAST = 2, 3
 FIRST, LAST, BEFORE = 4, 5, 6
 CANDIDATE = 7  # by candidate: its point
 STACK_FIRST, STACK_LAST = 8, 9  # by piece that waits for its search: first and last point
-INTS = 10
+ARC_FIRST, ARC_LAST = 10, 11  # by arc: first and last point
+INTS = 12
 
 # Counts.
-POINTS, CLOSED, CLASSES, PIECES, CANDIDATES = 0, 1, 2, 3, 4
-COUNTS = 5
+POINTS, CLOSED, CLASSES, PIECES, CANDIDATES, ARCS = 0, 1, 2, 3, 4, 5
+COUNTS = 6

@@ -6,15 +6,31 @@ import numpy as np
 
 from . import helper, kernel
 from .layout import (
+    ARC_FIRST,
+    ARC_LAST,
+    ARC_R,
+    ARC_RMS,
+    ARC_RR,
+    ARC_X,
+    ARC_XR,
+    ARC_XX,
+    ARC_XY,
+    ARC_Y,
+    ARC_YR,
+    ARC_YY,
+    ARCS,
     BEAM,
     BEFORE,
     CLASS_FIRST,
     CLASS_LAST,
     CLASSES,
     CLOSED,
+    COST,
     FIRST,
     LABEL,
     LAST,
+    LINE_A,
+    LINE_B,
     MEASURED_RHO,
     MEASURED_X,
     MEASURED_Y,
@@ -22,8 +38,15 @@ from .layout import (
     POINTS,
     RESPONSE,
 )
-from .line_fit import fit_line, range_variance
+from .line_fit import REFINED, excess, fit_line, range_variance, refine_line
 from .records import (
+    A_CENTER,
+    A_COVARIANCE,
+    A_FIRST,
+    A_LAST,
+    A_POINTS,
+    A_RADIUS,
+    A_RMS,
     B_BEAM,
     B_KIND,
     B_OCCLUDER,
@@ -69,6 +92,7 @@ def measure(
     gap,
     segments,
     corners,
+    arcs,
     breaks,
     clusters,
     offsets,
@@ -98,7 +122,7 @@ def measure(
         How many spacings an intersection may lie from the point at which the cut was made.
     gap : float
         Beams from one class to the next beyond which their break is a gap.
-    segments, corners, breaks : float64 arrays
+    segments, corners, arcs, breaks : float64 arrays
         The tables as words, see `records`; with room for n + 1 features of each kind a row.
     clusters : int32 array, shape (m, n)
         Result.
@@ -113,7 +137,11 @@ def measure(
     for k in range(pieces):
         first, last = ints[FIRST, k], ints[LAST, k]
         a, b = _clear_of_corners(ints[BEFORE], pieces, k, first, last, trim)
-        line = fit_line(x, y, rho, a, b, noise, fit)
+        if fit == REFINED:
+            uneven = _unevenness(floats, rho, a, b, noise, k)
+            line = refine_line(x, y, rho, a, b, noise, floats[LINE_A, k], floats[LINE_B, k], uneven)
+        else:
+            line = fit_line(x, y, rho, a, b, noise, fit)
         _write_segment(x, y, ints, first, last, line, segments, segment_ints, segment + k)
     for k in range(pieces):
         before = ints[BEFORE, k]
@@ -134,7 +162,7 @@ def measure(
         corner += 1
     offsets[row + 1, 0] = segment + pieces
     offsets[row + 1, 1] = corner
-    offsets[row + 1, 2] = offsets[row, 2]
+    offsets[row + 1, 2] = _write_arcs(floats, ints, counts, arcs, offsets[row, 2])
     offsets[row + 1, 3] = _write_breakpoints(
         floats,
         ints,
@@ -170,6 +198,15 @@ def _clear_of_corners(before, pieces, k, first, last, trim):
     a = first + trim if before[k] >= 0 else first
     b = last - trim if before[after] == k else last
     return (a, b) if b - a >= 2 else (first, last)
+
+
+@helper
+def _unevenness(floats, rho, first, last, noise, k):
+    """Variance of a wall about its line [m²]: what χ² has too much, along the normal."""
+    middle = rho[(first + last) // 2]
+    a, b = floats[LINE_A, k], floats[LINE_B, k]
+    square = min(1.0 / ((a * a + b * b) * middle * middle), 1.0)
+    return excess(floats[COST, k], last - first + 1) * range_variance(middle, noise) * square
 
 
 @helper
@@ -262,6 +299,23 @@ def _place_at_beam(x, y, rho, spacing, variance, corners, k):
     corners[k, C_COVARIANCE + 1] = along * c * s
     corners[k, C_COVARIANCE + 2] = along * c * s
     corners[k, C_COVARIANCE + 3] = across + along * s * s
+
+
+@helper
+def _write_arcs(floats, ints, counts, arcs, k):
+    arc_ints = arcs.view(np.int32)
+    for j in range(counts[ARCS]):
+        arcs[k, A_CENTER], arcs[k, A_CENTER + 1] = floats[ARC_X, j], floats[ARC_Y, j]
+        arcs[k, A_RADIUS], arcs[k, A_RMS] = floats[ARC_R, j], floats[ARC_RMS, j]
+        for i, covariance in enumerate(
+            (ARC_XX, ARC_XY, ARC_XR, ARC_XY, ARC_YY, ARC_YR, ARC_XR, ARC_YR, ARC_RR)
+        ):
+            arcs[k, A_COVARIANCE + i] = floats[covariance, j]
+        first, last = ints[ARC_FIRST, j], ints[ARC_LAST, j]
+        arc_ints[k, A_FIRST], arc_ints[k, A_LAST] = ints[BEAM, first], ints[BEAM, last]
+        arc_ints[k, A_POINTS] = last - first + 1
+        k += 1
+    return k
 
 
 @helper

@@ -5,12 +5,14 @@ import math
 import numpy as np
 
 from . import helper, kernel, usable
-from .layout import RANGE, SPARE
+from .layout import RANGE, SPARE, X, Y
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
 LEAST_SIGMA = 1e-4
 #: No scanner reports its ranges in coarser steps [m].
 COARSEST_QUANTUM = 0.15
+#: Fewer triples of neighbours say little about how noise grows with range.
+_LEAST_TRIPLES = 12
 
 
 @kernel
@@ -93,3 +95,72 @@ def _median(values, count):
         else:
             break
     return values[middle]
+
+
+@helper
+def estimate_by_range(floats, range_min, range_max, grows, noise):
+    """Estimate the constant and the proportional part of the noise, from second differences.
+
+    Of the near and of the far half of the readings apart: the variance of a range is
+    σ² + p² ρ² in both. As `range_sigma`, but by the mean square of what is not far out, which a
+    lattice does not bias and which scatters less than the median. p is 0 where the halves are
+    about as noisy, or if it does not grow.
+    """
+    n = floats.shape[1] - 1
+    near, far, at = floats[SPARE], floats[X], floats[Y]
+    count = _second_differences(floats[RANGE], n, range_min, range_max, near, at)
+    for i in range(count):
+        far[i] = at[i]
+    middle = _median(far, count) if count > 0 else 0.0
+    low, high, near_squares, far_squares = np.int64(0), np.int64(0), 0.0, 0.0
+    for i in range(count):
+        if at[i] <= middle:
+            near_squares += at[i] * at[i]
+            near[low] = near[i]
+            low += 1
+        else:
+            far_squares += at[i] * at[i]
+            far[high] = near[i]
+            high += 1
+    if low < _LEAST_TRIPLES or high < _LEAST_TRIPLES:
+        noise[0], noise[1] = range_sigma(floats[RANGE], n, range_min, range_max, near), 0.0
+        return
+    near_squares, far_squares = near_squares / low, far_squares / high
+    v_near, v_far = _clipped_variance(near, low), _clipped_variance(far, high)
+    if not grows or far_squares < 1.2 * near_squares or v_far < 1.7 * v_near:
+        noise[0], noise[1] = math.sqrt((low * v_near + high * v_far) / count), 0.0
+        return
+    growth = (v_far - v_near) / (far_squares - near_squares)
+    constant = v_near - growth * near_squares
+    if constant < 0.0:
+        constant, growth = 0.0, 0.5 * (v_near / near_squares + v_far / far_squares)
+    noise[0], noise[1] = max(math.sqrt(constant), LEAST_SIGMA), math.sqrt(growth)
+
+
+@helper
+def _second_differences(ranges, n, range_min, range_max, out, at):
+    """Sizes of ρ[i-1] - 2ρ[i] + ρ[i+1] of every other triple, and its ρ[i]."""
+    count = np.int64(0)
+    for i in range(1, n - 1, 2):
+        a, b, c = ranges[i - 1], ranges[i], ranges[i + 1]
+        if (
+            usable(a, range_min, range_max)
+            and usable(b, range_min, range_max)
+            and usable(c, range_min, range_max)
+        ):
+            out[count], at[count] = abs(a - 2.0 * b + c), b
+            count += 1
+    return count
+
+
+@helper
+def _clipped_variance(values, count):
+    """Variance of a range, of sizes of second differences; those above three deviations are out."""
+    limit = max(3.0 * 1.4826 * _median(values, count), LEAST_SIGMA)
+    total, used = 0.0, 0
+    for i in range(count):
+        if values[i] <= limit:
+            total += values[i] * values[i]
+            used += 1
+    # What is cut off of a normal distribution at three deviations is 3 % of its variance.
+    return max(1.03 * total / (6.0 * used), LEAST_SIGMA * LEAST_SIGMA)

@@ -7,7 +7,7 @@ matrix of float64, or of int32, over the same memory, and each field by its colu
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import BREAKPOINT, CORNER, SEGMENT
+from ..features import ARC, BREAKPOINT, CORNER, SEGMENT
 
 KIND_NAMES = ("jump", "gap", "scan_end")
 JUMP, GAP, SCAN_END = 0, 1, 2
@@ -40,3 +40,7 @@ C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE = (
 C_CONVEX, C_BEAM, C_SEGMENTS = (_int(CORNER, name) for name in ("convex", "beam", "segments"))
 B_POSITION = _float(BREAKPOINT, "position")
 B_BEAM, B_KIND, B_OCCLUDER = (_int(BREAKPOINT, name) for name in ("beam", "kind", "occluder"))
+A_CENTER, A_RADIUS, A_COVARIANCE, A_RMS = (
+    _float(ARC, name) for name in ("center", "radius", "covariance", "rms")
+)
+A_FIRST, A_LAST, A_POINTS = (_int(ARC, name) for name in ("first_beam", "last_beam", "n_points"))

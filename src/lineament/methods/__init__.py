@@ -18,6 +18,7 @@ DEFAULT_METHOD = "liu"
 
 #: Name of each method, and the class that it is, in the module of the same name.
 METHODS = {
+    "optimal": "Optimal",
     "liu": "Liu",
     "pdbs": "PDBS",
     "iepf": "IEPF",
@@ -66,7 +67,7 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     5
     >>> get_method("lui")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: method 'lui' is unknown, expected one of: liu, liu:paper, liu:scale_free, ...
+    ValueError: method 'lui' is unknown, expected one of: optimal, liu, liu:paper, ...
     """
     base, _, preset = str(name).partition(":")
     cls = _method_class(base) if base in METHODS else None

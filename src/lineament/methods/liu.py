@@ -191,6 +191,7 @@ class Liu(MethodBase):
             block.noises,
             block.segments,
             block.corners,
+            block.arcs,
             block.breakpoints,
             block.clusters,
             block.offsets,

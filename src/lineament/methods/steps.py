@@ -58,6 +58,7 @@ def measure(
         gap,
         block.segments,
         block.corners,
+        block.arcs,
         block.breakpoints,
         block.clusters,
         block.offsets,

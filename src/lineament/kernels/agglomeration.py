@@ -1,0 +1,79 @@
+"""Pieces of classes merged, the cheapest pair first, while one line explains both."""
+
+import math
+
+from . import helper
+from .inverse_range import line_through
+from .layout import COST, FIRST, JOINT_COST, LAST
+
+#: χ² of a point that is still on a line.
+_GOOD = 4.0
+
+
+@helper
+def list_stretches(ints, first, last, size, n):
+    """Part a class into stretches of `size` points or a little more, as pieces from the n-th on.
+
+    Returns the number of pieces.
+    """
+    points = last - first + 1
+    parts = max(points // size, 1)
+    for j in range(parts):
+        ints[FIRST, n] = first + points * j // parts
+        ints[LAST, n] = first + points * (j + 1) // parts - 1
+        n += 1
+    return n
+
+
+@helper
+def agglomerate(floats, ints, sums, c, low, high, evidence):
+    """Merge the pieces `low`..`high` - 1, all of class c.
+
+    Merging two raises χ² by that of one line through both, less those of their own lines. Pairs
+    that cost less than their neighbours, and at most `evidence`, are merged, and again until
+    there are none.
+
+    Returns
+    -------
+    int
+        One more than the last piece that is left.
+    """
+    first, last, own, joint = ints[FIRST], ints[LAST], floats[COST], floats[JOINT_COST]
+    for k in range(low, high):
+        # A stretch around a corner is a piece of no line: it does not get better by merging.
+        most = _GOOD * (last[k] - first[k] + 1)
+        _, _, chi_square = line_through(sums, c, first[k], last[k])
+        own[k], joint[k] = min(chi_square, most), math.nan
+    while True:
+        for k in range(low + 1, high):
+            if math.isnan(joint[k]):
+                _, _, joint[k] = line_through(sums, c, first[k - 1], last[k])
+        left = _merge_cheapest(first, last, own, joint, low, high, evidence)
+        if left == high:
+            return high
+        high = left
+
+
+@helper
+def _merge_cheapest(first, last, own, joint, low, high, evidence):
+    """Merge each pair that costs less than the pairs beside it. Joint costs to be found are NaN."""
+    kept, stale = low, False
+    before, here = math.inf, _rise(own, joint, low + 1, high)
+    for k in range(low + 1, high):
+        after = _rise(own, joint, k + 1, high)
+        if here <= evidence and here <= before and here < after:
+            last[kept], own[kept] = last[k], joint[k]
+            joint[kept], stale = math.nan, True
+        else:
+            kept += 1
+            first[kept], last[kept], own[kept] = first[k], last[k], own[k]
+            joint[kept] = math.nan if stale else joint[k]
+            stale = False
+        before, here = here, after
+    return kept + 1
+
+
+@helper
+def _rise(own, joint, k, high):
+    """Tell what merging a piece with the one before raises χ² by."""
+    return joint[k] - own[k - 1] - own[k] if k < high else math.inf

@@ -1,0 +1,130 @@
+"""Borders between pieces put where they cost least; pieces that are none; ends that are off."""
+
+import math
+
+from . import helper
+from .inverse_range import line_through, squared_error
+from .layout import FIRST, LAST
+
+#: Points that each piece keeps.
+_LEAST = 3
+#: Ends that a piece may lose.
+_ENDS = 2
+
+
+@helper
+def move_border(floats, ints, sums, c, k, margin, price):
+    """Move the border of a piece and the one before to where χ² to both their lines is least.
+
+    By up to `margin` points. No point costs more than `price`: it may be on neither.
+    """
+    first, last = ints[FIRST], ints[LAST]
+    start, end, border = first[k - 1], last[k], first[k]
+    a1, b1, _ = line_through(sums, c, start, last[k - 1])
+    a2, b2, _ = line_through(sums, c, border, end)
+    low = max(start + _LEAST, last[k - 1] + 1 - margin)
+    high = min(end + 1 - _LEAST, border + margin)
+    if low > high:
+        return
+    total, least, at = 0.0, math.inf, low
+    for i in range(low, high + 1):
+        # `total` is that of a border before point i.
+        if total < least:
+            least, at = total, i
+        total += min(squared_error(floats, a1, b1, i), price)
+        total -= min(squared_error(floats, a2, b2, i), price)
+    last[k - 1] = _last_on(floats, a1, b1, at - 1, start + _LEAST - 1, price)
+    first[k] = _first_on(floats, a2, b2, at, end + 1 - _LEAST, price)
+
+
+@helper
+def _last_on(floats, a, b, i, least, price):
+    """Last point up to i that is on a line; not before `least`."""
+    while i > least and squared_error(floats, a, b, i) > price:
+        i -= 1
+    return i
+
+
+@helper
+def _first_on(floats, a, b, i, most, price):
+    """First point from i on that is on a line; not after `most`."""
+    while i < most and squared_error(floats, a, b, i) > price:
+        i += 1
+    return i
+
+
+@helper
+def dissolve(floats, ints, sums, c, low, high, most, evidence, price):
+    """Give the points of small pieces to their neighbours, where these explain them as well.
+
+    As well but for `evidence`; a point that is on neither costs `price`. Returns one more than
+    the last piece that is left.
+    """
+    first, last = ints[FIRST], ints[LAST]
+    kept = low
+    for k in range(low, high):
+        first[kept], last[kept] = first[k], last[k]
+        if last[k] - first[k] < most and high - low > 1:
+            points = last[k] - first[k] + 1
+            _, _, own = line_through(sums, c, first[k], last[k])
+            if _share(
+                floats,
+                ints,
+                sums,
+                c,
+                low,
+                high,
+                kept,
+                k,
+                price,
+                evidence + min(own, price * points),
+            ):
+                continue
+        kept += 1
+    return kept
+
+
+@helper
+def _share(floats, ints, sums, c, low, high, kept, k, price, most):
+    """Share the points of a piece between its neighbours, if that costs at most so much."""
+    first, last = ints[FIRST], ints[LAST]
+    start, end = first[k], last[k]
+    a1, b1, a2, b2 = 0.0, 0.0, 0.0, 0.0
+    before, after = kept > low, k + 1 < high
+    if before:
+        a1, b1, _ = line_through(sums, c, first[kept - 1], last[kept - 1])
+    if after:
+        a2, b2, _ = line_through(sums, c, first[k + 1], last[k + 1])
+    total = 0.0
+    for i in range(start, end + 1):
+        total += min(squared_error(floats, a2, b2, i), price) if after else price
+    least, border = total, start
+    for i in range(start, end + 1):
+        total += min(squared_error(floats, a1, b1, i), price) if before else price
+        total -= min(squared_error(floats, a2, b2, i), price) if after else price
+        if total < least:
+            least, border = total, i + 1
+    if least > most:
+        return False
+    if before:
+        last[kept - 1] = _last_on(floats, a1, b1, border - 1, last[kept - 1], price)
+    if after:
+        first[k + 1] = _first_on(floats, a2, b2, border, first[k + 1], price)
+    return True
+
+
+@helper
+def trim_ends(floats, ints, sums, c, k, price):
+    """Leave out ends of a piece that the line through its other points does not explain."""
+    first, last = ints[FIRST], ints[LAST]
+    start, end = first[k], last[k]
+    while last[k] - first[k] > _LEAST and first[k] - start < _ENDS:
+        a, b, _ = line_through(sums, c, first[k] + 1, last[k])
+        if squared_error(floats, a, b, first[k]) <= price:
+            break
+        first[k] += 1
+    while last[k] - first[k] > _LEAST and end - last[k] < _ENDS:
+        a, b, _ = line_through(sums, c, first[k], last[k] - 1)
+        if squared_error(floats, a, b, last[k]) <= price:
+            break
+        last[k] -= 1

@@ -1,0 +1,64 @@
+"""Walls that bow: neighbouring pieces at so shallow an angle that they are one wall."""
+
+import math
+
+from . import helper
+from .inverse_range import line_through
+from .layout import FIRST, LAST, RHO, X, Y
+from .line_fit import range_variance
+
+#: Points without a piece over which a wall goes on.
+_BETWEEN = 3
+#: Sine of the angle below which neighbours are one wall (10°).
+_SHALLOW = 0.17
+#: Root mean square of what a wall bows by, over its length.
+_BOW = 0.01
+#: What neighbours may be apart where they meet: over the length of both, but not more than panels
+#: and frames stand out [m]; or deviations of a reading, if these are more.
+_STEP, _FRAME, _SIGMAS = 0.02, 0.04, 3.0
+
+
+@helper
+def straighten(floats, ints, noise, sums, c, low, high):
+    """Merge neighbours that are one wall, though it bows. Returns one more than the last left.
+
+    Real walls are off a line by more than the noise. Neighbours are one where they turn by a
+    shallow angle, without a step that a reading would show, and one line through both is off by
+    little for its length.
+    """
+    first, last = ints[FIRST], ints[LAST]
+    kept = low
+    for k in range(low, high):
+        first[kept], last[kept] = first[k], last[k]
+        while kept > low and _is_one_wall(floats, ints, noise, sums, c, kept):
+            last[kept - 1] = last[kept]
+            kept -= 1
+        kept += 1
+    return kept
+
+
+@helper
+def _is_one_wall(floats, ints, noise, sums, c, k):
+    """Whether a piece goes on in the wall of the piece before."""
+    start, i, j, end = ints[FIRST, k - 1], ints[LAST, k - 1], ints[FIRST, k], ints[LAST, k]
+    if j - i > _BETWEEN + 1:
+        return False
+    a1, b1, _ = line_through(sums, c, start, i)
+    a2, b2, _ = line_through(sums, c, j, end)
+    norm1, norm2 = math.sqrt(a1 * a1 + b1 * b1), math.sqrt(a2 * a2 + b2 * b2)
+    sine, cosine = a1 * b2 - a2 * b1, a1 * a2 + b1 * b2
+    if cosine <= 0.0 or abs(sine) > _SHALLOW * norm1 * norm2:
+        return False
+    x, y = 0.5 * (floats[X, i] + floats[X, j]), 0.5 * (floats[Y, i] + floats[Y, j])
+    step = abs((1.0 - a1 * x - b1 * y) / norm1 - (1.0 - a2 * x - b2 * y) / norm2)
+    dx, dy = floats[X, end] - floats[X, start], floats[Y, end] - floats[Y, start]
+    length = math.sqrt(dx * dx + dy * dy)
+    sigma = math.sqrt(range_variance(floats[RHO, i], noise))
+    if step > max(min(_STEP * length, _FRAME), _SIGMAS * sigma):
+        return False
+    a, b, _ = line_through(sums, c, start, end)
+    squares, norm = 0.0, a * a + b * b
+    for p in range(start, end + 1):
+        off = 1.0 - a * floats[X, p] - b * floats[Y, p]
+        squares += off * off / norm
+    return squares <= _BOW * _BOW * length * length * (end - start + 1)
