@@ -7,6 +7,7 @@ import numpy as np
 from . import helper
 from .inverse_range import line_through
 from .layout import (
+    BEAM,
     BEFORE,
     CLASS_FIRST,
     CLASS_LAST,
@@ -33,6 +34,8 @@ from .line_fit import excess, range_variance
 _BETWEEN = 3
 #: Sine of the least angle of a corner (5.7°).
 _LEAST_SINE = 0.1
+#: Spacings that readings of one surface may be apart.
+_APART = 2.0
 
 
 @helper
@@ -56,7 +59,7 @@ def join(floats, ints, counts, noise, sums, step):
                 floats[RISE, k] = joint - floats[COST, k - 1] - floats[COST, k]
                 if _meet(floats, ints, noise, k - 1, k, step):
                     before[k], response[k] = k - 1, floats[RISE, k]
-                else:
+                elif not _touch(floats, ints, noise, k - 1, k):
                     ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, first[k] - 1
                     start = first[k]
                     classes += 1
@@ -109,6 +112,22 @@ def _meet(floats, ints, noise, p, q, step):
     before = (x * floats[Y, j] - y * floats[X, j]) / floats[RHO, j]
     ahead = floats[X, i] * x + floats[Y, i] * y > 0.0
     return ahead and after > -tolerance and before > -tolerance
+
+
+@helper
+def _touch(floats, ints, noise, p, q):
+    """Whether readings of neighbours are no farther apart than those within either of them.
+
+    Then something small is between them, and no surface ends in front of another.
+    """
+    i, j = ints[LAST, p], ints[FIRST, q]
+    x, y, beam = floats[X], floats[Y], ints[BEAM]
+    apart = math.hypot(x[j] - x[i], y[j] - y[i])
+    before = math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) / max(beam[i] - beam[i - 1], 1)
+    after = math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) / max(beam[j + 1] - beam[j], 1)
+    beams = max(beam[j] - beam[i], 1)
+    sigma = math.sqrt(range_variance(max(floats[RHO, i], floats[RHO, j]), noise))
+    return apart <= _APART * beams * max(before, after) + 3.0 * sigma
 
 
 @helper

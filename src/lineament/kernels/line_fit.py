@@ -15,6 +15,8 @@ FAR_OFF = 16.0
 FAIR = 4.0
 #: Parts of a wall that bow each for itself.
 BOWS = 3.0
+#: Readings that a cut costs.
+CUT = 2.0
 
 
 @sums
@@ -87,12 +89,13 @@ def excess(chi_square, points):
 
 
 @sums
-def refine_line(x, y, rho, first, last, noise, a, b, uneven):
+def refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts):
     """Fit a line to the points `first`..`last` by maximum likelihood, from one near it.
 
     That is a x + b y = 1, and gives the weights. As `fit_line`, by one pass; readings that are
     far off do not count. The wall is `uneven`, a variance [m²]: so much is added to that of each
-    reading, and to the covariance, as neighbours are off together.
+    reading, and to the covariance, as neighbours are off together. `cuts` is at how many of its ends
+    it was cut at a corner: by the same readings, which costs about two of them each.
     """
     span = slice(first, last + 1)
     x, y, rho = x[span], y[span], rho[span]
@@ -125,8 +128,9 @@ def refine_line(x, y, rho, first, last, noise, a, b, uneven):
     cx, cy, rms = x0 + sx / total, y0 + sy / total, math.sqrt(across / total)
     if along <= 0.0:
         return cx, cy, c, s, 1.0 / total, 0.0, math.pi**2 / 12.0, rms
-    common = uneven / BOWS
-    return cx, cy, c, s, 1.0 / total + common, 0.0, (1.0 + common * total) / along, rms
+    common, scale = uneven / BOWS, 1.0 + CUT * cuts / len(x)
+    var_offset, var_angle = 1.0 / total + common, (1.0 + common * total) / along
+    return cx, cy, c, s, scale * var_offset, 0.0, scale * var_angle, rms
 
 
 @sums

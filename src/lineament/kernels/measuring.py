@@ -138,8 +138,7 @@ def measure(
         first, last = ints[FIRST, k], ints[LAST, k]
         a, b = _clear_of_corners(ints[BEFORE], pieces, k, first, last, trim)
         if fit == REFINED:
-            uneven = _unevenness(floats, rho, a, b, noise, k)
-            line = refine_line(x, y, rho, a, b, noise, floats[LINE_A, k], floats[LINE_B, k], uneven)
+            line = _refined_line(floats, ints, pieces, k, noise)
         else:
             line = fit_line(x, y, rho, a, b, noise, fit)
         _write_segment(x, y, ints, first, last, line, segments, segment_ints, segment + k)
@@ -201,12 +200,17 @@ def _clear_of_corners(before, pieces, k, first, last, trim):
 
 
 @helper
-def _unevenness(floats, rho, first, last, noise, k):
-    """Variance of a wall about its line [m²]: what χ² has too much, along the normal."""
+def _refined_line(floats, ints, pieces, k, noise):
+    """Fit the line of a piece from what is known of it: LINE_A, LINE_B, COST, and its corners."""
+    x, y, rho = floats[MEASURED_X], floats[MEASURED_Y], floats[MEASURED_RHO]
+    first, last, a, b = ints[FIRST, k], ints[LAST, k], floats[LINE_A, k], floats[LINE_B, k]
+    # What χ² has too much is the wall's own, along its normal.
     middle = rho[(first + last) // 2]
-    a, b = floats[LINE_A, k], floats[LINE_B, k]
     square = min(1.0 / ((a * a + b * b) * middle * middle), 1.0)
-    return excess(floats[COST, k], last - first + 1) * range_variance(middle, noise) * square
+    uneven = excess(floats[COST, k], last - first + 1) * range_variance(middle, noise) * square
+    after = 0 if k + 1 == pieces else k + 1
+    cuts = (ints[BEFORE, k] >= 0) + (ints[BEFORE, after] == k)
+    return refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts)
 
 
 @helper

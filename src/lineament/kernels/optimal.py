@@ -32,7 +32,7 @@ from .measuring import measure
 from .noise import estimate_by_range
 from .residual_noise import refine_noise
 from .spikes import drop_spikes
-from .straightening import straighten
+from .straightening import drop_crooked, straighten
 
 #: Parts that can be left out, to see what each is worth.
 SPIKES, GROWTH, BORDERS, DISSOLVING, ARCS_TOO, STRAIGHTENING = 1, 2, 4, 8, 16, 32
@@ -197,6 +197,7 @@ def cut(floats, ints, counts, noise, unknown, evidence, parts, sums):
             n = find_arcs(floats, ints, counts, noise, sums, c, low, n, evidence, _ARC_PRICE)
         if parts & STRAIGHTENING:
             n = straighten(floats, ints, noise, sums, c, low, n)
+            n = drop_crooked(floats, ints, sums, c, low, n)
     counts[PIECES] = n
 
 

@@ -5,7 +5,7 @@ import math
 from . import helper
 from .inverse_range import line_through
 from .layout import FIRST, LAST, RHO, X, Y
-from .line_fit import range_variance
+from .line_fit import excess, range_variance
 
 #: Points without a piece over which a wall goes on.
 _BETWEEN = 3
@@ -13,6 +13,8 @@ _BETWEEN = 3
 _SHALLOW = 0.17
 #: Root mean square of what a wall bows by, over its length.
 _BOW = 0.01
+#: The same from which on a piece is no wall.
+_CROOKED = 0.03
 #: What neighbours may be apart where they meet: over the length of both, but not more than panels
 #: and frames stand out [m]; or deviations of a reading, if these are more.
 _STEP, _FRAME, _SIGMAS = 0.02, 0.04, 3.0
@@ -56,9 +58,33 @@ def _is_one_wall(floats, ints, noise, sums, c, k):
     sigma = math.sqrt(range_variance(floats[RHO, i], noise))
     if step > max(min(_STEP * length, _FRAME), _SIGMAS * sigma):
         return False
-    a, b, _ = line_through(sums, c, start, end)
+    return _is_straight(floats, sums, c, start, end, _BOW)
+
+
+@helper
+def drop_crooked(floats, ints, sums, c, low, high):
+    """Leave out pieces that are no line, nor a wall that bows. Returns one more than the last left.
+
+    Stretches over clutter, that nothing explains.
+    """
+    first, last = ints[FIRST], ints[LAST]
+    kept = low
+    for k in range(low, high):
+        _, _, chi_square = line_through(sums, c, first[k], last[k])
+        fair = excess(chi_square, last[k] - first[k] + 1) == 0.0
+        if fair or _is_straight(floats, sums, c, first[k], last[k], _CROOKED):
+            first[kept], last[kept] = first[k], last[k]
+            kept += 1
+    return kept
+
+
+@helper
+def _is_straight(floats, sums, c, first, last, bow):
+    """Whether points are off the line through them by little for its length."""
+    a, b, _ = line_through(sums, c, first, last)
     squares, norm = 0.0, a * a + b * b
-    for p in range(start, end + 1):
-        off = 1.0 - a * floats[X, p] - b * floats[Y, p]
+    for i in range(first, last + 1):
+        off = 1.0 - a * floats[X, i] - b * floats[Y, i]
         squares += off * off / norm
-    return squares <= _BOW * _BOW * length * length * (end - start + 1)
+    dx, dy = floats[X, last] - floats[X, first], floats[Y, last] - floats[Y, first]
+    return squares <= bow * bow * (dx * dx + dy * dy) * (last - first + 1)
