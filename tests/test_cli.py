@@ -71,9 +71,9 @@ def test_extract_writes_the_features_of_each_scan(npz, tmp_path, capsys):
 
 def test_extract_jsonl_holds_what_to_dict_gives(npz, tmp_path):
     out = tmp_path / "features.jsonl"
-    assert run(["extract", str(npz), "-o", str(out), "-q", "--set", "min_points=4"]) == 0
+    assert run(["extract", str(npz), "-o", str(out), "-q", "--set", "max_missing=4"]) == 0
     lines = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
-    extractor = ln.Extractor("liu", min_points=4)
+    extractor = ln.Extractor(max_missing=4)
     assert lines == [
         {"scan": k, **extractor(scan).to_dict()} for k, scan in enumerate(ln.open_log(npz))
     ]
@@ -119,9 +119,9 @@ def test_options_of_method_and_noise_arrive(npz, tmp_path):
         (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "a=1"], 2, "'a'"),
         (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "a"], 2, "NAME=VALUE"),
         (
-            ["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "sigma_d=wide"],
+            ["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--set", "evidence=wide"],
             2,
-            "sigma_d is 'wide', expected a number",
+            "evidence is 'wide', expected a number",
         ),
         (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--noise", "-1"], 2, "--noise"),
         (["extract", "{dir}/wall.npz", "-o", "{dir}/f.parquet", "--topic", "x"], 1, "topic 'x'"),
@@ -131,7 +131,7 @@ def test_options_of_method_and_noise_arrive(npz, tmp_path):
         (["info", "{dir}/other.npz"], 1, "other.npz: expected the key"),
         (["plot", "{dir}/wall.npz", "--scan", "7", "-o", "{dir}/p.png"], 1, "has no scan 7"),
         (["plot", "{dir}/wall.npz", "--scan", "-1", "-o", "{dir}/p.png"], 1, "has no scan -1"),
-        (["plot", "{dir}/wall.npz", "-o", "{dir}/p.gif"], 1, "p.gif"),
+        (["plot", "{dir}/wall.npz", "-o", "{dir}/p.gif"], 2, "p.gif"),
         (["plot", "{dir}/wall.npz", "-o", "{dir}/p.png", "-m", "x"], 2, "'x'"),
         (["demo", "{dir}/none.log", "-o", "{dir}/demo"], 1, "none.log"),
         (["demo", "-o", "{dir}/wall.npz"], 1, "cannot make this folder"),
@@ -338,8 +338,8 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys
     monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     assert list(progress.tracker(quiet=False)(range(4), "reading", 4)) == [0, 1, 2, 3]
     assert capsys.readouterr().err.splitlines() == [
-        "reading: 2/4, 1/s, 3 s left",
-        "reading: 4/4, 1/s, 0 s left",
+        "reading: 2/4, 0.7/s, 3 s left",
+        "reading: 4/4, 0.7/s, 0 s left",
     ]
 
 

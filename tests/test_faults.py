@@ -23,7 +23,7 @@ def test_a_parameter_of_no_method_is_refused_whatever_its_name():
 
 
 def test_batches_are_equal_to_the_byte():
-    rows = 3.0 + np.random.default_rng(4).normal(0, 0.02, (40, 301))
+    rows = 3.0 + np.random.default_rng(4).normal(0, 0.02, (12, 301))
     batches = [
         ln.Extractor("liu").batch(rows, angle_min=-1.0, angle_increment=0.005, workers=workers)
         for workers in (1, 2, 3)
@@ -35,7 +35,7 @@ def test_batches_are_equal_to_the_byte():
 def test_huge_ranges_do_not_drown_their_neighbours():
     ranges = np.full(41, 2.0)
     ranges[[5, 20, 21]] = 3.4e38, 1e100, 1e7
-    filtered = ln.trace(LaserScan(ranges, -0.2, 0.01)).filtered
+    filtered = ln.trace(LaserScan(ranges, -0.2, 0.01), method="liu").filtered
     np.testing.assert_allclose(filtered, ranges, rtol=1e-6)
 
 

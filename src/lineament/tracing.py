@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,9 @@ class Trace:
         What their responses were compared with.
     cuts : int32 array
         Beams at which clusters were cut into pieces.
+    evidence : dict of str to float64 array
+        By table ("segments", "corners", "arcs"), how much χ² would rise without each feature;
+        empty where a method does not decide by that.
     """
 
     scan: LaserScan
@@ -68,10 +71,16 @@ class Trace:
     candidates: NDArray[np.void]
     threshold: float
     cuts: NDArray[np.int32]
+    evidence: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 def trace_of(
-    block: Block, method: str, scan: LaserScan, features: Features, threshold: float
+    block: Block,
+    method: str,
+    scan: LaserScan,
+    features: Features,
+    threshold: float,
+    evidence: dict[str, NDArray[np.float64]],
 ) -> Trace:
     """Make the trace of the scan that a method has just run on, alone in its block."""
     candidates = candidate_records(block, threshold)
@@ -87,6 +96,7 @@ def trace_of(
         candidates=candidates,
         threshold=threshold,
         cuts=np.sort(candidates["beam"][candidates["accepted"]]),
+        evidence=evidence,
     )
 
 

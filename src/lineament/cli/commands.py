@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from .experiments import bench, compare, reproduce, simulate
-from .options import KEEP_GOING, LOG, QUIET, TOPIC
+from .options import KEEP_GOING, LOG, PATH, QUIET, SCAN, TOPIC, check_ending, wrong_usage
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
@@ -32,25 +31,21 @@ _NOISE = click.option(
 )
 
 
-def _default_method(function: Callable[..., Any]) -> Callable[..., Any]:
-    option = click.option("-m", "--method", help="Name of the method.  [default: liu]")
-    return option(function)
+_METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
 
 
-def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
-    """Make the extractor that the options ask for; what is wrong with them is wrong usage."""
+def _extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
+    """Make the extractor that the options ask for."""
     from ..extractor import Extractor
     from ..methods import DEFAULT_METHOD
     from ..scan import RangeNoise
 
-    try:
+    with wrong_usage():
         return Extractor(
             DEFAULT_METHOD if method is None else method,
             noise=None if noise is None else RangeNoise(sigma=noise),
             **dict(_setting(text) for text in settings),
         )
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def _setting(text: str) -> tuple[str, Any]:
@@ -64,15 +59,15 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 @click.command()
-@click.argument("logs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("logs", nargs=-1, required=True, type=PATH)
 @click.option(
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="File to write, .parquet or .jsonl; for several logs, a folder.",
 )
-@_default_method
+@_METHOD
 @_SET
 @_NOISE
 @TOPIC
@@ -93,9 +88,8 @@ def extract(
     from ..output import ENDINGS
     from .progress import tracker
 
-    if not output.is_dir() and output.suffix.lower() not in ENDINGS:
-        raise click.UsageError(f"{output}: expected a folder or an ending of {', '.join(ENDINGS)}")
-    extractor, track = make_extractor(method, settings, noise), tracker(quiet)
+    check_ending(output, ENDINGS, or_folder=True)
+    extractor, track = _extractor(method, settings, noise), tracker(quiet)
     for log, path in zip(logs, output_paths(logs, output), strict=True):
         extraction = extract_log(
             log,
@@ -103,7 +97,7 @@ def extract(
             extractor,
             topic=topic,
             keep_going=keep_going,
-            track=lambda opened: track(opened, opened.path.name, len(opened)),
+            track=track,
         )
         if not quiet:
             click.echo(str(extraction))
@@ -126,12 +120,12 @@ def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
 
 @click.command()
 @LOG
-@click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
+@SCAN
 @click.option(
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="Picture to write: .png, .svg or .pdf.",
 )
 @click.option(
@@ -139,7 +133,7 @@ def info(log: Path, topic: str | None, keep_going: bool, quiet: bool) -> None:
     "--method",
     "methods",
     multiple=True,
-    help="Name of the method; may be given again, side by side.  [default: liu]",
+    help="Name of the method; may be given again, side by side.  [default: optimal]",
 )
 @_SET
 @_NOISE
@@ -160,10 +154,12 @@ def plot(
     """Draw a scan of LOG and what is found in it."""
     from ..logs import open_log
     from ..methods import DEFAULT_METHOD
+    from ..output.canvas import PICTURE_ENDINGS
     from ..output.figures import plot_scan, plot_trace
 
+    check_ending(output, PICTURE_ENDINGS)
     names = methods or (DEFAULT_METHOD,)
-    extractors = {name: make_extractor(name, settings, noise) for name in names}
+    extractors = {name: _extractor(name, settings, noise) for name in names}
     scan = open_log(log, topic=topic, keep_going=keep_going).scan(index)
     if trace:
         plot_trace(extractors[names[0]].trace(scan), output)
@@ -177,27 +173,25 @@ def plot(
     "--method",
     "methods",
     multiple=True,
-    help="Name of the method; may be given again.  [default: liu]",
+    help="Name of the method; may be given again.  [default: optimal]",
 )
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
     """Compile and cache the kernels of a method."""
     from ..warmup import warm_up
 
-    try:
+    with wrong_usage():
         seconds = warm_up(methods)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
     if not quiet:
         click.echo(f"kernels ready after {seconds:.2f} s")
 
 
 @click.command()
-@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.argument("log", required=False, type=PATH)
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("demo"),
     show_default=True,
     help="Folder to write to.",

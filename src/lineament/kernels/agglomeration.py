@@ -44,14 +44,15 @@ def agglomerate(floats, ints, sums, c, low, high, evidence):
         most = _GOOD * (last[k] - first[k] + 1)
         _, _, chi_square = line_through(sums, c, first[k], last[k])
         own[k], joint[k] = min(chi_square, most), math.nan
-    while True:
+    while high - low > 1:
         for k in range(low + 1, high):
             if math.isnan(joint[k]):
                 _, _, joint[k] = line_through(sums, c, first[k - 1], last[k])
         left = _merge_cheapest(first, last, own, joint, low, high, evidence)
         if left == high:
-            return high
+            break
         high = left
+    return high
 
 
 @helper

@@ -56,7 +56,9 @@ def line_through(sums, c, first, last):
     if determinant <= 1e-13 * xx * yy:
         return 0.0, 0.0, 0.0
     a, b = (sx * yy - sy * xy) / determinant, (sy * xx - sx * xy) / determinant
-    return a, b, max(s - a * sx - b * sy, 0.0)
+    # All of Σ w (1 - a x - b y)²: the errors of a and b by rounding then count as squares only.
+    squares = a * a * xx + 2.0 * a * b * xy + b * b * yy
+    return a, b, max(s - 2.0 * (a * sx + b * sy) + squares, 0.0)
 
 
 @helper

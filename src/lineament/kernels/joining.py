@@ -9,6 +9,10 @@ from .inverse_range import line_through
 from .layout import (
     BEAM,
     BEFORE,
+    CANDIDATE,
+    CANDIDATE_RESPONSE,
+    CANDIDATES,
+    CHORD_DISTANCE,
     CLASS_FIRST,
     CLASS_LAST,
     CLASSES,
@@ -43,7 +47,8 @@ def join(floats, ints, counts, noise, sums, step):
     """Join the pieces where they meet; a class ends where two neighbours do not.
 
     RISE is by piece how much χ² rises if it is merged with the one before; where they meet it is
-    the RESPONSE of the corner. Lines by piece are filled, and the classes listed anew.
+    the RESPONSE of the corner. Each such border is a candidate. Lines by piece are filled, and the
+    classes listed anew.
     """
     first, last, before, response = ints[FIRST], ints[LAST], ints[BEFORE], floats[RESPONSE]
     k, classes = np.int64(0), np.int64(0)
@@ -57,6 +62,7 @@ def join(floats, ints, counts, noise, sums, step):
             if k > low and first[k] - last[k - 1] <= _BETWEEN + 1:
                 _, _, joint = line_through(sums, c, first[k - 1], last[k])
                 floats[RISE, k] = joint - floats[COST, k - 1] - floats[COST, k]
+                _note_candidate(floats, ints, counts, k)
                 if _meet(floats, ints, noise, k - 1, k, step):
                     before[k], response[k] = k - 1, floats[RISE, k]
                 elif not _touch(floats, ints, noise, k - 1, k):
@@ -69,6 +75,16 @@ def join(floats, ints, counts, noise, sums, step):
         ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, end
         classes += 1
     _list_classes(ints, counts, classes)
+
+
+@helper
+def _note_candidate(floats, ints, counts, k):
+    """Note the first point of a piece, how far it is off the line before, and its RISE."""
+    n, i, a, b = counts[CANDIDATES], ints[FIRST, k], floats[LINE_A, k - 1], floats[LINE_B, k - 1]
+    off = abs(1.0 - a * floats[X, i] - b * floats[Y, i]) / math.sqrt(a * a + b * b)
+    ints[CANDIDATE, n] = i
+    floats[CHORD_DISTANCE, n], floats[CANDIDATE_RESPONSE, n] = off, floats[RISE, k]
+    counts[CANDIDATES] = n + 1
 
 
 @helper

@@ -94,8 +94,8 @@ def refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts):
 
     That is a x + b y = 1, and gives the weights. As `fit_line`, by one pass; readings that are
     far off do not count. The wall is `uneven`, a variance [m²]: so much is added to that of each
-    reading, and to the covariance, as neighbours are off together. `cuts` is at how many of its ends
-    it was cut at a corner: by the same readings, which costs about two of them each.
+    reading, and to the covariance, as neighbours are off together. `cuts` is at how many of its
+    ends it was cut at a corner: by the same readings, which costs about two of them each.
     """
     span = slice(first, last + 1)
     x, y, rho = x[span], y[span], rho[span]

@@ -62,13 +62,17 @@ def range_sigma(ranges, n, range_min, range_max, scratch):
             any_usable |= usable(ranges[i], range_min, range_max)
         return LEAST_SIGMA if any_usable else math.nan
     sigma = 1.4826 / math.sqrt(6.0) * _median(scratch, count)
-    if sigma >= LEAST_SIGMA:
-        return sigma
+    return sigma if sigma >= LEAST_SIGMA else _rounding_sigma(scratch, count)
+
+
+@helper
+def _rounding_sigma(differences, count):
+    """Deviation of rounding to a lattice, whose step is the least of the second differences."""
     quantum = math.inf
     for i in range(count):
         # What is coarser than any lattice is a jump.
-        if LEAST_SIGMA < scratch[i] < min(quantum, COARSEST_QUANTUM):
-            quantum = scratch[i]
+        if LEAST_SIGMA < differences[i] < min(quantum, COARSEST_QUANTUM):
+            quantum = differences[i]
     return max(quantum / math.sqrt(12.0), LEAST_SIGMA) if quantum < math.inf else LEAST_SIGMA
 
 
@@ -155,8 +159,14 @@ def _second_differences(ranges, n, range_min, range_max, out, at):
 
 @helper
 def _clipped_variance(values, count):
-    """Variance of a range, of sizes of second differences; those above three deviations are out."""
-    limit = max(3.0 * 1.4826 * _median(values, count), LEAST_SIGMA)
+    """Variance of a range, of sizes of second differences; those above three deviations are out.
+
+    Where half of them are zero, it is that of rounding.
+    """
+    limit = 3.0 * 1.4826 * _median(values, count)
+    if limit < LEAST_SIGMA:
+        sigma = _rounding_sigma(values, count)
+        return sigma * sigma
     total, used = 0.0, 0
     for i in range(count):
         if values[i] <= limit:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method"]
 
-DEFAULT_METHOD = "liu"
+DEFAULT_METHOD = "optimal"
 
 #: Name of each method, and the class that it is, in the module of the same name.
 METHODS = {

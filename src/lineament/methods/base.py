@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..block import Block
 from ..features import Features, noise_row
 from ..scan import LaserScan
@@ -56,7 +59,13 @@ class MethodBase:
         block = Block(scan, noise_row(features.noise), 1, self.own_arrays(len(scan)))
         block.load(scan.ranges)
         self.run(block)
-        return trace_of(block, self.name, scan, features, self.least_response)
+        return trace_of(
+            block, self.name, scan, features, self.least_response, self.report_evidence(block)
+        )
+
+    def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:  # noqa: ARG002
+        """Tell how much evidence there is for each feature of the last scan, by table."""
+        return {}
 
     def _settle_types(self) -> None:
         """Make every parameter of the type of its default, for numba compiles for each type."""

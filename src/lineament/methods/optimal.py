@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..block import Block
+from ..kernels import layout
 from ..kernels.inverse_range import SUMS
 from ..kernels.optimal import (
     ARCS_TOO,
@@ -144,3 +145,24 @@ class Optimal(MethodBase):
             block.clusters,
             block.offsets,
         )
+
+    @property
+    def least_response(self) -> float:
+        """What the response of a candidate exceeds: the evidence that is asked for."""
+        return self.evidence
+
+    def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:
+        """Tell how much χ² would rise without each feature of the last scan.
+
+        Of a corner, if its two segments were one; of a segment, if it were one with the neighbour
+        that it is most like (inf without neighbours); of an arc, if lines were in its place.
+        """
+        if self.max_vertices:
+            return {}
+        pieces = block.counts[layout.PIECES]
+        rise = np.append(block.floats[layout.RISE, :pieces], np.inf)
+        return {
+            "segments": np.minimum(rise[:-1], rise[1:]),
+            "corners": block.written()[1]["response"],
+            "arcs": block.floats[layout.ARC_GAIN, : block.counts[layout.ARCS]].copy(),
+        }
