@@ -33,24 +33,28 @@ def move_border(floats, ints, sums, c, k, margin, price):
             least, at = total, i
         total += min(squared_error(floats, a1, b1, i), price)
         total -= min(squared_error(floats, a2, b2, i), price)
-    last[k - 1] = _last_on(floats, a1, b1, at - 1, start + _LEAST - 1, price)
-    first[k] = _first_on(floats, a2, b2, at, end + 1 - _LEAST, price)
+    last[k - 1] = _end_on(floats, a1, b1, start + _LEAST - 1, last[k - 1], at - 1, 1, price)
+    first[k] = _end_on(floats, a2, b2, end + 1 - _LEAST, first[k], at, -1, price)
 
 
 @helper
-def _last_on(floats, a, b, i, least, price):
-    """Last point up to i that is on a line; not before `least`."""
-    while i > least and squared_error(floats, a, b, i) > price:
-        i -= 1
-    return i
+def _end_on(floats, a, b, inner, old, new, way, price):
+    """Where a piece ends that goes on to the right (`way` 1) or the left (-1).
 
-
-@helper
-def _first_on(floats, a, b, i, most, price):
-    """First point from i on that is on a line; not after `most`."""
-    while i < most and squared_error(floats, a, b, i) > price:
-        i += 1
-    return i
+    It may go as far as point `new`, and ended at `old`. It keeps the points up to `inner`, and
+    gains others until two in a row are off its line.
+    """
+    end = old if way * (new - old) > 0 else new
+    while end != inner and squared_error(floats, a, b, end) > price:
+        end -= way
+    i, off = end, 0
+    while i != new and off < 2:
+        i += way
+        if squared_error(floats, a, b, i) <= price:
+            end, off = i, 0
+        else:
+            off += 1
+    return end
 
 
 @helper
@@ -107,9 +111,11 @@ def _share(floats, ints, sums, c, low, high, kept, k, price, most):
     if least > most:
         return False
     if before:
-        last[kept - 1] = _last_on(floats, a1, b1, border - 1, last[kept - 1], price)
+        inner = last[kept - 1]
+        last[kept - 1] = _end_on(floats, a1, b1, inner, inner, border - 1, 1, price)
     if after:
-        first[k + 1] = _first_on(floats, a2, b2, border, first[k + 1], price)
+        inner = first[k + 1]
+        first[k + 1] = _end_on(floats, a2, b2, inner, inner, border, -1, price)
     return True
 
 

@@ -35,7 +35,7 @@ from .layout import (
 from .line_fit import excess, range_variance
 
 #: Points without a piece over which neighbours still meet.
-_BETWEEN = 3
+_BETWEEN = 8
 #: Sine of the least angle of a corner (5.7°).
 _LEAST_SINE = 0.1
 #: Spacings that readings of one surface may be apart.
@@ -121,7 +121,8 @@ def _meet(floats, ints, noise, p, q, step):
         return False
     x, y = (b2 - b1) / determinant, (a1 - a2) / determinant
     rho = 0.5 * (floats[RHO, i] + floats[RHO, j])
-    share = _end_share(floats, ints, p) + _end_share(floats, ints, q)
+    # The border was placed by a reading, with its own noise.
+    share = 1.0 + _end_share(floats, ints, p) + _end_share(floats, ints, q)
     deviation = math.sqrt(range_variance(rho, noise) * share) / sine
     tolerance = step * rho + 3.0 * deviation
     after = (floats[X, i] * y - floats[Y, i] * x) / floats[RHO, i]

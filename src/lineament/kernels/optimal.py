@@ -6,10 +6,10 @@ from . import helper, kernel
 from .agglomeration import agglomerate, list_stretches
 from .arcs import find_arcs
 from .borders import dissolve, move_border, trim_ends
-from .budget import LINK, WORST, limit_pieces
+from .budget import LINK
 from .clustering import list_points, part_points
 from .inverse_range import fill_sums
-from .joining import chain, join
+from .joining import join
 from .layout import (
     ARCS,
     BEAM,
@@ -30,6 +30,7 @@ from .layout import (
 from .line_fit import REFINED, WEIGHTED, range_variance
 from .measuring import measure
 from .noise import estimate_by_range
+from .polylines import fit_polylines, hold_together
 from .residual_noise import refine_noise
 from .spikes import drop_spikes
 from .straightening import drop_crooked, straighten
@@ -37,6 +38,8 @@ from .straightening import drop_crooked, straighten
 #: Parts that can be left out, to see what each is worth.
 SPIKES, GROWTH, BORDERS, DISSOLVING, ARCS_TOO, STRAIGHTENING = 1, 2, 4, 8, 16, 32
 
+#: No scanner sees farther [m]; the fourth power of much more is no number.
+_FARTHEST = 1e6
 #: Tangent of the steepest incidence at which a wall is expected to hold together (86°).
 _STEEPEST = 14.3
 #: Deviations of the distance of two readings that are added to the spacing of a surface.
@@ -44,16 +47,16 @@ _FLOOR = 5.0
 #: Points of the stretches that pieces are made of.
 _STRETCH = 4
 #: Pieces of up to so many points may dissolve.
-_SMALL = 6
+_SMALL = 32
 #: Points that a border is moved by at first, and when the pieces are settled.
 _MARGIN = 5
 #: Share of the evidence that the first merging asks for, before the borders are moved.
 _FIRST_SHARE = 0.3
 #: χ² from which on a reading is on no line, and what an arc costs in lines.
 _PRICE, _ARC_PRICE = 14.0, 1.5
-#: Evidence of the pieces that a budget of vertices chooses from, and how many spacings their lines
-#: may meet from where they were cut.
-_FINE, _NEAR = 3.0, 2.0
+#: Error of a range from which on a point is better left out of a map [m], and how many spacings the
+#: fitted lines may meet from a vertex of it for their covariance to be that of the vertex.
+_WORST, _NEAR = 0.31, 2.0
 
 
 @kernel
@@ -74,8 +77,8 @@ def extract_rows(
     ints,
     counts,
     sums,
-    budget_costs,
-    budget_follow,
+    map_costs,
+    map_follow,
     noises,
     segments,
     corners,
@@ -90,6 +93,7 @@ def extract_rows(
     and `counts` stays there until the next.
     """
     line, fit, reach = floats[RANGE], REFINED, math.inf
+    range_max = min(range_max, _FARTHEST)
     for row in range(rows):
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]
@@ -100,27 +104,27 @@ def extract_rows(
         if unknown:
             noise[2], noise[3] = 0.0, 0.0
             estimate_by_range(floats, range_min, range_max, parts & GROWTH != 0, noise)
-        apart = 2.0 * _STEEPEST * step if parts & SPIKES else -math.inf
+        # What a map leaves out is for its vertices to decide.
+        spikes = parts & SPIKES and max_vertices == 0
+        apart = 2.0 * _STEEPEST * step if spikes else -math.inf
         drop_spikes(floats, range_min, range_max, noise, apart)
         cluster(floats, ints, counts, bearings, circular, noise, max_missing)
         if max_vertices == 0:
             cut(floats, ints, counts, noise, unknown, evidence, parts, sums)
             join(floats, ints, counts, noise, sums, step)
         else:
-            cut(floats, ints, counts, noise, unknown, _FINE, BORDERS, sums)
-            chain(floats, ints, counts)
-            limit_pieces(
+            fit_polylines(
                 floats,
                 ints,
                 counts,
                 bearings,
                 max_vertices,
+                max_missing,
                 LINK,
-                WORST,
-                budget_costs,
-                budget_follow,
+                _WORST,
+                map_costs,
+                map_follow,
             )
-            # Nearly parallel lines meet anywhere: there a vertex stays at its reading.
             fit, reach = WEIGHTED, _NEAR
         measure(
             floats,
@@ -143,6 +147,8 @@ def extract_rows(
             clusters,
             offsets,
         )
+        if max_vertices > 0:
+            hold_together(floats, ints, counts, row, segments, corners, offsets)
 
 
 @helper

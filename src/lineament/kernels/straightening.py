@@ -11,9 +11,9 @@ from .line_fit import excess, range_variance
 _BETWEEN = 3
 #: Sine of the angle below which neighbours are one wall (10°).
 _SHALLOW = 0.17
-#: Root mean square of what a wall bows by, over its length.
-_BOW = 0.01
-#: The same from which on a piece is no wall.
+#: Root mean square of what a wall bows by, over its length, and at most [m].
+_BOW, _MOST_BOW = 0.01, 0.03
+#: The first of these from which on a piece is no wall.
 _CROOKED = 0.03
 #: What neighbours may be apart where they meet: over the length of both, but not more than panels
 #: and frames stand out [m]; or deviations of a reading, if these are more.
@@ -58,7 +58,8 @@ def _is_one_wall(floats, ints, noise, sums, c, k):
     sigma = math.sqrt(range_variance(floats[RHO, i], noise))
     if step > max(min(_STEP * length, _FRAME), _SIGMAS * sigma):
         return False
-    return _is_straight(floats, sums, c, start, end, _BOW)
+    bow = min(_BOW * length, math.sqrt(_MOST_BOW * _MOST_BOW + sigma * sigma))
+    return _is_straight(floats, sums, c, start, end, bow)
 
 
 @helper
@@ -67,24 +68,24 @@ def drop_crooked(floats, ints, sums, c, low, high):
 
     Stretches over clutter, that nothing explains.
     """
-    first, last = ints[FIRST], ints[LAST]
+    first, last, x, y = ints[FIRST], ints[LAST], floats[X], floats[Y]
     kept = low
     for k in range(low, high):
-        _, _, chi_square = line_through(sums, c, first[k], last[k])
-        fair = excess(chi_square, last[k] - first[k] + 1) == 0.0
-        if fair or _is_straight(floats, sums, c, first[k], last[k], _CROOKED):
-            first[kept], last[kept] = first[k], last[k]
+        i, j = first[k], last[k]
+        _, _, chi_square = line_through(sums, c, i, j)
+        bow = _CROOKED * math.hypot(x[j] - x[i], y[j] - y[i])
+        if excess(chi_square, j - i + 1) == 0.0 or _is_straight(floats, sums, c, i, j, bow):
+            first[kept], last[kept] = i, j
             kept += 1
     return kept
 
 
 @helper
 def _is_straight(floats, sums, c, first, last, bow):
-    """Whether points are off the line through them by little for its length."""
+    """Whether points are off the line through them by at most `bow` [m], root mean square."""
     a, b, _ = line_through(sums, c, first, last)
     squares, norm = 0.0, a * a + b * b
     for i in range(first, last + 1):
         off = 1.0 - a * floats[X, i] - b * floats[Y, i]
         squares += off * off / norm
-    dx, dy = floats[X, last] - floats[X, first], floats[Y, last] - floats[Y, first]
-    return squares <= bow * bow * (dx * dx + dy * dy) * (last - first + 1)
+    return squares <= bow * bow * (last - first + 1)
