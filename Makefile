@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint types tests coverage wheel bench figures clean
+.PHONY: demo test lint types tests coverage wheel bench clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -44,9 +44,6 @@ wheel: .venv/ready
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py
-
-figures: .venv/ready
-	$(BIN)/python benchmarks/response_readings.py
 
 clean:
 	rm -rf .venv dist build demo .coverage

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import numba
 import numpy as np
 
 import lineament as ln
+from lineament.evaluation.report import machine
 from lineament.extraction import extract_log
 from lineament.simulation import SENSORS, building, drive
 
@@ -209,28 +209,18 @@ def throughput() -> list[tuple[str, str]]:
     ]
 
 
-def machine() -> str:
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        name = lines[0].split(":")[1].strip() if lines else name
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-    )
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--method", default="liu")
-    method = parser.parse_args().method
+    parser.add_argument("--method", action="append", help="may be given again")
+    methods = parser.parse_args().method or ["optimal", "liu"]
     print(f"Machine: {machine()}\n")
     rates = throughput()
     print("| method | beams | in the kernels | `Extractor.__call__` | `batch`, 2 threads |")
     print("|---|---|---|---|---|")  # times: median (best tenth)
-    for sensor in ("paper", "utm30lx"):
-        beams, kernels, call, gain = speed_of_method(method, sensor)
-        print(f"| `{method}` | {beams} | {kernels} | {call} | {gain:.2f} × |")
+    for method in methods:
+        for sensor in ("paper", "utm30lx"):
+            beams, kernels, call, gain = speed_of_method(method, sensor)
+            print(f"| `{method}` | {beams} | {kernels} | {call} | {gain:.2f} × |")
     print(f"| arithmetic alone | | | | {gain_of_the_machine():.2f} × |")
     print("\n| | |\n|---|---|")
     for name, value in [*start_up(), *rates]:

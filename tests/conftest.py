@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import os
+from itertools import islice
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+from lineament import LaserScan, open_log
+
+# The same examples in every run: a failure on one machine is one on all.
+settings.register_profile("lineament", derandomize=True, deadline=None)
+settings.load_profile("lineament")
 
 
 @pytest.fixture(scope="session")
@@ -16,3 +24,10 @@ def data_dir() -> Path:
     if not (folder / "carmen").is_dir():
         pytest.skip(f"no recordings in {folder}: set LINEAMENT_DATA to their folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def recorded_scans(data_dir: Path) -> list[LaserScan]:
+    """Every sixtieth scan of a recording of offices and corridors."""
+    log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
+    return list(islice(log, 0, None, 60))

@@ -227,7 +227,7 @@ def test_broken_gzip(write):
         list(open_log(path))
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, suppress_health_check=list(HealthCheck))
 @given(
     st.lists(
         st.one_of(
@@ -257,7 +257,7 @@ def test_hostile_lines_never_crash(tmp_path, hostile, keep_going):
         assert scans[-1].stamp == 99
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.floats(0, 100, allow_nan=False), max_size=40))
 def test_ranges_are_read_to_the_last_bit(tmp_path, ranges):
     path = tmp_path / "exact.log"

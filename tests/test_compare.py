@@ -8,7 +8,7 @@ import pytest
 import lineament as ln
 from lineament import LineamentError
 from lineament.evaluation.compare import compare_log, compare_scan, write_comparison
-from lineament.evaluation.experiments.methods_compared import region_lines
+from lineament.evaluation.experiments.contenders import region_lines
 from lineament.logs import LogError, save_npz
 from lineament.simulation import SENSORS, room
 

@@ -12,7 +12,7 @@ from lineament import Extractor
 from lineament.evaluation import evaluate
 from lineament.evaluation.experiments import Setting, all_methods, repeatability, success
 from lineament.evaluation.experiments.charts import dot_chart
-from lineament.evaluation.experiments.contenders import extractors
+from lineament.evaluation.experiments.contenders import drawn_methods, every_method, feature_methods
 from lineament.evaluation.experiments.frames import (
     batch_of,
     frame_times,
@@ -91,7 +91,7 @@ class TestRuns:
     setting = Setting(frames=1)
 
     def test_every_method_takes_part_and_liu_twice_each(self):
-        names = list(extractors(self.setting, silent))
+        names = list(every_method(self.setting, silent))
         assert [name for name in METHODS if name != "liu"] == names[4:]
         assert [name.split(",")[0] for name in names[:4]] == [
             "liu:paper",
@@ -99,6 +99,9 @@ class TestRuns:
             "liu",
             "liu",
         ]
+        assert list(feature_methods(self.setting, silent)) == [n for n in names if n != "pdbs"]
+        drawn = list(drawn_methods(self.setting, silent))
+        assert drawn == ["pdbs, fitted" if name == "pdbs" else name for name in names[2:]]
 
     def test_table_3_has_the_numbers_of_the_papers_text(self):
         findings = success.run(self.setting, silent)

@@ -67,6 +67,7 @@ def test_bound_is_that_of_both_corners_along_their_line(monkeypatch):
     assert distance_bound((0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(13e-6))
 
 
+@pytest.mark.slow
 def test_good_method_spreads_like_the_bound_and_none_spreads_less():
     pose, rng = POSES[4], np.random.default_rng(2)
     scans = [PAPER.scan(WORLD, pose, rng) for _ in range(200)]

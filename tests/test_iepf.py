@@ -12,7 +12,7 @@ from naive_fit import range_variance
 from naive_partition import clusters_of, noise_of, parted, split, untied
 from worlds import NOISE, degenerate_scans, fan, random_scan, scan_of, vertex
 
-from lineament import Extractor, RangeNoise, open_log
+from lineament import Extractor, RangeNoise
 
 DEGENERATE = degenerate_scans()
 SENSOR = RangeNoise(0.01, 0.01, 0.002, 0.01)
@@ -56,7 +56,7 @@ def test_degenerate_scans_equal_the_slow_twin(extractor, scan):
     assert_same_split(untied(scan), extractor)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(EXTRACTORS)))
 def test_random_scans_equal_the_slow_twin(seed, name):
     assert_same_split(random_scan(seed), EXTRACTORS[name])
@@ -64,10 +64,8 @@ def test_random_scans_equal_the_slow_twin(seed, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXTRACTORS)
-def test_recorded_scans_equal_the_slow_twin(data_dir, name):
-    log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
-    scans = [scan for i, scan in enumerate(log) if i % 60 == 0]
-    assert sum(assert_same_split(scan, EXTRACTORS[name]) for scan in scans) > 50
+def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
+    assert sum(assert_same_split(scan, EXTRACTORS[name]) for scan in recorded_scans) > 50
 
 
 def test_tolerance_by_hand():

@@ -35,7 +35,7 @@ def test_filter_of_degenerate_scans(name):
     assert_same_filter(DEGENERATE[name], half_width=2, sigma_d=1.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(seeds, st.floats(0.3, 20), st.floats(0.01, 2), st.integers(0, 20))
 def test_filter_of_random_scans(seed, sigma_d, sigma_r, half_width):
     scan = random_scan(seed, 90)
@@ -70,7 +70,7 @@ def test_noise_of_degenerate_scans(name):
     assert_same_noise(DEGENERATE[name])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seeds)
 def test_noise_of_random_scans(seed):
     assert_same_noise(random_scan(seed))
@@ -126,7 +126,7 @@ def test_clusters_of_degenerate_scans(name):
     assert_same_clusters(DEGENERATE[name], min_points=1, noise_floor=0.0)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seeds, st.floats(1, 10), st.floats(0, 5), st.floats(0, 6), st.integers(1, 9))
 def test_clusters_of_random_scans(seed, scale, floor, k, least):
     changes = {"spacing_scale": scale, "noise_floor": floor, "density_k": k, "min_points": least}
@@ -226,7 +226,7 @@ def class_of(seed):
     return path + [2, 1] + 1e-4 * rng.normal(size=(m, 2))  # No two at one distance of a chord.
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seeds, st.integers(1, 9), st.sampled_from(READINGS))
 def test_response_of_random_classes(seed, radius, reading):
     points = class_of(seed)
@@ -237,7 +237,7 @@ def test_response_of_random_classes(seed, radius, reading):
         assert ((found >= 0) & (found <= 1 + 1e-12)).all()
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seeds, st.sampled_from(READINGS), st.integers(2, 6), st.floats(0.05, 0.5))
 def test_primary_corners_of_random_classes(seed, reading, least, threshold):
     points = class_of(seed)

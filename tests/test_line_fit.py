@@ -30,7 +30,7 @@ FITS = ("total", "y_of_x", "weighted")
 
 
 @pytest.mark.parametrize("fit", FITS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seeds)
 def test_fits_equal_their_twins(fit, seed):
     angles, rho, noise, row = seen_wall(seed, 0.01)

@@ -177,7 +177,7 @@ def test_covariances_of_corners_have_the_lever_arm(extractor):
 @every_method
 def test_batches_are_those_of_scans_alone(extractor):
     rng = np.random.default_rng(1)
-    rows = room(full_circle(360), BOX) + 0.02 * rng.normal(size=(30, 360))
+    rows = room(full_circle(360), BOX) + 0.02 * rng.normal(size=(12, 360))
     rows[rng.random(rows.shape) < 0.03] = np.nan
     step = 2 * math.pi / 360
     batch = extractor.batch(rows, angle_min=-math.pi, angle_increment=step, workers=2)

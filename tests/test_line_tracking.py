@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from naive_partition import clusters_of, noise_of, parted, track
 from worlds import NOISE, degenerate_scans, fan, random_scan, scan_of, vertex, wall
 
-from lineament import Extractor, RangeNoise, open_log
+from lineament import Extractor, RangeNoise
 from lineament.block import Block
 from lineament.features import noise_row
 from lineament.kernels.layout import BEAM, FIRST, LAST, PIECES
@@ -78,7 +78,7 @@ def test_degenerate_scans_equal_the_slow_twin(extractor, scan):
     assert_same_lines(scan, extractor)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(EXTRACTORS)))
 def test_random_scans_equal_the_slow_twin(seed, name):
     assert_same_lines(random_scan(seed), EXTRACTORS[name])
@@ -86,10 +86,8 @@ def test_random_scans_equal_the_slow_twin(seed, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXTRACTORS)
-def test_recorded_scans_equal_the_slow_twin(data_dir, name):
-    log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
-    scans = [scan for i, scan in enumerate(log) if i % 60 == 0]
-    assert sum(assert_same_lines(scan, EXTRACTORS[name]) for scan in scans) > 50
+def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
+    assert sum(assert_same_lines(scan, EXTRACTORS[name]) for scan in recorded_scans) > 50
 
 
 def test_a_line_passes_over_as_many_misses_as_it_may():

@@ -82,7 +82,7 @@ def test_jsonl_is_strict(tmp_path):
 
 
 def test_docs_name_every_field_of_a_line():
-    text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1]
+    text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1].split("\n## ")[0]
     rows = {line.split("|")[1].strip(" `"): line for line in text.splitlines() if "| `" in line}
     record = random_features(1, noise=RangeNoise(0.01)).to_dict()
     assert set(rows) == {"scan", *record}

@@ -12,7 +12,7 @@ from naive_fit import breakpoints
 from naive_partition import noise_of, parted
 from worlds import NOISE, degenerate_scans, fan, full_circle, random_scan, scan_of, wall
 
-from lineament import Extractor, LaserScan, RangeNoise, open_log
+from lineament import Extractor, LaserScan, RangeNoise
 from lineament.methods.pdbs import PDBS, RULES
 
 DEGENERATE = degenerate_scans()
@@ -37,6 +37,8 @@ def assert_same_partition(scan, extractor):
     ):
         expected = np.full(len(scan), np.nan)
         expected[list(slow)] = list(slow.values())
+        # Near its pole the rule of Santos has thresholds beyond all distances, and no digits.
+        kernel, expected = np.minimum(kernel, 1e6), np.minimum(expected, 1e6)
         np.testing.assert_allclose(kernel, expected, rtol=1e-6, atol=1e-12)
     assert np.isnan(trace.density_threshold).all()
     features = trace.features
@@ -57,7 +59,7 @@ def test_degenerate_scans_equal_the_slow_twin(extractor, scan):
     assert_same_partition(scan, extractor)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(EXTRACTORS)))
 def test_random_scans_equal_the_slow_twin(seed, name):
     assert_same_partition(random_scan(seed), EXTRACTORS[name])
@@ -65,10 +67,9 @@ def test_random_scans_equal_the_slow_twin(seed, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXTRACTORS)
-def test_recorded_scans_equal_the_slow_twin(data_dir, name):
-    for i, scan in enumerate(open_log(data_dir / "carmen" / "intel-corrected.log.gz")):
-        if i % 60 == 0:
-            assert_same_partition(scan, EXTRACTORS[name])
+def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
+    for scan in recorded_scans:
+        assert_same_partition(scan, EXTRACTORS[name])
 
 
 # The rules by hand

@@ -44,18 +44,28 @@ def authors_iepf(benchmark, score):
 
 @pytest.mark.slow
 def test_the_authors_iepf_comes_out_to_the_last_digit_on_real_scans(real):
-    calls = []
-    result = run_benchmark(real, iepf_map, progress=lambda done, total: calls.append((done, total)))
-    assert calls == [(i, 140) for i in range(1, 141)]
+    told = []
+
+    def track(scans, about, total):
+        told.append((len(scans), about, total))
+        return scans
+
+    result = run_benchmark(real, iepf_map, track=track)
+    assert told == [(140, "iepf_map", 140)]
     for score in ("rmse", "f", "fnr"):
         close = np.isclose(
             result.scores[score], authors_iepf(real, score), rtol=0, atol=1e-12, equal_nan=True
         )
         off = {(int(i), real.max_vertices[j]) for i, j in np.argwhere(~close)}
         assert off == (set(TIED) if score == "rmse" else set())
-    means = {row[:2]: row[2] for row in result.rows()}
-    assert np.round(means["rmse", "iepf_map"], 4).tolist() == [1.3572, 0.6577, 0.387, 0.2475, 0.153]
-    assert np.round(means["rmse", "ple+"], 4).tolist() == [0.0811, 0.0635, 0.0471, 0.0352, 0.0254]
+    assert np.round(result.means()["rmse"], 4).tolist() == [1.3572, 0.6577, 0.387, 0.2475, 0.153]
+    assert np.round(real.means()["rmse"]["ple+"], 4).tolist() == [
+        0.0811,
+        0.0635,
+        0.0471,
+        0.0352,
+        0.0254,
+    ]
 
 
 @pytest.mark.slow
@@ -68,8 +78,13 @@ def test_the_authors_iepf_comes_out_to_the_last_digit_on_simulated_scans(simulat
         )
     assert np.isnan(result.scores["fnr"]).all()
     assert (result.scores["vertices"] == simulated.max_vertices).all()
-    mean = {row[:2]: row[2] for row in result.rows()}["area_error", "iepf_map"]
-    assert np.round(mean, 5).tolist() == [0.03513, 0.01448, 0.01188, 0.01104, 0.01048]
+    assert np.round(result.means()["area_error"], 5).tolist() == [
+        0.03513,
+        0.01448,
+        0.01188,
+        0.01104,
+        0.01048,
+    ]
     # A ∪ B = A + B - A ∩ B, so that the one score bounds the other.
     assert (result.scores["iou"] <= 1 - result.scores["area_error"] / 2 + 1e-12).all()
 
@@ -244,13 +259,13 @@ def wall_benchmark(scans=2):
 
 def test_results_stand_beside_the_authors():
     result = run_benchmark(wall_benchmark(), lambda scan, _: [scan.points[[0, 20]]], name="chord")
-    rows = {row[:2]: row[2] for row in result.rows()}
-    assert rows["rmse", "peer"] == [0.25, 0.25]
-    assert rows["vertices", "chord"] == [2.0, 2.0]
-    assert rows["f", "chord"] == [1.0, 1.0]
-    assert not any(score in ("area_error", "iou") for score, _ in rows)
+    means = result.means()
+    assert list(means) == ["vertices", "rmse", "f", "fnr"]
+    assert (means["vertices"], means["f"]) == ([2.0, 2.0], [1.0, 1.0])
+    assert result.benchmark.means() == {"rmse": {"peer": [0.25, 0.25]}}
     written = json.loads(result.to_json())
-    assert written["mean"]["rmse"]["peer"] == [0.25, 0.25]
+    assert written["mean"]["f"] == [1.0, 1.0]
+    assert written["authors"]["rmse"]["peer"] == [0.25, 0.25]
     assert len(written["scans"]) == 2
     assert written["scans"][0][1] == {
         "max_vertices": 10,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lineament import LaserScan, LineamentError
-from lineament.evaluation import experiments
+from lineament.evaluation import experiments, ple
 from lineament.evaluation.experiments import (
     ALIASES,
     EXPERIMENTS,
@@ -16,7 +16,7 @@ from lineament.evaluation.experiments import (
     Setting,
     Table,
     experiment_names,
-    methods_compared,
+    recordings,
     scenes,
 )
 from lineament.evaluation.experiments.findings import cell_text, plain
@@ -86,6 +86,8 @@ def test_cells():
     assert plain((np.bool_(True), {1: np.nan})) == [True, {"1": None}]
     with pytest.raises(ValueError, match="row of 1 cells, expected 2"):
         Table("A", ("b", "c"), (("d",),))
+    with pytest.raises(ValueError, match=r"has columns .*'b'.*, then .*'c'"):
+        Table.of_records("A", [{"b": 1}, {"c": 1}])
 
 
 @pytest.mark.parametrize("field", [{"frames": 0}, {"seed": -1}])
@@ -116,18 +118,15 @@ def test_near_marks_beams_around():
 
 
 def test_benchmark_table_tells_the_authors_method_of_the_same_name():
-    scores = np.zeros((1, 1), [(n, "f8") for n in ("vertices", "rmse", "f", "fnr")])
-    scores["rmse"], scores["vertices"] = 0.25, 4
+    scores = np.zeros((1, 1), ple._SCORE)
+    scores["rmse"] = 0.25
+    scores["area_error"] = scores["iou"] = np.nan
     given = {"rmse": np.array([[[0.5], [0.75]]])}
     benchmark = Benchmark("real.npz", (None,), (10,), ("ple", "iepf"), given)
-    from lineament.evaluation import ple
-
-    full = np.zeros((1, 1), ple._SCORE)
-    for name in scores.dtype.names:
-        full[name] = scores[name]
-    full["area_error"] = full["iou"] = np.nan
-    results = [BenchmarkResult(benchmark, name, full) for name in ("iepf", "liu")]
-    rmse = next(t for t in benchmark_tables(results) if t.title.endswith("rmse"))
+    results = [BenchmarkResult(benchmark, name, scores) for name in ("iepf", "liu")]
+    tables = benchmark_tables(results)
+    assert [t.title.split(": ")[1] for t in tables] == ["vertices", "rmse", "f", "fnr"]
+    rmse = tables[1]
     assert rmse.columns == ("method", "J = 10")
     assert rmse.rows == (
         ("iepf", 0.25),
@@ -168,7 +167,7 @@ def test_perfect_lines_have_the_noise_as_similarity_error():
 @pytest.mark.slow
 def test_scenes_draw_recordings_where_they_are(data_dir, monkeypatch):
     monkeypatch.setattr(scenes, "KINDS", ("corridor",))
-    monkeypatch.setattr(methods_compared, "LOGS", dict([*methods_compared.LOGS.items()][:1]))
+    monkeypatch.setattr(recordings, "LOGS", dict([*recordings.LOGS.items()][:1]))
     found = scenes.run(Setting(frames=1, data=data_dir), quiet)
     assert [figure.name for figure in found.figures] == ["fig11-corridor", "fig11-intel-lab"]
     for table in found.tables:
@@ -181,10 +180,10 @@ def test_scenes_draw_recordings_where_they_are(data_dir, monkeypatch):
 def test_recorded_scans_are_spread_over_the_log(tmp_path, monkeypatch):
     scans = [LaserScan([1.0, 1.0], 0.0, 0.1, stamp=float(i)) for i in range(10)]
     save_npz(tmp_path / "a.npz", scans)
-    monkeypatch.setattr(methods_compared, "LOGS", {"A": "a.npz", "B": "b.npz"})
+    monkeypatch.setattr(recordings, "LOGS", {"A": "a.npz", "B": "b.npz"})
     setting = Setting(data=tmp_path)
     chosen = {
-        count: [scan.stamp for scan in dict(methods_compared.recorded_scans(setting, count))["A"]]
+        count: [scan.stamp for scan in dict(recordings.recorded_scans(setting, count))["A"]]
         for count in (1, 2, 3, 20)
     }
     assert chosen[1] == [5.0]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .errors import LineamentError
 
-__all__ = ["naming_errors", "written_beside"]
+__all__ = ["made_folder", "naming_errors", "write_text", "written_beside"]
 
 
 @contextmanager
@@ -64,6 +64,50 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8: the whole of it, or nothing.
+
+    A name that no encoding knows (of a file, say) is written with a mark, and is no failure.
+
+    Raises
+    ------
+    LineamentError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> target = Path(tempfile.mkdtemp()) / "a.txt"
+    >>> write_text(target, "1 m²")
+    >>> target.read_text(encoding="utf-8")
+    '1 m²'
+    """
+    with written_beside(path) as temporary, naming_errors(path):
+        temporary.write_bytes(text.encode("utf-8", errors="replace"))
+
+
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder, and those that it is in, unless it is there.
+
+    Raises
+    ------
+    LineamentError
+        If it cannot be made.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> made_folder(Path(tempfile.mkdtemp()) / "a" / "b").is_dir()
+    True
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LineamentError(f"{path}: cannot make this folder: {error.strerror}") from None
+    return folder
 
 
 @contextmanager

@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
+from .atomic import made_folder
 from .errors import LineamentError
 from .extraction import extract_log
 from .extractor import Extractor
 from .logs import open_log
+from .track import Track, untracked
 
 __all__ = ["run_demo"]
 
-Track = Callable[[Any, str, int], Iterable[Any]]
-
 #: The methods of the pictures, the first of which makes the table.
 DEMO_METHODS = ("liu:scale_free", "liu", "liu:paper")
-
-
-def _untracked(items: Iterable[Any], about: str, total: int) -> Iterable[Any]:  # noqa: ARG001
-    return items
 
 
 def run_demo(
     folder: str | os.PathLike[str],
     log: str | os.PathLike[str] | None = None,
     *,
-    track: Track = _untracked,
+    track: Track = untracked,
 ) -> list[tuple[str, str]]:
     """Simulate a drive (or take a log), extract its features, and make a page to look at.
 
@@ -52,22 +46,14 @@ def run_demo(
     LineamentError
         If the log cannot be read or the folder not be written.
     """
-    target = Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LineamentError(f"{target}: cannot make this folder: {error.strerror}") from None
+    target = made_folder(folder)
     if log is None:
         from .simulation import SENSORS, simulate_log
 
         log = target / "drive.npz"
         simulate_log(log, "building", SENSORS["utm30lx"], rate=4.0, seed=1, track=track)
-    summary = extract_log(
-        log,
-        target / "features.parquet",
-        Extractor(DEMO_METHODS[0]),
-        track=lambda opened: track(opened, "extracting", len(opened)),
-    )
+    extractor = Extractor(DEMO_METHODS[0])
+    summary = extract_log(log, target / "features.parquet", extractor, track=track)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
     figures = _draw(target, log, summary.scans, track)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,9 +14,8 @@ from .errors import LineamentError
 from .extractor import Extractor
 from .features import TABLES
 from .logs import open_log
-from .logs.base import Log
 from .output import open_writer
-from .scan import LaserScan
+from .track import Track, untracked
 
 __all__ = ["Extraction", "extract_log", "output_paths"]
 
@@ -73,7 +72,7 @@ def extract_log(
     *,
     topic: str | None = None,
     keep_going: bool = False,
-    track: Callable[[Log], Iterable[LaserScan]] = iter,
+    track: Track = untracked,
 ) -> Extraction:
     """Extract the features of all scans of a log into a file.
 
@@ -92,7 +91,7 @@ def extract_log(
     keep_going : bool
         Whether to leave out what is faulty in the log, and count it.
     track : callable
-        Gives the scans of a log, and shows how far they are.
+        ``track(log, name, total)`` gives the scans of the log, and shows how far they are.
 
     Raises
     ------
@@ -102,6 +101,7 @@ def extract_log(
     Examples
     --------
     >>> import tempfile
+    >>> from lineament import LaserScan
     >>> from lineament.logs import save_npz
     >>> folder = Path(tempfile.mkdtemp())
     >>> save_npz(folder / "log.npz", [LaserScan([2.0, 2.0, 2.0], 0.0, 0.01)] * 5)
@@ -114,7 +114,7 @@ def extract_log(
     scans, beams, valid = 0, 0, 0
     found = dict.fromkeys(TABLES, 0)
     with writer:
-        for scan in track(log):
+        for scan in track(log, log.path.name, len(log)):
             features = extractor(scan)
             writer.write(features)
             scans += 1

@@ -7,20 +7,18 @@ from typing import Any
 
 import click
 
-from .options import KEEP_GOING, LOG, QUIET, TOPIC
+from .options import KEEP_GOING, LOG, PATH, QUIET, SCAN, TOPIC, check_ending, wrong_usage
 
 __all__ = ["bench", "compare", "reproduce", "simulate"]
-
-_PATH = click.Path(path_type=Path)
 
 
 @click.command()
 @LOG
-@click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
+@SCAN
 @click.option(
     "-m", "--method", "methods", multiple=True, help="May be given again.  [default: all]"
 )
-@click.option("-o", "--output", required=True, type=_PATH, help="A picture (.png …) or .html.")
+@click.option("-o", "--output", required=True, type=PATH, help="A picture (.png …) or .html.")
 @TOPIC
 @KEEP_GOING
 @QUIET
@@ -37,18 +35,18 @@ def compare(
     from ..evaluation.compare import ENDINGS, compare_log, write_comparison
     from .progress import tracker
 
-    if output.suffix.lower() not in ENDINGS:
-        raise click.UsageError(f"{output}: expected an ending of {', '.join(ENDINGS)}")
-    comparison = _usage(
-        compare_log, log, index, methods, topic=topic, keep_going=keep_going, track=tracker(quiet)
-    )
+    check_ending(output, ENDINGS)
+    with wrong_usage():
+        comparison = compare_log(
+            log, index, methods, topic=topic, keep_going=keep_going, track=tracker(quiet)
+        )
     write_comparison(comparison, output)
     if not quiet:
         click.echo(str(comparison.table()))
 
 
 @click.command()
-@click.option("-o", "--output", required=True, type=_PATH, help="Folder to write to.")
+@click.option("-o", "--output", required=True, type=PATH, help="Folder to write to.")
 @click.option(
     "--only",
     "names",
@@ -75,12 +73,14 @@ def reproduce(
     output: Path, names: tuple[str, ...], frames: int, seed: int, data: Path | None, quiet: bool
 ) -> None:
     """Make the paper's experiments again: a page and all figures as JSON."""
-    from ..evaluation.experiments import Setting
+    from ..evaluation.experiments import Setting, experiment_names
     from ..evaluation.report import reproduce
     from .progress import telling
 
+    with wrong_usage():
+        chosen = experiment_names(names)
     with telling(quiet) as tell:
-        page = _usage(reproduce, output, names, Setting(frames, seed, data), tell)
+        page = reproduce(output, chosen, Setting(frames, seed, data), tell)
     if not quiet:
         click.echo(str(page))
 
@@ -91,41 +91,35 @@ def bench() -> None:
 
 
 @bench.command()
-@click.option("--data", required=True, type=_PATH, help="Half a benchmark, .npz.")
+@click.option("--data", required=True, type=PATH, help="Half a benchmark, .npz.")
 @click.option("-m", "--method", "methods", required=True, multiple=True, help="May be given again.")
-@click.option("--json", "output", type=_PATH, help="File for all scores, of one method.")
+@click.option("--json", "output", type=PATH, help="File for all scores, of one method.")
 @QUIET
 def ple(data: Path, methods: tuple[str, ...], output: Path | None, quiet: bool) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
-    from ..atomic import naming_errors, written_beside
-    from ..evaluation.ple import load_benchmark, run_benchmark
+    from ..atomic import write_text
+    from ..evaluation.ple import load_benchmark, method_map, run_benchmark
     from ..evaluation.report import benchmark_tables
-    from .progress import telling
+    from .progress import tracker
 
     if output is not None and len(methods) > 1:
         raise click.UsageError("--json holds the scores of one method, expected one -m")
-    benchmark, results = load_benchmark(data), []
-    with telling(quiet) as tell:
-        for method in methods:
-
-            def told(done: int, total: int, method: str = method) -> None:
-                tell(f"{method}: {done}/{total} scans")
-
-            results.append(_usage(run_benchmark, benchmark, method, progress=told))
+    with wrong_usage():
+        makers = {method: method_map(method) for method in methods}
+    benchmark, track = load_benchmark(data), tracker(quiet)
+    results = [
+        run_benchmark(benchmark, make, name=method, track=track) for method, make in makers.items()
+    ]
     if output is not None:
-        with written_beside(output) as temporary, naming_errors(output):
-            temporary.write_text(results[0].to_json() + "\n", encoding="utf-8")
+        write_text(output, results[0].to_json() + "\n")
     if not quiet:
         for table in benchmark_tables(results):
             click.echo(f"{table.title}\n{table}\n")
 
 
 @click.command()
-@click.argument("world", required=False, metavar="[building|room]")
-@click.option("--scene", "kind", help="A random scene in place of a world: room, hall, layers …")
-@click.option(
-    "-o", "--output", required=True, type=_PATH, help="Log to write: .npz, .log, .log.gz."
-)
+@click.argument("world")
+@click.option("-o", "--output", required=True, type=PATH, help="Log to write: .npz, .log, .log.gz.")
 @click.option("--sensor", "name", default="utm30lx", show_default=True, help="Preset of a scanner.")
 @click.option("--scans", type=click.IntRange(min=1), help="[default: the whole drive, or 100]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
@@ -137,8 +131,7 @@ def ple(data: Path, methods: tuple[str, ...], output: Path | None, quiet: bool) 
 @click.option("--outlier", type=float, help="Probability of a false return.")
 @QUIET
 def simulate(
-    world: str | None,
-    kind: str | None,
+    world: str,
     output: Path,
     name: str,
     sigma: float | None,
@@ -147,19 +140,14 @@ def simulate(
     quiet: bool,
     **settings: Any,
 ) -> None:
-    """Record a simulated log, with true poses: a drive through a building, or a scene."""
+    """Record a simulated log, with true poses.
+
+    WORLD is "building", driven through from end to end; or a kind of random scene, seen from one
+    place: room, star, corridor, hall, grazing, layers.
+    """
     from ..simulation import sensor_like, simulate_log
     from .progress import tracker
 
-    if (world is None) == (kind is None):
-        raise click.UsageError("expected either a WORLD or --scene")
-    sensor = _usage(sensor_like, name, sigma=sigma, dropout=dropout, outlier=outlier)
-    _usage(simulate_log, output, world or kind, sensor, track=tracker(quiet), **settings)
-
-
-def _usage(function: Any, *arguments: Any, **settings: Any) -> Any:
-    """Call a function of the library; what it finds wrong with the options is wrong usage."""
-    try:
-        return function(*arguments, **settings)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
+    with wrong_usage():
+        sensor = sensor_like(name, sigma=sigma, dropout=dropout, outlier=outlier)
+        simulate_log(output, world, sensor, track=tracker(quiet), **settings)

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
+from ..track import Track, untracked
+
 __all__ = ["telling", "tracker"]
 
 T = TypeVar("T")
@@ -16,10 +18,10 @@ T = TypeVar("T")
 _PATIENCE = 2.0
 
 
-def tracker(quiet: bool) -> Callable[[Iterable[T], str, int], Iterable[T]]:
-    """Choose how to show progress: ``track(items, about, total)`` gives the items."""
+def tracker(quiet: bool) -> Track:
+    """Choose how to show how far items are."""
     if quiet:
-        return lambda items, about, total: items  # noqa: ARG005
+        return untracked
     return _with_bar if sys.stderr.isatty() else _with_lines
 
 
@@ -43,7 +45,7 @@ def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
             done += 1
             if done % 32 == 0 or done == total:
                 rate = done / max(time.monotonic() - started, 1e-9)
-                progress.update(task, completed=done, rate=f"{rate:.0f}/s")
+                progress.update(task, completed=done, rate=_rate_text(rate))
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
@@ -54,8 +56,12 @@ def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
         if now - told >= _PATIENCE:
             told, rate = now, done / (now - started)
             left = max(total - done, 0) / rate
-            line = f"{about}: {done}/{total}, {rate:.0f}/s, {left:.0f} s left"
+            line = f"{about}: {done}/{total}, {_rate_text(rate)}, {left:.0f} s left"
             print(line, file=sys.stderr, flush=True)
+
+
+def _rate_text(rate: float) -> str:
+    return f"{rate:.0f}/s" if rate >= 10 else f"{rate:.1f}/s"
 
 
 @contextmanager

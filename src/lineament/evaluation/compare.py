@@ -19,6 +19,7 @@ from ..output import canvas
 from ..output.figures import scan_figure
 from ..output.page import write_parts
 from ..scan import Array, LaserScan
+from ..track import Track, untracked
 from .experiments.findings import Figure, Findings, Table
 from .report import findings_parts, machine
 from .similarity import SimilarityScores, similarity_errors, similarity_scores
@@ -176,7 +177,7 @@ def compare_log(
     *,
     topic: str | None = None,
     keep_going: bool = False,
-    track: Callable[[list[str], str, int], Iterable[str]] = lambda items, about, total: items,  # noqa: ARG005
+    track: Track = untracked,
 ) -> Comparison:
     """Compare methods on a scan of a log.
 

@@ -14,7 +14,7 @@ from .consistency import NormalisedErrors
 from .counts import Counts, Summable, quantile, rms
 from .matching import match
 
-__all__ = ["CornerScores", "corner_scores"]
+__all__ = ["CornerScores", "corner_scores", "demanded_corners"]
 
 #: A found corner is right within one of these distances of a true one [m].
 GATES = (0.05, 0.10, 0.25)
@@ -88,7 +88,7 @@ def corner_scores(found: Features, truth: Features) -> CornerScores:
     """
     difference = found.corners["position"][:, np.newaxis] - truth.corners["position"]
     distance = np.hypot(difference[..., 0], difference[..., 1])
-    demanded = _demanded(truth)
+    demanded = demanded_corners(truth)
     counts = {}
     for gate in GATES:
         near = distance <= gate
@@ -109,7 +109,7 @@ def corner_scores(found: Features, truth: Features) -> CornerScores:
     )
 
 
-def _demanded(truth: Features) -> NDArray[np.bool_]:
+def demanded_corners(truth: Features) -> NDArray[np.bool_]:
     """Whether both sides of each true corner are large enough; one that is not listed is not."""
     large = np.append(truth.segments["n_points"] >= MIN_BEAMS, False)
     return np.asarray(large[truth.corners["segments"]].all(axis=1))

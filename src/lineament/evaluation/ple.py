@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan import Array
-from .ple_data import Benchmark, load_benchmark
+from ..track import Track, untracked
+from .experiments.findings import plain
+from .ple_data import Benchmark, load_benchmark, scan_means
 from .ple_maps import MapMaker, benchmark_iepf, iepf_map, method_map, polylines_of
 from .ple_scores import MapScore, cast_map, score_map
 
@@ -57,50 +57,34 @@ class BenchmarkResult:
     method: str
     scores: NDArray[np.void]
 
-    def rows(self) -> list[tuple[str, str, list[float]]]:
-        """List (score, method, mean over the scans for each budget): this method, the authors'.
-
-        Scores that the benchmark has no truth for are left out.
-        """
-        rows = []
-        for score in _SCORE.names or ():
-            own = _means(self.scores[score])
-            if np.isnan(own).all():
-                continue
-            rows.append((score, self.method, own))
-            given = self.benchmark.scores.get(score)
-            if given is not None:
-                for k, method in enumerate(self.benchmark.methods):
-                    rows.append((score, method, _means(given[:, k])))
-        return rows
+    def means(self) -> dict[str, list[float]]:
+        """Mean of each score over the scans, by budget; without scores that no scan has."""
+        means = {score: scan_means(self.scores[score]) for score in _SCORE.names or ()}
+        return {score: mean for score, mean in means.items() if not all(map(math.isnan, mean))}
 
     def to_json(self) -> str:
-        """Write everything as JSON: means beside the authors', and the scores of each scan.
+        """Write everything as JSON: means, the authors' means, and the scores of each scan.
 
-        ``mean[score][method]`` lists the means by budget; ``scans[i]`` lists, by budget,
-        ``max_vertices`` and the scores. What there is no value for is null.
+        ``mean[score]`` and ``authors[score][method]`` list the means by budget; ``scans[i]``
+        lists, by budget, ``max_vertices`` and the scores. What there is no value for is null.
         """
-        means: dict[str, dict[str, list[float | None]]] = {}
-        for score, method, values in self.rows():
-            means.setdefault(score, {})[method] = [_or_null(value) for value in values]
-        return json.dumps(
-            {
-                "benchmark": self.benchmark.name,
-                "method": self.method,
-                "max_vertices": self.benchmark.max_vertices,
-                "mean": means,
-                "scans": [
-                    [
-                        {"max_vertices": budget}
-                        | {name: _or_null(row[name].item()) for name in _SCORE.names or ()}
-                        for budget, row in zip(self.benchmark.max_vertices, rows, strict=True)
-                    ]
-                    for rows in self.scores
-                ],
-            },
-            indent=1,
-            allow_nan=False,
-        )
+        budgets = self.benchmark.max_vertices
+        everything = {
+            "benchmark": self.benchmark.name,
+            "method": self.method,
+            "max_vertices": budgets,
+            "mean": self.means(),
+            "authors": self.benchmark.means(),
+            "scans": [
+                [
+                    {"max_vertices": budget}
+                    | dict(zip(_SCORE.names or (), row.item(), strict=True))
+                    for budget, row in zip(budgets, rows, strict=True)
+                ]
+                for rows in self.scores
+            ],
+        }
+        return json.dumps(plain(everything), indent=1, allow_nan=False)
 
 
 def run_benchmark(
@@ -108,7 +92,7 @@ def run_benchmark(
     method: str | MapMaker,
     *,
     name: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    track: Track = untracked,
 ) -> BenchmarkResult:
     """Map all scans with all budgets, and score the maps.
 
@@ -120,8 +104,8 @@ def run_benchmark(
         makes polylines, such as `iepf_map`.
     name : str, optional
         How the result is called; by default the name of the method or function.
-    progress : callable, optional
-        Called after each scan with the numbers of scans done and in all.
+    track : callable
+        ``track(scans, name, total)`` gives the scans, and shows how far they are.
 
     Raises
     ------
@@ -141,7 +125,7 @@ def run_benchmark(
     if name is None:
         name = method if isinstance(method, str) else getattr(method, "__name__", repr(method))
     scores = np.zeros((len(benchmark.scans), len(benchmark.max_vertices)), _SCORE)
-    for i, scan in enumerate(benchmark.scans):
+    for i, scan in enumerate(track(benchmark.scans, name, len(benchmark.scans))):
         outline = None if benchmark.outlines is None else benchmark.outlines[i]
         for j, budget in enumerate(benchmark.max_vertices):
             score = score_map(make(scan, budget), scan, outline)
@@ -151,19 +135,5 @@ def run_benchmark(
                     f"expected at most {budget}"
                 )
             scores[i, j] = astuple(score)
-        if progress is not None:
-            progress(i + 1, len(benchmark.scans))
     scores.flags.writeable = False
     return BenchmarkResult(benchmark, name, scores)
-
-
-def _means(values: Array) -> list[float]:
-    """Mean over the scans that have a value, for each budget."""
-    known = ~np.isnan(values)
-    with np.errstate(invalid="ignore"):
-        means: list[float] = (np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)).tolist()
-    return means
-
-
-def _or_null(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -15,7 +15,7 @@ from ..errors import LogError
 from ..logs.lines import reading
 from ..scan import Array, LaserScan
 
-__all__ = ["Benchmark", "load_benchmark"]
+__all__ = ["Benchmark", "load_benchmark", "scan_means"]
 
 #: Scores that the authors give; the last of the simulated set alone.
 _GIVEN = ("rmse", "f", "fnr", "area_error")
@@ -47,6 +47,27 @@ class Benchmark:
     methods: tuple[str, ...]
     scores: dict[str, Array]
     outlines: tuple[Array, ...] | None = None
+
+    def means(self) -> dict[str, dict[str, list[float]]]:
+        """Mean of each of the authors' scores over the scans, by method and budget."""
+        return {
+            score: {method: scan_means(values[:, k]) for k, method in enumerate(self.methods)}
+            for score, values in self.scores.items()
+        }
+
+
+def scan_means(values: Array) -> list[float]:
+    """Mean over the scans (rows) that have a value, for each budget (column); NaN of none.
+
+    Examples
+    --------
+    >>> scan_means(np.array([[1.0, np.nan, np.nan], [2.0, 4.0, np.nan]]))
+    [1.5, 4.0, nan]
+    """
+    return [
+        float(np.mean(known)) if len(known) else math.nan
+        for known in (column[~np.isnan(column)] for column in values.T)
+    ]
 
 
 def load_benchmark(path: str | os.PathLike[str]) -> Benchmark:

@@ -10,8 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..atomic import naming_errors, written_beside
-from ..errors import LineamentError
+from ..atomic import made_folder, write_text
 from ..output.page import (
     contents_part,
     heading_part,
@@ -68,11 +67,7 @@ def reproduce(
         If the folder cannot be written to.
     """
     setting = Setting() if setting is None else setting
-    chosen, target = experiment_names(names), Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LineamentError(f"{target}: cannot make this folder: {error.strerror}") from None
+    chosen, target = experiment_names(names), made_folder(folder)
     return write_report(target, run_experiments(chosen, setting, progress), setting)
 
 
@@ -86,10 +81,8 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
         "recordings": setting.data is not None,
     }
     experiments = {name: found.to_dict() for name, found in findings.items()}
-    figures = folder / "figures.json"
     text = json.dumps({**about, "experiments": experiments}, indent=1, ensure_ascii=False)
-    with written_beside(figures) as temporary, naming_errors(figures):
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_text(folder / "figures.json", text + "\n")
     facts = [(name, _fact(value)) for name, value in about.items()]
     parts = [list_part(facts), *text_parts(_INTRODUCTION)]
     parts.append(contents_part([(name, found.title) for name, found in findings.items()]))
@@ -125,17 +118,13 @@ def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:
     """
     benchmark = results[0].benchmark
     columns = ("method", *(f"J = {budget}" for budget in benchmark.max_vertices))
-    rows: dict[str, list[tuple[object, ...]]] = {}
-    for result in results:
-        before = ""
-        for score, method, means in result.rows():
-            # The method's own row comes first; the authors' rows are the same in every result.
-            if score != before:
-                rows.setdefault(score, []).append((method, *means))
-            elif result is results[-1]:
-                rows[score].append((f"{method} (authors)", *means))
-            before = score
-    return [Table(f"{benchmark.name}: {score}", columns, tuple(r)) for score, r in rows.items()]
+    means, authors = {r.method: r.means() for r in results}, benchmark.means()
+    tables = []
+    for score in dict.fromkeys(score for of in means.values() for score in of):
+        rows = [(method, *of[score]) for method, of in means.items() if score in of]
+        rows += [(f"{method} (authors)", *m) for method, m in authors.get(score, {}).items()]
+        tables.append(Table(f"{benchmark.name}: {score}", columns, tuple(rows)))
+    return tables
 
 
 def machine() -> str:

@@ -84,7 +84,7 @@ def scan_figure(
     for method, features in features_by_method.items():
         _check_beams(scan, features.clusters, method)
     n_methods, has_strips = len(features_by_method), errors_by_method is not None
-    columns = min(n_methods, 3)
+    columns = min(n_methods, 3 if n_methods <= 9 else 4)
     rows = math.ceil(n_methods / columns)
     height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), _PANEL)
     heights = [height + 0.9, _STRIP] if has_strips else [height + 0.9]

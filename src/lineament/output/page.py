@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from ..atomic import naming_errors, written_beside
+from ..atomic import write_text
 from ..errors import LineamentError
 
 __all__ = [
@@ -115,10 +115,7 @@ def write_parts(path: str | os.PathLike[str], title: str, parts: Iterable[str]) 
         *(part for part in parts if part),
         "</body>\n</html>\n",
     ]
-    # A name that no encoding knows (of a file, say) is shown with a mark, not a failure.
-    page = "\n".join(lines).encode("utf-8", errors="replace")
-    with written_beside(path) as temporary, naming_errors(path):
-        temporary.write_bytes(page)
+    write_text(path, "\n".join(lines))
 
 
 def list_part(facts: Iterable[tuple[str, str]]) -> str:

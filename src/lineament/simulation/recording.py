@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from typing import Any
@@ -12,19 +13,17 @@ import numpy as np
 
 from ..logs import save_log
 from ..scan import LaserScan, Pose
+from ..track import Track, untracked
 from .drive import drive, drive_poses
 from .presets import SENSORS
 from .scenes import SCENES, scene
 from .sensor import Sensor
-from .worlds import World, building, room
+from .worlds import World, building
 
 __all__ = ["WORLDS", "sensor_like", "simulate_log"]
 
 #: What a log can be recorded in: the storey is driven through, all others are seen from one place.
-WORLDS = ("building", "room", *SCENES)
-
-#: Shows how far the items are.
-Track = Callable[[Any, str, int], Iterable[Any]]
+WORLDS = ("building", *SCENES)
 
 
 def simulate_log(
@@ -37,7 +36,7 @@ def simulate_log(
     rate: float | None = None,
     seed: int = 0,
     moving: bool = False,
-    track: Track = lambda items, about, total: items,  # noqa: ARG005
+    track: Track = untracked,
 ) -> None:
     """Record a log of simulated scans, each with its stamp and true pose.
 
@@ -46,8 +45,8 @@ def simulate_log(
     path : path-like
         The log; its ending tells the format, see `lineament.logs.save_log`.
     world : str
-        "building", driven through from end to end; "room", or a kind of `SCENES`, where the
-        scanner stands still.
+        "building", driven through from end to end; or a kind of `SCENES`, a random one by the
+        seed, in which the scanner stands still.
     sensor : Sensor
         The scanner.
     scans : int, optional
@@ -86,6 +85,8 @@ def simulate_log(
     if scans is not None and scans < 1:
         raise ValueError(f"scans is {scans}, expected at least 1")
     rate = sensor.rate if rate is None else rate
+    if not 0 < rate < math.inf:
+        raise ValueError(f"rate is {rate}, expected a finite number > 0")
     if world == "building":
         plan, way = building()
         total = len(drive_poses(way, speed=speed, rate=rate)[0])
@@ -96,8 +97,7 @@ def simulate_log(
         if moving:
             raise ValueError(f"the scanner stands in world {world!r}, moving needs the building")
         total = 100 if scans is None else scans
-        where = (room(), (0.0, 0.0, 0.0)) if world == "room" else scene(world, seed)
-        taken = _standing(*where, sensor, total, rate, seed)
+        taken = _standing(*scene(world, seed), sensor, total, rate, seed)
     save_log(path, track(taken, "simulating", total))
 
 
@@ -134,7 +134,5 @@ def sensor_like(name: str, *, sigma: float | None = None, **changes: float | Non
 def _standing(
     world: World, pose: Pose, sensor: Sensor, scans: int, rate: float, seed: int
 ) -> Iterator[LaserScan]:
-    if not rate > 0:
-        raise ValueError(f"rate is {rate}, expected a finite number > 0")
     for i in range(scans):
         yield sensor.scan(world, pose, np.random.default_rng([seed, i]), i / rate)

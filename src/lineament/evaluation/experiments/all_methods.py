@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,15 +10,13 @@ import numpy as np
 from ...simulation import SCENES, SENSORS
 from ..scores import Scores, evaluate
 from .charts import dot_chart
-from .contenders import LIU_NOTE, extractors
-from .findings import Figure, Findings, Setting, Table
+from .contenders import LIU_NOTE, PARTITION_ONLY, every_method
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import batch_of, frame_times, scene_numbers, simulated_frames
 
 __all__ = ["run"]
 
-#: Methods that give clusters and breakpoints alone.
-PARTITION_ONLY = ("pdbs",)
-#: Names of the columns, the figures of `Scores.summary` that they show, times what.
+#: Names of the columns, the figures of `_Result.summary` that they show, times what.
 _COLUMNS = {
     "corner F1": ("corner_f1_0.10", 1),
     "precision": ("corner_precision_0.10", 1),
@@ -33,6 +31,7 @@ _COLUMNS = {
     "segment NEES": ("segment_nees_median", 1),
     "arc F1": ("arc_f1", 1),
     "partition": ("partition_success", 1),
+    "time [µs]": ("time", 1e6),
 }
 
 
@@ -54,9 +53,9 @@ class _Result:
 Results = Mapping[str, _Result]
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Score all methods on frames of all kinds of scenes, for each sensor."""
-    methods = extractors(setting, progress)
+    methods = every_method(setting, progress)
     numbers = scene_numbers(len(SCENES) * setting.frames, setting.seed)
     results: dict[str, dict[str, _Result]] = {}
     for name, sensor in SENSORS.items():
@@ -92,24 +91,25 @@ def _text(results: Mapping[str, Results]) -> tuple[str, ...]:
     )
     found = sum(r.scores.arcs.counts.found for of in results.values() for r in of.values())
     if found:
-        return (about,)
-    return about, "No method here gives arcs: round columns make false corners in all of them."
+        return about, LIU_NOTE
+    none = "No method here gives arcs: round columns make false corners in all of them."
+    return about, LIU_NOTE, none
 
 
 def _table(sensor: str, results: Results) -> Table:
     rows = []
     for method, result in results.items():
         figures = result.summary(method)
-        cells = (
-            factor * figures[key] if key in figures else None for key, factor in _COLUMNS.values()
-        )
-        rows.append((method, *cells, 1e6 * result.time))
+        cells: dict[str, object] = {
+            column: factor * figures[key] if key in figures else None
+            for column, (key, factor) in _COLUMNS.items()
+        }
+        rows.append({"method": method, **cells})
     scans = next(iter(results.values())).scores.scans
-    return Table(
+    return Table.of_records(
         f"{sensor}: {SENSORS[sensor].n_beams} beams, {scans} scans",
-        ("method", *_COLUMNS, "time [µs]"),
-        tuple(rows),
-        f"{LIU_NOTE} A dash: nothing found, or nothing that defines the figure.",
+        rows,
+        "A dash: nothing found, or nothing that defines the figure.",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +35,11 @@ ARENA = "truth/jackal_static_data.npz"
 #: A found corner is a real one within this distance [m].
 GATE = 0.10
 #: Ends of fitted walls so near to a corner end there; the walls of a room leave gaps [m].
-_JOINED = 0.12
+_JOINED = 0.15
+#: Within so much of an open end of a fitted wall nothing is known [m].
+_UNKNOWN = 0.3
+#: Flatter corners may be bends of panels, which the fitted walls do not have [rad].
+_FLAT = math.radians(150)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,12 +57,16 @@ class Arena:
     corners : ndarray, shape (K, 2)
         All real corners, whether visible or not [m], and those places where one wall ends on
         another, which may be found but are not demanded.
+    open_ends : ndarray, shape (m, 2)
+        All other ends of the fitted walls [m]: beyond them there are walls that were not fitted,
+        and corners that are not listed.
     """
 
     scans: list[LaserScan]
     truths: list[Features]
     walls: World
     corners: Array
+    open_ends: Array
 
 
 def load_arena(path: Path, count: int) -> Arena:
@@ -77,7 +86,8 @@ def load_arena(path: Path, count: int) -> Arena:
         LaserScan(ranges[i], first, step, range_max=range_max, pose=_pose(poses[i])) for i in chosen
     ]
     truths = [truth(world, _pose(poses[i]), sensor) for i in chosen]
-    return Arena(scans, truths, world, np.vstack((corners, _on_other_walls(ends, corners))))
+    on_walls, open_ends = _lonely_ends(ends, corners)
+    return Arena(scans, truths, world, np.vstack((corners, on_walls)), open_ends)
 
 
 def _pose(row: Array) -> Pose:
@@ -85,20 +95,27 @@ def _pose(row: Array) -> Pose:
     return x, y, theta
 
 
+def _apart(points: Array, others: Array) -> Array:
+    """Distance of each point from each of the others [m]."""
+    return np.asarray(np.hypot(*np.moveaxis(points[:, np.newaxis] - others, 2, 0)))
+
+
 def _nearest(points: Array, others: Array) -> tuple[Array, Array]:
     """Of each point the nearest of the others, and its distance [m]."""
-    away = np.hypot(*np.moveaxis(points[:, np.newaxis] - others, 2, 0))
+    away = _apart(points, others)
     return others[away.argmin(axis=1)], away.min(axis=1, initial=np.inf)
 
 
-def _on_other_walls(ends: Array, corners: Array) -> Array:
-    """Pick the ends of walls that lie on another wall, and at no corner."""
+def _lonely_ends(ends: Array, corners: Array) -> tuple[Array, Array]:
+    """Pick the ends of walls that are at no corner: those on another wall, and all others."""
     walls = ends.reshape(-1, 4)
     lonely = np.flatnonzero(_nearest(ends, corners)[1] > 0)
     others = (World(np.delete(walls, k // 2, axis=0)) for k in lonely)
-    met = [clearance(w, ends[k : k + 1])[0] <= GATE for k, w in zip(lonely, others, strict=True)]
-    on_walls: Array = ends[lonely[met]]
-    return on_walls
+    met = np.array(
+        [clearance(w, ends[k : k + 1])[0] <= GATE for k, w in zip(lonely, others, strict=True)],
+        dtype=np.bool_,
+    )
+    return ends[lonely[met]], ends[lonely[~met]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +130,9 @@ class ArenaScores:
         All found corners, in the world frame [m].
     false : int
         How many of them lie on no real corner.
+    judged, sharp_false : int
+        The same of those alone that can be judged without doubt: on a real corner, or with an
+        opening of less than 150° and not near an open end of a fitted wall.
     scans : int
         How many scans.
     """
@@ -120,6 +140,8 @@ class ArenaScores:
     corners: CornerScores
     positions: Array
     false: int
+    judged: int
+    sharp_false: int
     scans: int
 
     def summary(self) -> dict[str, float]:
@@ -127,6 +149,7 @@ class ArenaScores:
         return {
             "recall": self.corners.counts[GATE].recall,
             "false": ratio(self.false, len(self.positions)),
+            "sharp_false": ratio(self.sharp_false, self.judged),
             "median_error": quantile(self.corners.distances, 0.5),
             "corners_per_scan": len(self.positions) / self.scans,
         }
@@ -141,10 +164,16 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
         if scan.pose is not None
     ]
     together = np.concatenate(positions)
+    false = _nearest(together, arena.corners)[1] > GATE
+    sharp = np.concatenate([features.corners["opening"] for features in found]) < _FLAT
+    known = (_apart(together, arena.open_ends) > _UNKNOWN).all(axis=1)
+    sharp_false = false & sharp & known
     return ArenaScores(
         CornerScores.total(map(corner_scores, found, arena.truths)),
         together,
-        int((_nearest(together, arena.corners)[1] > GATE).sum()),
+        int(false.sum()),
+        int((~false | sharp_false).sum()),
+        int(sharp_false.sum()),
         len(found),
     )
 
@@ -152,18 +181,21 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
 def arena_table(arena: Arena, scores: Mapping[str, ArenaScores]) -> Table:
     """Recall of the visible corners, errors, and share of false corners, by method."""
     visible = next(iter(scores.values())).corners.counts[GATE].true
-    columns = (
-        *("method", "recall", "on no real corner, of those found"),
-        *("median error [mm]", "corners a scan"),
-    )
     rows = []
     for name, score in scores.items():
-        recall, false, error, per_scan = score.summary().values()
-        rows.append((name, recall, false, 1e3 * error, per_scan))
-    return Table(
+        figures = score.summary()
+        rows.append(
+            {
+                "method": name,
+                "recall": figures["recall"],
+                "on no real corner, of those found": figures["false"],
+                "median error [mm]": 1e3 * figures["median_error"],
+                "corners a scan": figures["corners_per_scan"],
+            }
+        )
+    return Table.of_records(
         "Corners of a real arena with fitted walls",
-        columns,
-        tuple(rows),
+        rows,
         f"{len(arena.scans)} scans with {visible} visible corners of six beams or more on both "
         "sides, within 0.1 m. Walls and poses are known to about 1 cm, and the walls bow by 13 to "
         "23 mm rms: smaller errors tell nothing, and where a wall bends there may be a corner that "

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-__all__ = ["Figure", "Findings", "Setting", "Table"]
+__all__ = ["Figure", "Findings", "Progress", "Setting", "Table"]
+
+#: Told every second or two, in a few words, what is being done.
+Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,36 @@ class Table:
                     f"table {self.title!r} has a row of {len(row)} cells, "
                     f"expected {len(self.columns)}: {row!r}"
                 )
+
+    @classmethod
+    def of_records(
+        cls, title: str, records: Iterable[Mapping[str, object]], note: str = ""
+    ) -> Self:
+        """Make a table of rows that name their cells, each with the same columns.
+
+        Parameters
+        ----------
+        title : str
+        records : iterable of mapping of str to object
+            The cells of a row by the name of the column; at least one.
+        note : str
+
+        Raises
+        ------
+        ValueError
+            If a row has other columns than the first.
+
+        Examples
+        --------
+        >>> Table.of_records("Corners", [{"method": "liu", "F1": 0.9}]).columns
+        ('method', 'F1')
+        """
+        rows = list(records)
+        columns = tuple(rows[0])
+        for row in rows:
+            if tuple(row) != columns:
+                raise ValueError(f"table {title!r} has columns {columns!r}, then {tuple(row)!r}")
+        return cls(title, columns, tuple(tuple(row.values()) for row in rows), note)
 
     def __str__(self) -> str:
         """Write the table as plain text, in columns.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from ...extractor import Extractor
@@ -12,9 +11,9 @@ from ...output import canvas
 from ...output.figures import scan_figure
 from ...simulation import SENSORS
 from ..partition import PartitionScores, partition_scores
-from .findings import Figure, Findings, Setting, Table
+from .contenders import drawn_methods
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import Frame, scene_numbers, simulated_frames
-from .methods_compared import compared_methods
 
 __all__ = ["run"]
 
@@ -22,7 +21,7 @@ __all__ = ["run"]
 PAPER = {"liu": 95.11, "pdbs, fixed": 83.55}
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Score the regions of layered obstacles, and draw what all methods make of one scan."""
     numbers = scene_numbers(4 * setting.frames, setting.seed)
     rules = {f"pdbs, {rule}": Extractor("pdbs", rule=rule) for rule in RULES}
@@ -81,21 +80,20 @@ _CAPTIONS = {
 
 
 def _table(sensor: str, scores: dict[str, PartitionScores], frames: int) -> Table:
-    columns = (
-        *("method", "success, paper [%]", "success, here [%]", "breakpoints: precision"),
-        *("recall", "F1", "Rand index"),
-    )
-    rows = tuple(
-        (
-            *(method, PAPER.get(method, "–"), 100 * score.success),
-            *(score.breakpoints.precision, score.breakpoints.recall, score.breakpoints.f1),
-            score.rand_index,
-        )
+    rows = [
+        {
+            "method": method,
+            "success, paper [%]": PAPER.get(method),
+            "success, here [%]": 100 * score.success,
+            "breakpoints: precision": score.breakpoints.precision,
+            "recall": score.breakpoints.recall,
+            "F1": score.breakpoints.f1,
+            "Rand index": score.rand_index,
+        }
         for method, score in scores.items()
-    )
-    return Table(
-        f"Regions of layered obstacles, sensor “{sensor}”", columns, rows, f"{frames} scans."
-    )
+    ]
+    title = f"Regions of layered obstacles, sensor “{sensor}”"
+    return Table.of_records(title, rows, f"{frames} scans.")
 
 
 def _regions(features: Features) -> Features:
@@ -108,9 +106,7 @@ def _regions(features: Features) -> Features:
     )
 
 
-def _all_methods(frame: Frame, setting: Setting, progress: Callable[[str], None]) -> Figure:
-    found = {
-        name: extract(frame.scan) for name, extract in compared_methods(setting, progress).items()
-    }
+def _all_methods(frame: Frame, setting: Setting, progress: Progress) -> Figure:
+    found = {name: e(frame.scan) for name, e in drawn_methods(setting, progress).items()}
     picture = scan_figure(frame.scan, {"true features": frame.truth} | found)
     return Figure("fig10", _CAPTIONS["fig10"], canvas.figure_bytes(picture, dpi=100))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
@@ -16,9 +15,9 @@ from ...output import canvas, drawing
 from ...scan import Array, LaserScan
 from ...simulation import SENSORS, Sensor, World, scene, truth
 from ...stages import bilateral_filter
-from ..counts import rms
+from ..counts import quantile, rms
 from ..scores import Scores, evaluate
-from .findings import Figure, Findings, Setting, Table
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import scene_numbers
 from .repetition_grid import Parameters, best_parameters
 
@@ -51,7 +50,7 @@ class _Frame:
         return (ranges - self.true)[self.places[place]]
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Compare raw and filtered ranges, and what is found with the filter and without it."""
     numbers = scene_numbers(4 * setting.frames, setting.seed)
     progress(f"simulating {len(numbers)} scans")
@@ -145,27 +144,37 @@ def _ranges_table(frames: list[_Frame]) -> tuple[Table, dict[str, dict[str, floa
         figures[place] = {"beams": len(raw), "raw": rms(raw), "filtered": rms(filtered)}
         figures[place]["off_after"] = left
         where = names.get(place, f"noise points, off by {place}")
-        rows.append((where, len(raw), 1e3 * rms(raw), 1e3 * rms(filtered), 100 * left))
-    columns = ("beams", "number", "raw, rms [mm]", "filtered, rms [mm]", "off by > 0.1 m after [%]")
+        rows.append(
+            {
+                "beams": where,
+                "number": len(raw),
+                "raw, rms [mm]": 1e3 * rms(raw),
+                "filtered, rms [mm]": 1e3 * rms(filtered),
+                "off by > 0.1 m after [%]": 100 * left,
+            }
+        )
     note = f"Errors of ranges over {len(frames)} scans; the noise of the ranges is 10 mm."
-    return Table("Errors of ranges", columns, tuple(rows), note), figures
+    return Table.of_records("Errors of ranges", rows, note), figures
 
 
 def _features_table(scores: dict[str, Scores]) -> Table:
     rows = []
     for name, score in scores.items():
-        figures = score.summary()
-        values = [figures.get(f"corner_{key}_0.10") for key in ("precision", "recall", "f1")]
-        median = figures.get("corner_median_error", math.nan)
-        offset = figures.get("segment_offset_rmse", math.nan)
-        ratio = figures.get("segment_offset_over_bound", math.nan)
-        found = score.corners.counts[0.10].found / score.scans
-        rows.append((name, found, *values, 1e3 * median, 1e3 * offset, ratio))
-    columns = (
-        *("liu", "corners a scan", "precision", "recall", "F1"),
-        *("corner error, median [mm]", "offset of lines, rmse [mm]", "the same ÷ bound"),
-    )
-    return Table("What is found with the filter and without it", columns, tuple(rows))
+        corners, segments = score.corners, score.segments
+        counts = corners.counts[0.10]
+        rows.append(
+            {
+                "liu": name,
+                "corners a scan": counts.found / score.scans,
+                "precision": counts.precision,
+                "recall": counts.recall,
+                "F1": counts.f1,
+                "corner error, median [mm]": 1e3 * quantile(corners.distances, 0.5),
+                "offset of lines, rmse [mm]": 1e3 * rms(segments.errors[:, 0]),
+                "the same ÷ bound": segments.offset_over_bound.over_bound,
+            }
+        )
+    return Table.of_records("What is found with the filter and without it", rows)
 
 
 def _figure(seed: int) -> Figure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -14,10 +14,10 @@ from ...scan import LaserScan
 from ..repeatability import Repeatability, repeatability
 from ..similarity import SimilarityScores, similarity_scores
 from .charts import dot_chart
-from .contenders import LIU_NOTE, extractors
-from .findings import Figure, Findings, Setting, Table
+from .contenders import LIU_NOTE, feature_methods
+from .findings import Figure, Findings, Progress, Setting, Table
 
-__all__ = ["run", "scan_pairs"]
+__all__ = ["LOGS", "repeats_of", "run", "scan_pairs"]
 
 #: The recordings, by name.
 LOGS = {
@@ -59,15 +59,14 @@ class _Result:
         }
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Look for the features of one scan in another of the same log, for all methods."""
     paths = {name: setting.recording(file) for name, file in LOGS.items()}
     there = {name: path for name, path in paths.items() if path is not None}
     title = "Repeatability in real logs"
     if not there:
         return Findings(title, ("The recordings are not there: nothing was measured.",))
-    methods = extractors(setting, progress)
-    del methods["pdbs"]  # It gives neither corners nor segments.
+    methods = feature_methods(setting, progress)
     results: dict[str, dict[str, _Result]] = {}
     for name, path in there.items():
         progress(f"{name}: reading")
@@ -93,6 +92,7 @@ _TEXT = (
     "A method that makes a corner of every other reading repeats many of them by chance: the "
     "corners per scan stand beside. The similarity error, the distance of each point from its own "
     "line, is of the points that belong to a line; the share of those is told too.",
+    LIU_NOTE,
 )
 
 
@@ -115,39 +115,48 @@ def _is_elsewhere(scan: LaserScan, other: LaserScan) -> bool:
     return math.dist(scan.pose[:2], other.pose[:2]) >= MOVED or abs(turn) >= TURNED
 
 
-def _measure(pairs: list[Pair], extractor: Extractor) -> _Result:
-    repeats, similarity, corners = [], [], 0
+def repeats_of(pairs: Iterable[Pair], extractor: Extractor) -> Repeatability:
+    """Look for the features of each scan of each pair in the other."""
+    repeats = []
     for scan, other in pairs:
         features, others = extractor(scan), extractor(other)
         repeats.append(repeatability(scan, features, other, others))
         repeats.append(repeatability(other, others, scan, features))
-        similarity.append(similarity_scores(scan, features))
-        corners += len(features.corners)
+    return Repeatability.total(repeats)
+
+
+def _measure(pairs: list[Pair], extractor: Extractor) -> _Result:
+    scans = [scan for scan, _ in pairs]
+    found = [extractor(scan) for scan in scans]
     return _Result(
-        Repeatability.total(repeats), SimilarityScores.total(similarity), corners / len(pairs)
+        repeats_of(pairs, extractor),
+        SimilarityScores.total(map(similarity_scores, scans, found)),
+        sum(len(features.corners) for features in found) / len(pairs),
     )
 
 
 def _table(log: str, results: Mapping[str, _Result]) -> Table:
-    columns = (
-        *("method", "corners a scan", "corners expected", "repeated [%]", "distance RMS [mm]"),
-        *("segments expected", "repeated [%] ", "distance RMS [mm] "),
-        *("similarity, mean [mm]", "variance [mm²]", "largest [m]", "points on lines [%]"),
-    )
     rows = []
     for method, result in results.items():
         corners, segments = result.repeats.corners, result.repeats.segments
         similarity = result.similarity
         rows.append(
-            (
-                *(method, result.corners_per_scan),
-                *(corners.expected, 100 * corners.rate, 1e3 * corners.rmse),
-                *(segments.expected, 100 * segments.rate, 1e3 * segments.rmse),
-                *(1e3 * similarity.mean, 1e6 * similarity.variance, similarity.maximum),
-                100 * similarity.explained,
-            )
+            {
+                "method": method,
+                "corners a scan": result.corners_per_scan,
+                "corners expected": corners.expected,
+                "corners repeated [%]": 100 * corners.rate,
+                "distance of corners, RMS [mm]": 1e3 * corners.rmse,
+                "segments expected": segments.expected,
+                "segments repeated [%]": 100 * segments.rate,
+                "distance of segments, RMS [mm]": 1e3 * segments.rmse,
+                "similarity, mean [mm]": 1e3 * similarity.mean,
+                "variance [mm²]": 1e6 * similarity.variance,
+                "largest [m]": similarity.maximum,
+                "points on lines [%]": 100 * similarity.explained,
+            }
         )
-    return Table(f"{log}: features found again", columns, tuple(rows), LIU_NOTE)
+    return Table.of_records(f"{log}: features found again", rows)
 
 
 def _figure(results: Mapping[str, Mapping[str, _Result]]) -> Figure:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, replace
 
 from ...output import canvas
-from .findings import Figure, Findings, Setting, Table
+from .findings import Figure, Findings, Progress, Setting, Table
 from .repetition_grid import (
     CRITERIA,
     RADIUS,
@@ -32,7 +31,7 @@ _FLAT = 0.02
 Choice = tuple[str, Parameters, Repetition]
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Repeat the experiment of Figure 9 on simulated scans, for every reading of equation 22."""
     grid = repetition_grid(setting, progress)
     numbers = repetition_scenes(setting, reported=True)
@@ -93,18 +92,25 @@ def _peaks(grid: Grid) -> Table:
 
 
 def _choices(choices: list[Choice]) -> Table:
-    return Table(
-        "The paper's parameters and the best of the grid, on other scenes",
-        (
-            *("reading", "chosen by", "radius [beams]", "threshold", "AR of actual"),
-            *("AR among found", "corners a view", "precision", "recall", "F1"),
-        ),
-        tuple(
-            (p.response, by, p.support_radius, p.threshold, *r.summary().values())
+    return Table.of_records(
+        "The paper’s parameters and the best of the grid, on other scenes",
+        [
+            {
+                "reading": p.response,
+                "chosen by": by,
+                "radius [beams]": p.support_radius,
+                "threshold": p.threshold,
+                "AR of actual": r.of_actual,
+                "AR among found": r.among_found,
+                "corners a view": r.corners_per_view,
+                "precision": r.counts.precision,
+                "recall": r.counts.recall,
+                "F1": r.counts.f1,
+            }
             for by, p, r in choices
-        ),
+        ],
         "Precision, recall and F1 are of corners within 0.1 m of actual ones that show six beams "
-        "or more of both sides. The paper's values of AR are lost.",
+        "or more of both sides. The paper’s values of AR are lost.",
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from itertools import product
@@ -16,7 +15,7 @@ from ...simulation import SCENES, SENSORS, scene, truth
 from ..corners import corner_scores
 from ..counts import Counts
 from ..stability import corner_stability
-from .findings import Setting
+from .findings import Progress, Setting
 from .frames import batch_of, scene_numbers
 
 __all__ = [
@@ -50,8 +49,6 @@ CRITERIA = {
     "of_actual": "the actual corners",
     "among_found": "the corners found before the turn",
 }
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ...output import canvas
@@ -11,9 +9,10 @@ from ...output.figures import scan_figure
 from ...simulation import SENSORS, scene, truth
 from ..compare import compare_scan
 from ..scores import evaluate
-from .findings import Figure, Findings, Setting, Table
+from .contenders import Extract, drawn_methods
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import scene_numbers
-from .methods_compared import Extract, compared_methods, recorded_scans
+from .recordings import recorded_scans
 
 __all__ = ["run"]
 
@@ -21,9 +20,9 @@ __all__ = ["run"]
 KINDS = ("room", "corridor", "hall")
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Draw scans of simulated scenes and of recordings, and count what is found in them."""
-    methods = compared_methods(setting, progress)
+    methods = drawn_methods(setting, progress)
     tables, figures = [], []
     for kind in KINDS:
         progress(f"{kind}: drawing all methods")
@@ -65,20 +64,21 @@ def _simulated(kind: str, number: int, methods: dict[str, Extract]) -> tuple[Tab
         scores = evaluate(features, true)
         corners, segments = scores.corners.counts[0.10], scores.segments.counts
         rows.append(
-            (
-                *(name, segments.found, segments.correct, segments.f1),
-                *(corners.found, corners.correct, corners.f1),
-            )
+            {
+                "method": name,
+                "segments found": segments.found,
+                "right segments": segments.correct,
+                "F1 of segments": segments.f1,
+                "corners found": corners.found,
+                "right corners": corners.correct,
+                "F1 of corners": corners.f1,
+            }
         )
-    columns = (
-        *("method", "segments found", "of them right", "F1"),
-        *("corners found", "of them right", "F1"),
-    )
-    demanded = (segments.true, corners.true)
     note = (
-        f"True segments: {demanded[0]}, true corners: {demanded[1]}, both sides of 6 beams or more."
+        f"True segments: {segments.true}, true corners: {corners.true}, both sides of 6 beams or "
+        "more."
     )
     picture = scan_figure(scan, {"true features": true} | found)
     caption = f"Simulated {kind}: the true features, and what each method finds."
     figure = Figure(f"fig11-{kind}", caption, canvas.figure_bytes(picture, dpi=100))
-    return Table(f"One scan of a simulated {kind}", columns, tuple(rows), note), figure
+    return Table.of_records(f"One scan of a simulated {kind}", rows, note), figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from ...extractor import Extractor
 from ...output import canvas, drawing
@@ -10,16 +10,10 @@ from ...scan import LaserScan
 from ...simulation import SENSORS
 from ...stages import bilateral_filter
 from ..similarity import SimilarityScores, similarity_errors, similarity_scores
-from .findings import Figure, Findings, Setting, Table
+from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, Extract, drawn_methods
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import scene_numbers, simulated_frames
-from .methods_compared import (
-    LIU_BEST,
-    LIU_PAPER,
-    PDBS_LINES,
-    Extract,
-    compared_methods,
-    recorded_scans,
-)
+from .recordings import recorded_scans
 
 __all__ = ["run"]
 
@@ -32,9 +26,9 @@ SHOWN = (LIU_PAPER, LIU_BEST, "iepf", PDBS_LINES)
 SMALL = 0.01
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Measure similarity errors on simulated scans and on recordings."""
-    methods = compared_methods(setting, progress)
+    methods = drawn_methods(setting, progress)
     numbers = scene_numbers(len(KINDS) * setting.frames, setting.seed)
     frames = list(simulated_frames(SENSORS["paper"], KINDS, numbers))
     scans = {"simulated rooms, corridors and halls": [frame.scan for frame in frames]}
@@ -90,21 +84,23 @@ def _filtered_scores(scans: Iterable[LaserScan]) -> SimilarityScores:
 
 
 def _table(where: str, scores: dict[str, SimilarityScores]) -> Table:
-    columns = (
-        *("method", "largest, paper", "largest, here [m]", "mean, paper", "mean, here [mm]"),
-        *("variance, paper", "variance, here [mm²]", "within 0.01 m [%]", "explained [%]"),
-    )
     rows = []
     for method, score in scores.items():
-        lost = "lost" if method in PAPER else "–"
+        lost = "lost" if method in PAPER else None
         rows.append(
-            (
-                *(method, PAPER.get(method, "–"), score.maximum, lost, 1e3 * score.mean),
-                *(lost, 1e6 * score.variance, 100 * float((score.errors <= SMALL).mean())),
-                100 * score.explained,
-            )
+            {
+                "method": method,
+                "largest, paper": PAPER.get(method),
+                "largest, here [m]": score.maximum,
+                "mean, paper": lost,
+                "mean, here [mm]": 1e3 * score.mean,
+                "variance, paper": lost,
+                "variance, here [mm²]": 1e6 * score.variance,
+                "within 0.01 m [%]": 100 * float((score.errors <= SMALL).mean()),
+                "explained [%]": 100 * score.explained,
+            }
         )
-    return Table(f"Similarity error: {where}", columns, tuple(rows))
+    return Table.of_records(f"Similarity error: {where}", rows)
 
 
 def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,16 @@ from ...simulation import SCENES, SENSORS
 from ..counts import Counts
 from ..scores import Scores, evaluate
 from .arena import ARENA, arena_figure, arena_scores, arena_table, load_arena
-from .contenders import LITERAL, LITERAL_BEST, LIU_NOTE, extractors, liu_extractors
-from .findings import Findings, Setting, Table
+from .contenders import (
+    LITERAL,
+    LITERAL_BEST,
+    LIU_BEST,
+    LIU_NOTE,
+    feature_methods,
+    liu_methods,
+)
+from .findings import Findings, Progress, Setting, Table
 from .frames import Frame, batch_of, frame_times, scene_numbers, simulated_frames
-from .methods_compared import LIU_BEST
 
 __all__ = ["run"]
 
@@ -41,7 +47,7 @@ class _Result:
 Results = Mapping[str, _Result]
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Measure the success of partition and of corners, and the time per frame."""
     progress("simulating")
     numbers = scene_numbers(MORE * setting.frames, setting.seed)
@@ -52,7 +58,7 @@ def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
         "pdbs, fixed 0.3 m": Extractor("pdbs", rule="fixed"),
         "pdbs": Extractor("pdbs"),
     }
-    corners = liu_extractors(setting, progress)
+    corners = liu_methods(setting, progress)
     corners |= {"iepf:paper": Extractor("iepf:paper"), "iepf": Extractor("iepf")}
     parted = _measured(partition, frames, setting.frames, progress)
     cornered = _measured(corners, frames, setting.frames, progress)
@@ -72,10 +78,9 @@ def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
     else:
         arena = load_arena(path, MORE * setting.frames)
         scores = {}
-        for name, extractor in extractors(setting, progress).items():
+        for name, extractor in feature_methods(setting, progress).items():
             progress(f"arena: {name}")
             scores[name] = arena_scores(arena, extractor)
-        del scores["pdbs"]  # It gives no corners.
         tables.append(arena_table(arena, scores))
         figures.append(arena_figure(arena, scores))
         numbers_of["arena"] = {name: score.summary() for name, score in scores.items()}
@@ -99,6 +104,7 @@ _TEXT = (
     "say so: 9.6 to 25.3 ms against 15.8 to 36.3 ms are 0.61 to 0.70, 21.6 to 38.2 ms against 29.9 "
     "to 53.4 ms are 0.72. Its times are of MATLAB, those here of compiled kernels: ratios can be "
     "compared, milliseconds cannot.",
+    LIU_NOTE,
 )
 
 
@@ -122,7 +128,7 @@ def _measured(
     methods: Mapping[str, Extractor],
     frames: list[Frame],
     few: int,
-    progress: Callable[[str], None],
+    progress: Progress,
 ) -> dict[str, _Result]:
     results = {}
     scans = [frame.scan for frame in frames]
@@ -136,54 +142,58 @@ def _measured(
 
 
 def _partition_table(results: Results, few: int) -> Table:
-    rows: list[tuple[object, ...]] = []
+    rows = []
     for name, result in results.items():
         success, milliseconds = PAPER_PARTITION.get(_family(name), (None, None))
-        breaks = result.many.partition.breakpoints
+        some, many = result.few.partition, result.many.partition
         rows.append(
-            (
-                *(name, success, result.few.partition.success, _of(result.few.partition.regions)),
-                *(result.many.partition.success, _of(result.many.partition.regions)),
-                *(breaks.precision, breaks.recall),
-                *(_range(milliseconds), _range(1e6 * np.sort(result.times)[[0, -1]])),
-            )
+            {
+                "method": name,
+                "paper: success": success,
+                f"here: success, {few} frames": some.success,
+                "regions": _of(some.regions),
+                f"here: success, {MORE * few} frames": many.success,
+                "regions of the many": _of(many.regions),
+                "breakpoint precision": many.breakpoints.precision,
+                "breakpoint recall": many.breakpoints.recall,
+                "paper: time [ms]": _range(milliseconds),
+                "here: time [µs]": _range(1e6 * np.sort(result.times)[[0, -1]]),
+            }
         )
-    return Table(
+    return Table.of_records(
         "Table 3, partition: correct regions of the true ones",
-        (
-            *("method", "paper: success", f"here: success, {few} frames", "regions"),
-            *(f"here: success, {MORE * few} frames", "regions of the many"),
-            *("breakpoint precision", "breakpoint recall"),
-            *("paper: time [ms]", "here: time [µs]"),
-        ),
-        tuple(rows),
+        rows,
         "The paper’s PDBS has a fixed threshold, whose value is not told; pdbs without more has "
         "that of Borges and Aldon. Times are from the fastest to the slowest frame.",
     )
 
 
 def _corner_table(results: Results, few: int) -> Table:
-    rows: list[tuple[object, ...]] = []
+    rows = []
     for name, result in results.items():
         success, milliseconds = PAPER_CORNERS.get(_family(name), (None, None))
-        counts, many = result.few.corners.counts[0.10], result.many.corners.counts[0.10]
+        some, many = (scores.corners.counts[0.10] for scores in (result.few, result.many))
         rows.append(
-            (
-                *(name, success, counts.recall, _of(counts), counts.precision, counts.f1),
-                *(many.recall, _of(many), many.precision, many.f1),
-                *(_range(milliseconds), _range(1e6 * np.sort(result.times)[[0, -1]])),
-            )
+            {
+                "method": name,
+                "paper: success": success,
+                f"here: success, {few} frames": some.recall,
+                "corners": _of(some),
+                "precision": some.precision,
+                "F1": some.f1,
+                f"here: success, {MORE * few} frames": many.recall,
+                "corners of the many": _of(many),
+                "precision of the many": many.precision,
+                "F1 of the many": many.f1,
+                "paper: time [ms]": _range(milliseconds),
+                "here: time [µs]": _range(1e6 * np.sort(result.times)[[0, -1]]),
+            }
         )
-    return Table(
+    return Table.of_records(
         "Table 3, corners: correct corners of the true ones",
-        (
-            *("method", "paper: success", f"here: success, {few} frames", "corners"),
-            *("precision", "F1", f"here: success, {MORE * few} frames", "corners of the many"),
-            *("precision of the many", "F1 of the many", "paper: time [ms]", "here: time [µs]"),
-        ),
-        tuple(rows),
-        f"{LIU_NOTE} iepf:paper has a fixed tolerance and corners on readings, but parts the scan "
-        "into clusters first, which by the paper’s words IEPF does not.",
+        rows,
+        "iepf:paper has a fixed tolerance and corners on readings, but parts the scan into "
+        "clusters first, which by the paper’s words IEPF does not.",
     )
 
 

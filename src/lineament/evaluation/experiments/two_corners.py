@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +13,9 @@ from ...output import canvas, drawing
 from ...scan import Array, LaserScan, Pose
 from ...simulation import SENSORS, World, truth
 from ..counts import rms
-from .contenders import LITERAL, LIU_NOTE, extractors
-from .findings import Figure, Findings, Setting, Table
+from .contenders import LITERAL, LIU_BEST, LIU_NOTE, LIU_PAPER, feature_methods
+from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import batch_of
-from .methods_compared import LIU_BEST, LIU_PAPER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +51,7 @@ POSES = tuple(_pose(*place) for place in _PLACES)
 Distances = list[Array]
 
 
-def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
+def run(setting: Setting, progress: Progress) -> Findings:
     """Measure the distance between two corners from five places, many times."""
     sensor, count = SENSORS["paper"], SCANS_A_FRAME * setting.frames
     scans = []
@@ -61,8 +60,7 @@ def run(setting: Setting, progress: Callable[[str], None]) -> Findings:
         rng = np.random.default_rng([setting.seed, k, 13])
         scans.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
     found: dict[str, Distances] = {}
-    methods = extractors(setting, progress)
-    del methods["pdbs"]  # It gives no corners.
+    methods = feature_methods(setting, progress)
     for name, extractor in methods.items():
         progress(name)
         views = (batch_of(extractor, some) for some in scans)
@@ -146,6 +144,7 @@ def _text(found: Mapping[str, Distances], count: int) -> tuple[str, ...]:
         "root of the mean of their variances.",
         "A spread below the bound is no miracle: an estimate that is off by as much every time, as "
         "that of a filter which rounds corners, spreads little. The RMS error tells.",
+        LIU_NOTE,
     ]
     absent = [name for name in (LITERAL, LIU_PAPER) if not any(map(len, found[name]))]
     if absent:
@@ -160,36 +159,41 @@ def _overall(found: Mapping[str, Distances], bounds: Array, count: int) -> Table
     for name, distances in found.items():
         together = np.concatenate(distances)
         error, spread = rms(together - DISTANCE), _deviation(together)
-        ours = name.startswith("liu")
+        is_papers = name.startswith("liu")
         rows.append(
-            (
-                *(name, "2.302" if ours else None),
-                f"{together.mean():.4f}" if len(together) else None,
-                *("lost" if ours else None, None if spread is None else 1e3 * spread),
-                *(1e3 * error, error / bound, len(together) / (len(POSES) * count)),
-            )
+            {
+                "method": name,
+                "paper: mean [m]": "2.302" if is_papers else None,
+                "here: mean [m]": f"{together.mean():.4f}" if len(together) else None,
+                "paper: spread": "lost" if is_papers else None,
+                "here: standard deviation [mm]": None if spread is None else 1e3 * spread,
+                "RMS error [mm]": 1e3 * error,
+                "RMS error ÷ bound": error / bound,
+                "share of scans with both": len(together) / (len(POSES) * count),
+            }
         )
-    return Table(
+    best = dict.fromkeys(rows[0]) | {
+        "method": "bound",
+        "here: mean [m]": f"{DISTANCE:.4f}",
+        "here: standard deviation [mm]": 1e3 * bound,
+        "RMS error [mm]": 1e3 * bound,
+        "RMS error ÷ bound": 1.0,
+    }
+    return Table.of_records(
         "Table 2: distance between the two corners, from all five places together",
-        (
-            *("method", "paper: mean [m]", "here: mean [m]"),
-            *("paper: spread", "here: standard deviation [mm]"),
-            *("RMS error [mm]", "RMS error ÷ bound", "share of scans with both"),
-        ),
-        (*rows, ("bound", None, f"{DISTANCE:.4f}", None, 1e3 * bound, 1e3 * bound, 1.0, None)),
-        f"A and B are the found corners within {GATE} m of them. {LIU_NOTE}",
+        [*rows, best],
+        f"A and B are the found corners within {GATE} m of them.",
     )
 
 
 def _by_place(found: Mapping[str, Distances], bounds: Array, count: int) -> Table:
-    rows = [
-        (name, *(_place_cell(d, count) for d in distances)) for name, distances in found.items()
-    ]
+    places = tuple(f"place {k + 1}" for k in range(len(POSES)))
+    rows = [(name, *(_place_cell(d, count) for d in found[name])) for name in found]
     return Table(
         "Mean less 2.302 m ± standard deviation [mm], and share of scans with both corners",
-        ("method", *(f"place {k + 1}" for k in range(len(POSES)))),
+        ("method", *places),
         (*rows, ("bound", *(f"± {1e3 * bound:.1f}" for bound in bounds))),
-        "The paper's values of single places are lost.",
+        "The paper’s values of single places are lost.",
     )
 
 

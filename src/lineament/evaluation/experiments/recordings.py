@@ -1,0 +1,29 @@
+"""Recorded scans, for pictures and for similarity errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+
+from ...logs import open_log
+from ...scan import LaserScan
+from .findings import Setting
+
+__all__ = ["recorded_scans"]
+
+#: The recordings, by name.
+LOGS = {
+    "Intel lab": "carmen/intel-corrected.log.gz",
+    "MIT CSAIL": "carmen/csail-corrected.log.gz",
+    "ACES": "carmen/aces-corrected.log.gz",
+}
+
+
+def recorded_scans(setting: Setting, count: int) -> Iterator[tuple[str, list[LaserScan]]]:
+    """Give so many scans of each recording that is there, from equal parts of it."""
+    for name, file in LOGS.items():
+        path = setting.recording(file)
+        if path is not None:
+            log = open_log(path, keep_going=True)
+            step = max(len(log) // count, 1)
+            yield name, list(islice(log, step // 2, None, step))[:count]
