@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.collections import EllipseCollection
 from test_tables import random_features
 
 import lineament as ln
@@ -201,7 +202,11 @@ def test_map_moves_features_by_their_poses(tmp_path, monkeypatch):
     lines = axes.collections[0].get_segments()
     assert len(lines) == 4
     np.testing.assert_allclose(lines[2][1], [8, 2], atol=1e-12)
-    assert "2 scans · 4 segments · 2 corners" in {text.get_text() for text in axes.texts}
+    arcs = 2 * len(features.arcs)
+    said = f"2 scans · 4 segments · 2 corners · {canvas.count(arcs, 'arc')}"
+    assert said in {text.get_text() for text in axes.texts}
+    circles = [part for part in axes.collections if isinstance(part, EllipseCollection)]
+    assert [len(circle.get_offsets()) for circle in circles] == [arcs]
     monkeypatch.undo()
     figures.plot_map([], tmp_path / "empty.png")
     pixels(tmp_path / "empty.png")

@@ -15,7 +15,7 @@ from .track import Track, untracked
 __all__ = ["run_demo"]
 
 #: The methods of the pictures, the first of which makes the table.
-DEMO_METHODS = ("liu:scale_free", "liu", "liu:paper")
+DEMO_METHODS = ("optimal", "liu:scale_free", "liu:paper")
 
 
 def run_demo(
@@ -102,6 +102,6 @@ def _draw(
     posed = [(s.pose, extractor(s)) for s in open_log(log) if s.pose is not None]
     if posed:
         figures.append(("All scans, by the poses of the log.", target / "map.png"))
-        plot_map(posed, figures[-1][1], title="Segments and corners of the whole drive")
+        plot_map(posed, figures[-1][1], title="What was found on the whole drive")
     next(steps, None)
     return figures

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..features import TABLES, Features
 from ..scan import LaserScan, Pose
 from . import canvas, drawing, stage_panels
-from .canvas import CORNER_COLOR, INK, count
+from .canvas import ARC_COLOR, CORNER_COLOR, INK, count
 from .labels import label_points
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
 def plot_map(
     posed: Iterable[tuple[Pose, Features]], path: str | os.PathLike[str], title: str = "Map"
 ) -> None:
-    """Draw the segments and corners of many scans in the world, with the way of the sensor.
+    """Draw segments, corners and arcs of many scans in the world, with the way of the sensor.
 
     Parameters
     ----------
@@ -186,10 +186,10 @@ def plot_map(
     LineamentError
         If the ending is not known or the file cannot be written.
     """
-    from matplotlib.collections import LineCollection
+    from matplotlib.collections import EllipseCollection, LineCollection
 
     canvas.check_ending(path)
-    way, lines, corners = _in_the_world(posed)
+    way, lines, corners, arcs = _in_the_world(posed)
     shown = np.vstack([lines.reshape(-1, 2), corners, way])
     figure = canvas.new_figure(9, canvas.plane_size(shown, 9) + 1.3)
     axes = figure.subplots()
@@ -197,7 +197,7 @@ def plot_map(
     alpha = float(np.clip(60 / max(len(way), 1), 0.08, 0.9))
     about = (
         f"{count(len(way), 'scan')} · {count(len(lines), 'segment')} · "
-        f"{count(len(corners), 'corner')}"
+        f"{count(len(corners), 'corner')} · {count(len(arcs), 'arc')}"
     )
     canvas.style_plane(axes, title, about, shown)
     axes.add_collection(LineCollection(list(lines), colors=INK, linewidths=0.9, alpha=alpha))
@@ -205,6 +205,15 @@ def plot_map(
     x, y = corners.T
     axes.plot(x, y, "o", markersize=2.2, color=CORNER_COLOR, alpha=max(alpha, 0.2), mew=0, zorder=3)
     axes.plot([], [], "o", markersize=4, color=CORNER_COLOR, label="corners")
+    if len(arcs):
+        radius = arcs[:, 2]
+        circles = EllipseCollection(
+            2 * radius, 2 * radius, 0 * radius, units="xy", offsets=arcs[:, :2],
+            offset_transform=axes.transData, facecolors="none", edgecolors=ARC_COLOR,
+            linewidths=0.7, alpha=alpha,
+        )  # fmt: skip
+        axes.add_collection(circles)
+        axes.plot([], [], color=ARC_COLOR, linewidth=1.2, label="arcs")
     axes.plot(*way.T, color="#0969da", linewidth=1.3, label="way of the sensor", zorder=4)
     if len(way):
         axes.plot(*way[0], "o", color="#0969da", markersize=6, mec="white", label="start", zorder=5)
@@ -214,20 +223,26 @@ def plot_map(
 
 def _in_the_world(
     posed: Iterable[tuple[Pose, Features]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners (k, 2); only what is finite."""
+) -> tuple[NDArray[np.float64], ...]:
+    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners (k, 2), arcs x y r (a, 3).
+
+    Only what is finite.
+    """
     way, lines, corners = [np.zeros((0, 2))], [np.zeros((0, 2, 2))], [np.zeros((0, 2))]
+    arcs = [np.zeros((0, 3))]
     for pose, features in posed:
         with np.errstate(invalid="ignore"):  # what is not finite is not drawn
             moved = features.transform(*pose)
         way.append(np.array([pose[:2]], dtype=np.float64))
         lines.append(np.stack((moved.segments["start"], moved.segments["end"]), axis=1))
         corners.append(moved.corners["position"])
-    line, corner = np.concatenate(lines), np.concatenate(corners)
+        arcs.append(np.column_stack((moved.arcs["center"], moved.arcs["radius"])))
+    line, corner, arc = np.concatenate(lines), np.concatenate(corners), np.concatenate(arcs)
     return (
         np.concatenate(way),
         line[np.isfinite(line).all(axis=(1, 2))],
         corner[np.isfinite(corner).all(axis=1)],
+        arc[np.isfinite(arc).all(axis=1)],
     )
 
 
