@@ -53,9 +53,16 @@ def test_page_says_whether_the_figure_is_reproduced(grid):
     grid[Parameters("tangent", 8, 0.66)] = made(0.95)
     told = repetition._verdict(grid)
     assert told.startswith("Not reproduced")
-    assert "tangent at radius 8 and threshold 0.66" in told
-    assert "product at radius 8 and threshold 0.5" in told
+    assert "tangent at radius 8 (threshold 0.66) and at threshold 0.66 (radius 6)" in told
+    assert "product at radius 8 (threshold 0.66) and at threshold 0.5 (radius 6)" in told
     assert "relative finds none at 0.66" in told
+    assert "two separate optima" in told
+    assert told.endswith("At an end of the grid: 8, 0.5; the optimum may lie beyond.")
+
+
+def test_optimum_inside_the_grid_is_not_told_to_be_at_its_end():
+    assert repetition._at_an_end({6, 8}, {5, 6, 8, 10}) == []
+    assert repetition._at_an_end({0.66, 0.05, 1.0}, {0.05, 0.66, 1.0}) == ["0.05", "1"]
 
 
 def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(grid):

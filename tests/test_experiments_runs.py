@@ -7,20 +7,25 @@ import json
 import numpy as np
 import pytest
 
+from lineament import Extractor
 from lineament.evaluation.experiments import (
     EXPERIMENTS,
     Setting,
+    ablation,
     all_methods,
     contenders,
     frames,
     layered,
     noise_points,
+    optimal_aims,
+    recorded_aims,
     recordings,
     repeatability,
     repetition_grid,
     run_experiments,
     scenes,
     similarity,
+    speed_aims,
     success,
     two_corners,
 )
@@ -29,6 +34,8 @@ from lineament.simulation import SENSORS, room
 
 #: Found on a small grid elsewhere; here it is only to be quick.
 CHOSEN = repetition_grid.Parameters("relative", 6, 0.25)
+#: Two rows of the ablation.
+TWO = {name: Extractor(name) for name in ("iepf", "hough")}
 
 
 @pytest.fixture
@@ -45,6 +52,10 @@ def small(monkeypatch):
         (scenes, {"KINDS": ("room",)}),
         (similarity, {"KINDS": ("room",)}),
         (layered, {"RULES": ("fixed", "dietmayer")}),
+        (ablation, {"SCANNERS": ("lms181",), "SCENES_A_FRAME": 1, "ladder": lambda *_: TWO}),
+        (optimal_aims, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES_A_FRAME": 1}),
+        (optimal_aims, {"METHOD": "iepf"}),
+        (speed_aims, {"BEAMS": (90, 180), "CALLS": 1, "BATCH": 4, "SCANS_A_FRAME": 1}),
     ):
         for name, value in changes.items():
             monkeypatch.setattr(module, name, value)
@@ -70,6 +81,10 @@ def data(tmp_path, monkeypatch):
     monkeypatch.setattr(recordings, "LOGS", {"Office": "room.npz"})
     monkeypatch.setattr(repeatability, "LOGS", {"Office": "room.npz"})
     monkeypatch.setattr(success, "ARENA", "arena.npz")
+    monkeypatch.setattr(ablation, "ARENA", "arena.npz")
+    monkeypatch.setattr(ablation, "LOG", "room.npz")
+    monkeypatch.setattr(recorded_aims, "ARENAS", {"arena": "arena.npz"})
+    monkeypatch.setattr(recorded_aims, "LOGS", {"Office": "room.npz"})
     return tmp_path
 
 

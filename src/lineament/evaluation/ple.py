@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from ..track import Track, untracked
 from .experiments.findings import plain
 from .ple_data import Benchmark, load_benchmark, scan_means
-from .ple_maps import MapMaker, benchmark_iepf, iepf_map, method_map, polylines_of
+from .ple_maps import (
+    MapMaker,
+    benchmark_iepf,
+    iepf_map,
+    method_map,
+    polylines_of,
+    sparing_map,
+)
 from .ple_scores import MapScore, cast_map, score_map
 
 __all__ = [
@@ -33,6 +40,7 @@ __all__ = [
     "polylines_of",
     "run_benchmark",
     "score_map",
+    "sparing_map",
 ]
 
 #: Scores of one scan and budget, as of `MapScore`.

@@ -12,14 +12,17 @@ from ..extractor import Extractor
 from ..features import Features
 from ..methods import get_method
 from ..scan import Array, LaserScan
+from .ple_scores import cast_map
 
-__all__ = ["MapMaker", "benchmark_iepf", "iepf_map", "method_map", "polylines_of"]
+__all__ = ["MapMaker", "benchmark_iepf", "iepf_map", "method_map", "polylines_of", "sparing_map"]
 
 #: Makes the polylines of a scan, arrays of shape (k, 2) [m], with at most so many vertices in all.
 MapMaker = Callable[[LaserScan, int], Sequence[Array]]
 
 #: Steeper than this to the ray, a line is not followed to where the ray would meet it.
 _LEAST_COSINE = 0.1
+#: What a return that the map does not explain counts as being off, and the most that any does [m].
+_WORST = 0.3
 #: Distances closer than this are equal but for rounding [m].
 _TIE = 1e-12
 
@@ -54,6 +57,52 @@ def method_map(method: str) -> MapMaker:
         return polylines_of(extractors[max_vertices](scan), scan)
 
     return make
+
+
+def sparing_map(method: str) -> MapMaker:
+    """Make maps with a method of the registry, of as many vertices as there is evidence for.
+
+    Of the maps with 2, 3, … vertices that of the least n ln(E/n) + v (2 ln(n/v) + 5), where v is
+    the budget, n the number of returns, and E the sum of their squared range errors: the penalty
+    of E. Lebarbier, *Detecting multiple change-points in the mean of Gaussian process by model
+    selection*, Signal Processing 85, 2005, with the noise taken from what is left of E.
+
+    Parameters
+    ----------
+    method : str
+        As for `method_map`.
+
+    Raises
+    ------
+    ValueError
+        As `method_map` does.
+
+    Examples
+    --------
+    >>> bearings = np.radians(np.arange(-40, 41))
+    >>> ranges = 2.0 / (np.cos(bearings) + np.abs(np.sin(bearings)))  # a corner, straight ahead
+    >>> ranges += np.random.default_rng(7).normal(0.0, 0.01, len(ranges))
+    >>> scan = LaserScan(ranges, angles=bearings)
+    >>> polylines = sparing_map("optimal")(scan, 10)
+    >>> [len(polyline) for polyline in polylines]
+    [3]
+    """
+    make = method_map(method)
+
+    def make_sparingly(scan: LaserScan, max_vertices: int) -> Sequence[Array]:
+        maps = [make(scan, vertices) for vertices in range(2, max_vertices + 1)]
+        penalised = [_penalised(polylines, scan, k + 2) for k, polylines in enumerate(maps)]
+        return maps[int(np.argmin(penalised))] if maps else []
+
+    return make_sparingly
+
+
+def _penalised(polylines: Sequence[Array], scan: LaserScan, vertices: int) -> float:
+    """How ill a map explains a scan, and what its vertices cost."""
+    ranges, n = scan.ranges[scan.valid], max(int(scan.valid.sum()), 1)
+    errors = np.nan_to_num(cast_map(polylines, scan.angles[scan.valid]) - ranges, nan=_WORST)
+    squares = max(float(np.sum(np.minimum(errors**2, _WORST**2))), n * _TIE**2)
+    return n * math.log(squares / n) + vertices * (2.0 * math.log(n / vertices) + 5.0)
 
 
 def polylines_of(features: Features, scan: LaserScan) -> list[Array]:

@@ -123,14 +123,15 @@ def refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts):
     c, s = _direction(sxx, sxy, syy, TOTAL)
     if c * (x[-1] - x0) + s * (y[-1] - y0) < 0.0:
         c, s = -c, -s
-    along = max(c * c * sxx + 2.0 * c * s * sxy + s * s * syy, 0.0)
+    along = c * c * sxx + 2.0 * c * s * sxy + s * s * syy
     across = max(sxx + syy - along, 0.0)
     cx, cy, rms = x0 + sx / total, y0 + sy / total, math.sqrt(across / total)
     common, scale = uneven / BOWS, 1.0 + CUT * cuts / len(x)
-    var_offset, var_angle = 1.0 / total + common, (1.0 + common * total) / along
+    var_offset, var_angle = scale * (1.0 / total + common), math.pi**2 / 12.0
     # Points that all but coincide have no direction: any angle is as good.
-    var_angle = min(scale * var_angle, math.pi**2 / 12.0)
-    return cx, cy, c, s, scale * var_offset, 0.0, var_angle, rms
+    if along > 0.0:
+        var_angle = min(var_angle, scale * (1.0 + common * total) / along)
+    return cx, cy, c, s, var_offset, 0.0, var_angle, rms
 
 
 @sums

@@ -209,7 +209,7 @@ def _refined_line(floats, ints, pieces, k, noise):
     square = min(1.0 / ((a * a + b * b) * middle * middle), 1.0)
     uneven = excess(floats[COST, k], last - first + 1) * range_variance(middle, noise) * square
     after = 0 if k + 1 == pieces else k + 1
-    cuts = (ints[BEFORE, k] >= 0) + (ints[BEFORE, after] == k)
+    cuts = int(ints[BEFORE, k] >= 0) + int(ints[BEFORE, after] == k)
     return refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts)
 
 

@@ -30,16 +30,17 @@ from .layout import (
 from .line_fit import REFINED, WEIGHTED, range_variance
 from .measuring import measure
 from .noise import estimate_by_range
-from .polylines import fit_polylines, hold_together
+from .polylines import fit_polylines
 from .residual_noise import refine_noise
 from .spikes import drop_spikes
 from .straightening import drop_crooked, straighten
+from .vertices import hold_together
 
 #: Parts that can be left out, to see what each is worth.
 SPIKES, GROWTH, BORDERS, DISSOLVING, ARCS_TOO, STRAIGHTENING = 1, 2, 4, 8, 16, 32
 
-#: No scanner sees farther [m]; the fourth power of much more is no number.
-_FARTHEST = 1e6
+#: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
+_NEAREST, _FARTHEST = 1e-6, 1e6
 #: Tangent of the steepest incidence at which a wall is expected to hold together (86°).
 _STEEPEST = 14.3
 #: Deviations of the distance of two readings that are added to the spacing of a surface.
@@ -93,7 +94,7 @@ def extract_rows(
     and `counts` stays there until the next.
     """
     line, fit, reach = floats[RANGE], REFINED, math.inf
-    range_max = min(range_max, _FARTHEST)
+    range_min, range_max = max(range_min, _NEAREST), min(range_max, _FARTHEST)
     for row in range(rows):
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]

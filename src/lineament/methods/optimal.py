@@ -25,9 +25,9 @@ from ..kernels.optimal import (
     STRAIGHTENING,
     extract_rows,
 )
+from ..kernels.polylines import PLANES
 from .base import MethodBase
 from .checks import check_choice, check_count, check_number
-from .steps import budget_scratch
 
 __all__ = ["PARTS", "Optimal"]
 
@@ -75,8 +75,9 @@ class Optimal(MethodBase):
     max_missing : int
         Missing beams in a row over which a surface goes on.
     max_vertices : int
-        Pieces are joined or left out until they have no more vertices, such that the range error
-        is the least; 0 allows any number, and finds features rather than a map.
+        If not 0, a map instead of features: polylines of at most so many vertices in all, such
+        that their range error is the least. Their vertices are the corners, and `evidence` and
+        `without` do not matter.
     without : tuple of str
         Parts of `PARTS` that are left out, to see what they are worth.
 
@@ -112,8 +113,11 @@ class Optimal(MethodBase):
         self._settle_types()
 
     def own_arrays(self, beams: int) -> _Scratch:
-        """Make room for running sums and the budget."""
-        return _Scratch(np.empty((2 * beams + 4, SUMS)), *budget_scratch(beams, self.max_vertices))
+        """Make room for running sums, and for the vertices of a map."""
+        shape = (beams + 2, min(self.max_vertices, beams + 1) + 1)
+        return _Scratch(
+            np.empty((2 * beams + 4, SUMS)), np.empty((PLANES, *shape)), np.empty(shape, np.int64)
+        )
 
     def run(self, block: Block) -> None:
         """Find and measure the features of the scans of a block."""

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Smaller similarity errors are drawn as this one [m]: a log axis has no place for 0.
+LEAST_ERROR = 2e-4
+
 
 def draw_beams(axes: Axes, scan: LaserScan, clusters: NDArray[np.int32]) -> Array:
     """Points by cluster, noise, invalid beams at the rim, the sensor; gives what must be seen."""
@@ -228,11 +231,11 @@ def draw_errors(axes: Axes, scan: LaserScan, errors: Array) -> None:
         else "no lines, no similarity error"
     )
     style(axes, "", told)
-    # A log axis has no place for 0.
-    axes.plot(np.degrees(scan.angles), np.maximum(errors, 2e-4), ".", markersize=3, color=INK)
+    bearings = np.degrees(scan.angles)
+    axes.plot(bearings, np.maximum(errors, LEAST_ERROR), ".", markersize=3, color=INK)
     axes.set_yscale("log")
-    axes.set_ylim(1e-4, max(1.0, 1.5 * float(known.max(initial=0.0))))
+    axes.set_ylim(1e-4, 10.0)
     axes.set_xlabel("bearing [°]", fontsize=9, color="#57606a")
     axes.set_ylabel("error [m]", fontsize=9, color="#57606a")
     if len(scan) > 1:
-        axes.set_xlim(*np.degrees(scan.angles[[0, -1]]))
+        axes.set_xlim(*bearings[[0, -1]])

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from importlib import import_module
 
-from .findings import Figure, Findings, Setting, Table
+from .findings import Figure, Findings, Progress, Setting, Table
 
 __all__ = [
     "EXPERIMENTS",
     "Figure",
     "Findings",
+    "Progress",
     "Setting",
     "Table",
     "experiment_names",
@@ -28,6 +29,8 @@ EXPERIMENTS: dict[str, str] = {
     "success": "success",
     "all_methods": "all_methods",
     "repeatability": "repeatability",
+    "ablation": "ablation",
+    "aims": "optimal_aims",
 }
 
 #: The paper's names of figures and tables, and the experiment that each is part of.
@@ -77,7 +80,7 @@ def experiment_names(names: Iterable[str]) -> list[str]:
 
 
 def run_experiments(
-    names: Iterable[str], setting: Setting, progress: Callable[[str], None]
+    names: Iterable[str], setting: Setting, progress: Progress
 ) -> dict[str, Findings]:
     """Run some experiments.
 

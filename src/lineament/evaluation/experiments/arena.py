@@ -22,6 +22,7 @@ from .frames import batch_of
 
 __all__ = [
     "ARENA",
+    "FLAT",
     "Arena",
     "ArenaScores",
     "arena_figure",
@@ -39,7 +40,7 @@ _JOINED = 0.15
 #: Within so much of an open end of a fitted wall nothing is known [m].
 _UNKNOWN = 0.3
 #: Flatter corners may be bends of panels, which the fitted walls do not have [rad].
-_FLAT = math.radians(150)
+FLAT = math.radians(150)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,7 +166,7 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
     ]
     together = np.concatenate(positions)
     false = _nearest(together, arena.corners)[1] > GATE
-    sharp = np.concatenate([features.corners["opening"] for features in found]) < _FLAT
+    sharp = np.concatenate([features.corners["opening"] for features in found]) < FLAT
     known = (_apart(together, arena.open_ends) > _UNKNOWN).all(axis=1)
     sharp_false = false & sharp & known
     return ArenaScores(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 from ...extractor import Extractor
+from ...features import Features
 from ...logs import open_log
 from ...scan import LaserScan
 from ..repeatability import Repeatability, repeatability
@@ -115,13 +116,25 @@ def _is_elsewhere(scan: LaserScan, other: LaserScan) -> bool:
     return math.dist(scan.pose[:2], other.pose[:2]) >= MOVED or abs(turn) >= TURNED
 
 
-def repeats_of(pairs: Iterable[Pair], extractor: Extractor) -> Repeatability:
-    """Look for the features of each scan of each pair in the other."""
+def repeats_of(
+    pairs: Iterable[Pair],
+    extractor: Extractor,
+    demanded: Callable[[Features], Features] = lambda features: features,
+) -> Repeatability:
+    """Look for the features of each scan of each pair in the other.
+
+    Parameters
+    ----------
+    pairs : iterable of (LaserScan, LaserScan)
+    extractor : Extractor
+    demanded : callable
+        Picks the features of a scan that are looked for in the other, among all of its own.
+    """
     repeats = []
     for scan, other in pairs:
         features, others = extractor(scan), extractor(other)
-        repeats.append(repeatability(scan, features, other, others))
-        repeats.append(repeatability(other, others, scan, features))
+        repeats.append(repeatability(scan, features, other, demanded(others)))
+        repeats.append(repeatability(other, others, scan, demanded(features)))
     return Repeatability.total(repeats)
 
 

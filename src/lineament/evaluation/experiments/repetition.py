@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import asdict, replace
 
 from ...output import canvas
@@ -141,24 +142,40 @@ def _text(grid: Grid, everywhere: Repetition) -> tuple[str, ...]:
 
 def _verdict(grid: Grid) -> str:
     """Say whether any reading has the largest AR where the paper has it."""
-    told, reproduced = [], []
+    told, reproduced, radii, thresholds = [], [], set(), set()
     for reading in READINGS:
         at_threshold = largest(grid, "of_actual", reading, threshold=THRESHOLD)
         at_radius = largest(grid, "of_actual", reading, radius=RADIUS)
         best_radius, best_threshold = at_threshold.support_radius, at_radius.threshold
+        thresholds.add(best_threshold)
         if not _ar(grid, at_threshold, "of_actual"):
             told.append(f"{reading} finds none at 0.66, and most at {best_threshold:g} (radius 6)")
             continue
-        told.append(f"{reading} at radius {best_radius} and threshold {best_threshold:g}")
+        radii.add(best_radius)
+        told.append(
+            f"{reading} at radius {best_radius} (threshold 0.66) and at threshold "
+            f"{best_threshold:g} (radius 6)"
+        )
         if (best_radius, best_threshold) == (RADIUS, THRESHOLD):
             reproduced.append(reading)
     if reproduced:
         return f"Reproduced by the reading {' and '.join(reproduced)}."
+    ends = [
+        *_at_an_end(radii, {p.support_radius for p in grid}),
+        *_at_an_end(thresholds, {p.threshold for p in grid}),
+    ]
+    beyond = f" At an end of the grid: {', '.join(ends)}; the optimum may lie beyond." * bool(ends)
     return (
         "Not reproduced: along the lines of the figure, no reading of equation 22 has the largest "
-        f"AR of the actual corners at 6 and 0.66, but {'; '.join(told)}. At 0.66 a larger radius "
-        "finds more corners, at radius 6 a lower threshold does."
+        f"AR of the actual corners at 6 and 0.66, but {'; '.join(told)}. Radius and threshold are "
+        "each the best beside the paper’s value of the other: two separate optima, no pair. At "
+        f"0.66 a larger radius finds more corners, at radius 6 a lower threshold does.{beyond}"
     )
+
+
+def _at_an_end(optima: AbstractSet[float], values: AbstractSet[float]) -> list[str]:
+    """Name the optima that are the least or the largest of the values of the grid."""
+    return [f"{best:g}" for best in sorted(optima & {min(values), max(values)})]
 
 
 def _ar(grid: Grid, parameters: Parameters, criterion: str) -> float:

@@ -14,8 +14,12 @@ from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import scene_numbers
 from .recordings import recorded_scans
 
-__all__ = ["run"]
+__all__ = ["RESPONSES", "run"]
 
+#: What the numbers in the pictures are.
+RESPONSES = "Red numbers: response of the corner, in the unit of the method."
+#: Scans of a recording, one of which is drawn.
+CHOICE = 5
 #: Kinds of scenes that are drawn.
 KINDS = ("room", "corridor", "hall")
 
@@ -29,14 +33,18 @@ def run(setting: Setting, progress: Progress) -> Findings:
         table, figure = _simulated(kind, scene_numbers(1, setting.seed)[0], methods)
         tables.append(table)
         figures.append(figure)
-    for name, scans in recorded_scans(setting, 5):
+    for name, scans in recorded_scans(setting, CHOICE):
         progress(f"{name}: drawing all methods")
         # One far reading would make a picture of small dots: the scan that reaches the least far.
         nearest = min(scans, key=lambda scan: float(scan.ranges[scan.valid].max(initial=0.0)))
         comparison = compare_scan(nearest, methods, title=f"{name}, one scan")
         tables.append(comparison.table(times=False))
         picture = canvas.figure_bytes(comparison.figure(errors=False), dpi=100)
-        figures.append(Figure(f"fig11-{name.lower().replace(' ', '-')}", comparison.title, picture))
+        caption = (
+            f"{name}: what each method finds in one scan, of {CHOICE} from equal parts of the "
+            f"recording the one that reaches the least far. {RESPONSES}"
+        )
+        figures.append(Figure(f"fig11-{name.lower().replace(' ', '-')}", caption, picture))
     numbers = {table.title: table.to_dict()["rows"] for table in tables}
     return Findings(
         "The methods side by side (Figure 11)", _TEXT, tuple(tables), tuple(figures), numbers
@@ -79,6 +87,6 @@ def _simulated(kind: str, number: int, methods: dict[str, Extract]) -> tuple[Tab
         "more."
     )
     picture = scan_figure(scan, {"true features": true} | found)
-    caption = f"Simulated {kind}: the true features, and what each method finds."
+    caption = f"Simulated {kind}: the true features, and what each method finds. {RESPONSES}"
     figure = Figure(f"fig11-{kind}", caption, canvas.figure_bytes(picture, dpi=100))
     return Table.of_records(f"One scan of a simulated {kind}", rows, note), figure

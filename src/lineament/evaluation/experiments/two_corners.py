@@ -182,7 +182,8 @@ def _overall(found: Mapping[str, Distances], bounds: Array, count: int) -> Table
     return Table.of_records(
         "Table 2: distance between the two corners, from all five places together",
         [*rows, best],
-        f"A and B are the found corners within {GATE} m of them.",
+        f"A and B are the found corners nearest to them, within {GATE} m. That favours methods "
+        "with many corners: of several about one vertex it takes the best.",
     )
 
 
@@ -203,7 +204,7 @@ def _place_cell(distances: Array, count: int) -> str | None:
     off, share = 1e3 * (distances.mean() - DISTANCE), len(distances) / count
     spread = _deviation(distances)
     about = "" if spread is None else f" ± {1e3 * spread:.1f}"
-    return f"{off:+.1f}{about} ({100 * share:.0f} %)"
+    return f"{off:+.1f}{about} ({100 * share:.0f} %)".replace("-", "−")
 
 
 def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
@@ -218,7 +219,8 @@ def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
         drawing.draw_features(axes, features, scan, extent=6.0)
         c, s = math.cos(pose[2]), math.sin(pose[2])
         for name, vertex in (("A", A), ("B", B)):
-            _label(axes, name, (vertex - pose[:2]) @ np.array([[c, -s], [s, c]]))
+            at = (vertex - pose[:2]) @ np.array([[c, -s], [s, c]])
+            _label(axes, name, at, np.zeros(2))
     handles = {
         label: handle
         for axes in panels
@@ -245,15 +247,19 @@ def _draw_room(axes: Axes) -> None:
         axes.annotate(str(k + 1), (x, y), xytext=(7, -9), textcoords="offset points", fontsize=9)
     axes.plot(*np.array((A, B)).T, ":", color=canvas.CORNER_COLOR, linewidth=1.2)
     for name, vertex in (("A", A), ("B", B)):
-        _label(axes, name, vertex)
+        _label(axes, name, vertex, np.mean(POSES, axis=0)[:2])
 
 
-def _label(axes: Axes, name: str, at: Array) -> None:
+def _label(axes: Axes, name: str, at: Array, viewer: Array) -> None:
+    """Write the name of a corner on the line of sight to it, where no wall can be."""
+    toward = (viewer - at) / math.dist(viewer, at)
     axes.annotate(
         name,
         (float(at[0]), float(at[1])),
-        xytext=(-12, 7),
+        xytext=(15 * float(toward[0]), 15 * float(toward[1])),  # points
         textcoords="offset points",
+        ha="center",
+        va="center",
         fontsize=11,
         fontweight="bold",
         color=canvas.CORNER_COLOR,
