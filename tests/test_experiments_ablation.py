@@ -123,6 +123,7 @@ class TestRecorded:
             "optimal": Repeats(10, np.zeros(6)),
             "iepf": Repeats(20, np.zeros(8)),
             "hough": Repeats(5, np.zeros(4)),
+            "liu": Repeats(2, np.zeros(2)),  # too few for a rate
         }
         count, rate = recorded_aims._repeat_aims("log", "", "optimal", repeats)
         assert (count.figure, count.limits.low, count.reached) == (

@@ -87,18 +87,17 @@ def geometries():
     for n in (1, 2, 3, 4, 7, 61, 360):
         yield n, -0.5, 0.005
         yield n, -math.pi, 2 * math.pi / n
-    yield 100, 0.0, 1e-9
 
 
 def all_hostile():
     for k, (n, first, step) in enumerate(geometries()):
-        for name, ranges in hostile_scans(n, np.random.default_rng(k)).items():
-            yield f"{name}, {n} beams by {step:.2g}", LaserScan(ranges, first, step)
+        for ranges in hostile_scans(n, np.random.default_rng(k)).values():
+            yield LaserScan(ranges, first, step)
 
 
 @every_extractor
 def test_features_of_hostile_scans_are_sound(extractor):
-    for _, scan in all_hostile():
+    for scan in all_hostile():
         assert_sound(scan, extractor(scan))
 
 
@@ -116,8 +115,9 @@ def test_features_of_thousands_of_scans_are_sound(extractor):
         scan = random_scan(seed)
         assert_sound(scan, extractor(scan))
     for _ in range(100):
-        n, full = int(rng.integers(1, 500)), rng.random() < 0.5
-        step = 2 * math.pi / n if full else 0.01
+        n = int(rng.integers(1, 500))
+        # With beams as near as the last digits, points determine no line.
+        step = rng.choice([2 * math.pi / n, 0.01, 1e-9])
         for ranges in hostile_scans(n, rng).values():
             scan = LaserScan(ranges, -math.pi, step, range_max=rng.choice([5.0, np.inf]))
             assert_sound(scan, extractor(scan))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from lineament.evaluation.ple import (
     polylines_of,
     run_benchmark,
     score_map,
+    sparing_map,
 )
 from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT
 
@@ -87,6 +89,29 @@ def test_the_authors_iepf_comes_out_to_the_last_digit_on_simulated_scans(simulat
     ]
     # A ∪ B = A + B - A ∩ B, so that the one score bounds the other.
     assert (result.scores["iou"] <= 1 - result.scores["area_error"] / 2 + 1e-12).all()
+
+
+def odd(benchmark):
+    """Give the scans with odd numbers: a constant of `optimal` was chosen on the others."""
+    scores = {score: values[1::2] for score, values in benchmark.scores.items()}
+    outlines = benchmark.outlines and benchmark.outlines[1::2]
+    return replace(benchmark, scans=benchmark.scans[1::2], scores=scores, outlines=outlines)
+
+
+@pytest.mark.slow
+def test_optimal_explains_more_of_real_scans_and_better_than_any_authors(real):
+    result = run_benchmark(odd(real), "optimal")
+    for score, better in (("rmse", np.less), ("f", np.greater)):
+        theirs = result.benchmark.means()[score]["ple+"]
+        assert better(result.means()[score], theirs).all()
+
+
+@pytest.mark.slow
+def test_a_map_of_few_vertices_is_nearer_to_the_truth_than_the_authors_best(simulated):
+    pytest.importorskip("shapely")
+    scans = replace(odd(simulated), max_vertices=(30,))
+    area_error = run_benchmark(scans, sparing_map("optimal")).means()["area_error"]
+    assert area_error[0] < 0.8 * min(scans.means()["area_error"]["ple+"])
 
 
 @pytest.mark.parametrize(("scan", "budget"), TIED)
@@ -293,6 +318,19 @@ def test_a_method_of_the_registry():
     assert result.scores["vertices"].tolist() == [[2, 2]] * 2
     assert result.scores["rmse"].max() < 1e-9
     assert [len(line) for line in method_map("iepf")(wall_benchmark().scans[0], 10)] == [2]
+
+
+@pytest.mark.parametrize("sigma", [1e-3, 0.02])
+def test_a_sparing_map_spends_no_vertices_on_noise(sigma):
+    bearings = np.radians(np.arange(-60, 61))
+    noise = np.random.default_rng(2).normal(0.0, sigma, 121)
+    scan = LaserScan(2 / np.maximum(np.cos(bearings), 0.7) + noise, angles=bearings)
+    sparing = sparing_map("optimal")
+    assert sum(map(len, method_map("optimal")(scan, 14))) == 14
+    assert 2 < sum(map(len, sparing(scan, 14))) < 14
+    assert sparing(scan, 1) == []
+    nothing = LaserScan(np.full(121, np.nan), angles=bearings)
+    assert sparing(nothing, 5) == []
 
 
 def archive(**changes):

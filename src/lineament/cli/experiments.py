@@ -93,19 +93,23 @@ def bench() -> None:
 @bench.command()
 @click.option("--data", required=True, type=PATH, help="Half a benchmark, .npz.")
 @click.option("-m", "--method", "methods", required=True, multiple=True, help="May be given again.")
+@click.option("--sparing", is_flag=True, help="As many vertices as there is evidence for, up to J.")
 @click.option("--json", "output", type=PATH, help="File for all scores, of one method.")
 @QUIET
-def ple(data: Path, methods: tuple[str, ...], output: Path | None, quiet: bool) -> None:
+def ple(
+    data: Path, methods: tuple[str, ...], sparing: bool, output: Path | None, quiet: bool
+) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
     from ..atomic import write_text
-    from ..evaluation.ple import load_benchmark, method_map, run_benchmark
+    from ..evaluation.ple import load_benchmark, method_map, run_benchmark, sparing_map
     from ..evaluation.report import benchmark_tables
     from .progress import tracker
 
     if output is not None and len(methods) > 1:
         raise click.UsageError("--json holds the scores of one method, expected one -m")
+    make_map = sparing_map if sparing else method_map
     with wrong_usage():
-        makers = {method: method_map(method) for method in methods}
+        makers = {method: make_map(method) for method in methods}
     benchmark, track = load_benchmark(data), tracker(quiet)
     results = [
         run_benchmark(benchmark, make, name=method, track=track) for method, make in makers.items()

@@ -81,19 +81,12 @@ def join(floats, ints, counts, noise, sums, step):
 def _note_candidate(floats, ints, counts, k):
     """Note the first point of a piece, how far it is off the line before, and its RISE."""
     n, i, a, b = counts[CANDIDATES], ints[FIRST, k], floats[LINE_A, k - 1], floats[LINE_B, k - 1]
-    off = abs(1.0 - a * floats[X, i] - b * floats[Y, i]) / math.sqrt(a * a + b * b)
+    norm = math.sqrt(a * a + b * b)
+    # Points all around have no line.
+    off = abs(1.0 - a * floats[X, i] - b * floats[Y, i]) / norm if norm > 0.0 else math.inf
     ints[CANDIDATE, n] = i
     floats[CHORD_DISTANCE, n], floats[CANDIDATE_RESPONSE, n] = off, floats[RISE, k]
     counts[CANDIDATES] = n + 1
-
-
-@helper
-def chain(floats, ints, counts):
-    """Join all neighbours in a class, as a polyline does, wherever they meet."""
-    for k in range(counts[PIECES]):
-        ints[BEFORE, k], floats[RESPONSE, k] = -1, math.nan
-        if k > 0 and ints[LABEL, ints[FIRST, k]] == ints[LABEL, ints[LAST, k - 1]]:
-            ints[BEFORE, k] = k - 1
 
 
 @helper
@@ -116,9 +109,10 @@ def _meet(floats, ints, noise, p, q, step):
     i, j = ints[LAST, p], ints[FIRST, q]
     a1, b1, a2, b2 = floats[LINE_A, p], floats[LINE_B, p], floats[LINE_A, q], floats[LINE_B, q]
     determinant = a1 * b2 - a2 * b1
-    sine = abs(determinant) / math.sqrt((a1 * a1 + b1 * b1) * (a2 * a2 + b2 * b2))
-    if not sine > _LEAST_SINE:
+    norms = math.sqrt((a1 * a1 + b1 * b1) * (a2 * a2 + b2 * b2))
+    if not abs(determinant) > _LEAST_SINE * norms:
         return False
+    sine = abs(determinant) / norms
     x, y = (b2 - b1) / determinant, (a1 - a2) / determinant
     rho = 0.5 * (floats[RHO, i] + floats[RHO, j])
     # The border was placed by a reading, with its own noise.

@@ -38,7 +38,7 @@ from .layout import (
     POINTS,
     RESPONSE,
 )
-from .line_fit import REFINED, excess, fit_line, range_variance, refine_line
+from .line_fit import REFINED, WEIGHTED, excess, fit_line, range_variance, refine_line
 from .records import (
     A_CENTER,
     A_COVARIANCE,
@@ -204,6 +204,8 @@ def _refined_line(floats, ints, pieces, k, noise):
     """Fit the line of a piece from what is known of it: LINE_A, LINE_B, COST, and its corners."""
     x, y, rho = floats[MEASURED_X], floats[MEASURED_Y], floats[MEASURED_RHO]
     first, last, a, b = ints[FIRST, k], ints[LAST, k], floats[LINE_A, k], floats[LINE_B, k]
+    if a == 0.0 and b == 0.0:  # Points all around: no line is the best.
+        return fit_line(x, y, rho, first, last, noise, WEIGHTED)
     # What χ² has too much is the wall's own, along its normal.
     middle = rho[(first + last) // 2]
     square = min(1.0 / ((a * a + b * b) * middle * middle), 1.0)

@@ -1,6 +1,6 @@
 """What method `optimal` is to reach, and what it reaches: in simulation, on recordings, in time.
 
-Seeds and recordings are those that it was not tuned on, as far as there are others.
+The scenes are others than those that it was tuned on; of the recordings there are no others.
 """
 
 from __future__ import annotations

@@ -85,7 +85,9 @@ def _repeat_aims(name: str, kind: str, method: str, repeats: Mapping[str, Repeat
     mine = repeats[method]
     others = {m: r for m, r in repeats.items() if m != method}
     most = max(others, key=lambda m: others[m].repeated)
-    highest = max(others, key=lambda m: others[m].rate)
+    # The rate of a handful of corners tells nothing.
+    several = {m: r for m, r in others.items() if 2 * r.repeated >= mine.repeated} or others
+    highest = max(several, key=lambda m: several[m].rate)
     return [
         Aim(
             name,
