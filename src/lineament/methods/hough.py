@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..kernels.hough import find_by_votes
-from ..kernels.settling import settle
 from ..kernels.stretches import MOMENTS
 from ..stages import FITS
-from .base import MethodBase
 from .checks import check_choice, check_count, check_number
-from .pdbs import check_acute, part
-from .steps import limit_vertices, measure
+from .lines import LineMethod
 
 __all__ = ["Hough"]
 
@@ -38,7 +35,7 @@ class _Scratch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hough(MethodBase):
+class Hough(LineMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
 
     1. *Part* the scan at its breakpoints. In each cluster:
@@ -70,15 +67,12 @@ class Hough(MethodBase):
         Unevenness: how far a point may lie from the line without noise [m].
     sigmas : float
         Standard deviations of its range noise that a point may lie off besides.
-    reach : float
-        How many spacings the intersection of two neighbouring lines may lie from the ends of both
-        pieces to be a corner.
     fit : {"weighted", "total", "y_of_x"}
         How the final lines are fitted: maximum likelihood, orthogonal or axial least squares.
-    grazing_angle, noise_factor, max_missing
+    noise_factor : float
         Of the breakpoint detector that parts the scan first, see `PDBS`.
-    max_vertices : int
-        Pieces are joined until their polylines have no more vertices; 0 allows any number.
+    reach, grazing_angle, max_missing, max_vertices
+        As in `lineament.methods.lines.LineMethod`.
 
     Raises
     ------
@@ -105,26 +99,19 @@ class Hough(MethodBase):
     max_misses: int = 2
     epsilon: float = 0.01
     sigmas: float = 2.5
-    reach: float = 6.0
     fit: str = "weighted"
-    grazing_angle: float = math.radians(6.0)
     noise_factor: float = 3.0
-    max_missing: int = 5
-    max_vertices: int = 0
 
     def __post_init__(self) -> None:
         check_number("resolution", self.resolution)
         check_count("angles", self.angles, least=4)
         check_count("distances", self.distances, least=4)
-        for name in ("min_length", "epsilon", "sigmas", "reach", "noise_factor"):
+        for name in ("min_length", "epsilon", "sigmas", "noise_factor"):
             check_number(name, getattr(self, name), or_equal=True)
         check_count("min_points", self.min_points, least=3)
         check_count("max_misses", self.max_misses, least=0)
         check_choice("fit", self.fit, FITS)
-        check_acute("grazing_angle", self.grazing_angle)
-        for name in ("max_missing", "max_vertices"):
-            check_count(name, getattr(self, name), least=0)
-        self._settle_types()
+        self._check_shared()
 
     def own_arrays(self, beams: int) -> _Scratch:
         """Make the accumulator, its directions, and room for running sums and tolerances."""
@@ -142,14 +129,7 @@ class Hough(MethodBase):
         """Part, find by votes, settle the borders and fit the scan in a block's workspace."""
         own: _Scratch = block.own
         workspace = (block.floats, block.ints, block.counts)
-        part(
-            block,
-            row,
-            constant=self.noise_factor,
-            angle=self.grazing_angle,
-            max_missing=self.max_missing,
-            min_points=self.min_points,
-        )
+        self._part(block, row, self.min_points, self.noise_factor)
         find_by_votes(
             *workspace,
             block.noises[row],
@@ -161,6 +141,5 @@ class Hough(MethodBase):
             self.sigmas,
             *own,
         )
-        settle(*workspace, block.noises[row], self.epsilon, self.reach, own.moments)
-        limit_vertices(block, self.max_vertices)
-        measure(block, row, fit=FITS[self.fit], reach=4.0 * self.reach, gap=self.max_missing + 1.0)
+        self._settle_borders(block, row, self.epsilon, own.moments)
+        self._finish(block, row, fit=FITS[self.fit])

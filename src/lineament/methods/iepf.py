@@ -9,7 +9,6 @@ data*, RoMoCo 2017.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -18,17 +17,14 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..kernels.line_fit import TOTAL, WEIGHTED
-from ..kernels.settling import settle
 from ..kernels.splitting import CHORD, split
 from ..kernels.stretches import MOMENTS
-from .base import MethodBase
 from .checks import check_choice, check_count, check_number
-from .pdbs import check_acute, part
-from .steps import limit_vertices, measure
+from .lines import LineMethod
 
 __all__ = ["IEPF"]
 
-_LEAST = {"min_piece": 2, "corner_trim": 0, "max_missing": 0, "min_points": 2, "max_vertices": 0}
+_LEAST = {"min_piece": 2, "corner_trim": 0, "min_points": 2}
 
 
 class _Scratch(NamedTuple):
@@ -37,7 +33,7 @@ class _Scratch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class IEPF(MethodBase):
+class IEPF(LineMethod):
     """Iterative end point fit.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -66,20 +62,12 @@ class IEPF(MethodBase):
     unevenness : float
         Of walls [m], root mean square, beside the noise: what two lines may differ by and still
         be merged.
-    reach : float
-        How many spacings the lines of two pieces may meet from the ends of both: farther off
-        there is no corner.
     corner_trim : int
         Readings next to a corner that the last fits leave out.
-    grazing_angle : float
-        λ of the breakpoint detector that parts the scan into clusters (Borges and Aldon, see
-        `PDBS`), in 0..π/2 [rad].
-    max_missing : int
-        Missing beams in a row over which a cluster goes on.
     min_points : int
         Clusters of fewer points are noise.
-    max_vertices : int
-        Pieces are joined until they have no more vertices; 0 allows any number.
+    reach, grazing_angle, max_missing, max_vertices
+        As in `lineament.methods.lines.LineMethod`.
 
     Raises
     ------
@@ -105,25 +93,20 @@ class IEPF(MethodBase):
     merge: bool = True
     corner: str = "intersection"
     unevenness: float = 0.01
-    reach: float = 6.0
     corner_trim: int = 1
-    grazing_angle: float = math.radians(6.0)
-    max_missing: int = 5
     min_points: int = 3
-    max_vertices: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("threshold", "proportion", "noise_factor", "unevenness", "reach"):
+        for name in ("threshold", "proportion", "noise_factor", "unevenness"):
             check_number(name, getattr(self, name), or_equal=True)
         if self.threshold == self.proportion == self.noise_factor == 0:
             raise ValueError("threshold, proportion and noise_factor are all 0, expected one > 0")
-        check_acute("grazing_angle", self.grazing_angle)
         for name, least in _LEAST.items():
             check_count(name, getattr(self, name), least=least)
         if not isinstance(self.merge, bool):
             raise ValueError(f"merge is {self.merge!r}, expected True or False")
         check_choice("corner", self.corner, ("intersection", "beam"))
-        self._settle_types()
+        self._check_shared()
 
     @classmethod
     def paper(cls, **changes: Any) -> IEPF:
@@ -149,13 +132,7 @@ class IEPF(MethodBase):
         own: _Scratch = block.own
         workspace = (block.floats, block.ints, block.counts, block.noises[row])
         sharp = self.corner == "intersection"
-        part(
-            block,
-            row,
-            angle=self.grazing_angle,
-            max_missing=self.max_missing,
-            min_points=self.min_points,
-        )
+        self._part(block, row, self.min_points)
         split(
             *workspace,
             CHORD,
@@ -166,16 +143,13 @@ class IEPF(MethodBase):
             own.tolerance,
         )
         if self.merge:
-            settle(*workspace, self.unevenness, self.reach, own.moments)
-        limit_vertices(block, self.max_vertices)
-        measure(
+            self._settle_borders(block, row, self.unevenness, own.moments)
+        self._finish(
             block,
             row,
             fit=WEIGHTED if sharp else TOTAL,
             sharp=sharp,
             trim=self.corner_trim if sharp else 0,
-            reach=self.reach,
-            gap=self.max_missing + 1.0,
         )
 
     @property

@@ -10,7 +10,6 @@ primitives produced by a 2D range finder*, ICRA 1996.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,12 +19,9 @@ from numpy.typing import NDArray
 from ..block import Block
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.line_tracking import track_lines
-from ..kernels.settling import settle
 from ..kernels.stretches import MOMENTS
-from .base import MethodBase
 from .checks import check_count, check_number
-from .pdbs import check_acute, part
-from .steps import limit_vertices, measure
+from .lines import LineMethod
 
 __all__ = ["LineTracking"]
 
@@ -33,14 +29,12 @@ _LEAST = {
     "max_misses": 0,
     "min_piece": 3,
     "corner_trim": 0,
-    "max_missing": 0,
     "min_points": 2,
-    "max_vertices": 0,
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LineTracking(MethodBase):
+class LineTracking(LineMethod):
     """Line tracking.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -65,20 +59,12 @@ class LineTracking(MethodBase):
     unevenness : float
         Of walls [m], root mean square, beside the noise: what two lines may differ by and still
         be merged.
-    reach : float
-        How many spacings the lines of two pieces may meet from the ends of both: farther off
-        there is no corner.
     corner_trim : int
         Readings next to a corner that the last fits leave out.
-    grazing_angle : float
-        λ of the breakpoint detector that parts the scan into clusters (Borges and Aldon, see
-        `PDBS`), in 0..π/2 [rad].
-    max_missing : int
-        Missing beams in a row over which a cluster goes on.
     min_points : int
         Clusters of fewer points are noise.
-    max_vertices : int
-        Pieces are joined until they have no more vertices; 0 allows any number.
+    reach, grazing_angle, max_missing, max_vertices
+        As in `lineament.methods.lines.LineMethod`.
 
     Raises
     ------
@@ -101,21 +87,16 @@ class LineTracking(MethodBase):
     max_misses: int = 2
     min_piece: int = 3
     unevenness: float = 0.01
-    reach: float = 6.0
     corner_trim: int = 1
-    grazing_angle: float = math.radians(6.0)
-    max_missing: int = 5
     min_points: int = 3
-    max_vertices: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("threshold", "unevenness", "reach"):
+        for name in ("threshold", "unevenness"):
             check_number(name, getattr(self, name), or_equal=True)
         check_number("noise_factor", self.noise_factor)
-        check_acute("grazing_angle", self.grazing_angle)
         for name, least in _LEAST.items():
             check_count(name, getattr(self, name), least=least)
-        self._settle_types()
+        self._check_shared()
 
     def own_arrays(self, beams: int) -> NDArray[np.float64]:
         """Make scratch for the merging."""
@@ -124,21 +105,7 @@ class LineTracking(MethodBase):
     def find(self, block: Block, row: int) -> None:
         """Cluster, track, merge and fit the scan in a block's workspace."""
         workspace = (block.floats, block.ints, block.counts, block.noises[row])
-        part(
-            block,
-            row,
-            angle=self.grazing_angle,
-            max_missing=self.max_missing,
-            min_points=self.min_points,
-        )
+        self._part(block, row, self.min_points)
         track_lines(*workspace, self.threshold, self.noise_factor, self.max_misses, self.min_piece)
-        settle(*workspace, self.unevenness, self.reach, block.own)
-        limit_vertices(block, self.max_vertices)
-        measure(
-            block,
-            row,
-            fit=WEIGHTED,
-            trim=self.corner_trim,
-            reach=self.reach,
-            gap=self.max_missing + 1.0,
-        )
+        self._settle_borders(block, row, self.unevenness, block.own)
+        self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)

@@ -8,7 +8,6 @@ Autonomous Robots 23, 2007.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -17,13 +16,10 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..kernels.ransac import PERIOD, find_by_consensus
-from ..kernels.settling import settle
 from ..kernels.stretches import MOMENTS
 from ..stages import FITS
-from .base import MethodBase
 from .checks import check_choice, check_count, check_number
-from .pdbs import check_acute, part
-from .steps import limit_vertices, measure
+from .lines import LineMethod
 
 __all__ = ["Ransac"]
 
@@ -37,7 +33,7 @@ class _Scratch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ransac(MethodBase):
+class Ransac(LineMethod):
     """Random sample consensus within the clusters of a scan.
 
     1. *Part* the scan at its breakpoints. In each cluster, until no piece is long enough:
@@ -69,15 +65,12 @@ class Ransac(MethodBase):
         Standard deviations of its range noise that a point may lie off besides.
     seed : int
         Where the generator begins, 1 … 2³¹ - 2.
-    reach : float
-        How many spacings the intersection of two neighbouring lines may lie from the ends of both
-        pieces to be a corner.
     fit : {"weighted", "total", "y_of_x"}
         How the final lines are fitted: maximum likelihood, orthogonal or axial least squares.
-    grazing_angle, noise_factor, max_missing
+    noise_factor : float
         Of the breakpoint detector that parts the scan first, see `PDBS`.
-    max_vertices : int
-        Pieces are joined until their polylines have no more vertices; 0 allows any number.
+    reach, grazing_angle, max_missing, max_vertices
+        As in `lineament.methods.lines.LineMethod`.
 
     Raises
     ------
@@ -104,15 +97,11 @@ class Ransac(MethodBase):
     epsilon: float = 0.01
     sigmas: float = 2.5
     seed: int = 1
-    reach: float = 6.0
     fit: str = "weighted"
-    grazing_angle: float = math.radians(6.0)
     noise_factor: float = 3.0
-    max_missing: int = 5
-    max_vertices: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("min_length", "epsilon", "sigmas", "reach", "noise_factor"):
+        for name in ("min_length", "epsilon", "sigmas", "noise_factor"):
             check_number(name, getattr(self, name), or_equal=True)
         check_count("min_points", self.min_points, least=3)
         check_count("max_misses", self.max_misses, least=0)
@@ -122,10 +111,7 @@ class Ransac(MethodBase):
         if self.seed >= PERIOD:
             raise ValueError(f"seed is {self.seed}, expected a whole number < {PERIOD}")
         check_choice("fit", self.fit, FITS)
-        check_acute("grazing_angle", self.grazing_angle)
-        for name in ("max_missing", "max_vertices"):
-            check_count(name, getattr(self, name), least=0)
-        self._settle_types()
+        self._check_shared()
 
     def own_arrays(self, beams: int) -> _Scratch:
         """Make room for the running sums, the tolerances, and the points that are left."""
@@ -142,14 +128,7 @@ class Ransac(MethodBase):
         """Part, find by consensus, settle the borders and fit the scan in a block's workspace."""
         own: _Scratch = block.own
         workspace = (block.floats, block.ints, block.counts)
-        part(
-            block,
-            row,
-            constant=self.noise_factor,
-            angle=self.grazing_angle,
-            max_missing=self.max_missing,
-            min_points=self.min_points,
-        )
+        self._part(block, row, self.min_points, self.noise_factor)
         find_by_consensus(
             *workspace,
             block.noises[row],
@@ -163,6 +142,5 @@ class Ransac(MethodBase):
             self.seed,
             *own,
         )
-        settle(*workspace, block.noises[row], self.epsilon, self.reach, own.moments)
-        limit_vertices(block, self.max_vertices)
-        measure(block, row, fit=FITS[self.fit], reach=4.0 * self.reach, gap=self.max_missing + 1.0)
+        self._settle_borders(block, row, self.epsilon, own.moments)
+        self._finish(block, row, fit=FITS[self.fit])

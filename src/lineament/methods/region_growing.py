@@ -6,7 +6,6 @@ seeded region growing*, International Journal of Advanced Robotic Systems 15(1),
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -15,13 +14,10 @@ from numpy.typing import NDArray
 
 from ..block import Block
 from ..kernels.region_growing import grow_regions
-from ..kernels.settling import settle
 from ..kernels.stretches import MOMENTS
 from ..stages import FITS
-from .base import MethodBase
 from .checks import check_choice, check_count, check_number
-from .pdbs import check_acute, part
-from .steps import limit_vertices, measure
+from .lines import LineMethod
 
 __all__ = ["RegionGrowing"]
 
@@ -33,7 +29,7 @@ class _Scratch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RegionGrowing(MethodBase):
+class RegionGrowing(LineMethod):
     """The method of Gao et al. 2018, its thresholds scaled by the noise.
 
     1. *Part* the scan at its breakpoints.
@@ -57,15 +53,12 @@ class RegionGrowing(MethodBase):
         Unevenness: how far a point may lie from the line without noise [m].
     sigmas : float
         Standard deviations of its range noise that a point may lie off besides.
-    reach : float
-        How many spacings the intersection of two neighbouring lines may lie from the ends of both
-        pieces to be a corner.
     fit : {"weighted", "total", "y_of_x"}
         How the final lines are fitted: maximum likelihood, orthogonal or axial least squares.
-    grazing_angle, noise_factor, max_missing
+    noise_factor : float
         Of the breakpoint detector that parts the scan first, see `PDBS`.
-    max_vertices : int
-        Pieces are joined until their polylines have no more vertices; 0 allows any number.
+    reach, grazing_angle, max_missing, max_vertices
+        As in `lineament.methods.lines.LineMethod`.
 
     Raises
     ------
@@ -90,23 +83,16 @@ class RegionGrowing(MethodBase):
     epsilon: float = 0.01
     delta: float = 0.1
     sigmas: float = 3.0
-    reach: float = 6.0
     fit: str = "weighted"
-    grazing_angle: float = math.radians(6.0)
     noise_factor: float = 3.0
-    max_missing: int = 5
-    max_vertices: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("l_min", "epsilon", "delta", "sigmas", "reach", "noise_factor"):
+        for name in ("l_min", "epsilon", "delta", "sigmas", "noise_factor"):
             check_number(name, getattr(self, name), or_equal=True)
         check_count("s_num", self.s_num, least=3)
         check_count("p_min", self.p_min, least=3)
         check_choice("fit", self.fit, FITS)
-        check_acute("grazing_angle", self.grazing_angle)
-        for name in ("max_missing", "max_vertices"):
-            check_count(name, getattr(self, name), least=0)
-        self._settle_types()
+        self._check_shared()
 
     def own_arrays(self, beams: int) -> _Scratch:
         """Make room for the running sums and the tolerances."""
@@ -117,14 +103,7 @@ class RegionGrowing(MethodBase):
         """Part, seed and grow, settle the overlaps and fit the scan in a block's workspace."""
         own: _Scratch = block.own
         workspace = (block.floats, block.ints, block.counts)
-        part(
-            block,
-            row,
-            constant=self.noise_factor,
-            angle=self.grazing_angle,
-            max_missing=self.max_missing,
-            min_points=self.s_num,
-        )
+        self._part(block, row, self.s_num, self.noise_factor)
         grow_regions(
             *workspace,
             block.noises[row],
@@ -136,6 +115,5 @@ class RegionGrowing(MethodBase):
             self.sigmas,
             *own,
         )
-        settle(*workspace, block.noises[row], self.epsilon, self.reach, own.moments)
-        limit_vertices(block, self.max_vertices)
-        measure(block, row, fit=FITS[self.fit], reach=4.0 * self.reach, gap=self.max_missing + 1.0)
+        self._settle_borders(block, row, self.epsilon, own.moments)
+        self._finish(block, row, fit=FITS[self.fit])
