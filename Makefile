@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint types tests coverage wheel bench clean
+.PHONY: demo test lint types tests coverage wheel bench browser clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -24,8 +24,14 @@ lint: .venv/ready
 types: .venv/ready
 	$(BIN)/mypy
 
+# The tests of the page of `lineament view` drive a browser; without one they skip, and say so.
+browser:
+	@(command -v chromium && command -v chromedriver) >/dev/null || if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; \
+	then apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver >/dev/null; \
+	else echo "no chromium: the tests of the page will be skipped"; fi
+
 # Numba sees a change in a kernel's own file, but not in those that it calls: compile anew.
-tests: .venv/ready
+tests: .venv/ready browser
 	find src -name '*.nb[ic]' -delete
 	$(BIN)/python -m pytest --durations=5
 
