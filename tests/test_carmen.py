@@ -272,7 +272,8 @@ def test_ranges_are_read_to_the_last_bit(tmp_path, ranges):
         ("carmen/aces-corrected.log.gz", 440, 180, None),
         ("carmen/csail-corrected.log.gz", 406, 361, None),
         ("carmen/intel-corrected.log.gz", 910, 180, None),
-        ("graph/intel-lab.log.gz", 2672, 180, (4.775, -5.841, -1.686332)),
+        ("graph/intel-lab.log.gz", 2672, 180, (4.78, -5.84, -1.69)),
+        ("graph/killian.g2o.zip", 3873, 180, (1.96, 37.867, -2.01239)),
     ],
 )
 def test_recordings(data_dir, name, count, beams, pose):

@@ -38,7 +38,7 @@ def test_format_is_found_by_content(tmp_path, name, pack):
     ],
 )
 def test_what_is_no_log(tmp_path, content, problem):
-    path = tmp_path / "thing.dat"
+    path = tmp_path / "thing.bin"
     path.write_bytes(content)
     with pytest.raises(LogError, match=problem) as caught:
         open_log(path)
@@ -48,7 +48,7 @@ def test_what_is_no_log(tmp_path, content, problem):
 
 def test_the_ending_helps_where_content_does_not(tmp_path):
     (tmp_path / "a.log").write_text("hello\n")
-    with pytest.raises(LogError, match="is no CARMEN log, expected lines FLASER"):
+    with pytest.raises(LogError, match=r"is no log of CARMEN \(FLASER"):
         open_log(tmp_path / "a.log")
     (tmp_path / "a.npz").write_text("hello\n")
     with pytest.raises(LogError, match="is no whole npz archive"):

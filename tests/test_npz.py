@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lineament import LaserScan, LineamentError, LogError
-from lineament.logs import open_log, save_npz
+from lineament.logs import copies, open_log, save_npz
 
 GOOD = {"ranges": np.ones((4, 3)), "angle_min": 0.0, "angle_increment": 0.1}
 
@@ -141,7 +141,7 @@ def test_cut_off_and_damaged_archives(tmp_path):
     data = path.read_bytes()
     for cut in range(1, len(data), 17):
         path.write_bytes(data[:cut])
-        with pytest.raises(LogError, match=r"is no whole npz archive|is no log"):
+        with pytest.raises(LogError, match=r"is no whole (npz|zip) archive|is no log"):
             open_log(path)
     for at in range(0, len(data), 5):
         path.write_bytes(data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :])
@@ -177,3 +177,10 @@ def test_recordings(data_dir, name, shape):
 def test_the_benchmark_is_no_log(data_dir, name):
     with pytest.raises(LogError, match=r"expected the keys ranges, .*found azimuth, radius"):
         open_log(data_dir / "benchmark" / f"{name}.npz")
+
+
+def test_an_archive_that_grows_too_much(tmp_path, monkeypatch):
+    monkeypatch.setattr(copies, "SMALL_COPY", 1 << 20)
+    np.savez_compressed(tmp_path / "a.npz", **{**GOOD, "ranges": np.zeros((1000, 2000))})
+    with pytest.raises(LogError, match=r"a\.npz: unpacks to more than 300 times its size"):
+        open_log(tmp_path / "a.npz")

@@ -206,6 +206,29 @@ class LaserScan:
         span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
         return span >= 2 * math.pi - 2.5 * step
 
+    def with_pose(self, pose: Pose | None) -> LaserScan:
+        """Make the same scan with another pose; they share their arrays.
+
+        Parameters
+        ----------
+        pose : (x, y, theta) or None
+            Pose of the sensor in the world frame [m, m, rad].
+
+        Raises
+        ------
+        ValueError
+            If the pose is not three finite numbers.
+
+        Examples
+        --------
+        >>> scan = LaserScan([1.0, 2.0], 0.0, 0.1)
+        >>> scan.with_pose((3, 4, 0)).pose, scan.pose
+        ((3.0, 4.0, 0.0), None)
+        """
+        other = LaserScan.__new__(LaserScan)
+        other.__dict__.update(self.__dict__, pose=None if pose is None else _pose(pose))
+        return other
+
     @classmethod
     def from_message(cls, message: Any, *, pose: Pose | None = None) -> LaserScan:
         """Make a scan of any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
@@ -277,27 +300,38 @@ def _vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
         given = np.asarray(values)
         if given.dtype.kind == "c":
             raise TypeError
-        vector = given.astype(np.float64)
+        vector = _as_float64(given)
     except (TypeError, ValueError):
         raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
     if vector.ndim != 1:
         raise ValueError(f"{name} has shape {vector.shape}, expected one dimension")
     if length is not None and len(vector) != length:
         raise ValueError(f"{name} has {len(vector)} values, expected {length}, one for each range")
-    vector.flags.writeable = False
+    vector.setflags(write=False)
     return vector
+
+
+# A damaged file may hold a signalling NaN: it becomes a NaN like any other, without a warning.
+@np.errstate(invalid="ignore")
+def _as_float64(values: NDArray[Any]) -> Array:
+    return values.astype(np.float64)
 
 
 def _regular_bearings(first: object, step: object, n: int) -> tuple[float, float]:
     if first is None or step is None:
         raise ValueError("angle_min and angle_increment, or angles, must be given")
     first, step = _finite("angle_min", first), _finite("angle_increment", step)
-    if n > 1 and step <= 0:
+    if n > 1 and not first + 0.5 * step > first:
+        if step > 0:
+            raise ValueError(f"angle_increment is {step}, too small for bearings from {first}")
         raise ValueError(f"angle_increment is {step}, expected > 0: beams run counter-clockwise")
-    _check_turn("angle_increment", first, first + (n - 1) * step, step)
+    last = first + (n - 1) * step
+    if last - first > 2 * math.pi:  # Rare, and the check proper takes longer.
+        _check_turn("angle_increment", first, last, step)
     return first, step
 
 
+@np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
 def _irregular_bearings(angles: Array) -> tuple[float, float]:
     n = len(angles)
     bad = np.flatnonzero(~np.isfinite(angles))

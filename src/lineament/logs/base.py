@@ -4,23 +4,91 @@ from __future__ import annotations
 
 import os
 import stat
+import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
+from operator import itemgetter
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from ..errors import LogError
 from ..scan import LaserScan
 from .lines import GZIP, chunks, reading
 
-__all__ = ["Head", "Log"]
+__all__ = ["ECHOES", "Head", "Log", "ReadOptions", "Topic"]
+
+T = TypeVar("T")
 
 #: How much of a file is looked at to find its format [bytes].
 HEAD_SIZE = 1 << 16
 #: How many messages about faults are kept.
 MAX_FAULTS = 10
+#: Which return of a beam that has several can be asked for.
+ECHOES = ("first", "last", "strongest")
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How to make scans of messages that hold more than one; formats without them pass it over.
+
+    Parameters
+    ----------
+    echo : str
+        Which return of a beam that has several: ``first``, ``last`` or ``strongest``.
+    ring : int, optional
+        Which ring of a point cloud is the scan.
+    pose_topic : str, optional
+        Which topic gives the poses.
+
+    Raises
+    ------
+    ValueError
+        If a value is none of these.
+
+    Examples
+    --------
+    >>> ReadOptions(echo="last").ring is None
+    True
+    """
+
+    echo: str = "first"
+    ring: int | None = None
+    pose_topic: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.echo not in ECHOES:
+            raise ValueError(f"echo is {self.echo!r}, expected {' or '.join(ECHOES)}")
+        if self.ring is not None and (type(self.ring) is not int or self.ring < 0):
+            raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
+        if self.pose_topic is not None and not (
+            isinstance(self.pose_topic, str) and self.pose_topic
+        ):
+            raise ValueError(f"pose_topic is {self.pose_topic!r}, expected the name of a topic")
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One kind of messages in a log, of scans or of anything else.
+
+    Parameters
+    ----------
+    name : str
+        As it is asked for.
+    type : str
+        Type of its messages; empty where the name says it all.
+    count : int
+        How many there are.
+    publishers : int
+        How many senders the log knows of.
+    """
+
+    name: str
+    type: str
+    count: int
+    publishers: int = 1
 
 
 @dataclass(frozen=True)
@@ -35,11 +103,14 @@ class Head:
         Its first bytes, decompressed where it is gzip; empty for a folder.
     is_directory : bool
         Whether it is a folder.
+    is_gzip : bool
+        Whether the file is compressed.
     """
 
     path: Path
     data: bytes
     is_directory: bool = False
+    is_gzip: bool = False
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Head:
@@ -59,10 +130,22 @@ class Head:
                 first = file.read(HEAD_SIZE)
         if not first:
             raise LogError(path, "is empty, expected a log")
-        return cls(where, _decompressed_head(where) if first.startswith(GZIP) else first)
+        if not first.startswith(GZIP):
+            return cls(where, first)
+        return cls(where, _decompressed_head(path), is_gzip=True)
+
+    @classmethod
+    def of(cls, path: Path, first: bytes) -> Head:
+        """Make the head of a file that is not at hand, from its first bytes as they are stored."""
+        if not first.startswith(GZIP):
+            return cls(path, first)
+        plain = b""
+        with suppress(zlib.error):
+            plain = zlib.decompressobj(wbits=31).decompress(first, HEAD_SIZE)
+        return cls(path, plain, is_gzip=True)
 
 
-def _decompressed_head(path: Path) -> bytes:
+def _decompressed_head(path: str | os.PathLike[str]) -> bytes:
     data = b""
     try:
         for chunk in chunks(path):
@@ -84,18 +167,27 @@ class Log(ABC):
     Parameters
     ----------
     path : path-like
-        The file.
+        The file. Its ``str`` is what errors call it, which is not the path itself where the log
+        is a temporary copy of what an archive or an address holds.
     topic : str, optional
-        Which scans to read; the reader's own choice if None.
+        Which scans to read; all, or the reader's own choice, if None.
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
+    options : ReadOptions
+        How to make scans of messages that hold more than one.
 
     Attributes
     ----------
+    source : path-like
+        The file as it was given: what is opened, and what errors are made of.
     path : pathlib.Path
-        The file.
+        The file that is read.
+    name : str
+        What a person calls it, for messages.
     topic : str or None
         The topic that was asked for.
+    options : ReadOptions
+        The options.
     skipped : int
         How many faults the last iteration went over; 0 unless `keep_going`.
     faults : list of str
@@ -108,6 +200,8 @@ class Log(ABC):
     description: ClassVar[str]
     #: Usual endings, lower case, of files in this format.
     endings: ClassVar[tuple[str, ...]]
+    #: Whether the reader jumps about in the file, which must then not be compressed as a whole.
+    needs_seek: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -115,12 +209,21 @@ class Log(ABC):
         topic: str | None = None,
         *,
         keep_going: bool = False,
+        options: ReadOptions = ReadOptions(),
     ) -> None:
+        # A temporary copy lives as long as this.
+        self.source = path
         self.path = Path(path)
+        self.name = str(path)
         self.topic = topic
         self.keep_going = keep_going
+        self.options = options
         self.skipped = 0
         self.faults: list[str] = []
+        self._open()
+
+    def _open(self) -> None:  # noqa: B027 (nothing to do is a way to open)
+        """Look into the file as far as it takes to know that it is a log, and has the topic."""
 
     @classmethod
     @abstractmethod
@@ -137,12 +240,28 @@ class Log(ABC):
         """Return the number of scans, faulty ones included."""
 
     @abstractmethod
-    def _scans(self) -> Iterator[LaserScan]:
-        """Read the scans from the start; faults go through `_fault`."""
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        """Read each scan, with its topic, from the start; faults go through `_fault`."""
+
+    def contents(self) -> list[Topic]:
+        """Tell all that the log holds, scans and other messages, in the log's own words."""
+        return []
+
+    def items(self) -> Iterator[tuple[str, LaserScan]]:
+        """Read each scan with its topic, from the start.
+
+        Yields
+        ------
+        topic : str
+            The topic, one of `topics`.
+        scan : LaserScan
+            The scan.
+        """
+        self.skipped, self.faults = 0, []
+        yield from self._items()
 
     def __iter__(self) -> Iterator[LaserScan]:
-        self.skipped, self.faults = 0, []
-        yield from self._scans()
+        return map(itemgetter(1), self.items())
 
     def scan(self, index: int) -> LaserScan:
         """Read one scan by its index, from 0; those before it are read and left.
@@ -155,19 +274,26 @@ class Log(ABC):
         if index >= 0:
             for scan in islice(self, index, None):
                 return scan
-        raise LogError(self.path, f"has no scan {index}, expected 0 to {len(self) - 1}")
+        raise LogError(self.name, f"has no scan {index}, expected 0 to {len(self) - 1}")
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({str(self.path)!r}, topic={self.topic!r})"
+        return f"{type(self).__name__}({self.name!r}, topic={self.topic!r})"
 
     def _fault(self, error: LogError) -> None:
         """Raise `error`, or count it when the log keeps going."""
         if not self.keep_going:
-            raise error
+            raise error.fresh() from None
         self.skipped += 1
         if len(self.faults) < MAX_FAULTS:
             self.faults.append(str(error))
 
+    def _until_broken(self, items: Iterable[T]) -> Iterator[T]:
+        """Pass on what is read from a file; a break in it is a fault, and the end."""
+        try:
+            yield from items
+        except LogError as error:
+            self._fault(error)
+
     def _no_such_topic(self, topics: list[str]) -> LogError:
         known = ", ".join(topics) if topics else "none that carries scans"
-        return LogError(self.path, f"has no topic {self.topic!r}; topics there are: {known}")
+        return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from typing import BinaryIO
 
 from ..errors import LogError
 
-__all__ = ["GZIP", "MAX_LINE", "chunks", "numbered_lines", "reading"]
+__all__ = ["BOM", "GZIP", "MAX_LINE", "chunks", "numbered_lines", "reading"]
 
 #: How a gzip file begins.
 GZIP = b"\x1f\x8b"
@@ -19,7 +20,8 @@ MAX_LINE = 1 << 24
 
 _COMPRESSED = 1 << 16
 _PLAIN = 1 << 20
-_BOM = b"\xef\xbb\xbf"
+#: Mark that some programs put before the first line.
+BOM = b"\xef\xbb\xbf"
 
 
 @contextmanager
@@ -39,8 +41,10 @@ def reading(path: object) -> Iterator[None]:
         raise LogError(path, f"is no path of a file: {error}") from None
 
 
-def chunks(path: Path) -> Iterator[bytes]:
+def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
     """Yield the content of `path`, decompressed where it is gzip, in pieces of up to 1 MiB.
+
+    What is appended while the file is read is left for the next time.
 
     Raises
     ------
@@ -48,34 +52,47 @@ def chunks(path: Path) -> Iterator[bytes]:
         If the file cannot be read, or its gzip data is broken or ends early: after all that
         could be decompressed has been delivered.
     """
-    file = _open(path)
-    with file:
-        first = _read(path, file, _COMPRESSED)
+    with _opened(path) as opened:
+        file = _Source(path, opened)
+        first = file.read(_COMPRESSED)
         if first.startswith(GZIP):
             yield from _gunzip(path, file, first)
             return
         while first:
             yield first
-            first = _read(path, file, _PLAIN)
+            first = file.read(_PLAIN)
 
 
-def _open(path: Path) -> BinaryIO:
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    # Only what the file does is guarded: what the consumer of a generator does is not.
     with reading(path):
-        return path.open("rb")
+        file = Path(path).open("rb")  # noqa: SIM115
+    with file:
+        yield file
 
 
-def _read(path: Path, file: BinaryIO, size: int) -> bytes:
-    # Only the read is guarded: what the consumer of a generator does is not.
-    with reading(path):
-        return file.read(size)
+class _Source:
+    """A file as long as it is now: what is written to it while it is read is left for later."""
+
+    def __init__(self, path: object, file: BinaryIO) -> None:
+        self._path, self._file = path, file
+        with reading(path):
+            self._left = os.fstat(file.fileno()).st_size
+
+    def read(self, size: int) -> bytes:
+        with reading(self._path):
+            data = self._file.read(min(size, self._left))
+        self._left -= len(data)
+        return data
 
 
-def _gunzip(path: Path, file: BinaryIO, data: bytes) -> Iterator[bytes]:
+def _gunzip(path: object, file: _Source, data: bytes) -> Iterator[bytes]:
     """Decompress member after member, as gzip does; zeros may pad the end."""
     stream = zlib.decompressobj(wbits=31)
     while True:
         if not data:
-            data = _read(path, file, _COMPRESSED)
+            data = file.read(_COMPRESSED)
             if not data:
                 yield stream.flush()
                 break
@@ -113,7 +130,7 @@ def _reason(error: zlib.error) -> str:
     return str(error).rpartition(": ")[2]
 
 
-def numbered_lines(path: Path) -> Iterator[tuple[int, bytes]]:
+def numbered_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, bytes]]:
     """Yield each line of `path` with its number, from 1; memory holds one line and one piece.
 
     A last line without an end is delivered, unless the stream broke within it.
@@ -129,7 +146,7 @@ def numbered_lines(path: Path) -> Iterator[tuple[int, bytes]]:
         for chunk in chunks(path):
             lines = (rest + chunk).split(b"\n")
             if number == 1:
-                lines[0] = lines[0].removeprefix(_BOM)
+                lines[0] = lines[0].removeprefix(BOM)
             rest = lines.pop()
             yield from enumerate(lines, number)
             number += len(lines)

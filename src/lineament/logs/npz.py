@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from ..atomic import naming_errors, written_beside
 from ..errors import LogError
 from ..scan import LaserScan
 from .base import Head, Log
+from .copies import check_growth
 from .lines import reading
 
 __all__ = ["NpzLog", "save_npz"]
@@ -46,18 +48,12 @@ class NpzLog(Log):
     format = "npz"
     description = "npz (ranges, angle_min, angle_increment)"
     endings = (".npz",)
+    needs_seek = True
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        topic: str | None = None,
-        *,
-        keep_going: bool = False,
-    ) -> None:
-        super().__init__(path, topic, keep_going=keep_going)
-        if topic not in (None, _TOPIC):
+    def _open(self) -> None:
+        if self.topic not in (None, _TOPIC):
             raise self._no_such_topic(self.topics)
-        self._arrays = _load(self.path)
+        self._arrays = _load(self.source)
         self._n, self._m = self._arrays[_TOPIC].shape
 
     @classmethod
@@ -75,14 +71,14 @@ class NpzLog(Log):
     def __len__(self) -> int:
         return int(self._n)
 
-    def _scans(self) -> Iterator[LaserScan]:
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
         for i in range(self._n):
             try:
                 scan = self._scan(i)
             except ValueError as error:
-                self._fault(LogError(self.path, f"scan {i}: {error}"))
+                self._fault(LogError(self.name, f"scan {i}: {error}"))
             else:
-                yield scan
+                yield _TOPIC, scan
 
     def _scan(self, i: int) -> LaserScan:
         arrays = self._arrays
@@ -107,12 +103,16 @@ def _at(values: NDArray[Any], i: int) -> Any:
     return values[i] if values.ndim else values[()]
 
 
-def _load(path: Path) -> dict[str, NDArray[Any]]:
-    with reading(path), path.open("rb") as file:
+def _load(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    with reading(path), Path(path).open("rb") as file:
         try:
             with np.load(file, allow_pickle=False) as archive:
                 found = list(archive.files)
-                arrays = {key: archive[key] for key in _KEYS if key in found}
+                size = sum(member.file_size for member in archive.zip.infolist())
+                check_growth(path, size, Path(path).stat().st_size)
+                arrays = {key: np.asarray(archive[key]) for key in _KEYS if key in found}
+        except LogError:
+            raise
         # A damaged archive fails in a dozen ways, in zipfile, zlib, struct and numpy's parser.
         except Exception as error:
             problem = f"is no whole npz archive: {type(error).__name__}: {error}"
@@ -138,6 +138,8 @@ def _check(arrays: dict[str, NDArray[Any]], found: list[str]) -> None:
     n, m = shape
     if n == 0:
         raise ValueError("ranges has no scans, expected at least one row")
+    if m == 0:  # Any number of scans would fit into no space.
+        raise ValueError("ranges has no beams, expected at least one column")
     expected: dict[str, tuple[tuple[int, ...], ...]] = {
         "ranges": ((n, m),),
         "angle_min": ((),),
@@ -156,6 +158,14 @@ def _check(arrays: dict[str, NDArray[Any]], found: list[str]) -> None:
         if array.dtype.kind not in kinds:
             wanted = "text" if key == "frame_id" else "numbers"
             raise ValueError(f"{key} has type {array.dtype}, expected {wanted}")
+        if key == "frame_id" and not _is_text(array):
+            raise ValueError("frame_id has letters that do not exist, expected text")
+
+
+def _is_text(array: NDArray[Any]) -> bool:
+    """Whether its letters exist: NumPy makes strings of others, which break Python."""
+    letters = np.frombuffer(array.tobytes(), f"{array.dtype.byteorder}u4")
+    return bool(letters.max(initial=0) <= sys.maxunicode)
 
 
 def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: ArrayLike) -> None:
@@ -173,8 +183,8 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
     Raises
     ------
     ValueError
-        If there are no scans, bearings differ, only some scans have intensities, or an extra
-        key is one of the log's own or holds objects.
+        If there are no scans or no beams, bearings differ, only some scans have intensities, or
+        an extra key is one of the log's own or holds objects.
     LineamentError
         If the file cannot be written.
 
@@ -202,6 +212,8 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
     if not scans:
         raise ValueError("there are no scans to write")
     first = scans[0]
+    if not len(first):
+        raise ValueError("scan 0 has no beams, expected at least one")
     for i, scan in enumerate(scans):
         if scan.is_regular != first.is_regular or not np.array_equal(scan.angles, first.angles):
             raise ValueError(f"scan {i} has other bearings than scan 0, expected the same for all")

@@ -1,0 +1,83 @@
+"""Bearings that text logs round or leave out: exact steps, and what SICK scanners do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["SICK_RANGE_MAX", "bearing_fields", "sick_step", "snap"]
+
+#: Range from which a SICK scanner saw nothing, where the log does not say otherwise [m].
+SICK_RANGE_MAX = 50.0
+
+# Logs print angles with 6 decimals; scanners step by simple fractions of a degree.
+_ANGLES_PER_DEGREE = 12
+_ROUNDING = 6e-7
+#: Beyond this there are no bearings, but what a file may hold all the same [rad].
+_FARTHEST = 1e6
+
+
+def snap(angle: float) -> float:
+    """Return the multiple of 1/12° that was rounded to `angle` [rad], or `angle` itself.
+
+    Examples
+    --------
+    >>> math.degrees(snap(0.017453)), snap(0.0174)
+    (1.0, 0.0174)
+    """
+    if not abs(angle) < _FARTHEST:
+        return angle
+    exact = math.radians(round(math.degrees(angle) * _ANGLES_PER_DEGREE) / _ANGLES_PER_DEGREE)
+    return exact if abs(exact - angle) <= _ROUNDING else angle
+
+
+def sick_step(n: int) -> float:
+    """Return the step [rad] between `n` beams of a scanner that sees 180°.
+
+    Exactly 1° for 180 or 181 beams and 0.5° for 360 or 361, else π/(n - 1).
+
+    Examples
+    --------
+    >>> math.degrees(sick_step(180))
+    1.0
+    """
+    if n in (180, 181):
+        return math.radians(1.0)
+    if n in (360, 361):
+        return math.radians(0.5)
+    return math.pi / max(n - 1, 1)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # Absurd bearings: `LaserScan` refuses them.
+def bearing_fields(angles: NDArray[np.float64]) -> dict[str, Any]:
+    """Return the fields of `LaserScan` for bearings that a text lists.
+
+    Parameters
+    ----------
+    angles : ndarray, shape (n,)
+        Bearings [rad], perhaps rounded to 6 decimals.
+
+    Returns
+    -------
+    dict
+        ``angle_min`` and ``angle_increment`` where the steps are even but for the rounding, else
+        ``angles``.
+
+    Examples
+    --------
+    >>> bearing_fields(np.array([0.0, 0.1, 0.2, 0.3]))
+    {'angle_min': 0.0, 'angle_increment': 0.09999999999999999}
+    >>> list(bearing_fields(np.array([0.0, 0.1, 0.3])))
+    ['angles']
+    """
+    n = len(angles)
+    if n > 1 and np.isfinite(angles[[0, -1]]).all():
+        first, step = float(angles[0]), float(angles[-1] - angles[0]) / (n - 1)
+        for start, increment in ((snap(first), snap(step)), (first, step)):
+            off = np.abs(start + increment * np.arange(n) - angles)
+            if increment > 0 and off.max() <= 2 * _ROUNDING:
+                return {"angle_min": start, "angle_increment": increment}
+    return {"angles": angles}

@@ -1,0 +1,133 @@
+"""Scans of CSM, the Canonical Scan Matcher: JSON objects, one after the other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LogError
+from ..scan import LaserScan, Pose
+from .base import Head, Log
+from .bearings import bearing_fields
+from .lines import BOM
+from .objects import json_objects
+
+__all__ = ["CsmLog"]
+
+_TOPIC = "scan"
+_BEGINNING = re.compile(rb"\s*\{\s*\"")
+_KEY = re.compile(rb"\"(?:nrays|readings|min_theta)\"\s*:")
+#: Poses, the best first.
+_POSES = ("true_pose", "estimate", "odometry")
+
+
+class CsmLog(Log):
+    """JSON objects with ``readings`` [m] and ``theta`` [rad], or ``min_theta`` and ``max_theta``.
+
+    A reading is invalid where it is null or its ``valid`` is 0. Bearings that run clockwise are
+    turned round; even steps that were rounded are made exact. The pose is the first of
+    ``true_pose``, ``estimate`` and ``odometry`` that is given; ``timestamp`` is seconds and
+    microseconds.
+
+    Raises
+    ------
+    LogError
+        If the topic is another than ``scan``, or the file does not begin with a scan.
+    """
+
+    format = "csm"
+    description = "CSM JSON (readings, theta)"
+    endings = (".json", ".csm")
+
+    def _open(self) -> None:
+        self._count: int | None = None
+        if self.topic not in (None, _TOPIC):
+            raise self._no_such_topic(self.topics)
+        first = next(json_objects(self.source), None)
+        if isinstance(first, LogError):
+            self._fault(first)
+        if first is None or (isinstance(first, dict) and "readings" not in first):
+            raise LogError(self.source, "is no CSM log, expected JSON objects with readings")
+
+    @classmethod
+    def recognises(cls, head: Head) -> bool:
+        """Whether it begins as a JSON object, and names a key of a scan near the beginning."""
+        data = head.data.removeprefix(BOM)
+        return _BEGINNING.match(data) is not None and _KEY.search(data) is not None
+
+    @property
+    def topics(self) -> list[str]:
+        """The one kind of scans there is: ``scan``."""
+        return [_TOPIC]
+
+    def __len__(self) -> int:
+        if self._count is None:
+            self._count = sum(isinstance(found, dict) for found in json_objects(self.source))
+        return self._count
+
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        for i, found in enumerate(json_objects(self.source)):
+            if isinstance(found, LogError):
+                self._fault(found)
+                continue
+            try:
+                scan = _scan(found)
+            except (ValueError, OverflowError) as error:
+                self._fault(LogError(self.name, f"scan {i}: {error}"))
+            else:
+                yield _TOPIC, scan
+
+
+def _scan(found: dict[str, Any]) -> LaserScan:
+    readings = _numbers("readings", found.get("readings"))
+    n = len(readings)
+    if found.get("valid") is not None:
+        readings = np.where(_numbers("valid", found["valid"], n) == 1, readings, np.nan)
+    angles = _angles(found, n)
+    if n > 1 and angles[-1] < angles[0]:
+        readings, angles = readings[::-1], angles[::-1]
+    return LaserScan(
+        readings, **bearing_fields(angles), stamp=_stamp(found.get("timestamp")), pose=_pose(found)
+    )
+
+
+def _numbers(name: str, values: object, length: int | None = None) -> NDArray[np.float64]:
+    """Return a list of numbers as an array, null as NaN."""
+    if not isinstance(values, list):
+        raise ValueError(f"{name} is {values!r:.40}, expected a list of numbers")
+    if length is not None and len(values) != length:
+        raise ValueError(f"{name} has {len(values)} values, expected {length}")
+    # Booleans are what some programs write for valid; text is never a number.
+    if any(not isinstance(value, (int, float, type(None))) for value in values):
+        raise ValueError(f"{name} has a value that is no number")
+    return np.array(values, np.float64)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # Absurd limits: `LaserScan` refuses what they make.
+def _angles(found: dict[str, Any], n: int) -> NDArray[np.float64]:
+    if found.get("theta") is not None:
+        return _numbers("theta", found["theta"], n)
+    limits = _numbers("min_theta, max_theta", [found.get("min_theta"), found.get("max_theta")])
+    if not np.isfinite(limits).all():
+        raise ValueError("has neither theta nor finite min_theta and max_theta")
+    return np.linspace(limits[0], limits[1], n)
+
+
+def _stamp(timestamp: object) -> float:
+    if timestamp is None:
+        return 0.0
+    seconds, microseconds = _numbers("timestamp", timestamp, 2)
+    return float(seconds + 1e-6 * microseconds)
+
+
+def _pose(found: dict[str, Any]) -> Pose | None:
+    for name in _POSES:
+        if found.get(name) is not None:
+            x, y, theta = _numbers(name, found[name], 3).tolist()
+            if np.isfinite((x, y, theta)).all():
+                return x, y, theta
+    return None

@@ -1,0 +1,177 @@
+"""Streams of JSON objects, one after the other, in bounded memory."""
+
+from __future__ import annotations
+
+import codecs
+import json
+import os
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from ..errors import LogError
+from .lines import chunks
+
+__all__ = ["MAX_OBJECT", "json_objects"]
+
+#: Length of an object from which it is no scan any more [characters].
+MAX_OBJECT = 1 << 22
+#: What is broken may be read several times, up to so many characters beside 16 times the whole.
+SPARE = 1 << 24
+_SPARE_RATIO = 16
+#: Each fault counts as at least so many characters.
+_LEAST_WASTE = 1000
+
+_decode = json.JSONDecoder().raw_decode
+_SPACE = re.compile(r"[\s\ufeff]*")
+_NEXT = re.compile(r"\n(?=\{)")
+
+
+def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogError]:
+    """Yield each JSON object of a file, plain or gzip, or what is wrong with it.
+
+    Objects may follow each other with or without line breaks. After one that is broken, reading
+    goes on at the next line that begins with a brace; in a file that is broken all over, where that
+    would take much longer than to read it, it ends.
+
+    Parameters
+    ----------
+    path : path-like
+        The file. Memory holds one object and one piece of it.
+
+    Yields
+    ------
+    dict or LogError
+        An object; or a fault, with the line on which what is broken begins.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be opened.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "two.json")
+    >>> _ = path.write_text('{"a": 1} {"a": 2}')
+    >>> list(json_objects(path))
+    [{'a': 1}, {'a': 2}]
+    """
+    text = _Text(path)
+    while text.skip_space():
+        line = text.line
+        try:
+            found = text.read_value()
+        except ValueError as error:
+            # Of a stream that breaks, only that is reported: it ends within a value.
+            if text.broken is None:
+                yield LogError(path, str(error), line=line)
+            text.skip_to_object()
+        else:
+            if isinstance(found, dict):
+                yield found
+            else:
+                yield LogError(path, "is no JSON object", line=line)
+    if text.broken is not None:
+        yield LogError(path, text.broken.problem, line=text.line)
+
+
+class _Text:
+    """A text that is read as far as it is needed, and how far that is."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._pieces = chunks(path)
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        self._text, self._at = "", 0
+        #: Number of the line that was reached, from 1.
+        self.line = 1
+        #: What ended the stream too early.
+        self.broken: LogError | None = None
+        self._path, self._passed, self._wasted = path, 0, 0
+
+    def skip_space(self) -> bool:
+        """Go to the next value; False if there is none."""
+        while True:
+            match = _SPACE.match(self._text, self._at)
+            self._go(match.end() if match else self._at)
+            if self._at < len(self._text):
+                return True
+            if not self._grow():
+                return False
+
+    def read_value(self) -> object:
+        """Return the value that begins here, and go behind it; ValueError if it is broken."""
+        while True:
+            try:
+                found, end = _decode(self._text, self._at)
+            except RecursionError:
+                self._waste(len(self._text) - self._at)
+                raise ValueError("JSON is nested too deep, expected a scan") from None
+            except ValueError as error:
+                if len(self._text) - self._at >= MAX_OBJECT:
+                    self._waste(_place(error, self._text) - self._at)
+                    raise ValueError(
+                        f"JSON object is broken or longer than {MAX_OBJECT >> 20} MiB"
+                    ) from None
+                if not self._grow():
+                    self._waste(_place(error, self._text) - self._at)
+                    raise ValueError(f"JSON is broken: {_reason(error)}") from None
+            else:
+                self._go(end)
+                return found
+
+    def skip_to_object(self) -> None:
+        """Go to the next line that begins with a brace, or to the end."""
+        while True:
+            match = _NEXT.search(self._text, self._at)
+            if match:
+                self._go(match.end())
+                return
+            # The last line end may be followed by a brace.
+            self._go(max(self._at, len(self._text) - self._text.endswith("\n")))
+            if not self._grow():
+                self._go(len(self._text))
+                return
+
+    def _go(self, end: int) -> None:
+        self.line += self._text.count("\n", self._at, end)
+        self._passed += end - self._at
+        self._at = end
+
+    def _waste(self, n: int) -> None:
+        """Note that `n` characters were read in vain; too many of them end the stream."""
+        self._wasted += max(n, _LEAST_WASTE)
+        if self._wasted > SPARE + _SPARE_RATIO * self._passed:
+            self.broken = LogError(self._path, "is broken in too many places, expected JSON")
+            self._pieces, self._text, self._at = iter(()), "", 0
+
+    def _grow(self) -> bool:
+        """Have at least twice as much ahead, which bounds the work; False at the end."""
+        self._text, self._at = self._text[self._at :], 0
+        before = len(self._text)
+        more = [self._text]
+        while sum(map(len, more)) <= 2 * before:
+            piece = self._next_piece()
+            if piece is None:
+                break
+            more.append(piece)
+        self._text = "".join(more)
+        return len(self._text) > before
+
+    def _next_piece(self) -> str | None:
+        try:
+            return self._decoder.decode(next(self._pieces))
+        except StopIteration:
+            return None
+        except LogError as error:
+            self.broken = error.fresh()
+            return None
+
+
+def _place(error: ValueError, text: str) -> int:
+    """Where reading failed; of a number with too many digits that is not told."""
+    return error.pos if isinstance(error, json.JSONDecodeError) else len(text)
+
+
+def _reason(error: ValueError) -> str:
+    return error.msg if isinstance(error, json.JSONDecodeError) else str(error)

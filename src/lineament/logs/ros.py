@@ -1,0 +1,161 @@
+"""Scans from bags of ROS messages, whatever the container."""
+
+from __future__ import annotations
+
+import os
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Container, Iterator, Sequence
+
+from ..errors import LogError
+from ..scan import LaserScan
+from .base import Log, ReadOptions, Topic
+from .ros_bag import Bag, Buffer, Connection
+from .ros_messages import CLOUD, decoders
+from .ros_poses import PoseFinder
+
+__all__ = ["RosLog"]
+
+#: How many topics an error lists.
+_LISTED = 20
+
+_Ready = Sequence[tuple[str, LaserScan]]
+
+
+class RosLog(Log):
+    """Scans of a bag: those of the topic that is asked for, or of all, as the bag has them.
+
+    Parameters
+    ----------
+    path : path-like
+        The bag.
+    topic : str, optional
+        Topic of the scans; all that carry scans if None.
+    keep_going : bool
+        Skip and count broken chunks and malformed messages instead of raising an error.
+    options : ReadOptions
+        Which echo of ``MultiEchoLaserScan``; which ring of ``PointCloud2``, whose topics carry
+        scans only where a ring is chosen; and the topic of poses, as
+        :class:`~lineament.logs.ros_poses.PoseFinder` takes it. Poses are those of the frame that
+        the topic is about, and never guessed: none without a topic.
+
+    Raises
+    ------
+    LogError
+        If the bag cannot be read, or there is no such topic, or none with scans: the message lists
+        those there are. While it is iterated: at a message that is malformed, by its number from
+        0 among those of its topic; and where the bag is broken or cut off, after all that is whole.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        topic: str | None = None,
+        *,
+        keep_going: bool = False,
+        options: ReadOptions = ReadOptions(),  # noqa: B008 (frozen)
+    ) -> None:
+        super().__init__(path, topic, keep_going=keep_going, options=options)
+        self._decoders = decoders(self.options.echo, self.options.ring)
+        self._bags = self._open_bags()
+        self._counts: Counter[Connection] = Counter()
+        for bag in self._bags:
+            self._counts.update(bag.counts())
+        self._wanted = self.topics if topic is None else [topic]
+        if not any(name in self.topics for name in self._wanted):
+            raise self._no_scans()
+        self._pose_finder()
+
+    @abstractmethod
+    def _open_bags(self) -> list[Bag]:
+        """Open the files of the bag, in the order of time."""
+
+    @property
+    def topics(self) -> list[str]:
+        """The topics with scans."""
+        return self._topics_of(self._decoders)
+
+    def __len__(self) -> int:
+        return sum(
+            count
+            for connection, count in self._counts.items()
+            if connection.topic in self._wanted and connection.type in self._decoders
+        )
+
+    def contents(self) -> list[Topic]:
+        """Tell all topics, with their types, messages and, in a ROS 1 bag, publishers."""
+        kinds: dict[tuple[str, str], list[int]] = {}
+        for connection, count in sorted(self._counts.items()):
+            kinds.setdefault(connection[:2], []).append(count)
+        return [
+            Topic(name, kind, sum(counts), len(counts)) for (name, kind), counts in kinds.items()
+        ]
+
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        finder = self._pose_finder()
+        waiting = finder.finish if finder else tuple
+        try:
+            yield from self._ready(finder)
+        except LogError:
+            yield from waiting()  # They are whole, whatever comes behind them.
+            raise
+        yield from waiting()
+
+    def _ready(self, finder: PoseFinder | None) -> Iterator[tuple[str, LaserScan]]:
+        topics = {*self._wanted, *(finder.topics if finder else ())}
+        numbers: Counter[str] = Counter()
+        for bag in self._bags:
+            for connection, data in bag.messages(topics, self._fault):
+                number = numbers[connection.topic]
+                numbers[connection.topic] = number + 1
+                try:
+                    ready = self._read(connection, data, finder)
+                except ValueError as error:
+                    where = f"{connection.topic} message {number}"
+                    self._fault(LogError(bag.path, f"{where}: {error}"))
+                else:
+                    yield from ready
+
+    def _read(self, connection: Connection, data: Buffer, finder: PoseFinder | None) -> _Ready:
+        """Read one message: the scans that are ready after it, by topic."""
+        topic, kind = connection.topic, connection.type
+        if finder and topic in finder.topics and kind in finder.types:
+            return finder.learn(connection, data)
+        if topic not in self._wanted or kind not in self._decoders:
+            return ()
+        scan = self._decoders[kind](data, connection.encoding)
+        return finder.wait(topic, scan) if finder else ((topic, scan),)
+
+    def _pose_finder(self) -> PoseFinder | None:
+        if self.options.pose_topic is None:
+            return None
+        try:
+            finder = PoseFinder(self.options.pose_topic)
+        except ValueError as error:
+            raise LogError(self.name, str(error)) from None
+        if finder.topic not in self._topics_of(finder.types):
+            wanted = " or ".join(finder.types)
+            raise LogError(
+                self.name,
+                f"has no {wanted} on {finder.topic!r}; topics there are: {self._listing()}",
+            )
+        return finder
+
+    def _topics_of(self, types: Container[str]) -> list[str]:
+        return sorted({c.topic for c in self._counts if c.type in types})
+
+    def _no_scans(self) -> LogError:
+        wanted = " or ".join(name.removeprefix("sensor_msgs/") for name in self._decoders)
+        on = "" if self.topic is None else f" on {self.topic!r}"
+        hint = ""
+        if self.options.ring is None and self._topics_of((CLOUD,)):
+            hint = "; choose a ring to read a PointCloud2"
+        problem = f"has no {wanted}{on}; topics there are: {self._listing()}{hint}"
+        return LogError(self.name, problem)
+
+    def _listing(self) -> str:
+        known = self.contents()
+        names = [f"{topic.name} ({topic.type}, {topic.count})" for topic in known[:_LISTED]]
+        if len(known) > _LISTED:
+            names.append(f"{len(known) - _LISTED} more")
+        return ", ".join(names) or "none"

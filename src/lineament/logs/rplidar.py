@@ -1,0 +1,141 @@
+"""Scans of RPLIDAR units as JSON: for each unit a list of pairs of numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LogError
+from ..scan import LaserScan, Pose
+from .base import Head, Log
+from .lines import BOM
+from .objects import MAX_OBJECT, json_objects
+from .turn import one_turn
+
+__all__ = ["RplidarLog"]
+
+_NUMBER = rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
+_BEGINNING = re.compile(
+    rb"\s*\{\s*\"[^\"]{1,99}\"\s*:\s*\[\s*\[\s*" + _NUMBER + rb"\s*,\s*" + _NUMBER + rb"\s*\]"
+)
+#: Where the poses of the units stand, beside the scans.
+_TRANSFORMS = "transforms.json"
+
+
+class RplidarLog(Log):
+    """A JSON object ``{"unit": [[a, b], …], …}``: one scan a unit, which is a topic.
+
+    Pairs are ranges and bearings [m, rad], or points x, y [m] in the frame of the unit, as some
+    recorders write them: points where a first number is negative or the second numbers do not
+    run one way around. Bearings over 2π are degrees. Beams are sorted by bearing, of several
+    with one bearing the first is kept; there are no stamps.
+
+    A file ``transforms.json`` in the same folder gives poses: ``{"a": {"b": 3 × 3 matrix}}`` takes
+    points of unit a to the frame of unit b. The world is the frame of the first unit.
+
+    Raises
+    ------
+    LogError
+        If there is no such unit, or the file is no such object.
+    """
+
+    format = "rplidar"
+    description = "RPLIDAR JSON ([range, angle] or [x, y] of units)"
+    endings = (".json",)
+
+    def _open(self) -> None:
+        found = next(json_objects(self.source), None)
+        if isinstance(found, LogError):
+            raise found.fresh()
+        # A name is shown in messages, of one line each.
+        self._units = {
+            name if name.isprintable() else ascii(name): pairs
+            for name, pairs in (found or {}).items()
+        }
+        if not self._units:
+            raise LogError(self.source, f"is no {self.description}")
+        if self.topic not in (None, *self._units):
+            raise self._no_such_topic(self.topics)
+        self._wanted = self.topics if self.topic is None else [self.topic]
+
+    @classmethod
+    def recognises(cls, head: Head) -> bool:
+        """Whether it begins as an object whose first value is a list of pairs of numbers."""
+        return _BEGINNING.match(head.data.removeprefix(BOM)) is not None
+
+    @property
+    def topics(self) -> list[str]:
+        """The units, in the order of the file."""
+        return list(self._units)
+
+    def __len__(self) -> int:
+        return len(self._wanted)
+
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        transforms = _read_transforms(self.path.parent / _TRANSFORMS)
+        world = self.topics[0]
+        for unit in self._wanted:
+            try:
+                ranges, bearings = _polar(_pairs(self._units[unit]))
+                order, angles = one_turn(bearings)
+                pose = (0.0, 0.0, 0.0) if unit == world else _pose(transforms, unit, world)
+                scan = LaserScan(
+                    ranges[order],
+                    angles=angles,
+                    frame_id=unit,
+                    pose=pose if transforms else None,
+                )
+            except (ValueError, OverflowError) as error:
+                self._fault(LogError(self.name, f"unit {unit}: {error}"))
+            else:
+                yield unit, scan
+
+
+def _pairs(values: object) -> NDArray[np.float64]:
+    try:
+        pairs = np.array(values, np.float64)
+    except (TypeError, ValueError):
+        pairs = np.zeros(0)
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise ValueError("expected a list of pairs of numbers")
+    return pairs
+
+
+@np.errstate(over="ignore")
+def _polar(pairs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return ranges and bearings of pairs of either kind."""
+    first, second = pairs.T
+    steps = np.diff(second)
+    one_way = (steps >= 0).all() or (steps <= 0).all()
+    if one_way and (first >= 0).all():
+        return first, second
+    return np.hypot(first, second), np.arctan2(second, first)
+
+
+def _read_transforms(path: Path) -> dict[str, Any]:
+    """Read the matrices beside the scans; none where there is no such file, or another one."""
+    if not path.is_file():
+        return {}
+    try:
+        with path.open("rb") as file:
+            found = json.loads(file.read(MAX_OBJECT))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _pose(transforms: dict[str, Any], unit: str, world: str) -> Pose | None:
+    """Return the pose of a unit in the frame of another, from the matrix between them."""
+    try:
+        matrix = np.array(transforms[unit][world], np.float64)
+        (c, _, x), (s, _, y) = matrix[:2].tolist()
+    except (KeyError, TypeError, ValueError, IndexError):
+        return None
+    return x, y, math.atan2(s, c)

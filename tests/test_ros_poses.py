@@ -1,0 +1,158 @@
+"""Poses of topics, at the stamps of scans."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import ros_bags
+
+from lineament import LogError
+from lineament.logs import open_log, ros_poses
+
+SECOND = 1_000_000_000
+both = pytest.mark.parametrize("kind", ["rosbag1", "mcap"])
+
+
+def write(path, kind, make):
+    """Write a bag of what `make` gives of messages: (topic, time of receipt [s], message)."""
+    messages = ros_bags.Messages(ros_bags.ros_of(kind))
+    items = [(topic, round(time * SECOND), message) for topic, time, message in make(messages)]
+    return ros_bags.write_bag(path / f"log{ros_bags.ending(kind)}", kind, items)
+
+
+def poses(path, pose_topic):
+    return [scan.pose for scan in open_log(path, pose_topic=pose_topic)]
+
+
+def scans(messages, *stamps, time=None):
+    """Scans with their stamps, received at them or at `time`."""
+    for stamp in stamps:
+        yield "/scan", stamp if time is None else time, messages.scan(stamp, [1.0, 2.0])
+
+
+@both
+@pytest.mark.parametrize("maker", ["odometry", "pose_stamped", "pose_with_covariance"])
+def test_between_two_poses(tmp_path, kind, maker):
+    def make(messages):
+        pose = getattr(messages, maker)
+        yield from scans(messages, 1.5)
+        yield "/pose", 2.0, pose(2.0, 1.0, 2.0, 3.0)
+        yield from scans(messages, 2.0, 2.25)
+        yield "/pose", 3.0, pose(3.0, 5.0, 0.0, -3.0)
+        yield from scans(messages, 3.5)
+
+    path = write(tmp_path, kind, make)
+    before, at, between, after = poses(path, "/pose")
+    assert before is None
+    assert at == pytest.approx((1.0, 2.0, 3.0))
+    # The heading goes on through π, the shorter way from 3 to -3.
+    assert between == pytest.approx((2.0, 1.5, 3.0 + 0.25 * (2 * math.pi - 6.0)))
+    assert after == pytest.approx((5.0, 0.0, -3.0))
+    assert [scan.pose for scan in open_log(path)] == [None] * 4
+    assert [scan.stamp for scan in open_log(path, pose_topic="/pose")] == [1.5, 2.0, 2.25, 3.5]
+
+
+@both
+def test_a_transform_of_its_own(tmp_path, kind):
+    def make(messages):
+        yield "/vicon", 1.0, messages.transform(1.0, "world", "robot", 1.0, 2.0, 0.5)
+        yield from scans(messages, 1.0)
+
+    assert poses(write(tmp_path, kind, make), "/vicon") == [pytest.approx((1.0, 2.0, 0.5))]
+
+
+@both
+def test_a_chain_of_transforms(tmp_path, kind):
+    def make(messages):
+        at = messages.transform
+        fixed = at(0.0, "base_link", "laser", 0.5, 0.0, math.pi)
+        yield "/tf_static", 0.0, messages.transforms(fixed, at(0.0, "a", "b", 7.0, 7.0, 7.0))
+        yield "/tf", 1.0, messages.transforms(at(1.0, "odom", "/base_link", 1.0, 0.0, 0.0))
+        yield "/tf", 1.0, messages.transforms(at(1.0, "map", "odom", 0.0, 10.0, math.pi / 2))
+        yield from scans(messages, 1.5)
+        yield "/tf", 2.0, messages.transforms(at(2.0, "odom", "base_link", 3.0, 0.0, 0.0))
+        yield from scans(messages, 2.5)
+
+    path = write(tmp_path, kind, make)
+    between, last = poses(path, "/tf:odom->base_link")
+    assert between == pytest.approx((2.0, 0.0, 0.0))
+    assert last == pytest.approx((3.0, 0.0, 0.0))
+    # base_link is 2 m along the odom frame, which looks along the y axis of the map.
+    between, _ = poses(path, "/tf:map -> /odom -> base_link -> laser")
+    assert between == pytest.approx((0.0, 12.5, -math.pi / 2))
+    assert poses(path, "/tf:map->laser") == [None, None]
+
+
+def test_stamps_that_run_backwards_find_their_poses(tmp_path):
+    def make(messages):
+        for stamp in (1.0, 2.0, 3.0):
+            yield "/odom", stamp, messages.odometry(stamp, stamp, 0.0, 0.0)
+        yield from scans(messages, 2.5, 1.5, 2.0, time=4.0)
+
+    found = poses(write(tmp_path, "mcap", make), "/odom")
+    assert [pose[0] for pose in found] == pytest.approx([2.5, 1.5, 2.0])
+
+
+def test_scans_do_not_wait_for_ever(tmp_path, monkeypatch):
+    """What stands far behind in the bag, or was recorded long ago, is not held in memory."""
+    monkeypatch.setattr(ros_poses, "MAX_WAITING", 2)
+    monkeypatch.setattr(ros_poses, "MAX_POSES", 3)
+
+    def make(messages):
+        yield from scans(messages, *(0.1 * i for i in range(5)))
+        for i in range(20):
+            yield "/odom", 1 + i, messages.odometry(0.05 * i, i, 0.0, 0.0)
+        yield from scans(messages, 0.2, time=50.0)
+
+    found = poses(write(tmp_path, "mcap-plain", make), "/odom")
+    assert found[:3] == [None] * 3  # Given up when the next two came.
+    assert [pose and pose[0] for pose in found[3:5]] == pytest.approx([6.0, 8.0])
+    assert found[5] is None  # Of the poses, only the newest are kept.
+
+
+def test_a_broken_pose_is_told(tmp_path):
+    def make(messages):
+        yield "/odom", 1.0, messages.odometry(1.0, math.nan, 0.0, 0.0)
+        yield from scans(messages, 1.0)
+
+    path = write(tmp_path, "mcap", make)
+    with pytest.raises(LogError, match=r"/odom message 0: pose is \(nan, 0.0, 0.0\), expected"):
+        poses(path, "/odom")
+    log = open_log(path, pose_topic="/odom", keep_going=True)
+    assert [scan.pose for scan in log] == [None]
+    assert log.skipped == 1
+
+
+def test_scans_that_wait_where_a_bag_breaks_are_given(tmp_path):
+    def make(messages):
+        yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)
+        yield from scans(messages, 1.0, 2.0, 3.0)
+
+    path = write(tmp_path, "mcap-plain", make)
+    data = path.read_bytes()
+    path.write_bytes(data[: data.rindex(b"laser") + 20])
+    found = []
+    with pytest.raises(LogError, match="is cut off"):
+        found.extend(scan.pose for scan in open_log(path, pose_topic="/odom"))
+    assert found == [(7.0, 0.0, 0.0)] * 2
+
+
+@pytest.mark.parametrize(
+    ("pose_topic", "problem"),
+    [
+        ("/pose", r"has no .*nav_msgs/Odometry on '/pose'; topics there are: /odom \(nav_msgs"),
+        ("/scan", "has no .*PoseStamped or .* on '/scan'"),
+        ("/odom:a->b", "has no tf2_msgs/TFMessage or tf/tfMessage on '/odom'"),
+        ("/tf:odom", "pose topic is '/tf:odom', expected frames as in /tf:odom->base_link"),
+        ("/tf:odom->", "expected frames as in /tf:odom->base_link"),
+    ],
+)
+def test_topics_that_have_no_poses(tmp_path, pose_topic, problem):
+    def make(messages):
+        yield "/odom", 1.0, messages.odometry(1.0, 0.0, 0.0, 0.0)
+        yield from scans(messages, 1.0)
+
+    path = write(tmp_path, "mcap", make)
+    with pytest.raises(LogError, match=problem):
+        open_log(path, pose_topic=pose_topic)
