@@ -16,12 +16,21 @@ import pyarrow.parquet as pq
 import pytest
 from test_tables import random_features
 
-from lineament import LineamentError, RangeNoise
+from lineament import LaserScan, LineamentError, RangeNoise
 from lineament.output import ENDINGS, open_writer, written_beside
 from lineament.output.page import write_page
 from lineament.tables import SCHEMA, features_table
 
+try:
+    import resource
+except ModuleNotFoundError:  # Windows
+    resource = None
+
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
+
+
+#: Forty beams at a pose, for formats that draw the scan.
+SCAN = LaserScan([2.0] * 40, angle_min=-1.0, angle_increment=0.05, pose=(1.0, 2.0, 0.5))
 
 
 @pytest.fixture(params=ENDINGS)
@@ -32,7 +41,7 @@ def target(request, tmp_path):
 def write(path, scans):
     with open_writer(path) as writer:
         for features in scans:
-            writer.write(features)
+            writer.write(features, SCAN)
 
 
 def test_parquet_reads_back_the_same(tmp_path):
@@ -85,7 +94,7 @@ def test_docs_name_every_field_of_a_line():
     text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1].split("\n## ")[0]
     rows = {line.split("|")[1].strip(" `"): line for line in text.splitlines() if "| `" in line}
     record = random_features(1, noise=RangeNoise(0.01)).to_dict()
-    assert set(rows) == {"scan", *record}
+    assert set(rows) == {"scan", "topic", *record}
     for name in ("noise", "segments", "corners", "arcs", "breakpoints"):
         fields = record[name] if name == "noise" else record[name][0]
         for field in fields:
@@ -93,20 +102,23 @@ def test_docs_name_every_field_of_a_line():
 
 
 def test_log_without_scans_or_features(target):
+    nothing = random_features(0, n_beams=0, counts=(0, 0, 0, 0))
     write(target, [])
     if target.suffix == ".parquet":
         assert pq.read_table(target).schema.equals(SCHEMA)
         assert pq.read_table(target).num_rows == 0
-    else:
+    elif target.suffix == ".jsonl":
         assert target.read_bytes() == b""
-    write(target, [random_features(0, n_beams=0, counts=(0, 0, 0, 0))] * 2)
+    write(target, [nothing] * 2)
     if target.suffix == ".parquet":
         assert pq.read_metadata(target).metadata[b"lineament.scans"] == b"2"
-    else:
+    elif target.suffix == ".jsonl":
         assert len(target.read_text(encoding="utf-8").splitlines()) == 2
 
 
-def test_same_scans_give_same_bytes(target):
+@pytest.mark.parametrize("ending", sorted(set(ENDINGS) - {".dxf", ".rrd"}))
+def test_same_scans_give_same_bytes(tmp_path, ending):
+    target = tmp_path / f"features{ending}"
     scans = [random_features(i) for i in range(20)]
     write(target, scans)
     first = target.read_bytes()
@@ -119,8 +131,8 @@ def test_exception_leaves_the_old_file(target, error):
     features = random_features(1)
     target.write_text("old")
     with pytest.raises(error), open_writer(target) as writer:  # noqa: PT012
-        for _ in range(1010):
-            writer.write(features)
+        for _ in range(1010 if target.suffix in {".parquet", ".csv"} else 110):
+            writer.write(features, SCAN)
         raise error
     assert target.read_text() == "old"
     assert list(target.parent.iterdir()) == [target]
@@ -135,20 +147,44 @@ def test_failure_while_the_rest_is_written_leaves_nothing(target, monkeypatch):
 
     monkeypatch.setattr(writer, "_write", fail)
     with pytest.raises(LineamentError, match="cannot be written: No space left") as caught, writer:
-        writer.write(features)
+        writer.write(features, SCAN)
     assert str(target) in str(caught.value)
     assert list(target.parent.iterdir()) == []
 
 
-def test_killed_process_leaves_nothing_under_the_name(target):
+@pytest.mark.skipif(resource is None, reason="no limits of files on this system")
+@pytest.mark.parametrize("ending", [ending for ending in ENDINGS if ending != ".rrd"])
+def test_full_disk_leaves_one_line_and_nothing_else(tmp_path, ending):
+    target = tmp_path / f"features{ending}"
+    scans = [random_features(i) for i in range(150)]
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        for size in (0, 300, 900):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+            with pytest.raises(LineamentError, match="cannot be written: ") as caught:
+                write(target, scans)
+            assert "\n" not in str(caught.value)
+            assert list(target.parent.iterdir()) == []
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    write(target, scans)
+    assert target.stat().st_size > 900
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".mcap", ".rrd", ".dxf"])
+def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
+    target = tmp_path / f"features{ending}"
     script = """
         import sys, time
+        from test_output import SCAN
         from test_tables import random_features
         from lineament.output import open_writer
         features = random_features(1)
         with open_writer(sys.argv[1]) as writer:
             for _ in range(1010):
-                writer.write(features)
+                writer.write(features, SCAN)
             print("in the middle", flush=True)
             time.sleep(60)
     """
@@ -168,7 +204,9 @@ def test_killed_process_leaves_nothing_under_the_name(target):
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a", "a.parquet.gz"])
 def test_unknown_ending_is_told(tmp_path, name):
-    with pytest.raises(LineamentError, match=r"expected one of \.parquet, \.jsonl") as caught:
+    with pytest.raises(
+        LineamentError, match=r"expected one of \.parquet, \.csv, \.jsonl"
+    ) as caught:
         open_writer(tmp_path / name)
     assert "\n" not in str(caught.value)
     assert Path(name).suffix in str(caught.value)
@@ -177,12 +215,38 @@ def test_unknown_ending_is_told(tmp_path, name):
 def test_writer_must_be_open(target):
     writer = open_writer(target)
     with pytest.raises(ValueError, match="not open"):
-        writer.write(random_features(1))
+        writer.write(random_features(1), SCAN)
     write(target, [])
     with writer:
         pass
     with pytest.raises(ValueError, match="not open"):
-        writer.write(random_features(1))
+        writer.write(random_features(1), SCAN)
+
+
+def test_formats_that_draw_the_scan_say_so(target):
+    is_table = target.suffix in {".parquet", ".csv", ".jsonl"}
+    with open_writer(target) as writer:
+        if is_table:
+            writer.write(random_features(1))
+        else:
+            with pytest.raises(ValueError, match=r"needs the scan: write\(features, scan\)"):
+                writer.write(random_features(1))
+
+
+def test_topic_must_be_one_of_those_of_the_log(target):
+    with (
+        pytest.raises(ValueError, match="topic is '/c', expected one of /a, /b"),
+        open_writer(target, ["/a", "/b"]) as writer,
+    ):
+        writer.write(random_features(1), SCAN, "/c")
+    assert not target.exists()
+
+
+def test_package_that_is_missing_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    monkeypatch.delitem(sys.modules, "lineament.output.rrd", raising=False)
+    with pytest.raises(LineamentError, match=r"a\.rrd: files .* need the package rerun"):
+        open_writer(tmp_path / "a.rrd")
 
 
 def test_targets_that_cannot_be(target):
@@ -222,7 +286,7 @@ def test_written_beside_follows_links_and_the_umask(tmp_path):
 def test_import_is_light():
     code = (
         "import sys, lineament.output, lineament.output.figures, lineament.output.page\n"
-        "heavy = {'matplotlib', 'pyarrow', 'numba'} & set(sys.modules)\n"
+        "heavy = {'matplotlib', 'pyarrow', 'numba', 'mcap', 'ezdxf', 'rerun'} & set(sys.modules)\n"
         "sys.exit(str(heavy) if heavy else 0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

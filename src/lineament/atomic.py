@@ -19,7 +19,8 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Whatever interrupts the block, Ctrl-C included, removes the temporary file and leaves `path` as
     it was. A run that is killed leaves at most the temporary file, whose name is hidden and ends in
-    ``.part``.
+    ``.part``. What was written is on the disk before it gets its name, so that a loss of power
+    leaves no empty file under it.
 
     Parameters
     ----------
@@ -59,11 +60,18 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         with naming_errors(path):
+            _flush_to_disk(temporary)
             temporary.replace(target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
+
+
+def _flush_to_disk(path: Path) -> None:
+    # Windows flushes only what is open for writing.
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from .errors import LineamentError
 from .extractor import Extractor
 from .features import TABLES
 from .logs import open_log
 from .output import open_writer
 from .track import Track, untracked
 
-__all__ = ["Extraction", "extract_log", "output_paths"]
+__all__ = ["Extraction", "extract_log"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +27,8 @@ class Extraction:
     ----------
     log, output : str
         The files.
+    topics : list of str
+        The topics of the scans.
     scans : int
         Scans that were read.
     features : dict of str to int
@@ -44,6 +45,7 @@ class Extraction:
 
     log: str
     output: str
+    topics: list[str]
     scans: int
     features: dict[str, int]
     invalid: float
@@ -57,7 +59,7 @@ class Extraction:
         lines = [
             f"{self.log} -> {self.output}",
             f"  {self.scans} scans, {100 * self.invalid:.1f} % of beams invalid, "
-            f"{self.skipped} lines skipped",
+            f"{self.skipped} faults skipped",
             f"  {found}",
             f"  {self.seconds:.2f} s, {rate:.0f} scans/s",
             *(f"  skipped: {fault}" for fault in self.faults),
@@ -70,9 +72,9 @@ def extract_log(
     output: str | os.PathLike[str],
     extractor: Extractor,
     *,
-    topic: str | None = None,
-    keep_going: bool = False,
+    topic_column: bool | None = None,
     track: Track = untracked,
+    **reading: Any,
 ) -> Extraction:
     """Extract the features of all scans of a log into a file.
 
@@ -83,15 +85,16 @@ def extract_log(
     path : path-like
         The log, of any format that `lineament.open_log` reads.
     output : path-like
-        A file that ends in ``.parquet`` or ``.jsonl``.
+        A file of any ending that `lineament.output.open_writer` knows.
     extractor : Extractor
         The method.
-    topic : str, optional
-        Which scans of the log.
-    keep_going : bool
-        Whether to leave out what is faulty in the log, and count it.
+    topic_column : bool, optional
+        Whether tables tell the topic of each row; where the log has several, if not given.
     track : callable
-        ``track(log, name, total)`` gives the scans of the log, and shows how far they are.
+        ``track(items, name, total)`` gives the scans of the log, and shows how far they are.
+    **reading
+        How the log is read: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``, as for
+        `lineament.open_log`.
 
     Raises
     ------
@@ -108,15 +111,19 @@ def extract_log(
     >>> extract_log(folder / "log.npz", folder / "features.parquet", Extractor("liu")).scans
     5
     """
-    writer = open_writer(output)
     started = time.perf_counter()
-    log = open_log(path, topic=topic, keep_going=keep_going)
+    log = open_log(path, **reading)
+    topics = log.topics if log.topic is None else [log.topic]
+    if topic_column is None:
+        topic_column = len(topics) > 1
     scans, beams, valid = 0, 0, 0
     found = dict.fromkeys(TABLES, 0)
-    with writer:
-        for scan in track(log, log.path.name, len(log)):
+    with open_writer(output, topics if topic_column else ()) as writer:
+        for topic, scan in track(log.items(), Path(log.name).name, len(log)):
             features = extractor(scan)
-            writer.write(features)
+            # What draws the scan is called after its topic; tables need not tell the only one.
+            told = topic if topic_column or writer.needs_scan else ""
+            writer.write(features, scan, told)
             scans += 1
             beams += len(scan)
             valid += int(np.count_nonzero(scan.valid))
@@ -125,6 +132,7 @@ def extract_log(
     return Extraction(
         log=str(path),
         output=str(output),
+        topics=topics,
         scans=scans,
         features=found,
         invalid=1 - valid / beams if beams else 0.0,
@@ -132,34 +140,3 @@ def extract_log(
         skipped=log.skipped,
         faults=list(log.faults),
     )
-
-
-def output_paths(
-    logs: Iterable[str | os.PathLike[str]], output: str | os.PathLike[str]
-) -> list[Path]:
-    """Name the output of each log: the file that is given, or one a log in the folder given.
-
-    Raises
-    ------
-    LineamentError
-        If there are several logs and the output is no folder, or two of them have one name.
-
-    Examples
-    --------
-    >>> str(output_paths(["a.log.gz"], "features.jsonl")[0])
-    'features.jsonl'
-    """
-    sources = [Path(log) for log in logs]
-    target = Path(output)
-    if not target.is_dir():
-        if len(sources) > 1:
-            raise LineamentError(f"{target}: is no folder, expected one for {len(sources)} logs")
-        return [target]
-    paths = [target / f"{log.name.split('.')[0]}.parquet" for log in sources]
-    for k, path in enumerate(paths):
-        if path in paths[:k]:
-            raise LineamentError(
-                f"{path}: would hold both {sources[paths.index(path)]} and {sources[k]}; "
-                "extract them into different folders"
-            )
-    return paths

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
@@ -15,21 +16,30 @@ __all__ = ["ENDINGS", "Writer", "open_writer", "written_beside"]
 #: Module and class of the writer of each ending. A new format is one file and one line here.
 _WRITERS = {
     ".parquet": ("parquet", "ParquetWriter"),
+    ".csv": ("csv", "CsvWriter"),
     ".jsonl": ("jsonl", "JsonLinesWriter"),
+    ".ros2.mcap": ("ros2", "Ros2Writer"),  # before the ending that it contains
+    ".mcap": ("foxglove", "FoxgloveWriter"),
+    ".rrd": ("rrd", "RerunWriter"),
+    ".svg": ("svg", "SvgWriter"),
+    ".dxf": ("dxf", "DxfWriter"),
 }
 
 #: The endings that `open_writer` knows.
 ENDINGS = tuple(_WRITERS)
 
 
-def open_writer(path: str | os.PathLike[str]) -> Writer:
+def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Writer:
     """Make a writer of features for a file, of the format that its ending tells.
 
     Parameters
     ----------
     path : path-like
-        The file: ``.parquet`` (one row a feature) or ``.jsonl`` (one line a scan). Both are
-        described in ``docs/formats.md``.
+        The file, which is replaced if it is there: ``.parquet`` or ``.csv`` (one row a feature),
+        ``.jsonl`` (one line a scan), ``.mcap`` (for Foxglove), ``.ros2.mcap`` (for RViz), ``.rrd``
+        (for rerun), ``.svg`` or ``.dxf`` (a plan). They are described in ``docs/formats.md``.
+    topics : sequence of str
+        The topics that the scans come from, where a log has several: tables have a column then.
 
     Returns
     -------
@@ -39,7 +49,8 @@ def open_writer(path: str | os.PathLike[str]) -> Writer:
     Raises
     ------
     LineamentError
-        If the ending is not known; on entering, if the file cannot be written.
+        If the ending is not known, or a package that its format needs is not installed; on
+        entering, if the file cannot be written.
 
     Examples
     --------
@@ -48,14 +59,25 @@ def open_writer(path: str | os.PathLike[str]) -> Writer:
     >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
     >>> path = Path(tempfile.mkdtemp()) / "features.jsonl"
     >>> with open_writer(path) as writer:
-    ...     writer.write(ln.extract(scan))
+    ...     writer.write(ln.extract(scan), scan)
     >>> path.read_text(encoding="utf-8")[:25]
     '{"scan": 0, "stamp": 0.0,'
     """
-    ending = Path(path).suffix.lower()
-    if ending not in _WRITERS:
-        told = f"the ending {ending!r} is not known" if ending else "the name has no ending"
-        raise LineamentError(f"{path}: {told}, expected one of {', '.join(ENDINGS)}")
-    module, name = _WRITERS[ending]
-    writer: type[Writer] = getattr(import_module(f".{module}", __name__), name)
-    return writer(path)
+    name = Path(path).name.lower()
+    for ending, (module, writer) in _WRITERS.items():
+        if name.endswith(ending):
+            return _writer(path, ending, module, writer)(path, topics)
+    own = Path(path).suffix.lower()
+    told = f"the ending {own!r} is not known" if own else "the name has no ending"
+    raise LineamentError(f"{path}: {told}, expected one of {', '.join(ENDINGS)}")
+
+
+def _writer(path: str | os.PathLike[str], ending: str, module: str, name: str) -> type[Writer]:
+    try:
+        writer: type[Writer] = getattr(import_module(f".{module}", __name__), name)
+    except ModuleNotFoundError as error:
+        raise LineamentError(
+            f"{path}: files that end in {ending} need the package {error.name}, "
+            "which is not installed"
+        ) from None
+    return writer

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..features import Features
 from ..scan import LaserScan
 from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, FAINT, INK, colors_of, style
+from .markers import arc_span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -189,7 +190,7 @@ def draw_arcs(axes: Axes, arcs: NDArray[np.void], scan: LaserScan) -> None:
     label = "arc"
     for arc in arcs[np.isfinite(arcs["center"]).all(axis=1) & np.isfinite(arcs["radius"])]:
         whole = _circle(arc, 0.0, 2 * math.pi)
-        seen = _circle(arc, *_seen_of_arc(arc, scan))
+        seen = _circle(arc, *arc_span(arc, scan))
         axes.plot(*whole, color=ARC_COLOR, linewidth=0.5, linestyle=(0, (2, 3)), zorder=4.05)
         axes.plot(*seen, color=ARC_COLOR, linewidth=2.0, label=label, zorder=4.1)
         label = ""
@@ -199,19 +200,6 @@ def _circle(arc: np.void, first: float, last: float) -> tuple[Array, Array]:
     turn = np.linspace(first, last, 181)
     x, y = arc["center"]
     return x + arc["radius"] * np.cos(turn), y + arc["radius"] * np.sin(turn)
-
-
-def _seen_of_arc(arc: np.void, scan: LaserScan) -> tuple[float, float]:
-    """First and last direction [rad] from the centre to the points of an arc."""
-    first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
-    if not (0 <= first < n and 0 <= last < n):
-        return 0.0, 2 * math.pi
-    beams = np.arange(first, last + 1 if first <= last else last + n + 1) % n
-    from_center = scan.points[beams[scan.valid[beams]]] - arc["center"]
-    if not len(from_center):
-        return 0.0, 2 * math.pi
-    angles = np.unwrap(np.arctan2(from_center[:, 1], from_center[:, 0]))
-    return float(angles.min()), float(angles.max())
 
 
 def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float) -> None:

@@ -8,22 +8,22 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from ..features import Features
-from .writer import Writer
+from .writer import Found, Writer
 
 __all__ = ["JsonLinesWriter"]
 
 
 class JsonLinesWriter(Writer):
-    """Writes ``{"scan": i, **features.to_dict()}``, in strict JSON."""
+    """Writes ``{"scan": i, **features.to_dict()}``, in strict JSON; ``topic`` where it is told."""
 
     def _open(self, temporary: Path, files: ExitStack) -> None:
         # The same bytes on every system: no "\r\n".
         self._file = files.enter_context(temporary.open("w", encoding="utf-8", newline="\n"))
 
-    def _write(self, scans: list[Features], first_scan: int) -> None:
-        for i, features in enumerate(scans, first_scan):
-            self._file.write(_line({"scan": i, **features.to_dict()}))
+    def _write(self, found: list[Found], first_scan: int) -> None:
+        for i, (features, _, topic) in enumerate(found, first_scan):
+            where = {"scan": i, "topic": topic} if topic else {"scan": i}
+            self._file.write(_line(where | features.to_dict()))
 
 
 def _line(record: dict[str, Any]) -> str:

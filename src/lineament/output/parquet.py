@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from ..features import Features
-from ..tables import SCHEMA, features_table
-from .writer import Writer
+from .rows import RowWriter
+from .writer import Found
 
 __all__ = ["ParquetWriter"]
 
 
-class ParquetWriter(Writer):
+class ParquetWriter(RowWriter):
     """Writes the table of `lineament.tables`, with the frames and the number of scans.
 
     A log without scans gives a file without rows, with the same schema.
@@ -26,18 +25,18 @@ class ParquetWriter(Writer):
         self._file = files.enter_context(
             pq.ParquetWriter(
                 temporary,
-                SCHEMA,
+                self._schema,
                 compression="zstd",
                 # Of numbers a dictionary costs more time than it saves space.
-                use_dictionary=["kind", "breakpoint"],
+                use_dictionary=["kind", "breakpoint", "topic"],
                 # What rows are looked for by.
-                write_statistics=["kind", "scan", "stamp"],
+                write_statistics=["kind", "scan", "stamp", "topic"],
             )
         )
 
-    def _write(self, scans: list[Features], first_scan: int) -> None:
-        self._frames.update(dict.fromkeys(features.frame_id for features in scans))
-        table = features_table(scans, first_scan).replace_schema_metadata(SCHEMA.metadata)
+    def _write(self, found: list[Found], first_scan: int) -> None:
+        self._frames.update(dict.fromkeys(one.features.frame_id for one in found))
+        table = self._table(found, first_scan)
         self._file.write_table(table, row_group_size=max(table.num_rows, 1))
 
     def _close(self) -> None:

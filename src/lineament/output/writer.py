@@ -4,25 +4,36 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from contextlib import ExitStack
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, NamedTuple, Self
 
 from ..atomic import naming_errors, written_beside
 from ..features import Features
+from ..scan import LaserScan
 
-__all__ = ["Writer"]
+__all__ = ["Found", "Writer"]
 
-#: Scans that are kept before they are written: a row group of a table.
-CHUNK = 1000
+
+class Found(NamedTuple):
+    """What was found in one scan, the scan, and the topic of its log.
+
+    The scan is None where a writer was not given it, the topic "" where it is not told.
+    """
+
+    features: Features
+    scan: LaserScan | None
+    topic: str
 
 
 class Writer(ABC):
     """Writes the features of one scan after the other to one file.
 
     The file appears under its name when the block ends; if it ends by an exception, a file that
-    was there before stays as it was. Scans are numbered from 0 in the order in which they come.
+    was there before stays as it was. Nothing is ever added to a file. Scans are numbered from 0
+    in the order in which they come.
 
     A format is a subclass with `_open`, `_write` and `_close`.
 
@@ -30,22 +41,31 @@ class Writer(ABC):
     ----------
     path : path-like
         The file.
+    topics : sequence of str
+        The topics that the scans come from, where a log has several.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    #: Scans that are kept before they are written.
+    chunk: ClassVar[int] = 1
+    #: Whether the format draws the scans, and not only what is found in them.
+    needs_scan: ClassVar[bool] = False
+
+    def __init__(self, path: str | os.PathLike[str], topics: Sequence[str] = ()) -> None:
         self.path = path
+        self.topics = tuple(topics)
         self._stack, self._files = ExitStack(), ExitStack()
-        self._waiting: list[Features] = []
+        self._waiting: list[Found] = []
         self._written = 0
         self._is_open = False
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             temporary = stack.enter_context(written_beside(self.path))
-            self._files = stack.enter_context(ExitStack())
+            stack.callback(self._abandon)
             with naming_errors(self.path):
                 self._open(temporary, self._files)
             self._stack = stack.pop_all()
+        self._waiting, self._written = [], 0
         self._is_open = True
         return self
 
@@ -64,25 +84,39 @@ class Writer(ABC):
             self._close()
             self._files.close()  # here, so that a disk that is full at the last byte is named
 
-    def write(self, features: Features) -> None:
+    def _abandon(self) -> None:
+        """Close what an error has left open: a full disk says so again here, and is not asked."""
+        with suppress(OSError):
+            self._files.close()
+
+    def write(self, features: Features, scan: LaserScan | None = None, topic: str = "") -> None:
         """Take the features of the next scan.
 
         Parameters
         ----------
         features : Features
             They must not change until the block ends.
+        scan : LaserScan, optional
+            What they were found in. Formats that draw it need it; tables do without.
+        topic : str
+            The topic of the scan, where its log has several.
 
         Raises
         ------
         LineamentError
-            If the file cannot be written.
+            If the file cannot be written, or cannot hold this scan.
         ValueError
-            If the writer is not open.
+            If the writer is not open or needs the scan, or the topic is none of its topics.
         """
         if not self._is_open:
             raise ValueError(f"the writer of {self.path} is not open: use it as a context manager")
-        self._waiting.append(features)
-        if len(self._waiting) >= CHUNK:
+        if self.needs_scan and scan is None:
+            raise ValueError(f"the writer of {self.path} needs the scan: write(features, scan)")
+        if self.topics and topic not in self.topics:
+            raise ValueError(f"topic is {topic!r}, expected one of {', '.join(self.topics)}")
+        # Tables keep no ranges until they are written.
+        self._waiting.append(Found(features, scan if self.needs_scan else None, topic))
+        if len(self._waiting) >= self.chunk:
             with naming_errors(self.path):
                 self._flush()
 
@@ -97,8 +131,8 @@ class Writer(ABC):
         """Open the temporary file; what must be closed is entered into `files`."""
 
     @abstractmethod
-    def _write(self, scans: list[Features], first_scan: int) -> None:
-        """Write some scans, the first of which has this index."""
+    def _write(self, found: list[Found], first_scan: int) -> None:
+        """Write what was found in some scans, the first of which has this index."""
 
     def _close(self) -> None:  # noqa: B027  (most formats have no end)
         """Write what comes after the last scan."""

@@ -1,0 +1,55 @@
+"""DXF: a plan for CAD, in metres, with the layers WALLS, CORNERS, ARCS and ELLIPSES."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from ezdxf import units
+from ezdxf.document import Drawing
+from ezdxf.filemanagement import new
+
+from .plans import Plan, PlanWriter
+
+__all__ = ["DxfWriter"]
+
+#: Layers and their colours, as numbers of AutoCAD: black or white, red, magenta, grey.
+LAYERS = {"WALLS": 7, "CORNERS": 1, "ARCS": 6, "ELLIPSES": 8}
+#: Name under which each wall tells in how many views it was seen.
+APPLICATION = "LINEAMENT"
+#: Points are drawn as crosses of this size [m].
+CROSS, CROSS_SIZE = 3, 0.1
+
+
+class DxfWriter(PlanWriter):
+    """Writes LINE, POINT, ARC or CIRCLE and ELLIPSE entities into the model space (R2010)."""
+
+    def _draw(self, temporary: Path, plan: Plan) -> None:
+        drawing = new("R2010", units=units.M)
+        drawing.header["$PDMODE"], drawing.header["$PDSIZE"] = CROSS, CROSS_SIZE
+        drawing.header.custom_vars.append("lineament", plan.caption)
+        drawing.appids.add(APPLICATION)
+        for name, color in LAYERS.items():
+            drawing.layers.add(name, color=color)
+        _add(drawing, plan)
+        drawing.saveas(temporary)
+
+
+def _add(drawing: Drawing, plan: Plan) -> None:
+    space, markers = drawing.modelspace(), plan.markers
+    for (start, end), views in zip(markers.segments.tolist(), plan.views.tolist(), strict=True):
+        line = space.add_line(start, end, {"layer": "WALLS"})
+        line.set_xdata(APPLICATION, [(1000, "views"), (1071, views)])
+    for corner in markers.corners.tolist():
+        space.add_point(corner, {"layer": "CORNERS"})
+    for x, y, radius, first, last in markers.arcs.tolist():
+        if last - first >= 2 * math.pi - 1e-6:
+            space.add_circle((x, y), radius, {"layer": "ARCS"})
+        else:
+            turn = math.degrees(first) % 360, math.degrees(last) % 360
+            space.add_arc((x, y), radius, *turn, dxfattribs={"layer": "ARCS"})
+    for x, y, a, b, direction in markers.ellipses.tolist():
+        if a > 0:  # CAD knows no ellipse without an extent, and no thinner one than this
+            axis = (a * math.cos(direction), a * math.sin(direction))
+            ratio = max(b / a, 1e-6)
+            space.add_ellipse((x, y), axis, ratio, dxfattribs={"layer": "ELLIPSES"})

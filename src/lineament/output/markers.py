@@ -1,0 +1,176 @@
+"""Features as marks to be drawn: lines, points, arcs and ellipses, as plain arrays.
+
+What the writers of scenes and plans, and the live node, make their own messages of.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import Features
+from ..scan import LaserScan
+
+__all__ = ["FARTHEST", "LEVEL", "Markers", "arc_span", "ellipses_of", "markers_of"]
+
+Array = NDArray[np.float64]
+
+#: Share of the errors that lie within an ellipse.
+LEVEL = 0.95
+#: Vertices of a whole turn, when an arc or an ellipse becomes a strip of lines.
+TURN = 48
+#: What is farther from the origin than this is not drawn [m]: no scanner sees so far.
+FARTHEST = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Markers:
+    """What is drawn of the features of a scan [m, rad], in their frame. All of it is finite.
+
+    Attributes
+    ----------
+    segments : float64 array, shape (L, 2, 2)
+        Start and end of each segment.
+    corners : float64 array, shape (K, 2)
+        Positions.
+    arcs : float64 array, shape (A, 5)
+        x, y of the centre, radius, and the directions from the centre in which what was seen
+        begins and ends, counter-clockwise; a whole turn apart where that is not known.
+    ellipses : float64 array, shape (E, 5)
+        x, y, half axes (the longer first), direction of the longer: within them lie 95 % of the
+        errors of the corners, then of the centres of the arcs.
+    """
+
+    segments: Array
+    corners: Array
+    arcs: Array
+    ellipses: Array
+
+    @property
+    def points(self) -> Array:
+        """Points (n, 2) that a picture of all of it must show."""
+        circles = np.repeat(self.arcs[:, :2], 4, axis=0)
+        circles += np.kron(self.arcs[:, 2:3], [[1, 0], [-1, 0], [0, 1], [0, -1]])
+        return np.vstack([self.segments.reshape(-1, 2), self.corners, circles])
+
+    def arc_strips(self) -> list[Array]:
+        """Make strips of vertices (n, 2), one an arc, at least 48 to a turn.
+
+        Examples
+        --------
+        >>> nothing = np.zeros((0, 2))
+        >>> arcs = np.array([[1.0, 0.0, 0.5, 0.0, math.pi / 2]])
+        >>> quarter = Markers(nothing.reshape(0, 2, 2), nothing, arcs, np.zeros((0, 5)))
+        >>> quarter.arc_strips()[0][[0, -1]].round(3).tolist()
+        [[1.5, 0.0], [1.0, 0.5]]
+        """
+        strips = []
+        for x, y, radius, first, last in self.arcs:
+            n = max(math.ceil(TURN * (last - first) / (2 * math.pi)), 2) + 1
+            turn = np.linspace(first, last, n)
+            strips.append(np.column_stack((x + radius * np.cos(turn), y + radius * np.sin(turn))))
+        return strips
+
+    def ellipse_strips(self) -> Array:
+        """Make closed strips of vertices, shape (E, 49, 2); the last vertex is the first."""
+        x, y, a, b, direction = self.ellipses.T[:, :, None]
+        turn = np.linspace(0, 2 * math.pi, TURN + 1)
+        u, v = a * np.cos(turn), b * np.sin(turn)
+        c, s = np.cos(direction), np.sin(direction)
+        return np.stack((x + c * u - s * v, y + s * u + c * v), axis=-1)
+
+
+def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
+    """Make the marks of the features of a scan.
+
+    Parameters
+    ----------
+    features : Features
+        In the frame of the scan, or moved since.
+    scan : LaserScan, optional
+        What they were found in: only its points tell which part of a circle was seen. The
+        features must then be in its frame.
+
+    Returns
+    -------
+    Markers
+        Features that are not finite, or farther away than any scanner sees, are left out.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> markers_of(ln.extract(scan), scan).segments.round(2).tolist()
+    [[[2.0, -0.02], [2.0, 0.02]]]
+    """
+    lines = np.stack((features.segments["start"], features.segments["end"]), axis=1)
+    corners, arcs = features.corners, features.arcs
+    arcs = arcs[_is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
+    spans = [(0.0, 2 * math.pi) if scan is None else arc_span(arc, scan) for arc in arcs]
+    return Markers(
+        segments=lines[_is_drawn(lines)],
+        corners=corners["position"][_is_drawn(corners["position"])],
+        arcs=np.column_stack((arcs["center"], arcs["radius"], np.reshape(spans, (-1, 2)))),
+        ellipses=np.vstack(
+            (
+                ellipses_of(corners["position"], corners["covariance"]),
+                ellipses_of(arcs["center"], arcs["covariance"][:, :2, :2]),
+            )
+        ),
+    )
+
+
+def _is_drawn(values: Array) -> NDArray[np.bool_]:
+    drawn: NDArray[np.bool_] = np.all(
+        np.abs(values) < FARTHEST,  # NaN is not
+        axis=tuple(range(1, values.ndim)),
+    )
+    return drawn
+
+
+def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
+    """First and last direction [rad] from the centre to the points of an arc.
+
+    A whole turn where none of its beams is valid.
+    """
+    first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
+    if not (0 <= first < n and 0 <= last < n):
+        return 0.0, 2 * math.pi
+    beams = np.arange(first, last + 1 if first <= last else last + n + 1) % n
+    from_center = scan.points[beams[scan.valid[beams]]] - arc["center"]
+    if not len(from_center):
+        return 0.0, 2 * math.pi
+    angles = np.unwrap(np.arctan2(from_center[:, 1], from_center[:, 0]))
+    return float(angles.min()), float(angles.max())
+
+
+def ellipses_of(positions: Array, covariances: Array, level: float = LEVEL) -> Array:
+    """Make the ellipses within which a share of the errors of some points lies.
+
+    Parameters
+    ----------
+    positions : float64 array, shape (n, 2)
+        The points [m].
+    covariances : float64 array, shape (n, 2, 2)
+        Their covariances [m²].
+    level : float
+        The share. Of two Gaussian coordinates it lies within √(-2 ln(1 - level)) deviations.
+
+    Returns
+    -------
+    float64 array, shape (m, 5)
+        As in `Markers`; points without a finite covariance have none.
+
+    Examples
+    --------
+    >>> ellipses_of(np.zeros((1, 2)), np.diag([0.01, 0.04])[None]).round(3).tolist()
+    [[0.0, 0.0, 0.49, 0.245, 1.571]]
+    """
+    known = _is_drawn(positions) & _is_drawn(covariances)
+    variances, axes = np.linalg.eigh(covariances[known])
+    half = np.sqrt(-2 * math.log1p(-level) * np.maximum(variances[:, ::-1], 0))
+    direction = np.arctan2(axes[:, 1, 1], axes[:, 0, 1]) % math.pi
+    return np.column_stack((positions[known], half, direction))

@@ -1,0 +1,108 @@
+"""What plans share: one scan as it was seen, or all scans of a log in one floor plan."""
+
+from __future__ import annotations
+
+import os
+from abc import abstractmethod
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LineamentError
+from .canvas import count
+from .floor_plan import FloorPlan
+from .markers import Markers, markers_of
+from .writer import Found, Writer
+
+__all__ = ["MIN_VIEWS", "Plan", "PlanWriter"]
+
+#: How often a part of a wall must have been seen to be drawn; once, in a log of few scans.
+MIN_VIEWS, FEW = 3, 10
+
+
+class Plan(NamedTuple):
+    """What is drawn, how often each of its segments was seen, and a line that tells what it is."""
+
+    markers: Markers
+    views: NDArray[np.int64]
+    caption: str
+
+
+class PlanWriter(Writer):
+    """Draws one scan in its own frame, or the floor plan of several in the frame of their poses.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    topics : sequence of str
+        The topics that the scans come from; they are drawn in one plan.
+    min_views : int, optional
+        How often a part of a wall, a corner or an arc must have been seen to be drawn in a floor
+        plan; by default 3 times, or once where the log has fewer than 10 scans.
+
+    Raises
+    ------
+    LineamentError
+        On writing, if one of several scans has no pose.
+    """
+
+    needs_scan = True
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        topics: Sequence[str] = (),
+        *,
+        min_views: int | None = None,
+    ) -> None:
+        super().__init__(path, topics)
+        self.min_views = min_views
+
+    def _open(self, temporary: Path, files: ExitStack) -> None:  # noqa: ARG002  (open at the end)
+        self._temporary = temporary
+        self._floor = FloorPlan()
+        self._first: Found | None = None
+
+    def _write(self, found: list[Found], first_scan: int) -> None:
+        for i, one in enumerate(found, first_scan):
+            if i == 0:
+                self._first = one
+                continue
+            if self._first is not None:
+                self._place(self._first, 0)
+                self._first = None
+            self._place(one, i)
+
+    def _place(self, found: Found, index: int) -> None:
+        assert found.scan is not None  # `write` has seen to it
+        if found.scan.pose is None:
+            raise LineamentError(
+                f"{self.path}: scan {index} has no pose, expected poses: several scans are drawn "
+                "where they were taken"
+            )
+        self._floor.add(found.features.transform(*found.scan.pose))
+
+    def _close(self) -> None:
+        self._draw(self._temporary, self._plan())
+
+    def _plan(self) -> Plan:
+        if self._first is not None:
+            markers = markers_of(self._first.features, self._first.scan)
+            views, told = np.ones(len(markers.segments), dtype=np.int64), ""
+        else:
+            least = self.min_views or (MIN_VIEWS if self._written >= FEW else 1)
+            markers, views = self._floor.markers(least)
+            told = f", each seen {count(least, 'time')} at least" if least > 1 else ""
+        walls = count(len(markers.segments), "wall")
+        corners = count(len(markers.corners), "corner")
+        scans = count(self._written, "scan")
+        return Plan(markers, views, f"{walls} and {corners} of {scans}{told}")
+
+    @abstractmethod
+    def _draw(self, temporary: Path, plan: Plan) -> None:
+        """Write the plan."""
