@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..scan import LaserScan
     from ..tracing import Trace
 
-__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method"]
+__all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method", "method_names"]
 
 DEFAULT_METHOD = "optimal"
 
@@ -72,7 +72,8 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     base, _, preset = str(name).partition(":")
     cls = _method_class(base) if base in METHODS else None
     if cls is None or (preset and preset not in cls.presets):
-        raise ValueError(f"method {name!r} is unknown, expected one of: {', '.join(_all_names())}")
+        known_methods = ", ".join(method_names())
+        raise ValueError(f"method {name!r} is unknown, expected one of: {known_methods}")
     known = [field.name for field in fields(cls)]
     for parameter in parameters:
         if parameter not in known:
@@ -87,7 +88,8 @@ def _method_class(name: str) -> Any:
     return getattr(import_module(f".{name}", __name__), METHODS[name])
 
 
-def _all_names() -> list[str]:
+def method_names() -> list[str]:
+    """List the names of all methods, each followed by those of its presets."""
     return [
         full
         for name in METHODS

@@ -1,0 +1,61 @@
+"""The options that choose methods, their parameters and the noise, and what they make."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .options import wrong_usage
+
+if TYPE_CHECKING:
+    from ..extractor import Extractor
+
+__all__ = ["METHOD", "METHODS", "NOISE", "SET", "make_extractor"]
+
+METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+METHODS = click.option(
+    "-m",
+    "--method",
+    "methods",
+    multiple=True,
+    help="Name of the method; may be given again, side by side.  [default: optimal]",
+)
+SET = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A parameter of the method; may be given again.",
+)
+NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+
+
+def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
+    """Make the extractor that the options ask for."""
+    from ..extractor import Extractor
+    from ..methods import DEFAULT_METHOD
+    from ..scan import RangeNoise
+
+    with wrong_usage():
+        return Extractor(
+            DEFAULT_METHOD if method is None else method,
+            noise=None if noise is None else RangeNoise(sigma=noise),
+            **dict(_setting(text) for text in settings),
+        )
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise click.UsageError(f"--set {text!r}: expected NAME=VALUE")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value

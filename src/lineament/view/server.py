@@ -1,0 +1,210 @@
+"""The local server: the page's own files, the answers of the API, and nothing else."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import socket
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from socketserver import TCPServer
+from typing import Any
+from urllib.parse import urlsplit
+
+from ..errors import LineamentError
+from .api import RequestError, answer
+from .session import Session
+
+__all__ = ["ViewServer", "serve"]
+
+#: The files of the page, all that is ever served, by what they are.
+_TYPES = {
+    "index.html": "text/html; charset=utf-8",
+    "style.css": "text/css; charset=utf-8",
+    "icon.svg": "image/svg+xml",
+    **dict.fromkeys(
+        ("main.js", "api.js", "plane.js", "drawing.js", "panel.js", "timeline.js", "details.js"),
+        "text/javascript; charset=utf-8",
+    ),
+}
+_JSON = "application/json; charset=utf-8"
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_HEADERS = {
+    "Content-Security-Policy": _POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+_LOOPBACK = ("localhost", "127.0.0.1", "::1")
+#: Seconds after which a connection that says nothing is closed.
+_PATIENCE = 60
+
+
+class ViewServer(ThreadingHTTPServer):
+    """Serves the page of a session.
+
+    It answers only requests that name it as loopback or by the host that it was bound to: a page
+    from elsewhere cannot read the log through a name of its own (DNS rebinding).
+
+    Parameters
+    ----------
+    session : Session
+    host : str
+        Address to listen on.
+    port : int
+        0 for any that is free.
+
+    Raises
+    ------
+    LineamentError
+        If it cannot listen there.
+    """
+
+    daemon_threads = True
+
+    def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 0) -> None:
+        self.session, self.host = session, host
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        folder = files(__package__) / "static"
+        self.page = {f"/{name}": (folder / name).read_bytes() for name in _TYPES}
+        self.page["/"] = self.page["/index.html"]
+        try:
+            super().__init__((host, port), _Handler)
+        except OSError as error:
+            reason = error.strerror or error
+            raise LineamentError(f"{host}:{port}: cannot listen there: {reason}") from None
+
+    def server_bind(self) -> None:
+        """Bind, without the look-up of a name that HTTPServer adds, which may take seconds."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = self.host, self.server_address[1]
+
+    @property
+    def address(self) -> str:
+        """The page's address; by loopback where the server listens everywhere."""
+        host = "localhost" if _is_wildcard(self.host) else self.host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.server_port}/"
+
+    def is_known_host(self, header: str | None) -> bool:
+        """Whether the Host header of a request names this server."""
+        try:
+            name = urlsplit(f"//{header or ''}").hostname or ""
+        except ValueError:
+            return False
+        if name in _LOOPBACK or name == self.host.lower():
+            return True
+        # Listening everywhere it has many addresses; none of them is a name that could be rebound.
+        return _is_wildcard(self.host) and _is_address(name)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing: the other side has gone."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: ViewServer
+    server_version, sys_version = "lineament", ""
+    protocol_version = "HTTP/1.1"
+    timeout = _PATIENCE
+
+    def do_GET(self) -> None:
+        try:
+            kind, body = self._found()
+        except RequestError as error:
+            self.send_error(error.status, str(error))
+        except Exception as error:  # A scan that breaks a method does not break the server.
+            self.send_error(500, f"{type(error).__name__}: {' '.join(str(error).split())}")
+        else:
+            self._send(200, kind, body)
+
+    do_HEAD = do_GET  # noqa: N815
+
+    def _found(self) -> tuple[str, bytes]:
+        if not self.server.is_known_host(self.headers.get("Host")):
+            raise RequestError(403, f"the request is for another host, expected {_LOOPBACK[0]}")
+        path = self.path.partition("?")[0]
+        if path in self.server.page:
+            return _TYPES[path[1:] or "index.html"], self.server.page[path]
+        return _JSON, answer(self.server.session, self.path)
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Send what is wrong as JSON, whatever found it."""
+        self.close_connection = True
+        problem = message or explain or "the request makes no sense"
+        self._send(code, _JSON, json.dumps({"error": problem}).encode())
+
+    def _send(self, status: int, kind: str, body: bytes) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        for name, value in _HEADERS.items():
+            self.send_header(name, value)
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(body)
+
+    def log_message(self, *_: Any) -> None:
+        """Keep the terminal quiet."""
+
+
+def serve(
+    session: Session,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    *,
+    browser: bool = True,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Serve the page of a session until interrupted, and open it in the browser.
+
+    Parameters
+    ----------
+    session : Session
+    host, port
+        As in `ViewServer`.
+    browser : bool
+        Whether to open the page.
+    tell : callable
+        Is told the address.
+
+    Raises
+    ------
+    LineamentError
+        If the server cannot listen there.
+    """
+    with session, ViewServer(session, host, port) as server:
+        if not _is_loopback(host):
+            warning = f"{host} is not loopback: everybody who can reach it can look at this log"
+            print(f"lineament: {warning}", file=sys.stderr, flush=True)
+        tell(f"{session.name}: look at {server.address} (Ctrl-C ends it)")
+        if browser:
+            # A browser of the terminal would keep its caller waiting.
+            opening = partial(webbrowser.open, server.address)
+            threading.Thread(target=opening, name="browser", daemon=True).start()
+        server.serve_forever()
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_loopback(host: str) -> bool:
+    return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _is_wildcard(host: str) -> bool:
+    return host == "" or (_is_address(host) and ipaddress.ip_address(host).is_unspecified)

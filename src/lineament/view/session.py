@@ -1,0 +1,161 @@
+"""What the page asks for: a log, its scans, and what methods make of them."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import LineamentError
+from ..explaining import explain
+from ..extractor import Extractor
+from ..logs import open_log
+from ..scan import LaserScan
+from .store import ScanStore
+
+__all__ = ["Session", "plain"]
+
+
+class Session:
+    """A log that is looked at, with one extractor a method.
+
+    Parameters
+    ----------
+    path : path-like
+        The log, of any format that `lineament.open_log` reads.
+    extractors : mapping of str to Extractor
+        By the name under which the page shows them; the first is shown first.
+    **reading
+        How to read the log, as in `lineament.open_log`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be read, up to its first scan.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        extractors: Mapping[str, Extractor],
+        **reading: Any,
+    ) -> None:
+        self.extractors = dict(extractors)
+        self._busy = {name: threading.Lock() for name in self.extractors}
+        self._log = open_log(path, **reading)
+        self._log.scan(0)
+        self.name = self._log.name
+        self._total: int | None = None
+        self._error = ""
+        # A log of its own, as each iteration counts its faults anew.
+        self._store = ScanStore(lambda: open_log(path, **reading).items())
+        self._reader = threading.Thread(target=self._fill, name="reader of the log", daemon=True)
+
+    def __enter__(self) -> Session:
+        self._reader.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._store.close()
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until the log is read; tell whether it is."""
+        self._reader.join(seconds)
+        return not self._reader.is_alive()
+
+    def facts(self) -> dict[str, Any]:
+        """Tell what is known of the log, and how far it has been read."""
+        return {
+            "name": Path(self.name).name,
+            "format": self._log.format,
+            "methods": list(self.extractors),
+            "scans": len(self._store),
+            "total": self._total,
+            "complete": not self._reader.is_alive(),
+            "error": self._error,
+            "skipped": self._log.skipped,
+            "faults": list(self._log.faults),
+        }
+
+    def stamps(self, first: int, count: int) -> dict[str, Any]:
+        """List the stamps of some scans [s]."""
+        return {"first": first, "stamps": plain(self._store.stamps(first, count))}
+
+    def scan(self, index: int, method: str) -> dict[str, Any]:
+        """Give a scan and the features that a method finds in it, for JSON.
+
+        Raises
+        ------
+        IndexError
+            If the scan was not read yet, or there is none.
+        """
+        topic, scan = self._store.item(index)
+        with self._busy[method]:
+            features = self.extractors[method](scan)
+        asked = {"index": index, "method": method, "topic": topic}
+        found = {**asked, **_beams(scan), **features.to_dict()}
+        return {name: plain(value) for name, value in found.items()}
+
+    def trace(self, index: int, method: str, beam: int) -> dict[str, Any]:
+        """Tell what became of a beam, for JSON.
+
+        Raises
+        ------
+        IndexError
+            If there is no such scan.
+        ValueError
+            If there is no such beam.
+        """
+        _, scan = self._store.item(index)
+        with self._busy[method]:
+            trace = self.extractors[method].trace(scan)
+        return {"index": index, "method": method, **asdict(explain(trace, beam))}
+
+    def _fill(self) -> None:
+        try:
+            self._total = len(self._log)
+            self._store.fill(self._log.items())
+        except LineamentError as error:
+            self._error = str(error)
+        except Exception as error:  # Nobody is there to catch it: the page tells it.
+            self._error = f"reading ended: {type(error).__name__}: {error}"
+
+
+def _beams(scan: LaserScan) -> dict[str, Any]:
+    """Beams of a scan; the range of an invalid one is None."""
+    ranges = np.where(scan.valid, scan.ranges, np.nan).tolist()
+    bearings: dict[str, Any] = {"angles": scan.angles.tolist()}
+    if scan.is_regular:
+        bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
+    return {
+        "beams": len(scan),
+        "ranges": ranges,
+        **bearings,
+        "range_min": scan.range_min,
+        "range_max": scan.range_max,
+        "is_full_circle": scan.is_full_circle,
+        "pose": scan.pose,
+    }
+
+
+def plain(value: Any) -> Any:
+    """Make what JSON takes of nested lists and dicts: None in place of what is not finite.
+
+    Examples
+    --------
+    >>> plain({"a": [1.0, float("nan")]})
+    {'a': [1.0, None]}
+    """
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return value

@@ -1,0 +1,39 @@
+// Questions to the server.
+
+/** Ask for `path` with parameters; an Error with the server's own words where that fails. */
+export async function ask(path, parameters = {}) {
+  const query = new URLSearchParams(parameters).toString();
+  let response;
+  try {
+    response = await fetch(`/api/${path}${query ? `?${query}` : ""}`);
+  } catch {
+    throw new Error("The server has ended: start `lineament view` again.");
+  }
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.error);
+  return answer;
+}
+
+/** Runs one job at a time; of those that wait, only the last is run. */
+export class Latest {
+  #job = null;
+  #running = null;
+
+  run(job) {
+    this.#job = job;
+    this.#running ??= this.#work();
+    return this.#running;
+  }
+
+  async #work() {
+    try {
+      while (this.#job) {
+        const job = this.#job;
+        this.#job = null;
+        await job();
+      }
+    } finally {
+      this.#running = null;
+    }
+  }
+}

@@ -1,0 +1,270 @@
+// A scan and its features on a canvas.
+
+// Colours of clusters, those of the figures: easy to tell apart, also with colour blindness.
+export const PALETTE = [
+  "#4477aa", "#ee9933", "#228833", "#cc6699", "#33a9c9",
+  "#aa7744", "#8866bb", "#a3a22a", "#dd6655", "#44aa88",
+];
+
+const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "accent", "corner", "break", "arc"];
+
+/** The colours of the page, light or dark. */
+export function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  return Object.fromEntries(NAMES.map((n) => [n, style.getPropertyValue(`--${n}`).trim()]));
+}
+
+/** Bearings and points of a scan as it comes from the server; null where a beam is invalid. */
+export function placeBeams(scan) {
+  const bearing = (i) => scan.angles?.[i] ?? scan.angle_min + i * scan.angle_increment;
+  scan.bearings = Array.from({ length: scan.beams }, (_, i) => bearing(i));
+  scan.points = scan.bearings.map((a, i) => {
+    const r = scan.ranges[i];
+    return r === null ? null : [r * Math.cos(a), r * Math.sin(a)];
+  });
+  scan.reach = Math.max(0, ...scan.ranges); // of the farthest reading [m]
+}
+
+/** Beams of a feature in order, over the seam where the first is larger than the last. */
+export function beamsOf(feature, scan) {
+  const count = (feature.last_beam - feature.first_beam + scan.beams) % scan.beams + 1;
+  const beams = Array.from({ length: count }, (_, k) => (feature.first_beam + k) % scan.beams);
+  return beams.filter((i) => scan.points[i]);
+}
+
+/** Standard deviations along the axes of an ellipse, and the direction of the longer one [rad]. */
+export function ellipseOf([[xx, xy], [, yy]]) {
+  const middle = (xx + yy) / 2, half = Math.hypot((xx - yy) / 2, xy);
+  return {
+    major: Math.sqrt(Math.max(middle + half, 0)),
+    minor: Math.sqrt(Math.max(middle - half, 0)),
+    direction: Math.atan2(2 * xy, xx - yy) / 2,
+  };
+}
+
+/** First and last direction [rad] from the centre of an arc to its readings. */
+function seenOf(arc, scan) {
+  const [cx, cy] = arc.center;
+  const turns = beamsOf(arc, scan).map((i) => {
+    const [x, y] = scan.points[i];
+    return Math.atan2(y - cy, x - cx);
+  });
+  const first = turns[0] ?? 0;
+  const around = turns.map((t) => Math.atan2(Math.sin(t - first), Math.cos(t - first)));
+  return [first + Math.min(0, ...around), first + Math.max(0, ...around)];
+}
+
+export class Drawing {
+  constructor(ctx, plane, size, theme) {
+    Object.assign(this, { ctx, plane, size, theme });
+  }
+
+  at(point) {
+    return this.plane.toPixels(point, this.size);
+  }
+
+  scan(scan, shown) {
+    this.#invalid(scan);
+    const half = Math.min(Math.max(this.plane.scale / 40, 1.9), 3.2);
+    scan.points.forEach((point, i) => {
+      if (!point) return;
+      const cluster = scan.clusters[i];
+      if (cluster < 0) return this.#cross(point, half + 0.8);
+      this.ctx.fillStyle = shown.clusters ? PALETTE[cluster % PALETTE.length] : this.theme.soft;
+      this.#disc(point, half);
+    });
+    this.#sensor();
+  }
+
+  features(scan, shown, sigmas) {
+    if (shown.arcs) scan.arcs.forEach((arc) => this.#arc(arc, scan));
+    if (shown.segments) scan.segments.forEach((segment) => this.#segment(segment));
+    if (shown.breakpoints) scan.breakpoints.forEach((b) => this.#breakpoint(b));
+    if (shown.corners) scan.corners.forEach((c) => this.#corner(c, sigmas, scan.reach));
+  }
+
+  /** Make a feature stand out, with the band or ellipse of its covariance. */
+  highlight({ kind, feature }, scan, sigmas) {
+    const { ctx, theme } = this;
+    ctx.save();
+    ctx.lineCap = "round";
+    ctx.lineWidth = 6;
+    ctx.globalAlpha = 0.35;
+    ctx.strokeStyle = theme.accent;
+    if (kind === "segment") {
+      this.#stroke([feature.start, feature.end]);
+      this.#band(feature, sigmas);
+    } else if (kind === "arc") {
+      this.#circle(feature, ...seenOf(feature, scan));
+    } else {
+      ctx.lineWidth = 3;
+      ctx.beginPath();
+      ctx.arc(...this.at(feature.position ?? scan.points[feature.beam]), 9, 0, 7);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  /** The beam that is asked about: a line from the sensor, and a ring where it ends. */
+  beam(scan, i) {
+    const { ctx, theme, size, plane } = this;
+    const far = (size.width + size.height) / plane.scale + Math.hypot(plane.x, plane.y);
+    const a = scan.bearings[i];
+    ctx.save();
+    ctx.strokeStyle = theme.accent;
+    ctx.setLineDash([2, 4]);
+    this.#stroke([[0, 0], scan.points[i] ?? [far * Math.cos(a), far * Math.sin(a)]]);
+    if (scan.points[i]) {
+      ctx.setLineDash([]);
+      ctx.lineWidth = 2;
+      ctx.beginPath();
+      ctx.arc(...this.at(scan.points[i]), 7, 0, 7);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  /** Where the pointer is in the other panel. */
+  cursor(point) {
+    const [u, v] = this.at(point);
+    this.ctx.strokeStyle = this.theme.accent;
+    this.ctx.lineWidth = 1;
+    this.#path([[u - 7, v], [u + 7, v]]);
+    this.#path([[u, v - 7], [u, v + 7]]);
+  }
+
+  // Short ticks on a ring about the sensor, in the directions from which nothing usable came.
+  #invalid(scan) {
+    const { ctx, theme } = this;
+    const [u, v] = this.at([0, 0]);
+    ctx.strokeStyle = theme.faint;
+    ctx.lineWidth = 1;
+    scan.points.forEach((point, i) => {
+      if (point) return;
+      const c = Math.cos(scan.bearings[i]), s = -Math.sin(scan.bearings[i]);
+      this.#path([[u + 16 * c, v + 16 * s], [u + 22 * c, v + 22 * s]]);
+    });
+  }
+
+  #segment({ start, end }) {
+    const { ctx, theme } = this;
+    if (![...start, ...end].every(Number.isFinite)) return;
+    ctx.strokeStyle = theme.ink;
+    ctx.lineWidth = 1.2;
+    this.#stroke([start, end]);
+    const [p, q] = [this.at(start), this.at(end)];
+    const length = Math.hypot(q[0] - p[0], q[1] - p[1]) || 1;
+    const [nu, nv] = [(4 * (q[1] - p[1])) / length, (-4 * (q[0] - p[0])) / length];
+    for (const [u, v] of [p, q]) this.#path([[u - nu, v - nv], [u + nu, v + nv]]);
+  }
+
+  // Standard deviations of the line's place along it: offset and angle, and what they share.
+  #band({ start, end, centroid, angle, covariance }, sigmas) {
+    if (!covariance.flat().every(Number.isFinite) || !sigmas) return;
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    const along = ([x, y]) => c * (x - centroid[0]) + s * (y - centroid[1]);
+    const [t0, t1] = [along(start), along(end)], upper = [], lower = [];
+    for (let k = 0; k <= 24; k++) {
+      const t = t0 + ((t1 - t0) * k) / 24;
+      const variance = covariance[0][0] + 2 * t * covariance[0][1] + t * t * covariance[1][1];
+      const half = sigmas * Math.sqrt(Math.max(variance, 0));
+      const [x, y] = [centroid[0] + t * c, centroid[1] + t * s];
+      upper.push([x - half * s, y + half * c]);
+      lower.unshift([x + half * s, y - half * c]);
+    }
+    this.ctx.fillStyle = this.theme.accent;
+    this.#trace([...upper, ...lower].map((p) => this.at(p)));
+    this.ctx.fill();
+  }
+
+  #corner({ position, covariance }, sigmas, reach) {
+    const { ctx, theme, plane } = this;
+    if (!position.every(Number.isFinite)) return;
+    const [u, v] = this.at(position);
+    ctx.strokeStyle = theme.corner;
+    ctx.lineWidth = 1.6;
+    this.#trace([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
+    ctx.stroke();
+    if (!sigmas || !covariance.flat().every(Number.isFinite)) return;
+    const { major, minor, direction } = ellipseOf(covariance);
+    const [a, b] = [major, minor].map((sigma) => sigmas * sigma * plane.scale);
+    // Hidden by the marker, or no knowledge at all: then the numbers say so.
+    if (a < 3 || 3 * major > reach) return;
+    ctx.beginPath();
+    ctx.ellipse(u, v, a, b, -direction, 0, 2 * Math.PI);
+    ctx.lineWidth = 1;
+    ctx.stroke();
+    ctx.globalAlpha = 0.15;
+    ctx.fillStyle = theme.corner;
+    ctx.fill();
+    ctx.globalAlpha = 1;
+  }
+
+  #arc(arc, scan) {
+    const { ctx, theme } = this;
+    if (![...arc.center, arc.radius].every(Number.isFinite)) return;
+    ctx.save();
+    ctx.strokeStyle = theme.arc;
+    ctx.lineWidth = 0.8;
+    ctx.setLineDash([3, 4]);
+    this.#circle(arc, 0, 2 * Math.PI);
+    ctx.setLineDash([]);
+    ctx.lineWidth = 2.5;
+    this.#circle(arc, ...seenOf(arc, scan));
+    ctx.restore();
+  }
+
+  #circle({ center, radius }, first, last) {
+    this.ctx.beginPath();
+    this.ctx.arc(...this.at(center), radius * this.plane.scale, -last, -first);
+    this.ctx.stroke();
+  }
+
+  #breakpoint({ position }) {
+    const { ctx, theme } = this;
+    if (!position.every(Number.isFinite)) return;
+    ctx.fillStyle = theme.page;
+    ctx.strokeStyle = theme.break;
+    ctx.lineWidth = 1.2;
+    ctx.beginPath();
+    ctx.arc(...this.at(position), 3.4, 0, 7);
+    ctx.fill();
+    ctx.stroke();
+  }
+
+  // A triangle at the origin that looks along the x axis.
+  #sensor() {
+    const [u, v] = this.at([0, 0]);
+    this.ctx.fillStyle = this.theme.ink;
+    this.#trace([[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]]);
+    this.ctx.fill();
+  }
+
+  #disc(point, radius) {
+    this.ctx.beginPath();
+    this.ctx.arc(...this.at(point), radius, 0, 7);
+    this.ctx.fill();
+  }
+
+  #cross(point, half) {
+    const [u, v] = this.at(point);
+    this.ctx.strokeStyle = this.theme.faint;
+    this.ctx.lineWidth = 1;
+    this.#path([[u - half, v - half], [u + half, v + half]]);
+    this.#path([[u - half, v + half], [u + half, v - half]]);
+  }
+
+  #stroke(points) {
+    this.#path(points.map((p) => this.at(p)));
+  }
+
+  #path(pixels) {
+    this.#trace(pixels);
+    this.ctx.stroke();
+  }
+
+  #trace(pixels) {
+    this.ctx.beginPath();
+    pixels.forEach(([u, v], k) => (k ? this.ctx.lineTo(u, v) : this.ctx.moveTo(u, v)));
+  }
+}

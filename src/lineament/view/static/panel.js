@@ -1,0 +1,227 @@
+// One panel: a method's choice, its canvas, and what the pointer does there.
+
+import { describe } from "./details.js";
+import { Drawing } from "./drawing.js";
+import { drawGrid, drawScaleBar } from "./plane.js";
+
+const NEAR = 12; // pixels within which something is meant
+const STILL = 4; // pixels that a click may move
+
+export class Panel {
+  scan = null; // with the features that the method found
+  hovered = null;
+  #pointers = new Map();
+  #moved = 0;
+
+  constructor(app, method) {
+    this.app = app;
+    this.element = document.createElement("section");
+    this.element.className = "panel";
+    this.element.innerHTML =
+      '<div class="bar"><select aria-label="Method"></select><span></span></div>' +
+      '<canvas tabindex="0" role="img"></canvas><div class="card" role="tooltip" hidden></div>';
+    this.select = this.element.querySelector("select");
+    this.caption = this.element.querySelector("span");
+    this.canvas = this.element.querySelector("canvas");
+    this.card = this.element.querySelector(".card");
+    this.select.append(...app.methods.map((name) => new Option(name, name)));
+    this.select.value = method;
+    this.select.addEventListener("change", () => app.changeMethod());
+    this.#listen();
+    this.observer = new ResizeObserver(() => app.resized());
+    this.observer.observe(this.canvas);
+  }
+
+  get method() {
+    return this.select.value;
+  }
+
+  get size() {
+    return { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
+  }
+
+  remove() {
+    this.observer.disconnect();
+    this.element.remove();
+  }
+
+  show(scan) {
+    this.scan = scan;
+    this.hovered = null;
+    this.card.hidden = true;
+    const clusters = new Set(scan.clusters.filter((c) => c >= 0)).size;
+    const noise = scan.noise ? `noise ${(1000 * scan.noise.sigma).toFixed(1)} mm` : "nothing valid";
+    const count = (n, one) => `${n} ${one}${n === 1 ? "" : "s"}`;
+    const found = [
+      count(scan.segments.length, "segment"), count(scan.corners.length, "corner"),
+      count(scan.arcs.length, "arc"), count(clusters, "cluster"),
+    ].join(", ");
+    this.caption.textContent = `${found}; ${noise}`;
+    this.canvas.setAttribute("aria-label", `Scan ${scan.index} by ${scan.method}: ${found}`);
+  }
+
+  draw() {
+    const { canvas, app, scan, size } = this, ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.round(size.width * ratio);
+    canvas.height = Math.round(size.height * ratio);
+    const ctx = canvas.getContext("2d");
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    drawGrid(ctx, app.plane, size, app.theme);
+    if (scan) {
+      const drawing = new Drawing(ctx, app.plane, size, app.theme);
+      drawing.scan(scan, app.shown);
+      drawing.features(scan, app.shown, app.sigmas);
+      if (app.asked?.panel === this) drawing.beam(scan, app.asked.beam);
+      if (this.hovered) drawing.highlight(this.hovered, scan, app.sigmas);
+      if (app.cursor && app.cursor.panel !== this) drawing.cursor(app.cursor.point);
+    }
+    drawScaleBar(ctx, app.plane, size, app.theme);
+  }
+
+  #listen() {
+    const { canvas, app } = this;
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const steps = Math.max(-3, Math.min(3, event.deltaY / (event.deltaMode ? 3 : 100)));
+      app.plane.zoom(1.25 ** -steps, this.#pixel(event), this.size);
+      app.redraw();
+    }, { passive: false });
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      this.#pointers.set(event.pointerId, this.#pixel(event));
+      if (this.#pointers.size === 1) this.#moved = 0;
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (this.#pointers.has(event.pointerId)) this.#drag(event);
+      else this.#hover(this.#pixel(event));
+    });
+    canvas.addEventListener("pointerup", (event) => {
+      if (this.#pointers.delete(event.pointerId) && this.#moved <= STILL) {
+        this.#click(this.#pixel(event));
+      }
+    });
+    canvas.addEventListener("pointercancel", (event) => this.#pointers.delete(event.pointerId));
+    canvas.addEventListener("pointerleave", () => this.#leave());
+  }
+
+  #pixel(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  // One pointer moves the view, two zoom it.
+  #drag(event) {
+    const before = this.#pointers.get(event.pointerId), now = this.#pixel(event);
+    this.#moved += Math.hypot(now[0] - before[0], now[1] - before[1]);
+    const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]) || 1;
+      this.app.plane.zoom(apart(now) / apart(before), other, this.size);
+    } else if (this.#moved > STILL) {
+      this.app.plane.move(now[0] - before[0], now[1] - before[1]);
+    }
+    this.#pointers.set(event.pointerId, now);
+    this.card.hidden = true;
+    this.app.redraw();
+  }
+
+  #hover(pixel) {
+    this.hovered = this.pick(pixel);
+    this.app.cursor = { panel: this, point: this.app.plane.toMetres(pixel, this.size) };
+    this.#placeCard(pixel);
+    this.app.redraw();
+  }
+
+  #leave() {
+    this.hovered = this.app.cursor = null;
+    this.card.hidden = true;
+    this.app.redraw();
+  }
+
+  #click(pixel) {
+    if (!this.scan) return;
+    const picked = this.pick(pixel);
+    if (picked && picked.kind !== "reading") this.app.pin(this, picked);
+    const beam = picked?.kind === "corner" ? picked.feature.beam : this.#beamAt(pixel);
+    if (beam !== null) this.app.explain(this, beam);
+  }
+
+  #placeCard([u, v]) {
+    this.card.hidden = !this.hovered;
+    if (!this.hovered) return;
+    const { title, rows } = describe(this.hovered, this.scan);
+    const heading = document.createElement("h3");
+    heading.textContent = title;
+    const list = document.createElement("dl");
+    for (const [name, value] of rows) {
+      list.append(Object.assign(document.createElement("dt"), { textContent: name }));
+      list.append(Object.assign(document.createElement("dd"), { textContent: value }));
+    }
+    this.card.replaceChildren(heading, list);
+    const { width, height } = this.size, top = this.canvas.offsetTop;
+    const [w, h] = [this.card.offsetWidth, this.card.offsetHeight];
+    const left = u + 16 + w < width ? u + 16 : Math.max(u - 16 - w, 4);
+    const below = v + 16 + h < height ? v + 16 : Math.max(v - 16 - h, 4);
+    this.card.style.left = `${left}px`;
+    this.card.style.top = `${top + below}px`;
+  }
+
+  /** What is under a pixel: { kind, index, feature }, corners before lines before readings. */
+  pick(pixel) {
+    const { scan } = this, { shown } = this.app;
+    if (!scan) return null;
+    const away = (p) => (p ? this.#distance(pixel, p) : Infinity);
+    const nearest = (kind, list, distance, near = NEAR) => {
+      let best = null, least = near;
+      list.forEach((feature, index) => {
+        const d = distance(feature);
+        if (d < least) [best, least] = [{ kind, index, feature }, d];
+      });
+      return best;
+    };
+    return (shown.corners && nearest("corner", scan.corners, (c) => away(c.position)))
+      || (shown.breakpoints && nearest("breakpoint", scan.breakpoints, (b) => away(b.position), 6))
+      || (shown.arcs && nearest("arc", scan.arcs, (a) => this.#offArc(pixel, a), 7))
+      || (shown.segments && nearest("segment", scan.segments, (s) => this.#offLine(pixel, s), 7))
+      || this.#reading(pixel);
+  }
+
+  #reading(pixel) {
+    let beam = null, least = NEAR;
+    this.scan.points.forEach((point, i) => {
+      const d = point ? this.#distance(pixel, point) : Infinity;
+      if (d < least) [beam, least] = [i, d];
+    });
+    return beam === null ? null : { kind: "reading", index: beam, feature: { beam } };
+  }
+
+  // The beam of the nearest reading; far from all of them, the one that goes nearest.
+  #beamAt(pixel) {
+    const reading = this.#reading(pixel);
+    if (reading) return reading.index;
+    const [x, y] = this.app.plane.toMetres(pixel, this.size), turn = Math.atan2(y, x);
+    let beam = null, least = Infinity;
+    this.scan.bearings.forEach((bearing, i) => {
+      const off = Math.abs(Math.atan2(Math.sin(bearing - turn), Math.cos(bearing - turn)));
+      if (off < least) [beam, least] = [i, off];
+    });
+    return beam;
+  }
+
+  #distance([u, v], point) {
+    const [pu, pv] = this.app.plane.toPixels(point, this.size);
+    return Math.hypot(u - pu, v - pv);
+  }
+
+  #offLine([u, v], { start, end }) {
+    const [pu, pv] = this.app.plane.toPixels(start, this.size);
+    const [qu, qv] = this.app.plane.toPixels(end, this.size);
+    const [du, dv] = [qu - pu, qv - pv], square = du * du + dv * dv || 1;
+    const t = Math.min(Math.max(((u - pu) * du + (v - pv) * dv) / square, 0), 1);
+    return Math.hypot(u - pu - t * du, v - pv - t * dv);
+  }
+
+  #offArc(pixel, { center, radius }) {
+    return Math.abs(this.#distance(pixel, center) - radius * this.app.plane.scale);
+  }
+}

@@ -1,0 +1,291 @@
+"""The server of `view`: its answers, and what it refuses."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import threading
+from contextlib import contextmanager
+from importlib.resources import files
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from view_scans import walls
+
+from lineament import Extractor
+from lineament.errors import LineamentError
+from lineament.explaining import explain
+from lineament.logs import open_log, save_npz
+from lineament.view import Session, ViewServer
+from lineament.view.api import MOST_STAMPS, RequestError, answer
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("view") / "wall.npz"
+    save_npz(path, walls(9))
+    return path
+
+
+@pytest.fixture
+def session(log):
+    extractors = {"pdbs": Extractor("pdbs"), "tight": Extractor("pdbs", noise_factor=1.0)}
+    with Session(log, extractors) as session:
+        assert session.wait(30)
+        yield session
+
+
+@contextmanager
+def served(session, host="127.0.0.1"):
+    with ViewServer(session, host) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.fixture
+def server(session):
+    with served(session) as server:
+        yield server
+
+
+def ask(server, target, method="GET", **headers):
+    """Status, headers and body of the answer to one request."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
+    try:
+        connection.request(method, target, headers=headers)
+        reply = connection.getresponse()
+        return reply.status, reply.headers, reply.read()
+    finally:
+        connection.close()
+
+
+def asked(server, target):
+    status, _, body = ask(server, target)
+    return status, json.loads(body)
+
+
+# The answers.
+
+
+def test_the_log_is_told_with_how_far_it_was_read(server):
+    status, facts = asked(server, "/api/log")
+    assert status == 200
+    assert facts["name"] == "wall.npz"
+    assert facts["format"] == "npz"
+    assert facts["methods"] == ["pdbs", "tight"]
+    assert (facts["scans"], facts["total"], facts["complete"]) == (9, 9, True)
+    assert (facts["error"], facts["skipped"], facts["faults"]) == ("", 0, [])
+
+
+def test_a_scan_comes_with_its_features(server, log):
+    status, found = asked(server, "/api/scan?i=4&method=pdbs")
+    scan = open_log(log).scan(4)
+    features = Extractor("pdbs")(scan).to_dict()
+    assert status == 200
+    assert {name: found[name] for name in features} == features
+    assert (found["index"], found["method"], found["beams"]) == (4, "pdbs", 31)
+    assert found["topic"] == "ranges"
+    assert found["ranges"][:3] == [None, None, None]
+    assert found["ranges"][3:] == scan.ranges[3:].tolist()
+    assert (found["angle_min"], found["angle_increment"]) == (-0.5, 1.0 / 30)
+    assert found["range_max"] == 30.0
+
+
+def test_a_trace_is_the_explanation_of_its_beam(server, log):
+    status, found = asked(server, "/api/trace?i=4&method=tight&beam=20")
+    expected = explain(Extractor("pdbs", noise_factor=1.0).trace(open_log(log).scan(4)), 20)
+    assert status == 200
+    assert (found["index"], found["method"], found["beam"]) == (4, "tight", 20)
+    assert found["summary"] == expected.summary
+    assert found["steps"] == [list(step) for step in expected.steps]
+
+
+def test_stamps_come_in_blocks(server):
+    stamps = [10 + 0.1 * k for k in range(9)]
+    assert asked(server, "/api/stamps?first=0&count=4096")[1]["stamps"] == stamps
+    assert asked(server, "/api/stamps?first=7&count=1")[1] == {"first": 7, "stamps": [stamps[7]]}
+    assert asked(server, "/api/stamps?first=99&count=1")[1]["stamps"] == []
+
+
+@pytest.mark.parametrize(
+    ("target", "status", "words"),
+    [
+        ("/api/scan", 400, "parameter i is missing"),
+        ("/api/scan?i=0", 400, "parameter method is missing"),
+        ("/api/scan?i=x&method=pdbs", 400, "i is 'x', expected a whole number"),
+        ("/api/scan?i=-1&method=pdbs", 400, "i is '-1'"),
+        ("/api/scan?i=1.0&method=pdbs", 400, "i is '1.0'"),
+        ("/api/scan?i=%EF%BC%91&method=pdbs", 400, "expected a whole number"),
+        (f"/api/scan?i={'9' * 5000}&method=pdbs", 400, "expected a whole number"),
+        ("/api/scan?i=9&method=pdbs", 404, "scan 9 is not there: 0 to 8 have been read"),
+        ("/api/scan?i=999999999999&method=pdbs", 404, "is not there"),
+        ("/api/scan?i=0&method=lui", 404, "method 'lui' is not there, expected one of: pdbs, "),
+        ("/api/scan?i=0&i=1&method=pdbs", 400, "a parameter is given twice"),
+        ("/api/scan?i=0&method=pdbs&x=1", 400, "parameter 'x' is unknown, expected i, method"),
+        ("/api/log?x=", 400, "parameter 'x' is unknown, expected none"),
+        ("/api/trace?i=0&method=pdbs&beam=31", 404, "beam is 31, expected a whole number from 0"),
+        ("/api/trace?i=9&method=pdbs&beam=0", 404, "scan 9 is not there"),
+        ("/api/stamps?first=0&count=0", 400, f"count is 0, expected 1 to {MOST_STAMPS}"),
+        ("/api/stamps?first=0&count=4097", 400, "count is 4097"),
+        ("/api/scan?" + "&".join(f"a{k}=1" for k in range(99)), 400, "makes no sense"),
+        ("/api/", 404, "/api/ is not there"),
+        ("/style.css/../../secret", 404, "is not there"),
+        ("/../store.py", 404, "is not there"),
+        ("/%2e%2e/store.py", 404, "is not there"),
+        ("//etc/passwd", 404, "is not there"),
+        ("/static/index.html", 404, "is not there"),
+    ],
+)
+def test_a_bad_question_gets_one_clear_line(server, target, status, words, capfd):
+    found, told = asked(server, target)
+    assert found == status
+    assert list(told) == ["error"]
+    assert words in told["error"]
+    assert "\n" not in told["error"]
+    assert capfd.readouterr() == ("", "")
+
+
+@given(st.text(max_size=40))
+def test_any_target_has_an_answer_or_a_refusal(target):
+    class Nobody:
+        extractors = {}  # noqa: RUF012
+
+    with pytest.raises(RequestError):
+        answer(Nobody(), "/" + target)
+
+
+# The server.
+
+
+def test_the_page_and_nothing_else_is_served(server):
+    there = {f"/{file.name}" for file in (files("lineament.view") / "static").iterdir()}
+    assert there | {"/"} == set(server.page)
+    kinds = {}
+    for name in server.page:
+        status, headers, body = ask(server, name)
+        kinds[name] = headers["Content-Type"]
+        assert status == 200
+        assert body == server.page[name]
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert headers["X-Content-Type-Options"] == "nosniff"
+    assert kinds["/"].startswith("text/html")
+    assert kinds["/main.js"].startswith("text/javascript")
+    status, headers, body = ask(server, "/", "HEAD")
+    assert (status, body) == (200, b"")
+    assert int(headers["Content-Length"]) == len(server.page["/"])
+
+
+def test_the_page_needs_nothing_from_elsewhere(server):
+    for name, body in server.page.items():
+        text = body.decode().replace("http://www.w3.org/2000/svg", "")
+        assert "//cdn" not in text
+        assert "http://" not in text, name
+        assert "https://" not in text, name
+
+
+def test_colours_of_clusters_are_those_of_the_figures(server):
+    from lineament.output.canvas import PALETTE
+
+    script = server.page["/drawing.js"].decode()
+    listed = script[script.index("PALETTE = [") : script.index("];")]
+    assert [part.strip(' \n",') for part in listed.split('"')[1::2]] == PALETTE.tolist()
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("localhost", 200),
+        ("LOCALHOST:1234", 200),
+        ("127.0.0.1", 200),
+        ("[::1]:80", 200),
+        ("evil.example", 403),
+        ("evil.example:8000", 403),
+        ("localhost.evil.example", 403),
+        ("192.168.0.7", 403),
+        ("localhost@evil.example", 403),
+        ("[", 403),
+        ("", 403),
+    ],
+)
+def test_requests_by_another_name_are_refused(server, host, status):
+    for target in ("/api/log", "/"):
+        assert ask(server, target, Host=host)[0] == status
+
+
+def test_listening_everywhere_takes_addresses_but_no_names(session):
+    with served(session, "0.0.0.0") as server:
+        assert server.address == f"http://localhost:{server.server_port}/"
+        assert ask(server, "/", Host="192.168.0.7:80")[0] == 200
+        assert ask(server, "/", Host="robot.example")[0] == 403
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "BREW"])
+def test_other_methods_are_refused_as_json(server, method):
+    status, headers, body = ask(server, "/api/log", method)
+    assert status == 501
+    assert headers["Content-Type"].startswith("application/json")
+    assert "Unsupported method" in json.loads(body)["error"]
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"\r\n\r\n",
+        b"nonsense\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET /\xff HTTP/1.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 300 + b"\r\n",
+        b"GET /" + b"a" * 70000,
+        b"\0" * 99,
+    ],
+)
+def test_garbage_and_broken_connections_leave_the_server_alive(server, raw, capfd):
+    with socket.create_connection(("127.0.0.1", server.server_port), timeout=5) as line:
+        line.sendall(raw)
+    assert asked(server, "/api/log")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_scan_that_breaks_a_method_breaks_nothing_else(session, capfd):
+    def broken(_):
+        raise RuntimeError("no\nluck")
+
+    session.extractors["tight"] = broken
+    with served(session) as server:
+        assert asked(server, "/api/scan?i=0&method=tight") == (
+            500,
+            {"error": "RuntimeError: no luck"},
+        )
+        assert asked(server, "/api/scan?i=0&method=pdbs")[0] == 200
+    assert capfd.readouterr() == ("", "")
+
+
+def test_many_at_once_get_what_one_gets(server):
+    targets = [
+        f"/api/scan?i={k % 9}&method={name}" for k in range(12) for name in ("pdbs", "tight")
+    ]
+    alone = [asked(server, target) for target in targets]
+    together = {}
+    threads = [
+        threading.Thread(target=lambda k=k: together.update({k: asked(server, targets[k])}))
+        for k in range(len(targets))
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [together[k] for k in range(len(targets))] == alone
+
+
+def test_a_port_that_is_taken_is_one_line(session):
+    with ViewServer(session) as server, pytest.raises(LineamentError, match="cannot listen there"):
+        ViewServer(session, port=server.server_port)

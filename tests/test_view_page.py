@@ -1,0 +1,219 @@
+"""The page of `view` in headless Chromium: it shows, plays, switches, tells numbers and answers."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from browser import MISSING, open_browser
+from view_scans import corners
+
+from lineament import Extractor
+from lineament.explaining import explain
+from lineament.logs import open_log, save_npz
+from lineament.view import Session, ViewServer
+
+pytestmark = [
+    pytest.mark.skipif(bool(MISSING), reason=MISSING or "there is a browser"),
+    pytest.mark.slow,
+]
+
+METHODS = ("liu:scale_free", "pdbs")
+SPACE, LEFT, RIGHT, HOME, END = " ", "\ue012", "\ue014", "\ue011", "\ue010"
+
+#: Pixel in the window of a point of the first panel.
+PLACE = """
+return import("/main.js").then(({ app }) => {
+  const panel = app.panels[0], box = panel.canvas.getBoundingClientRect();
+  const [u, v] = app.plane.toPixels(arguments[0], panel.size);
+  return [box.left + u, box.top + v];
+});
+"""
+#: Put a point into the middle, near enough to tell readings apart.
+LOOK_AT = """
+return import("/main.js").then(({ app }) => {
+  [app.plane.x, app.plane.y] = arguments[0];
+  app.zoom(4);
+});
+"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "corner.npz"
+    save_npz(path, corners(25))
+    return path
+
+
+@pytest.fixture(scope="module")
+def address(log):
+    with (
+        Session(log, {name: Extractor(name) for name in METHODS}) as session,
+        ViewServer(session) as server,
+    ):
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server.address
+        server.shutdown()
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with open_browser(tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.fixture
+def page(browser, address):
+    """The page, anew, with a scan on it; it must not have complained in the end."""
+    browser.resize(1366, 768)
+    browser.open("about:blank")
+    browser.open(address)
+    browser.wait("document.body.dataset.scan === '0' && document.querySelector('#reading').hidden")
+    yield browser
+    assert browser.console() == []
+    assert browser.text("#problem") == ""
+
+
+def shown(page, index):
+    return page.wait(f"document.body.dataset.scan === '{index}'")
+
+
+def caption(page, panel=1):
+    return page.text(f".panel:nth-child({panel}) span")
+
+
+def found(log, index, method=METHODS[0]):
+    return Extractor(method)(open_log(log).scan(index))
+
+
+def test_the_page_shows_the_log_and_its_first_scan(page, log):
+    features = found(log, 0)
+    assert page.text("h1") == "corner.npz"
+    assert page.text("header p") == "ranges in npz, 25 scans"
+    assert f"{len(features.segments)} segments, 1 corner, 0 arcs" in caption(page)
+    label = page.run("return document.querySelector('canvas').ariaLabel")
+    assert label.startswith("Scan 0 by liu:scale_free: ")
+    # Something is drawn: far more colours than those of a grid.
+    colours = page.run(
+        "const c = document.querySelector('canvas'), d = c.getContext('2d')"
+        ".getImageData(0, 0, c.width, c.height).data;"
+        "const seen = new Set(); for (let i = 0; i < d.length; i += 4)"
+        " seen.add((d[i] << 16) | (d[i + 1] << 8) | d[i + 2]); return seen.size"
+    )
+    assert colours > 20
+
+
+def test_scrubbing_and_keys_change_the_scan(page):
+    page.run(
+        "const s = document.querySelector('#slider'); s.value = 17;"
+        "s.dispatchEvent(new Event('input'))"
+    )
+    shown(page, 17)
+    page.wait("document.querySelector('#position').textContent === 'scan 17 / 24, 0.85 s'")
+    assert "scan=17" in page.run("return location.hash")
+    for key, index in ((RIGHT, 18), (LEFT, 17), (HOME, 0), (END, 24)):
+        page.press(key)
+        shown(page, index)
+
+
+def test_playing_goes_on_to_the_end_and_stops(page):
+    page.press(SPACE)
+    assert page.run("return document.querySelector('#play').ariaLabel") == "Pause"
+    shown(page, 24)
+    page.wait("document.querySelector('#play').ariaLabel === 'Play'")
+
+
+def test_hovering_tells_the_numbers_of_a_feature(page, log):
+    corner = found(log, 0).corners[0]
+    page.point(*page.run(PLACE, corner["position"].tolist()))
+    page.wait("!document.querySelector('.card').hidden")
+    told = page.text(".card")
+    x, y = corner["position"]
+    assert "corner 0" in told
+    assert f"{x:.3f}, {y:.3f} m" in told
+    segment = found(log, 0).segments[0]
+    page.point(*page.run(PLACE, segment["centroid"].tolist()))
+    page.wait("document.querySelector('.card').innerText.includes('segment 0')")
+    assert f"{segment['n_points']} readings" in page.text(".card")
+
+
+def test_a_click_pins_a_feature_once_and_it_can_be_removed(page, log):
+    place = page.run(PLACE, found(log, 0).corners[0]["position"].tolist())
+    for _ in range(2):
+        page.point(*place, click=True)
+    page.wait("document.querySelectorAll('#pins tbody tr').length === 1")
+    assert "corner 0" in page.text("#pins tbody")
+    assert "scan 0, liu:scale_free" in page.text("#pins tbody")
+    page.run("document.querySelector('#pins tbody button').click()")
+    page.wait("document.querySelector('#pins').hidden")
+
+
+def test_a_click_on_a_reading_is_answered(page, log):
+    scan = open_log(log).scan(0)
+    expected = explain(Extractor(METHODS[0]).trace(scan), 25)
+    page.run(LOOK_AT, scan.points[25].tolist())
+    page.point(*page.run(PLACE, scan.points[25].tolist()), click=True)
+    page.wait("document.querySelector('#why .summary')")
+    assert page.text("#why h3") == "beam 25, scan 0, liu:scale_free"
+    assert page.text("#why .summary") == expected.summary
+    assert page.text("#why dl dd:last-child") == expected.steps[-1][1]
+
+
+def test_a_beam_is_asked_for_by_its_number(page):
+    page.run("document.querySelector('#beam').focus()")
+    for key in "115\ue007":
+        page.press(key)
+    page.wait("document.querySelector('#why h3')?.textContent.startsWith('beam 115, ')")
+    assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
+
+
+def test_a_click_to_where_nothing_came_back_is_answered(page):
+    page.point(*page.run(PLACE, [0.6, 0.93]), click=True)
+    page.wait("document.querySelector('#why .summary')")
+    assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
+
+
+def test_methods_are_switched_and_shown_side_by_side(page):
+    page.run(
+        "const s = document.querySelector('.panel select'); s.value = 'pdbs';"
+        "s.dispatchEvent(new Event('change'))"
+    )
+    page.wait("document.querySelector('.panel span').textContent.startsWith('0 segments')")
+    page.run("document.querySelector('#compare').click()")
+    page.wait("document.querySelectorAll('.panel').length === 2")
+    page.wait("document.querySelector('.panel:nth-child(2) span').textContent.includes('1 corner')")
+    assert "with=liu" in page.run("return location.hash")
+    page.run("document.querySelector('#compare').click()")
+    page.wait("document.querySelectorAll('.panel').length === 1")
+
+
+def test_wheel_and_drag_move_the_view(page):
+    state = "return import('/main.js').then(({ app: { plane: p } }) => [p.x, p.y, p.scale])"
+    x, y, scale = page.run(state)
+    page.run(
+        "document.querySelector('canvas').dispatchEvent(new WheelEvent('wheel',"
+        "{ deltaY: -100, clientX: 300, clientY: 300, cancelable: true }))"
+    )
+    assert page.run(state)[2] == pytest.approx(1.25 * scale)
+    page.press("f")
+    assert page.run(state) == pytest.approx([x, y, scale])
+    page.drag((300, 300), (340, 280))
+    assert page.run(state) == pytest.approx([x - 40 / scale, y - 20 / scale, scale])
+
+
+def test_a_narrow_window_needs_no_scrolling_sideways(page):
+    page.resize(390, 844, dark=True)
+    page.wait("document.documentElement.scrollWidth <= 390")
+    assert page.run("return document.querySelector('canvas').clientHeight") > 300
+    dark = "getComputedStyle(document.body).backgroundColor === 'rgb(13, 17, 23)'"
+    page.wait(dark)
+
+
+def test_a_server_that_has_gone_is_told(page):
+    page.run("window.fetch = () => Promise.reject(new TypeError('gone'))")
+    page.press(RIGHT)
+    page.wait("!document.querySelector('#problem').hidden")
+    assert "The server has ended" in page.text("#problem")
+    page.run("document.querySelector('#problem').textContent = ''")
