@@ -177,3 +177,13 @@ def test_no_method_is_without_answers(method):
     trace = Extractor(method).trace(scan)
     for beam in range(0, len(scan), 25):
         assert agrees(trace, beam, explain(trace, beam))
+
+
+@pytest.mark.slow
+def test_the_evidence_is_of_the_same_run_where_the_noise_is_estimated():
+    extractor = Extractor("optimal")
+    for seed in range(5, 25):
+        for sensor in ("rplidar", "lms361"):
+            trace = extractor.trace(hall(sensor, seed))
+            for kind, values in trace.evidence.items():
+                assert len(values) == len(getattr(trace.features, kind)), (sensor, seed, kind)

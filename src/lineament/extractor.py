@@ -150,7 +150,7 @@ class Extractor:
 
     def trace(self, scan: LaserScan) -> Trace:
         """Extract the features of one scan and keep every intermediate of the run."""
-        return self.method.trace(scan, self(scan))
+        return self.method.trace(scan, self(scan), self._noise_row)
 
     def _blocks_of(self, frame: LaserScan, workers: int) -> list[Block]:
         """Give each worker a block; those of the last batch, where they fit."""

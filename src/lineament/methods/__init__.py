@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ..block import Block
     from ..features import Features
     from ..scan import LaserScan
@@ -42,7 +45,7 @@ class Method(Protocol):
     def run(self, block: Block) -> None:
         """Find and measure the features of the scans of a block."""
 
-    def trace(self, scan: LaserScan, features: Features) -> Trace:
+    def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
         """Run again on a scan of which these features came, and keep every intermediate."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..block import Block
-from ..features import Features, noise_row
+from ..features import Features
 from ..scan import LaserScan
 from ..tracing import Trace, trace_of
 from .steps import estimate_noise
@@ -50,13 +50,15 @@ class MethodBase:
         """What the response of a candidate exceeds where the first search accepts it."""
         return 0.0
 
-    def trace(self, scan: LaserScan, features: Features) -> Trace:
+    def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
         """Run again on a scan of which these features came, and keep every intermediate.
+
+        `noise` is the row that was given then: what was estimated is estimated again.
 
         Its candidates and cuts are those of the first search, before anything was merged; where
         none are examined, there are none. `lineament.Extractor.trace` does both.
         """
-        block = Block(scan, noise_row(features.noise), 1, self.own_arrays(len(scan)))
+        block = Block(scan, noise, 1, self.own_arrays(len(scan)))
         block.load(scan.ranges)
         self.run(block)
         return trace_of(
