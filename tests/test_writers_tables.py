@@ -62,10 +62,12 @@ def test_csv_tells_what_is_not_finite(tmp_path):
     assert [float(text) for text in texts] == pytest.approx([np.nan, np.inf, -np.inf], nan_ok=True)
 
 
-def test_parquet_has_a_column_of_topics_where_there_are_several(tmp_path):
+def test_parquet_has_a_column_of_topics_where_they_are_told(tmp_path):
     scans = [random_features(i) for i in range(1005)]
+    write(tmp_path / "none.parquet", scans[:3])
+    assert pq.read_schema(tmp_path / "none.parquet").equals(SCHEMA)
     write(tmp_path / "one.parquet", scans[:3], TOPICS[:1])
-    assert pq.read_schema(tmp_path / "one.parquet").equals(SCHEMA)
+    assert set(pq.read_table(tmp_path / "one.parquet")["topic"].to_pylist()) == {TOPICS[0]}
     write(tmp_path / "two.parquet", scans, TOPICS)
     table = pq.read_table(tmp_path / "two.parquet")
     assert table.schema.names == [*SCHEMA.names, "topic"]

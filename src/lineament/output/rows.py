@@ -27,11 +27,11 @@ class RowWriter(Writer):
 
     @property
     def _schema(self) -> pa.Schema:
-        return SCHEMA.append(TOPIC) if len(self.topics) > 1 else SCHEMA
+        return SCHEMA.append(TOPIC) if self.topics else SCHEMA
 
     def _table(self, found: Sequence[Found], first_scan: int) -> pa.Table:
         table = features_table([one.features for one in found], first_scan)
-        if len(self.topics) > 1:
+        if self.topics:
             places = {topic: k for k, topic in enumerate(self.topics)}
             of_scan = np.array([places[one.topic] for one in found], dtype=np.int32)
             codes = of_scan[table["scan"].to_numpy() - first_scan]

@@ -1,0 +1,154 @@
+"""The command that makes tables of logs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import LineamentError
+from .method_options import METHOD, NOISE, SET, make_extractor
+from .options import LOG_PATH, QUIET, check_ending, reading
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from ..extractor import Extractor
+
+__all__ = ["extract"]
+
+_COUNT = click.IntRange(min=1)
+
+
+@click.command()
+@click.argument("logs", nargs=-1, required=True, type=LOG_PATH)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    help="File to write, its format by its ending; or a folder, FOLDER/, for a file a log.",
+)
+@METHOD
+@SET
+@NOISE
+@reading
+@click.option(
+    "--format",
+    "ending",
+    metavar="ENDING",
+    help="Format of the files in a folder.  [default: parquet]",
+)
+@click.option("--resume", is_flag=True, help="Leave logs whose files in the folder are whole.")
+@click.option(
+    "--processes", type=_COUNT, help="Work in so many processes.  [default: one a processor]"
+)
+@click.option("--threads", type=_COUNT, help="Work in so many threads of one process.")
+@click.option("--dask", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
+@click.option("--append", is_flag=True, hidden=True)
+@QUIET
+def extract(
+    logs: tuple[Path | str, ...],
+    output: str,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    reading: dict[str, Any],
+    append: bool,
+    quiet: bool,
+    **bulk: Any,
+) -> None:
+    """Extract the features of LOGS into a table.
+
+    LOGS are files, folders, patterns, archives or addresses.
+    """
+    from ..output import ENDINGS
+
+    if append:
+        raise click.UsageError(
+            "--append: a file is written whole or not at all; write another, or a data set: -o FOLDER/"
+        )
+    is_folder = output.endswith(("/", os.sep)) or Path(output).is_dir()
+    if not is_folder:
+        check_ending(Path(output), ENDINGS, or_folder=True)
+        for name, value in bulk.items():
+            if value:
+                name = {"ending": "format"}.get(name, name)
+                raise click.UsageError(f"--{name}: expected a folder as output, FOLDER/")
+    extractor = make_extractor(method, settings, noise)
+    if is_folder:
+        _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)
+    else:
+        _extract_into_file(logs, output, extractor, reading, quiet)
+
+
+def _extract_into_file(
+    logs: tuple[Path | str, ...],
+    output: str,
+    extractor: Extractor,
+    reading: dict[str, Any],
+    quiet: bool,
+) -> None:
+    from ..extraction import extract_log
+    from ..logs import find_logs
+    from .progress import tracker
+
+    found = find_logs(logs)
+    if len(found) > 1:
+        raise LineamentError(f"{output}: is no folder, expected one for {len(found)} logs")
+    extraction = extract_log(found[0], output, extractor, track=tracker(quiet), **reading)
+    if not quiet:
+        click.echo(str(extraction))
+
+
+def _extract_into_folder(
+    logs: tuple[Path | str, ...],
+    output: str,
+    extractor: Extractor,
+    reading: dict[str, Any],
+    quiet: bool,
+    *,
+    ending: str | None,
+    resume: bool,
+    processes: int | None,
+    threads: int | None,
+    dask: str | None,
+) -> None:
+    from ..bulk import extract_logs
+    from .progress import telling
+
+    with _executor(processes, threads, dask) as executor, telling(quiet) as tell:
+        bulk = extract_logs(
+            logs,
+            output,
+            extractor,
+            executor=executor,
+            ending=f".{(ending or 'parquet').removeprefix('.')}",
+            resume=resume,
+            tell=tell,
+            **reading,
+        )
+    if not quiet:
+        click.echo(str(bulk))
+    if bulk.failed:
+        raise LineamentError(f"{bulk.failed} of {bulk.logs} logs failed, see {bulk.manifest}")
+
+
+@contextmanager
+def _executor(processes: int | None, threads: int | None, dask: str | None) -> Iterator[Executor]:
+    from ..bulk import Processes, Threads, dask_executor
+
+    if sum(value is not None for value in (processes, threads, dask)) > 1:
+        raise click.UsageError("expected one of --processes, --threads and --dask")
+    if dask is not None:
+        with dask_executor(dask) as executor:
+            yield executor
+    elif threads is not None:
+        with Threads(threads) as executor:
+            yield executor
+    else:
+        with Processes(processes) as executor:
+            yield executor
