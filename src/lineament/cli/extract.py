@@ -69,7 +69,7 @@ def extract(
 
     if append:
         raise click.UsageError(
-            "--append: a file is written whole or not at all; write another, or a data set: -o FOLDER/"
+            "--append: a file is written whole or not at all; write another, or into a FOLDER/"
         )
     is_folder = output.endswith(("/", os.sep)) or Path(output).is_dir()
     if not is_folder:
