@@ -146,11 +146,12 @@ def opening_and_side(before, after):
 
 def breakpoints(scan, found, rho, points, gap):
     """(beams, position, kind, occluder) where surfaces end."""
-    if not found.classes or found.closed:
+    if not found.classes:
         return []
     ends = [(members[0], members[-1]) for members in found.classes]
     breaks = []
-    following = ends[1:] + (ends[:1] if scan.is_full_circle else [])
+    is_open = scan.is_full_circle and not found.closed
+    following = ends[1:] + (ends[:1] if is_open else [])
     for (_, a), (b, _) in zip(ends, following, strict=False):
         near = a if rho[a] <= rho[b] else b
         if (b - a) % len(scan) > gap:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from naive_fit import range_variance
 
-from lineament.kernels import arcs, optimal
+from lineament.kernels import arcs
 
 
 def circle_of(xy):
@@ -51,6 +51,7 @@ def fit_arc(points, first, last):
         "center": center,
         "radius": r,
         "covariance": covariance,
+        "span": (first, last),
         "first_beam": points.beams[first],
         "last_beam": points.beams[last],
         "n_points": len(xy),
@@ -78,33 +79,44 @@ def may_be_arc(points, first, last):
     return r <= arcs._LARGEST and (abs(off) <= near).all()
 
 
-def find_arcs(points, pieces, evidence):
-    """Pieces that are left, and the arcs that explain the others better."""
-    kept, found, rest = [], [], list(pieces)
+def find_arcs(points, bounds, pieces, evidence):
+    """Pieces that are left of a class, and the arcs that explain the others better."""
+    kept, found, rest, free = [], [], list(pieces), bounds[0]
     while rest:
         best, most, taken = None, 0.0, 0
         for count in range(1, min(len(rest), arcs._MOST_PIECES) + 1):
-            gain, arc = arc_of(points, rest[:count], evidence)
-            if gain > most:
-                best, most, taken = arc, gain, count
+            run = rest[:count]
+            after = rest[count][0] - 1 if count < len(rest) else bounds[1]
+            left = min(run[0][0] - free, arcs._ENDS)
+            right = min(after - run[-1][1], arcs._ENDS)
+            for b in range(right + 1):
+                for a in range(left + 1):
+                    gain, arc = arc_of(points, bounds, run, a, b, evidence)
+                    if gain > most:
+                        best, most, taken = arc, gain, count
         if best is None:
             kept.append(rest.pop(0))
+            free = kept[-1][1] + 1
         else:
             found.append(best)
-            rest = rest[taken:]
+            rest, free = rest[taken:], best["span"][1] + 1
     return kept, found
 
 
-def arc_of(points, run, evidence):
-    """What one circle explains better than the lines of a run of pieces, and the circle."""
-    first, last = run[0][0], run[-1][1]
+def arc_of(points, bounds, run, left, right, evidence):
+    """What a circle explains better than the lines of a run, with so many points beside it."""
+    first, last = run[0][0] - left, run[-1][1] + right
     costs = [points.line(*piece)[1] for piece in run]
-    n = last - first + 1
-    straight = len(run) == 1 and costs[0] < n + 2 * math.sqrt(2 * n)
-    if n < arcs._LEAST_POINTS or straight or not may_be_arc(points, first, last):
+    n, own = last - first + 1, run[-1][1] - run[0][0] + 1
+    alone = first <= bounds[0] + 1 and last >= bounds[1] - 1
+    straight = len(run) == 1 and costs[0] < own + 2 * math.sqrt(2 * own)
+    if n < arcs._LEAST_POINTS or (straight and own == n and not alone):
         return 0.0, None
-    arc = fit_arc(points, first, last)
-    if arc is None or arc["chi_square"] >= 2 * n + 12:
+    arc = fit_arc(points, first, last) if may_be_arc(points, first, last) else None
+    variance = range_variance(points.rho[last], points.noise)
+    # Walls may be uneven, which is part of that; what is round is not.
+    if arc is None or arc["chi_square"] * variance >= (2 * n + 12) * (variance - points.uneven):
         return 0.0, None
-    lines = sum(costs) + len(run) * evidence
-    return lines - arc["chi_square"] - optimal._ARC_PRICE * evidence, arc
+    lines = sum(costs) + len(run) * evidence + arcs._OUT * (n - own)
+    price = points.arc_price - (arcs._ALONE if alone else 0)
+    return lines - arc["chi_square"] - price * evidence, arc

@@ -7,30 +7,44 @@ and what is compared is the way.
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 from naive_fit import range_variance
 
-from lineament.kernels import agglomeration, borders, line_fit, optimal
+from lineament.kernels import agglomeration, borders, line_fit, optimal, sifting, unevenness
 from lineament.kernels import straightening as bowing
-
-PRICE = optimal._PRICE
 
 
 @dataclass
 class Points:
-    """Points of a scan in the order of its classes; `noise` is (sigma, proportional, 0, 0)."""
+    """Points of a scan in the order of its classes.
+
+    `noise` is (sigma, proportional, 0, quantum). Walls are `uneven`, a variance that is added to
+    that of the noise, and what is off a line costs more.
+    """
 
     xy: np.ndarray
     beams: list[int]
     noise: tuple[float, ...]
+    uneven: float = 0.0
     lines: dict = field(default_factory=dict)
 
     def __post_init__(self):
         self.rho = np.hypot(*self.xy.T)
+        self.noise = (math.sqrt(self.noise[0] ** 2 + self.uneven), *self.noise[1:])
+        share = self.uneven / unevenness.MOST_UNEVEN**2
+        self.price = optimal._PRICE * (1 + optimal._DEARER * share)
+        self.arc_price = optimal._ARC_PRICE * (1 + optimal._ARC_DEARER * share)
         self.weight = self.rho**2 / range_variance(self.rho, self.noise)
+
+    def decided_by(self, noise):
+        """Return the points with the same lines, and another noise by which is decided."""
+        other = copy(self)
+        other.noise = noise
+        return other
 
     def line(self, first, last):
         """(a, b) of the line a x + b y = 1 of least χ² through a stretch, and its χ²."""
@@ -90,7 +104,7 @@ def end_on(points, ab, inner, old, new, way):
     """
 
     def is_on(i):
-        return points.error(ab, i) <= PRICE
+        return points.error(ab, i) <= points.price
 
     end = min(old, new) if way == 1 else max(old, new)
     while end != inner and not is_on(end):
@@ -118,7 +132,8 @@ def move_border(points, one, other, margin):
         return one, other
     left, right = points.line(a, b)[0], points.line(c, d)[0]
     shift, _ = best_border(
-        points.errors(left, low, high - 1, PRICE), points.errors(right, low, high - 1, PRICE)
+        points.errors(left, low, high - 1, points.price),
+        points.errors(right, low, high - 1, points.price),
     )
     at = low + shift
     return (
@@ -140,12 +155,12 @@ def dissolve(points, pieces, evidence):
 def shared(points, kept, piece, rest, evidence):
     """Give the points of a piece to its neighbours, if they explain them as well."""
     a, b = piece
-    nothing = np.full(b - a + 1, PRICE)
+    nothing = np.full(b - a + 1, points.price)
     left = points.line(*kept[-1])[0] if kept else None
     right = points.line(*rest[0])[0] if rest else None
     shift, least = best_border(
-        points.errors(left, a, b, PRICE) if kept else nothing,
-        points.errors(right, a, b, PRICE) if rest else nothing,
+        points.errors(left, a, b, points.price) if kept else nothing,
+        points.errors(right, a, b, points.price) if rest else nothing,
     )
     if least > evidence + min(points.line(a, b)[1], nothing.sum()):
         return False
@@ -162,11 +177,11 @@ def trimmed(points, piece):
     """Leave out up to two points at either end that the line through the others does not hold."""
     a, b = start, end = piece
     while b - a > borders._LEAST and a - start < borders._ENDS:
-        if points.error(points.line(a + 1, b)[0], a) <= PRICE:
+        if points.error(points.line(a + 1, b)[0], a) <= points.price:
             break
         a += 1
     while b - a > borders._LEAST and end - b < borders._ENDS:
-        if points.error(points.line(a, b - 1)[0], b) <= PRICE:
+        if points.error(points.line(a, b - 1)[0], b) <= points.price:
             break
         b -= 1
     return a, b
@@ -242,5 +257,49 @@ def drop_crooked(points, pieces):
         bow = bowing._CROOKED * np.linalg.norm(points.xy[b] - points.xy[a])
         is_fair = not excess(points.line(a, b)[1], b - a + 1)
         if is_fair or is_straight(points, (a, b), bow):
+            kept.append((a, b))
+    return kept
+
+
+def drop_round(points, pieces):
+    """Leave out runs of pieces on a circle around the sensor."""
+    kept, rest = [], list(pieces)
+    while rest:
+        a, b = rest[0]
+        r = points.rho[(a + b) // 2]
+        variance = range_variance(r, points.noise)
+        near = [
+            all(abs(points.rho[[a, (a + b) // 2, b]] - r) <= sifting._NEAR * math.sqrt(variance))
+            for a, b in rest
+        ]
+        count = [*near, False].index(False)
+        if count >= sifting._LEAST_PIECES and is_round(points, rest[:count]):
+            rest = rest[count:]
+        else:
+            kept.append(rest.pop(0))
+    return kept
+
+
+def is_round(points, pieces):
+    """Whether one range explains the readings of pieces."""
+    rho = np.concatenate([points.rho[a : b + 1] for a, b in pieces])
+    variance = range_variance(points.rho[pieces[0][0]], points.noise)
+    return len(rho) * np.var(rho) < (2 * len(rho) + 12) * variance
+
+
+def drop_radial(points, pieces):
+    """Leave out pieces that may be along their beams: by the inverse of their normal matrix."""
+    kept = []
+    for a, b in pieces:
+        ab, _ = points.line(a, b)
+        if not ab.any():
+            continue
+        rows = points.xy[a : b + 1] * np.sqrt(points.weight[a : b + 1])[:, np.newaxis]
+        # That the angle atan2(b, a) moves by, if a and b do.
+        gradient = np.array([-ab[1], ab[0]]) / (ab @ ab)
+        deviation = math.sqrt(gradient @ np.linalg.solve(rows.T @ rows, gradient))
+        turn = math.asin(min(1 / np.linalg.norm(ab) / points.rho[(a + b) // 2], 1.0))
+        few = b - a + 1 < sifting._FEW
+        if deviation < sifting._VAGUE or (not few and turn > sifting._TURNS * deviation):
             kept.append((a, b))
     return kept

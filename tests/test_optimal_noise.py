@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import fan, full_circle, room, scan_of, wall
+from worlds import BOX, fan, full_circle, room, scan_of, wall
 
 from lineament import Extractor, LaserScan, RangeNoise
 
@@ -46,7 +46,9 @@ def test_noise_of_ranges_on_a_lattice_is_that_of_the_rounding(sigma):
         ranges = np.round(noisy(true, sigma), 2)
         features = UNAWARE(scan_of(ranges, angles))
         expected = math.hypot(sigma, 0.01 / math.sqrt(12))
-        assert features.noise.sigma == pytest.approx(expected, rel=0.35)
+        assert math.sqrt(features.noise.range_variance(distance)) == pytest.approx(
+            expected, rel=0.35
+        )
         assert len(features.segments) == 1
 
 
@@ -58,3 +60,54 @@ def test_noise_that_is_given_is_used():
     )
     assert features.noise == noise
     assert UNAWARE(LaserScan(np.full(9, np.nan), 0.0, 0.1)).noise is None
+
+
+@pytest.mark.parametrize("digits", [np.float64, np.float32])
+@pytest.mark.parametrize("quantum", [0.001, 0.01, 0.05])
+def test_the_lattice_of_the_ranges_is_found(quantum, digits):
+    ring = full_circle(720)
+    for seed in range(5):
+        ranges = noisy(room(ring, BOX), 0.6 * quantum, seed)
+        rounded = (np.round(ranges / quantum) * quantum).astype(digits).astype(float)
+        noise = UNAWARE(scan_of(rounded, ring)).noise
+        assert noise.quantum == pytest.approx(quantum, rel=1e-3)
+        assert noise.sigma == pytest.approx(0.6 * quantum, rel=0.25)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1e-3, 0.01])
+def test_without_a_lattice_none_is_found(sigma):
+    ring = full_circle(720)
+    for seed in range(5):
+        assert UNAWARE(scan_of(noisy(room(ring, BOX), sigma, seed), ring)).noise.quantum == 0.0
+
+
+def test_ranges_that_hardly_change_or_jump_tell_no_lattice():
+    rng, n = np.random.default_rng(0), 200
+    few = np.full(n, 2.0)
+    few[100:] += 0.01
+    hostile = np.full(n, 2.0)
+    hostile[::3] = rng.choice([np.nan, np.inf, 0.0, -1.0, -0.99, 60.0], len(hostile[::3]))
+    for ranges in (
+        np.full(n, 2.0),
+        few,
+        hostile,
+        np.where(np.arange(n) % 2, 1.0, 4.0),
+        rng.uniform(1, 9, n),
+        rng.integers(1, 9, n).astype(float),
+    ):
+        found = UNAWARE(LaserScan(ranges, 0.0, 0.01, range_max=30.0)).noise
+        assert found.quantum == 0.0
+        assert found.sigma > 0.0
+
+
+def test_an_oblique_wall_is_not_taken_for_noise():
+    """At 80° the range bends so much from beam to beam that second differences are no noise."""
+    angles = fan(80, math.radians(1.0))
+    found = []
+    for seed in range(20):
+        # Seen to where the beams meet it at 2°.
+        ranges = noisy(wall(angles, 1.0, -80.0), 0.01, seed)
+        ranges[ranges > 30.0] = np.inf
+        found.append(UNAWARE(scan_of(ranges, angles)).noise)
+    at_three = [math.sqrt(noise.range_variance(3.0)) for noise in found]
+    assert np.mean(at_three) == pytest.approx(0.01, rel=0.15)

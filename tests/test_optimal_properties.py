@@ -139,10 +139,32 @@ def test_garbage_has_few_features():
     for n, first, step in ((481, -1.4, math.radians(1 / 3)), (720, -math.pi, 2 * math.pi / 720)):
         for name, ranges in hostile_scans(n, np.random.default_rng(3)).items():
             found = EXTRACTORS["default"](LaserScan(ranges, first, step))
-            # A circle around the scanner is a polygon, and a walk is made of straight pieces.
-            limit = n // 12 if name in ("constant", "one spike", "walk", "every sort") else 12
+            # A walk is made of straight pieces, and near ones hold few readings of all sizes.
+            many = ("white noise of all sizes", "walk", "every sort")
+            limit = n // 12 if name in many else 12
             assert len(found.segments) + len(found.arcs) <= limit, name
             assert len(found.corners) <= limit, name
+
+
+@pytest.mark.parametrize("n", [60, 360, 1440])
+def test_a_circle_around_the_scanner_is_no_polygon(n):
+    extractor, noise = EXTRACTORS["default"], np.random.default_rng(n).normal(size=n)
+    for sigma in (0.0, 0.003, 0.02):
+        for radius in (0.5, 2.0, 10.0):
+            found = extractor(LaserScan(radius + sigma * noise, -math.pi, 2 * math.pi / n))
+            assert len(found.segments) + len(found.corners) + len(found.arcs) <= 6
+
+
+def test_readings_behind_each_other_are_no_segment():
+    """Three and four along a beam, between two walls."""
+    angles = math.radians(1.0) * np.arange(-30, 31)
+    ranges = 3.0 / np.cos(angles)
+    for count in (3, 4):
+        behind = ranges.copy()
+        behind[30 : 30 + count] = np.linspace(1.0, 1.5, count)
+        found = EXTRACTORS["noise given"](LaserScan(behind, angles[0], math.radians(1.0)))
+        deviations = np.sqrt(found.segments["covariance"][:, 1, 1])
+        assert (np.degrees(deviations) < 15).all()
 
 
 def test_ranges_that_no_scanner_reports_are_no_features():

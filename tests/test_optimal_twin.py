@@ -73,7 +73,7 @@ def test_scenes_with_columns_equal_the_slow_twin(name):
         world, pose = scene("hall", seed)
         scan = sensor.scan(world, pose, np.random.default_rng(seed))
         twins.append(assert_same_run(scan, extractor))
-    assert sum(len(twin["arcs"]) for twin in twins) > 10
+    assert sum(len(twin["arcs"]) for twin in twins) >= 10
 
 
 @pytest.mark.slow

@@ -22,6 +22,8 @@ from .layout import (
     ARC_YR,
     ARC_YY,
     ARCS,
+    CLASS_FIRST,
+    CLASS_LAST,
     FIRST,
     LAST,
     RHO,
@@ -34,6 +36,12 @@ from .line_fit import range_variance
 _STEPS = 4
 #: An arc has at least so many points, and at most so many pieces of a line each.
 _LEAST_POINTS, _MOST_PIECES = 5, 8
+#: χ² that such a reading costs if it is on no arc.
+_OUT = 8.0
+#: Left-out readings that an arc may have at either end.
+_ENDS = 3
+#: Share of the evidence that an arc is spared that is all of its class, as a free column is.
+_ALONE = 0.2
 #: Larger circles are walls that bow [m].
 _LARGEST = 5.0
 #: Deviations that a point may be off the circle through three others.
@@ -51,7 +59,7 @@ def fit_arc(floats, first, last, noise, k):
     Returns
     -------
     bool
-        Whether there is one, that turns its outside to the sensor.
+        Whether there is one, that turns its outside to the sensor; else nothing is written.
     """
     x, y, rho = floats[X], floats[Y], floats[RHO]
     cx, cy, r = _algebraic_circle(x, y, first, last)
@@ -84,15 +92,17 @@ def fit_arc(floats, first, last, noise, k):
             cy += (xy * gx + yy * gy + yr * gr) / determinant
             r += (xr * gx + yr * gy + rr * gr) / determinant
             continue
+        middle = (first + last) // 2
+        bulge = x[middle] * (cx - x[middle]) + y[middle] * (cy - y[middle])
+        if not (bulge > 0.0 and xx > 0.0 and yy > 0.0 and rr > 0.0):
+            return False
         floats[ARC_X, k], floats[ARC_Y, k], floats[ARC_R, k] = cx, cy, r
         floats[ARC_RMS, k] = math.sqrt(squares / (last - first + 1))
         floats[ARC_COST, k] = chi_square
         floats[ARC_XX, k], floats[ARC_XY, k] = xx / determinant, xy / determinant
         floats[ARC_XR, k], floats[ARC_YY, k] = xr / determinant, yy / determinant
         floats[ARC_YR, k], floats[ARC_RR, k] = yr / determinant, rr / determinant
-    middle = (first + last) // 2
-    bulge = x[middle] * (cx - x[middle]) + y[middle] * (cy - y[middle])
-    return bulge > 0.0 and xx > 0.0 and yy > 0.0 and rr > 0.0
+    return True
 
 
 @helper
@@ -118,50 +128,75 @@ def _algebraic_circle(x, y, first, last):
 
 
 @helper
-def find_arcs(floats, ints, counts, noise, sums, c, low, high, evidence, price):
+def find_arcs(floats, ints, counts, noise, uneven, sums, c, low, high, evidence, price):
     """Take out the runs of pieces of class c that one circle explains better, as arcs.
 
-    A piece costs its χ² and `evidence`, an arc its χ² and `price` times as much. Returns one
-    more than the last piece that is left.
+    A piece costs its χ² and `evidence`, an arc its χ² and `price` times as much. An arc may have
+    points beside its pieces that are on none: the ends of a column are too steep for any line.
+    Returns one more than the last piece that is left.
     """
     first, last = ints[FIRST], ints[LAST]
-    kept, k = low, low
+    kept, k, free = low, low, ints[CLASS_FIRST, c]
     while k < high:
         arc = counts[ARCS]
-        end, gain = _best_arc(floats, ints, noise, sums, c, k, high, arc, evidence, price)
+        end, gain, i, j = _best_arc(
+            floats, ints, noise, uneven, sums, c, k, high, free, arc, evidence, price
+        )
         if end >= k:
-            fit_arc(floats, first[k], last[end], noise, arc)
+            fit_arc(floats, i, j, noise, arc)
             floats[ARC_GAIN, arc] = gain
-            ints[ARC_FIRST, arc], ints[ARC_LAST, arc] = first[k], last[end]
+            ints[ARC_FIRST, arc], ints[ARC_LAST, arc] = i, j
             counts[ARCS] += 1
-            k = end + 1
+            k, free = end + 1, j + 1
         else:
             first[kept], last[kept] = first[k], last[k]
+            free = last[k] + 1
             kept += 1
             k += 1
     return kept
 
 
 @helper
-def _best_arc(floats, ints, noise, sums, c, k, high, arc, evidence, price):
-    """Find the last piece of the best arc that begins with the k-th, or -1, and what it gains."""
-    lines, most, end = 0.0, 0.0, np.int64(-1)
-    for j in range(k, min(high, k + _MOST_PIECES)):
-        _, _, chi_square = line_through(sums, c, ints[FIRST, j], ints[LAST, j])
+def _best_arc(floats, ints, noise, uneven, sums, c, k, high, free, arc, evidence, price):
+    """Find the last piece of the best arc that begins with the k-th, or -1, and what it gains.
+
+    And its first and last point, of those from `free` on.
+    """
+    first, last, start, stop = ints[FIRST], ints[LAST], ints[CLASS_FIRST, c], ints[CLASS_LAST, c]
+    lines, most, end, best_i, best_j = 0.0, 0.0, np.int64(-1), np.int64(-1), np.int64(-1)
+    left = min(first[k] - free, _ENDS)
+    for q in range(k, min(high, k + _MOST_PIECES)):
+        _, _, chi_square = line_through(sums, c, first[q], last[q])
         lines += chi_square + evidence
-        points = ints[LAST, j] - ints[FIRST, k] + 1
-        # What a line explains is no arc.
-        straight = j == k and chi_square < points + 2.0 * math.sqrt(2.0 * points)
-        if points < _LEAST_POINTS or straight:
-            continue
-        if not _may_be_arc(floats, ints[FIRST, k], ints[LAST, j], noise):
-            continue
-        if fit_arc(floats, ints[FIRST, k], ints[LAST, j], noise, arc):
-            cost = floats[ARC_COST, arc]
-            gain = lines - cost - price * evidence
-            if gain > most and cost < 2.0 * points + 12.0:
-                most, end = gain, j
-    return end, most
+        points = last[q] - first[k] + 1
+        # What a line explains is no arc, if there is more about it.
+        straight = q == k and chi_square < points + 2.0 * math.sqrt(2.0 * points)
+        right = min((first[q + 1] - 1 if q + 1 < high else stop) - last[q], _ENDS)
+        for ends in range((left + 1) * (right + 1)):
+            i, j = first[k] - ends % (left + 1), last[q] + ends // (left + 1)
+            alone = i <= start + 1 and j >= stop - 1
+            if straight and ends == 0 and not alone:
+                continue
+            gain = lines - _arc_cost(floats, noise, uneven, i, j, arc) - price * evidence
+            gain += _OUT * (j - i + 1 - points) + (_ALONE * evidence if alone else 0.0)
+            if gain > most:
+                most, end, best_i, best_j = gain, q, i, j
+    return end, most, best_i, best_j
+
+
+@helper
+def _arc_cost(floats, noise, uneven, i, j, arc):
+    """χ² of the circle through points, fitted as an arc; inf if it does not explain them.
+
+    Walls may be `uneven`, which is part of the noise here; what is round is not.
+    """
+    points = j - i + 1
+    if points < _LEAST_POINTS or not _may_be_arc(floats, i, j, noise):
+        return math.inf
+    if not fit_arc(floats, i, j, noise, arc):
+        return math.inf
+    cost, variance = floats[ARC_COST, arc], range_variance(floats[RHO, j], noise)
+    return cost if cost * variance < (2.0 * points + 12.0) * (variance - uneven) else math.inf
 
 
 @helper

@@ -5,6 +5,8 @@ of the range, so that the weight is ρ⁴/σ². Times ρ, that is a x + b y = 1 
 normal equations are six sums over points, and running sums give those of every stretch.
 """
 
+import math
+
 from . import helper
 from .layout import CLASS_FIRST, CLASS_LAST, CLASSES, POINTS, RHO, WEIGHT, X, Y
 from .line_fit import range_variance
@@ -59,6 +61,23 @@ def line_through(sums, c, first, last):
     # All of Σ w (1 - a x - b y)²: the errors of a and b by rounding then count as squares only.
     squares = a * a * xx + 2.0 * a * b * xy + b * b * yy
     return a, b, max(s - 2.0 * (a * sx + b * sy) + squares, 0.0)
+
+
+@helper
+def line_and_variance(sums, c, first, last):
+    """Line a x + b y = 1 through points, and the variance of its angle atan2(b, a), to first order.
+
+    0, 0, inf where the points determine no line.
+    """
+    a, b, _ = line_through(sums, c, first, last)
+    i, j = first + c, last + c + 1
+    xx, xy, yy = sums[j, 0] - sums[i, 0], sums[j, 1] - sums[i, 1], sums[j, 2] - sums[i, 2]
+    # (a, b) have the covariance (yy, -xy, xx) over the determinant.
+    determinant, norm = xx * yy - xy * xy, a * a + b * b
+    if not determinant * norm > 0.0:
+        return 0.0, 0.0, math.inf
+    variance = (a * a * xx + 2.0 * a * b * xy + b * b * yy) / (determinant * norm * norm)
+    return a, b, variance
 
 
 @helper

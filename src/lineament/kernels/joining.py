@@ -7,7 +7,9 @@ import numpy as np
 from . import helper
 from .inverse_range import line_through
 from .layout import (
-    BEAM,
+    ARC_FIRST,
+    ARC_LAST,
+    ARCS,
     BEFORE,
     CANDIDATE,
     CANDIDATE_RESPONSE,
@@ -24,6 +26,7 @@ from .layout import (
     LINE_A,
     LINE_B,
     PIECES,
+    POINTS,
     RESPONSE,
     RHO,
     RISE,
@@ -32,49 +35,99 @@ from .layout import (
     X,
     Y,
 )
-from .line_fit import excess, range_variance
+from .line_fit import range_variance
+from .parting import OFF, cleared_at, end_share, gap, parted_at
 
 #: Points without a piece over which neighbours still meet.
 _BETWEEN = 8
+#: What comes next.
+_NONE, _PIECE, _ARC = 0, 1, 2
 #: Sine of the least angle of a corner (5.7°).
 _LEAST_SINE = 0.1
-#: Spacings that readings of one surface may be apart.
-_APART = 2.0
 
 
 @helper
 def join(floats, ints, counts, noise, sums, step):
-    """Join the pieces where they meet; a class ends where two neighbours do not.
+    """Join the pieces where they meet; a class ends where neighbours do not.
 
-    RISE is by piece how much χ² rises if it is merged with the one before; where they meet it is
-    the RESPONSE of the corner. Each such border is a candidate. Lines by piece are filled, and the
-    classes listed anew.
+    Neighbours are pieces and arcs. RISE is by piece how much χ² rises if it is merged with the one
+    before; where they meet it is the RESPONSE of the corner. Each such border is a candidate. Lines
+    by piece are filled, and the classes listed anew.
     """
-    first, last, before, response = ints[FIRST], ints[LAST], ints[BEFORE], floats[RESPONSE]
-    k, classes = np.int64(0), np.int64(0)
+    k, arc, classes = np.int64(0), np.int64(0), np.int64(0)
     for c in range(counts[CLASSES]):
-        start, end, low = ints[CLASS_FIRST, c], ints[CLASS_LAST, c], k
-        while k < counts[PIECES] and first[k] <= end:
-            before[k], response[k], floats[RISE, k] = -1, math.nan, math.inf
-            floats[LINE_A, k], floats[LINE_B, k], floats[COST, k] = line_through(
-                sums, c, first[k], last[k]
-            )
-            if k > low and first[k] - last[k - 1] <= _BETWEEN + 1:
-                _, _, joint = line_through(sums, c, first[k - 1], last[k])
-                floats[RISE, k] = joint - floats[COST, k - 1] - floats[COST, k]
-                _note_candidate(floats, ints, counts, k)
-                if _meet(floats, ints, noise, k - 1, k, step):
-                    before[k], response[k] = k - 1, floats[RISE, k]
-                elif not _touch(floats, ints, noise, k - 1, k):
-                    ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, first[k] - 1
-                    start = first[k]
-                    classes += 1
-            k += 1
-        if counts[CLOSED] and k - low > 2 and _meet(floats, ints, noise, k - 1, low, step):
-            before[low], response[low] = k - 1, math.inf
-        ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, end
+        # `end` is the last point of what is before, -1 for nothing.
+        start, low, end, after_arc = ints[CLASS_FIRST, c], k, np.int64(-1), False
+        while True:
+            kind, at = _next_kind(ints, counts, k, arc, ints[CLASS_LAST, c]), np.int64(-1)
+            if kind == _NONE:
+                break
+            if kind == _ARC:
+                if end >= 0:
+                    at = cleared_at(floats, ints, noise, arc, end, -1)
+                end, after_arc = ints[ARC_LAST, arc], True
+                arc += 1
+            else:
+                _begin_piece(floats, ints, sums, c, k)
+                if after_arc:
+                    at = cleared_at(floats, ints, noise, arc - 1, ints[FIRST, k], 1)
+                elif end >= 0:
+                    at = _bordered_at(floats, ints, counts, noise, sums, c, k, step)
+                end, after_arc = ints[LAST, k], False
+                k += 1
+            if at >= 0:
+                ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, at - 1
+                start = at
+                classes += 1
+        if counts[CLOSED]:
+            _close(floats, ints, counts, noise, low, k - 1, step)
+        ints[STACK_FIRST, classes], ints[STACK_LAST, classes] = start, ints[CLASS_LAST, c]
         classes += 1
     _list_classes(ints, counts, classes)
+
+
+@helper
+def _next_kind(ints, counts, k, arc, end):
+    """Tell what comes first up to point `end`: the k-th piece, the arc, or none of them."""
+    piece_at = ints[FIRST, k] if k < counts[PIECES] else end + 1
+    arc_at = ints[ARC_FIRST, arc] if arc < counts[ARCS] else end + 1
+    if min(piece_at, arc_at) > end:
+        return _NONE
+    return _PIECE if piece_at < arc_at else _ARC
+
+
+@helper
+def _begin_piece(floats, ints, sums, c, k):
+    """Fill the line of a piece, that is not joined yet."""
+    ints[BEFORE, k], floats[RESPONSE, k], floats[RISE, k] = -1, math.nan, math.inf
+    floats[LINE_A, k], floats[LINE_B, k], floats[COST, k] = line_through(
+        sums, c, ints[FIRST, k], ints[LAST, k]
+    )
+
+
+@helper
+def _bordered_at(floats, ints, counts, noise, sums, c, k, step):
+    """Join a piece to the one before at a corner, or tell where the next class begins, or -1."""
+    if ints[FIRST, k] - ints[LAST, k - 1] <= _BETWEEN + 1:
+        _, _, joint = line_through(sums, c, ints[FIRST, k - 1], ints[LAST, k])
+        floats[RISE, k] = joint - floats[COST, k - 1] - floats[COST, k]
+        _note_candidate(floats, ints, counts, k)
+        if _meet(floats, ints, noise, k - 1, k, step):
+            ints[BEFORE, k], floats[RESPONSE, k] = k - 1, floats[RISE, k]
+            return np.int64(-1)
+    return parted_at(floats, ints, noise, k - 1, k, step)
+
+
+@helper
+def _close(floats, ints, counts, noise, low, high, step):
+    """Join the last piece of a closed class to its first, or part them."""
+    if high - low < 2:
+        return
+    rho = floats[RHO, ints[FIRST, low]]
+    if _meet(floats, ints, noise, high, low, step):
+        ints[BEFORE, low], floats[RESPONSE, low] = high, math.inf
+    elif abs(gap(floats, ints, high, low)) > OFF * math.sqrt(range_variance(rho, noise)):
+        counts[CLOSED] = 0
 
 
 @helper
@@ -91,12 +144,15 @@ def _note_candidate(floats, ints, counts, k):
 
 @helper
 def _list_classes(ints, counts, classes):
-    """Take the classes from the stack, and label their points."""
+    """Take the classes from the stack, and label their points: those over a seam alike."""
     for c in range(classes):
         first, last = ints[STACK_FIRST, c], ints[STACK_LAST, c]
         ints[CLASS_FIRST, c], ints[CLASS_LAST, c] = first, last
         for i in range(first, last + 1):
             ints[LABEL, i] = c
+    if counts[CLOSED] and classes > 0:
+        for i in range(ints[CLASS_FIRST, classes - 1], counts[POINTS]):
+            ints[LABEL, i] = 0
     counts[CLASSES] = classes
 
 
@@ -104,7 +160,8 @@ def _list_classes(ints, counts, classes):
 def _meet(floats, ints, noise, p, q, step):
     """Whether a piece and its neighbour meet between their readings.
 
-    Between, but for a beam and three standard deviations of where they meet.
+    Between, but for a beam and three standard deviations of where they meet. If one is more than
+    both are long together, they may meet anywhere.
     """
     i, j = ints[LAST, p], ints[FIRST, q]
     a1, b1, a2, b2 = floats[LINE_A, p], floats[LINE_B, p], floats[LINE_A, q], floats[LINE_B, q]
@@ -116,8 +173,10 @@ def _meet(floats, ints, noise, p, q, step):
     x, y = (b2 - b1) / determinant, (a1 - a2) / determinant
     rho = 0.5 * (floats[RHO, i] + floats[RHO, j])
     # The border was placed by a reading, with its own noise.
-    share = 1.0 + _end_share(floats, ints, p) + _end_share(floats, ints, q)
+    share = 1.0 + end_share(floats, ints, p) + end_share(floats, ints, q)
     deviation = math.sqrt(range_variance(rho, noise) * share) / sine
+    if deviation > _length(floats, ints, p) + _length(floats, ints, q):
+        return False
     tolerance = step * rho + 3.0 * deviation
     after = (floats[X, i] * y - floats[Y, i] * x) / floats[RHO, i]
     before = (x * floats[Y, j] - y * floats[X, j]) / floats[RHO, j]
@@ -126,26 +185,7 @@ def _meet(floats, ints, noise, p, q, step):
 
 
 @helper
-def _touch(floats, ints, noise, p, q):
-    """Whether readings of neighbours are no farther apart than those within either of them.
-
-    Then something small is between them, and no surface ends in front of another.
-    """
-    i, j = ints[LAST, p], ints[FIRST, q]
-    x, y, beam = floats[X], floats[Y], ints[BEAM]
-    apart = math.hypot(x[j] - x[i], y[j] - y[i])
-    before = math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) / max(beam[i] - beam[i - 1], 1)
-    after = math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) / max(beam[j + 1] - beam[j], 1)
-    beams = max(beam[j] - beam[i], 1)
-    sigma = math.sqrt(range_variance(max(floats[RHO, i], floats[RHO, j]), noise))
-    return apart <= _APART * beams * max(before, after) + 3.0 * sigma
-
-
-@helper
-def _end_share(floats, ints, k):
-    """Variance of a piece's offset at its end, in variances of a reading.
-
-    Of n readings on a line it is 4/n. Where a wall bows, twice what χ² has too much is added.
-    """
-    n = ints[LAST, k] - ints[FIRST, k] + 1
-    return 4.0 / n + 4.0 * excess(floats[COST, k], n)
+def _length(floats, ints, k):
+    """Distance of the first and the last reading of a piece [m]."""
+    i, j = ints[FIRST, k], ints[LAST, k]
+    return math.hypot(floats[X, j] - floats[X, i], floats[Y, j] - floats[Y, i])

@@ -13,6 +13,11 @@ LEAST_SIGMA = 1e-4
 COARSEST_QUANTUM = 0.15
 #: Fewer triples of neighbours say little about how noise grows with range.
 _LEAST_TRIPLES = 12
+#: Three deviations of a normal distribution, in sizes that a third of it is below.
+CLIP = 3.0 / 0.4307
+_ROOT = math.sqrt(1.5)
+#: Ranges are on a lattice if so many differences of neighbours, of up to so many steps, tell it.
+_LEAST_STEPS, _MOST_STEPS = 8, 50.0
 
 
 @kernel
@@ -61,7 +66,7 @@ def range_sigma(ranges, n, range_min, range_max, scratch):
         for i in range(n):
             any_usable |= usable(ranges[i], range_min, range_max)
         return LEAST_SIGMA if any_usable else math.nan
-    sigma = 1.4826 / math.sqrt(6.0) * _median(scratch, count)
+    sigma = 1.4826 / math.sqrt(6.0) * _ranked(scratch, count, (count - 1) // 2)
     return sigma if sigma >= LEAST_SIGMA else _rounding_sigma(scratch, count)
 
 
@@ -77,9 +82,9 @@ def _rounding_sigma(differences, count):
 
 
 @helper
-def _median(values, count):
-    """Lower median of the first `count` values, which it reorders (Hoare's selection)."""
-    low, high, middle = 0, count - 1, (count - 1) // 2
+def _ranked(values, count, middle):
+    """Value of rank `middle` of the first `count`, which it reorders (Hoare's selection)."""
+    low, high = 0, count - 1
     while low < high:
         pivot = values[(low + high) // 2]
         i, j = low, high
@@ -102,20 +107,25 @@ def _median(values, count):
 
 
 @helper
-def estimate_by_range(floats, range_min, range_max, grows, noise):
-    """Estimate the constant and the proportional part of the noise, from second differences.
+def estimate_by_range(floats, bearings, range_min, range_max, grows, noise):
+    """Estimate the lattice of the ranges, and the constant and proportional part of their noise.
 
-    Of the near and of the far half of the readings apart: the variance of a range is
-    σ² + p² ρ² in both. As `range_sigma`, but by the mean square of what is not far out, which a
-    lattice does not bias and which scatters less than the median. p is 0 where the halves are
-    about as noisy, or if it does not grow.
+    From what readings are off the line through their neighbours. Of the near and of the far half
+    of the readings apart: the variance of a range is σ² + p² ρ² in both. By the mean square of
+    what is not far out, which scatters less than the median. p is 0 where the halves are about as
+    noisy, or if it does not grow.
     """
-    n = floats.shape[1] - 1
+    ranges, n = floats[RANGE], floats.shape[1] - 1
+    noise[3] = find_quantum(ranges, n, range_min, range_max)
     near, far, at = floats[SPARE], floats[X], floats[Y]
-    count = _second_differences(floats[RANGE], n, range_min, range_max, near, at)
+    count = _errors(ranges, bearings, n, range_min, range_max, near, at)
+    if count < 2 * _LEAST_TRIPLES:
+        sigma = range_sigma(ranges, n, range_min, range_max, near)
+        set_parts(noise, sigma * sigma, 0.0)
+        return
     for i in range(count):
         far[i] = at[i]
-    middle = _median(far, count) if count > 0 else 0.0
+    middle = _ranked(far, count, (count - 1) // 2)
     low, high, near_squares, far_squares = np.int64(0), np.int64(0), 0.0, 0.0
     for i in range(count):
         if at[i] <= middle:
@@ -126,24 +136,70 @@ def estimate_by_range(floats, range_min, range_max, grows, noise):
             far_squares += at[i] * at[i]
             far[high] = near[i]
             high += 1
-    if low < _LEAST_TRIPLES or high < _LEAST_TRIPLES:
-        noise[0], noise[1] = range_sigma(floats[RANGE], n, range_min, range_max, near), 0.0
-        return
-    near_squares, far_squares = near_squares / low, far_squares / high
     v_near, v_far = _clipped_variance(near, low), _clipped_variance(far, high)
-    if not grows or far_squares < 1.2 * near_squares or v_far < 1.7 * v_near:
-        noise[0], noise[1] = math.sqrt((low * v_near + high * v_far) / count), 0.0
+    near_squares, far_squares = near_squares / low, far_squares / max(high, 1)
+    if (
+        not grows
+        or high < _LEAST_TRIPLES
+        or far_squares < 1.2 * near_squares
+        or v_far < 1.7 * v_near
+    ):
+        set_parts(noise, (low * v_near + high * v_far) / count, 0.0)
         return
     growth = (v_far - v_near) / (far_squares - near_squares)
-    constant = v_near - growth * near_squares
-    if constant < 0.0:
-        constant, growth = 0.0, 0.5 * (v_near / near_squares + v_far / far_squares)
-    noise[0], noise[1] = max(math.sqrt(constant), LEAST_SIGMA), math.sqrt(growth)
+    constant, least = v_near - growth * near_squares, noise[3] * noise[3] / 12.0
+    if constant < least:
+        constant = least
+        growth = 0.5 * max((v_near - least) / near_squares + (v_far - least) / far_squares, 0.0)
+    set_parts(noise, constant, growth)
 
 
 @helper
-def _second_differences(ranges, n, range_min, range_max, out, at):
-    """Sizes of ρ[i-1] - 2ρ[i] + ρ[i+1] of every other triple, and its ρ[i]."""
+def set_parts(noise, constant, growth):
+    """Set the noise from its constant variance, that of rounding included, and the p² of ρ."""
+    rounding = noise[3] * noise[3] / 12.0
+    noise[0], noise[1] = math.sqrt(max(constant - rounding, 0.0)), math.sqrt(growth)
+    if constant >= 0.0:  # No NaN, of a scan without readings.
+        noise[0] = max(noise[0], LEAST_SIGMA)
+
+
+@helper
+def find_quantum(ranges, n, range_min, range_max):
+    """Step of the lattice that the ranges lie on [m], or 0 where they lie on none.
+
+    It is the least difference of neighbours, and other small ones are its multiples.
+    """
+    quantum, found = COARSEST_QUANTUM, 0
+    for i in range(1, n):
+        difference = _difference(ranges, i, range_min, range_max)
+        if LEAST_SIGMA < difference < quantum:
+            quantum = difference
+    for i in range(1, n):
+        steps = _difference(ranges, i, range_min, range_max) / quantum
+        # Those of larger ones are lost in the digits of a float32.
+        if 0.5 < steps < _MOST_STEPS:
+            if abs(steps - math.floor(steps + 0.5)) > 0.1:
+                return 0.0
+            found += 1
+    return quantum if found >= _LEAST_STEPS and quantum < COARSEST_QUANTUM else 0.0
+
+
+@helper
+def _difference(ranges, i, range_min, range_max):
+    """Size of the difference of a range from the one before; inf if one is not usable."""
+    a, b = ranges[i - 1], ranges[i]
+    both = usable(a, range_min, range_max) and usable(b, range_min, range_max)
+    return abs(b - a) if both else math.inf
+
+
+@helper
+def _errors(ranges, bearings, n, range_min, range_max, out, at):
+    """Errors of ranges, of every other triple of neighbours, and the ranges that they are of.
+
+    Three points of a line have u₁ sin(φ₃-φ₂) - u₂ sin(φ₃-φ₁) + u₃ sin(φ₂-φ₁) = 0 with u = 1/ρ,
+    whatever its direction. An error of ρ is one of u times ρ². The variance of the sum is that of
+    a range times sin²(φ₃-φ₂) + sin²(φ₃-φ₁) + sin²(φ₂-φ₁), 1.5 sin²(φ₃-φ₁) for even steps.
+    """
     count = np.int64(0)
     for i in range(1, n - 1, 2):
         a, b, c = ranges[i - 1], ranges[i], ranges[i + 1]
@@ -152,25 +208,25 @@ def _second_differences(ranges, n, range_min, range_max, out, at):
             and usable(b, range_min, range_max)
             and usable(c, range_min, range_max)
         ):
-            out[count], at[count] = abs(a - 2.0 * b + c), b
-            count += 1
+            s1 = bearings[0, i] * bearings[1, i + 1] - bearings[1, i] * bearings[0, i + 1]
+            s2 = bearings[0, i - 1] * bearings[1, i + 1] - bearings[1, i - 1] * bearings[0, i + 1]
+            s3 = bearings[0, i - 1] * bearings[1, i] - bearings[1, i - 1] * bearings[0, i]
+            if s2 > 0.0:  # Beams in the same direction tell nothing.
+                off = b * (b * (s1 * c + s3 * a) - s2 * a * c)
+                out[count], at[count] = abs(off / (_ROOT * s2 * a * c)), b
+                count += 1
     return count
 
 
 @helper
 def _clipped_variance(values, count):
-    """Variance of a range, of sizes of second differences; those above three deviations are out.
-
-    Where half of them are zero, it is that of rounding.
-    """
-    limit = 3.0 * 1.4826 * _median(values, count)
-    if limit < LEAST_SIGMA:
-        sigma = _rounding_sigma(values, count)
-        return sigma * sigma
+    """Variance of a range, of sizes of errors; those above three deviations are left out."""
+    # By the least third: in clutter, half of the readings and more are on no wall.
+    limit = max(CLIP * _ranked(values, count, count // 3), LEAST_SIGMA)
     total, used = 0.0, 0
     for i in range(count):
         if values[i] <= limit:
             total += values[i] * values[i]
             used += 1
     # What is cut off of a normal distribution at three deviations is 3 % of its variance.
-    return max(1.03 * total / (6.0 * used), LEAST_SIGMA * LEAST_SIGMA)
+    return max(1.03 * total / max(used, 1), LEAST_SIGMA * LEAST_SIGMA)

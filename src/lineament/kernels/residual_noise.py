@@ -1,12 +1,10 @@
 """Range noise of a scan, from what its readings are off the lines through them."""
 
-import math
-
 from . import helper
 from .inverse_range import line_through
 from .layout import FIRST, LABEL, LAST, PIECES, RHO, X, Y
 from .line_fit import range_variance
-from .noise import LEAST_SIGMA
+from .noise import set_parts
 
 #: Shorter pieces say little; fewer readings nothing.
 _LEAST_POINTS, _LEAST_READINGS = 8, 30
@@ -40,13 +38,13 @@ def refine_noise(floats, ints, counts, noise, sums):
             used += 1
     if used < _LEAST_READINGS:
         return
-    constant, growth = q_sum / one, 0.0
+    constant, growth, least = q_sum / one, 0.0, noise[3] * noise[3] / 12.0
     determinant = one * xx_sum - x_sum * x_sum
     if noise[1] > 0.0 and determinant > 1e-6 * one * xx_sum:
         constant = (q_sum * xx_sum - qx_sum * x_sum) / determinant
         growth = (qx_sum * one - q_sum * x_sum) / determinant
         if growth < 0.0:
             constant, growth = q_sum / one, 0.0
-        elif constant < 0.0:
-            constant, growth = 0.0, qx_sum / xx_sum
-    noise[0], noise[1] = max(math.sqrt(constant), LEAST_SIGMA), math.sqrt(growth)
+        elif constant < least:
+            constant, growth = least, max(qx_sum - least * x_sum, 0.0) / xx_sum
+    set_parts(noise, constant, growth)

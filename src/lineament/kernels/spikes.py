@@ -23,12 +23,24 @@ def drop_spikes(floats, range_min, range_max, noise, reach):
         value = ranges[i]
         kept[i] = value if usable(value, range_min, range_max) else math.nan
     for i in range(1, n - 1):
-        before, value, after = ranges[i - 1], kept[i], ranges[i + 1]
+        value = kept[i]
+        if math.isnan(value):
+            continue
+        # A beam without a reading beside it is passed over.
+        a, b = i - 1, i + 1
+        if a > 0 and not usable(ranges[a], range_min, range_max):
+            a -= 1
+        if b < n - 1 and not usable(ranges[b], range_min, range_max):
+            b += 1
+        before, after = ranges[a], ranges[b]
         if not usable(before, range_min, range_max) or not usable(after, range_min, range_max):
             continue
-        apart, sigma = abs(before - after), math.sqrt(range_variance(value, noise))
-        if (
-            abs(value - 0.5 * (before + after)) > _OFF * sigma + 0.5 * apart
-            and apart <= reach * min(before, after) + 4.0 * sigma
-        ):
-            kept[i] = math.nan
+        apart = abs(before - after)
+        off = abs(value - 0.5 * (before + after)) - 0.5 * apart
+        if off <= 0.0:
+            continue
+        variance = range_variance(value, noise)
+        if off * off > _OFF * _OFF * variance:
+            most = reach * 0.5 * (b - a) * min(before, after) + 4.0 * math.sqrt(variance)
+            if apart <= most:
+                kept[i] = math.nan

@@ -14,7 +14,7 @@ _SHALLOW = 0.17
 #: Root mean square of what a wall bows by, over its length, and at most [m].
 _BOW, _MOST_BOW = 0.01, 0.03
 #: The first of these from which on a piece is no wall.
-_CROOKED = 0.03
+_CROOKED = 0.05
 #: What neighbours may be apart where they meet: over the length of both, but not more than panels
 #: and frames stand out [m]; or deviations of a reading, if these are more.
 _STEP, _FRAME, _SIGMAS = 0.02, 0.04, 3.0
@@ -32,7 +32,9 @@ def straighten(floats, ints, noise, sums, c, low, high):
     kept = low
     for k in range(low, high):
         first[kept], last[kept] = first[k], last[k]
-        while kept > low and _is_one_wall(floats, ints, noise, sums, c, kept):
+        while kept > low and is_one_wall(
+            floats, noise, sums, c, first[kept - 1], last[kept - 1], first[kept], last[kept]
+        ):
             last[kept - 1] = last[kept]
             kept -= 1
         kept += 1
@@ -40,9 +42,8 @@ def straighten(floats, ints, noise, sums, c, low, high):
 
 
 @helper
-def _is_one_wall(floats, ints, noise, sums, c, k):
-    """Whether a piece goes on in the wall of the piece before."""
-    start, i, j, end = ints[FIRST, k - 1], ints[LAST, k - 1], ints[FIRST, k], ints[LAST, k]
+def is_one_wall(floats, noise, sums, c, start, i, j, end):
+    """Whether the points `j`..`end` go on in the wall of the points `start`..`i`."""
     if j - i > _BETWEEN + 1:
         return False
     a1, b1, _ = line_through(sums, c, start, i)

@@ -23,6 +23,7 @@ from ..kernels.optimal import (
     GROWTH,
     SPIKES,
     STRAIGHTENING,
+    UNEVENNESS,
     extract_rows,
 )
 from ..kernels.polylines import PLANES
@@ -39,6 +40,7 @@ PARTS = {
     "dissolving": DISSOLVING,
     "arcs": ARCS_TOO,
     "straightening": STRAIGHTENING,
+    "unevenness": UNEVENNESS,
 }
 
 
@@ -52,20 +54,22 @@ class _Scratch(NamedTuple):
 class Optimal(MethodBase):
     """Lines, corners and arcs by how much evidence there is for them.
 
-    1. *Noise*: the constant part and that which grows with range are estimated, first from
-       second differences, then from what the readings are off their lines. Spikes are left out.
+    1. *Noise*: the lattice of the ranges, the constant part and that which grows with range are
+       estimated, first from what readings are off the line through their neighbours, then from
+       what they are off the lines of pieces. Spikes are left out.
     2. *Cluster*: neighbours part where too many beams are missing, or where they are farther
        apart than readings of one surface can be, almost edge-on.
     3. *Cut*: stretches of four readings are merged, the cheapest pair first, while one line
        through both costs less than `evidence` more in χ² (bottom-up, by running sums of the
        inverse-range regression, each in O(1)). Borders are moved to where χ² is least; small
        pieces that neighbours explain dissolve, and readings that are on neither side (mixed
-       pixels) are left out. Runs of pieces that one circle explains better are arcs. Neighbours
-       at a shallow angle are one wall: real walls bow.
+       pixels) are left out. Runs of pieces that one circle explains better are arcs, with
+       their steep ends. Neighbours at a shallow angle are one wall: real walls bow. Where they are
+       more uneven than the noise, that is added to it, and the scan is cut anew.
     4. *Fit* each line by maximum likelihood to the raw ranges. What χ² has too much is put down
        to the wall, and added to its covariance. Neighbours that meet between their readings make
-       a corner where they meet; where they do not, a surface ends in front of another, and the
-       cluster with it.
+       a corner where they meet; where they do not, and an edge hides what is behind it, the
+       cluster ends with the surface.
 
     Parameters
     ----------

@@ -30,7 +30,15 @@ ARENA, LOG = "truth/jackal_static_data.npz", "truth/intel_graph.npz"
 
 NO_PARTS = "optimal, no parts"
 #: The parts of `optimal` in the order in which they are put back.
-PUT_BACK = ("borders", "dissolving", "spikes", "growth", "arcs", "straightening")
+PUT_BACK = (
+    "borders",
+    "dissolving",
+    "spikes",
+    "growth",
+    "arcs",
+    "straightening",
+    "unevenness",
+)
 
 #: Names of the columns, the figures of `Scores.summary` that they show, and what makes them larger
 #: by how much.
