@@ -65,7 +65,7 @@ class Optimal(MethodBase):
        pieces that neighbours explain dissolve, and readings that are on neither side (mixed
        pixels) are left out. Runs of pieces that one circle explains better are arcs, with
        their steep ends. Neighbours at a shallow angle are one wall: real walls bow. Where they are
-       more uneven than the noise, that is added to it, and the scan is cut anew.
+       more uneven than the noise, that is added to it for all that is decided from then on.
     4. *Fit* each line by maximum likelihood to the raw ranges. What χ² has too much is put down
        to the wall, and added to its covariance. Neighbours that meet between their readings make
        a corner where they meet; where they do not, and an edge hides what is behind it, the
