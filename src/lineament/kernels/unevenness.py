@@ -11,7 +11,7 @@ from .straightening import is_one_wall
 #: Shorter walls say little; squares above so many variances are of no wall.
 _LEAST_POINTS, _OUT = 8, 12.0
 #: Deviations of χ² from which on walls are uneven.
-_SURE = 0.2
+_SURE = 0.5
 #: Where they are, the pieces are parts of walls, cut where these are off: so many times more.
 _CUT_AWAY = 80.0
 #: What plaster, panels and frames are off by, root mean square, and no more [m].
