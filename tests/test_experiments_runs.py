@@ -27,6 +27,7 @@ from lineament.evaluation.experiments import (
     similarity,
     speed_aims,
     success,
+    tracking,
     two_corners,
 )
 from lineament.logs import save_npz
@@ -80,6 +81,7 @@ def data(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(recordings, "LOGS", {"Office": "room.npz"})
     monkeypatch.setattr(repeatability, "LOGS", {"Office": "room.npz"})
+    monkeypatch.setattr(tracking, "LOGS", {"Office": ("room.npz", 0.0)})
     monkeypatch.setattr(success, "ARENA", "arena.npz")
     monkeypatch.setattr(ablation, "ARENA", "arena.npz")
     monkeypatch.setattr(ablation, "LOG", "room.npz")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from .deskewing import deskew
     from .errors import LineamentError, LogError
     from .extractor import Extractor, extract, trace
     from .features import FeatureBatch, Features
@@ -33,6 +34,7 @@ _HOME = {
     "LogError": "errors",
     "RangeNoise": "scan",
     "Trace": "tracing",
+    "deskew": "deskewing",
     "extract": "extractor",
     "open_log": "logs",
     "trace": "extractor",

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..scan import Array, LaserScan, Pose
+from ..poses import relative
+from ..scan import Array, LaserScan
 from .counts import Summable, ratio, rms
 from .matching import match
 from .segments import ANGLE
@@ -121,18 +122,11 @@ def repeatability(
     if scan.pose is None or other_scan.pose is None:
         which = "scan" if scan.pose is None else "other_scan"
         raise ValueError(f"{which} has no pose, expected (x, y, theta)")
-    moved = other_features.transform(*_relative(scan.pose, other_scan.pose))
+    moved = other_features.transform(*relative(scan.pose, other_scan.pose))
     return Repeatability(
         _corners_again(scan, features.corners["position"], moved.corners["position"], gate),
         _segments_again(scan, features.segments, moved.segments, gate),
     )
-
-
-def _relative(pose: Pose, other: Pose) -> Pose:
-    """Pose of the other in the frame of the first."""
-    dx, dy = other[0] - pose[0], other[1] - pose[1]
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return c * dx + s * dy, c * dy - s * dx, other[2] - pose[2]
 
 
 def _corners_again(scan: LaserScan, positions: Array, others: Array, gate: float) -> Repeats:

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..poses import Twist
 from ..scan import Array, LaserScan
-from .sensor import Sensor, Twist
+from .sensor import Sensor
 from .worlds import World
 
 __all__ = ["drive", "drive_poses"]

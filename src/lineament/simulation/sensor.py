@@ -8,14 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..poses import Twist, poses_along
 from ..scan import Array, LaserScan, Pose, RangeNoise
 from .raycast import cast_rays
 from .worlds import World
 
-__all__ = ["Sensor", "Twist"]
-
-#: Velocity in the sensor's own frame: forward, to the left [m/s], turn rate [rad/s].
-Twist = tuple[float, float, float]
+__all__ = ["Sensor"]
 
 #: Share of the beams across an occlusion edge that blend both depths: the others are won by one.
 _BLEND_SHARE = 0.5
@@ -109,8 +107,7 @@ class Sensor:
     def sweep(self, pose: Pose, twist: Twist) -> Array:
         """Return the pose from which each beam is taken by a sensor that moves.
 
-        At constant velocities v = (v_x, v_y) and ω in its own frame, after the time t the sensor
-        has turned by ωt and gone along an arc, whose chord is R(ωt/2) v t sinc(ωt/2).
+        Its velocity is constant: see :func:`~lineament.poses.poses_along`.
 
         Parameters
         ----------
@@ -134,16 +131,10 @@ class Sensor:
         >>> ring.sweep((0.0, 1.0, math.pi / 2), (2.0, 0.0, 0.0))[:, :2].round(9).tolist()
         [[0.0, 1.0], [0.0, 1.5], [0.0, 2.0], [0.0, 2.5]]
         """
-        if len(twist) != 3 or not all(map(math.isfinite, twist)):
-            raise ValueError(f"twist is {twist!r}, expected three finite numbers")
         x, y, theta = pose
-        forward, left, turn_rate = twist
-        time = self.time_increment * np.arange(self.n_beams)
-        half = turn_rate * time / 2
-        chord = time * np.sinc(half / math.pi)
-        c, s = np.cos(theta + half), np.sin(theta + half)
-        moved = (x + chord * (c * forward - s * left), y + chord * (s * forward + c * left))
-        return np.column_stack((*moved, theta + 2 * half))
+        dx, dy, turn = poses_along(twist, self.time_increment * np.arange(self.n_beams)).T
+        c, s = math.cos(theta), math.sin(theta)
+        return np.column_stack((x + c * dx - s * dy, y + s * dx + c * dy, theta + turn))
 
     def ideal(self, world: World, pose: Pose) -> tuple[Array, NDArray[np.int32]]:
         """Return the true ranges and surfaces of all beams, whatever their length.

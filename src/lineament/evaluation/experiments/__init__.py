@@ -29,6 +29,7 @@ EXPERIMENTS: dict[str, str] = {
     "success": "success",
     "all_methods": "all_methods",
     "repeatability": "repeatability",
+    "tracking": "tracking",
     "ablation": "ablation",
     "aims": "optimal_aims",
 }

@@ -1,0 +1,190 @@
+"""How well features are followed, and the motion between frames: against known poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import Features
+from ..poses import compose, relative
+from ..scan import Array, Pose
+from ..tracking import Tracks
+from .counts import Summable, quantile, ratio, rms
+from .matching import Indices, match
+from .segments import ANGLE, line_errors
+
+__all__ = ["MotionErrors", "TrackScores", "motion_errors", "track_scores"]
+
+#: Features of two frames, in one frame, are the same within this distance [m]; segments also lie
+#: side by side along this share of the shorter one.
+_GATE, _OVERLAP = 0.10, 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionErrors(Summable):
+    """Relative pose errors: how far estimated motions are from the true ones.
+
+    Attributes
+    ----------
+    ways : ndarray, shape (m,)
+        Length of the error of the way [m].
+    turns : ndarray, shape (m,)
+        Error of the turn, without its sign [rad].
+
+    Examples
+    --------
+    >>> errors = MotionErrors(np.array([0.03, 0.04]), np.array([0.0, 0.02]))
+    >>> round(errors.summary()["way_rmse"], 4)
+    0.0354
+    """
+
+    ways: Array = field(default_factory=lambda: np.empty(0))
+    turns: Array = field(default_factory=lambda: np.empty(0))
+
+    def summary(self) -> dict[str, float]:
+        """List the figures by name."""
+        return {
+            "way_rmse": rms(self.ways),
+            "way_median": quantile(self.ways, 0.5),
+            "way_p95": quantile(self.ways, 0.95),
+            "turn_rmse": rms(self.turns),
+            "turn_median": quantile(self.turns, 0.5),
+            "turn_p95": quantile(self.turns, 0.95),
+        }
+
+
+def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1) -> MotionErrors:
+    """Compare motions between successive frames, put together over some, with those of the poses.
+
+    Parameters
+    ----------
+    motions : sequence of (x, y, theta)
+        Pose of each frame, from the second on, in the frame before [m, m, rad].
+    poses : sequence of (x, y, theta)
+        True pose of every frame: one more.
+    step : int
+        Over how many frames: 1 is from frame to frame.
+
+    Returns
+    -------
+    MotionErrors
+        One error for each frame that has another so many frames on.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of motions and poses do not fit.
+
+    Examples
+    --------
+    >>> errors = motion_errors([(1.0, 0.0, 0.0)], [(0.0, 0.0, 0.0), (1.0, 0.1, 0.0)])
+    >>> errors.ways.tolist(), errors.turns.tolist()
+    ([0.1], [0.0])
+    """
+    if len(poses) != len(motions) + 1:
+        raise ValueError(f"there are {len(poses)} poses, expected one more than motions")
+    way: list[Pose] = [(0.0, 0.0, 0.0)]
+    for motion in motions:
+        way.append(compose(way[-1], motion))
+    ways, turns = [], []
+    for i in range(len(poses) - step):
+        true = relative(poses[i], poses[i + step])
+        x, y, turn = relative(true, relative(way[i], way[i + step]))
+        ways.append(math.hypot(x, y))
+        turns.append(abs(turn))
+    return MotionErrors(np.array(ways), np.array(turns))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackScores(Summable):
+    """How the tracks of one kind last.
+
+    Attributes
+    ----------
+    pairs : int
+        Features that are the same in two successive frames by the known poses.
+    switched : int
+        Of these, those whose number changes to one that was given before: an *id switch*.
+    lost : int
+        Of these, those that get a new number.
+    lengths : ndarray, shape (m,)
+        Frames in which each track was seen.
+    """
+
+    pairs: int = 0
+    switched: int = 0
+    lost: int = 0
+    lengths: Array = field(default_factory=lambda: np.empty(0))
+
+    def summary(self, prefix: str = "") -> dict[str, float]:
+        """List the figures by name."""
+        return {
+            f"{prefix}pairs": self.pairs,
+            f"{prefix}kept": ratio(self.pairs - self.switched - self.lost, self.pairs),
+            f"{prefix}switches": self.switched,
+            f"{prefix}length_mean": float(self.lengths.mean()) if len(self.lengths) else math.nan,
+            f"{prefix}length_p90": quantile(self.lengths, 0.9),
+        }
+
+
+def track_scores(
+    frames: Sequence[Features], tracks: Sequence[Tracks], poses: Sequence[Pose]
+) -> dict[str, TrackScores]:
+    """Count how often the numbers of segments and corners change that the poses tell to be same.
+
+    The features of a frame are moved by the known poses into the frame before. Corners are the
+    same within 0.10 m; segments if the centroids of both are within 0.10 m of the other's line,
+    the directions within 10°, and they lie side by side along half of the shorter one. They are
+    matched one to one, without any of the tracker's own gates.
+
+    Parameters
+    ----------
+    frames : sequence of Features
+    tracks : sequence of Tracks
+        Those of each frame.
+    poses : sequence of (x, y, theta)
+        Known pose of each frame [m, m, rad].
+
+    Returns
+    -------
+    dict of str to TrackScores
+        By kind: "segments", "corners".
+    """
+    scores = {}
+    for kind, same in (("segments", _same_segments), ("corners", _same_corners)):
+        numbers: list[NDArray[np.int64]] = [getattr(track, kind) for track in tracks]
+        pairs = switched = lost = 0
+        for i in range(len(frames) - 1):
+            moved = frames[i + 1].transform(*relative(poses[i], poses[i + 1]))
+            one, other = same(getattr(frames[i], kind), getattr(moved, kind))
+            changed = numbers[i][one] != numbers[i + 1][other]
+            new = np.isin(numbers[i + 1][other], tracks[i + 1].born)
+            pairs += len(one)
+            switched += int((changed & ~new).sum())
+            lost += int((changed & new).sum())
+        _, lengths = np.unique(np.concatenate(numbers), return_counts=True)
+        scores[kind] = TrackScores(pairs, switched, lost, lengths.astype(np.float64))
+    return scores
+
+
+def _same_corners(before: NDArray[np.void], now: NDArray[np.void]) -> tuple[Indices, Indices]:
+    apart = before["position"][:, np.newaxis] - now["position"]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    return match(distance, distance <= _GATE)
+
+
+def _same_segments(before: NDArray[np.void], now: NDArray[np.void]) -> tuple[Indices, Indices]:
+    one, other = before[:, np.newaxis], now[np.newaxis]
+    offset, turn = line_errors(other, one)
+    back, _ = line_errors(one, other)
+    tangent = np.stack((np.cos(one["angle"]), np.sin(one["angle"])), axis=-1)
+    length = ((one["end"] - one["start"]) * tangent).sum(axis=-1)
+    first, last = (((other[end] - one["start"]) * tangent).sum(axis=-1) for end in ("start", "end"))
+    shared = np.minimum(last, length) - np.maximum(first, 0.0)
+    near = (abs(offset) <= _GATE) & (abs(back) <= _GATE) & (abs(turn) <= ANGLE)
+    beside = shared >= _OVERLAP * np.minimum(length, last - first)
+    return match(-shared, near & beside)

@@ -1,0 +1,221 @@
+"""`Tracker`: features that keep their numbers from frame to frame, and the motion between."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import TABLES, Features
+from ..poses import Twist, inverse, poses_along, relative
+from ..scan import Array, Pose
+from .association import KINDS, Matches, associate, chi_square
+from .motion import Motion, estimate_motion
+
+__all__ = ["Tracker", "Tracks"]
+
+Numbers = NDArray[np.int64]
+
+#: Deviations of the motion that odometry tells [m, rad], and their growth with way and turn.
+_ODOMETRY = (0.03, 0.01), (0.1, 0.1)
+#: The same of the motion that goes on as it was, or of none: no way is known to grow with.
+_CONTINUED = (0.1, 0.1), (0.5, 0.5)
+#: How often pairs are looked for: with the expected motion, then with the estimated one.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracks:
+    """Who is who in a frame.
+
+    Attributes
+    ----------
+    segments, corners, arcs : ndarray of int64
+        Number of the track of each feature, parallel to the tables of the frame. A number belongs
+        to one track alone, of whatever kind, for good.
+    born : ndarray of int64
+        Tracks that begin with this frame.
+    ended : ndarray of int64
+        Tracks that have been missed for too long, and are given up with this frame.
+    motion : Motion or None
+        Pose of this frame's sensor in the frame before; None of the first frame.
+    """
+
+    segments: Numbers
+    corners: Numbers
+    arcs: Numbers
+    born: Numbers
+    ended: Numbers
+    motion: Motion | None
+
+
+class Tracker:
+    """Recognises features from frame to frame, and estimates the motion of the sensor.
+
+    A frame's features are paired with the last sight of all tracks (`associate`), first under the
+    expected motion, then under the one that the pairs tell (`estimate_motion`, from the tracks
+    that were seen in the very last frame). The expected motion is that of the odometry; without
+    it, the sensor goes on as it did. A feature without a pair begins a track; a track ends when it
+    is missed in more than `max_missed` frames in a row. The world is taken to stand still: what
+    moves by more than its gate from frame to frame gets a new number.
+
+    Parameters
+    ----------
+    max_missed : int
+        Frames through which a track lasts without being seen.
+    gate : float
+        Share of the right pairs that are within the gates.
+    roughness : float
+        How far surfaces are from straight and round [m]: 0 in a simulation, 1 cm in offices.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of bounds.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, drive, room
+    >>> tracker, extract = Tracker(), ln.Extractor("liu:scale_free")
+    >>> for scan in drive(room(), [(-2, 0), (-1.8, 0)], SENSORS["paper"], speed=1, rate=10):
+    ...     tracks = tracker(extract(scan))
+    >>> tracks.motion.observable, round(tracks.motion.x, 2)
+    (True, 0.1)
+    """
+
+    def __init__(self, max_missed: int = 5, *, gate: float = 0.99, roughness: float = 0.01) -> None:
+        if isinstance(max_missed, bool) or not isinstance(max_missed, int) or max_missed < 0:
+            raise ValueError(f"max_missed is {max_missed!r}, expected a whole number ≥ 0")
+        if not 0 <= roughness < math.inf:
+            raise ValueError(f"roughness is {roughness}, expected a finite length ≥ 0")
+        chi_square(gate, 2)
+        self.max_missed, self.gate, self.roughness = max_missed, gate, roughness
+        #: Last sight of each track, in the frame of the last scan; those of that scan come first.
+        self._seen = _nothing()
+        self._tracks = {kind: np.empty(0, np.int64) for kind in KINDS}
+        self._missed = {kind: np.empty(0, np.int64) for kind in KINDS}
+        self._stamp: float | None = None
+        self._odometry: Pose | None = None
+        self._twists: deque[Twist] = deque(maxlen=2)
+        self._next = 0
+
+    @property
+    def twist(self) -> Twist | None:
+        """Velocity of the sensor in the last frames, as `deskew` takes it.
+
+        The mean of the last two motions: if scans are deskewed by it, the error of one motion
+        comes back in the next with the other sign. None before there were two frames with
+        increasing stamps.
+        """
+        if not self._twists:
+            return None
+        forward, left, turn_rate = np.mean(self._twists, axis=0).tolist()
+        return forward, left, turn_rate
+
+    def __call__(self, features: Features, odometry: Pose | None = None) -> Tracks:
+        """Take in the next frame.
+
+        Parameters
+        ----------
+        features : Features
+            Those of the next scan, in the frame of its sensor.
+        odometry : (x, y, theta), optional
+            Pose of the sensor by odometry, in any frame that stays [m, m, rad]. Its change since
+            the last frame is what is made use of, where both have one.
+
+        Returns
+        -------
+        Tracks
+
+        Raises
+        ------
+        ValueError
+            If the odometry is not three finite numbers; the tracks are then as they were.
+        """
+        if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
+            raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
+        motion = None
+        if self._stamp is None:
+            matches = associate(self._seen, features)
+        else:
+            duration = features.stamp - self._stamp
+            motion, matches = self._follow(features, *self._expected(odometry, duration))
+            self._seen = self._seen.transform(*inverse(motion.pose))
+            if duration > 0:
+                self._twists.append(motion.twist(duration))
+            else:
+                self._twists.clear()
+        self._stamp, self._odometry = features.stamp, odometry
+        return self._renew(features, matches, motion)
+
+    def _follow(self, features: Features, prior: Pose, spread: Array) -> tuple[Motion, Matches]:
+        """Find the tracks again, and the motion that they tell."""
+        motion = Motion(*prior, spread)
+        for _ in range(_ROUNDS):
+            matches = associate(
+                self._seen,
+                features,
+                motion.pose,
+                motion.covariance,
+                gate=self.gate,
+                roughness=self.roughness,
+            )
+            motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
+        return motion, matches
+
+    def _expected(self, odometry: Pose | None, duration: float) -> tuple[Pose, Array]:
+        """Motion since the last frame as it is expected, and its covariance."""
+        if odometry is not None and self._odometry is not None:
+            (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
+            pose = relative(self._odometry, odometry)
+        else:
+            (least_way, least_turn), (by_way, by_turn) = _CONTINUED
+            pose = (0.0, 0.0, 0.0)
+            twist = self.twist
+            if twist is not None and duration > 0:
+                x, y, theta = poses_along(twist, [duration])[0].tolist()
+                pose = (x, y, theta)
+        way = least_way + by_way * math.hypot(pose[0], pose[1])
+        turn = least_turn + by_turn * abs(pose[2])
+        return pose, np.diag((way, way, turn)) ** 2
+
+    def _fresh(self, matches: Matches) -> Matches:
+        """Keep the pairs whose track was seen in the very last frame."""
+        kept = {kind: getattr(matches, kind) for kind in KINDS}
+        fresh = {kind: pairs[self._missed[kind][pairs[:, 0]] == 0] for kind, pairs in kept.items()}
+        return replace(matches, **fresh)
+
+    def _renew(self, features: Features, matches: Matches, motion: Motion | None) -> Tracks:
+        """Give the features their numbers, and keep them with the tracks that were missed."""
+        numbers, born, ended = {}, [], []
+        tables: dict[str, Any] = {}
+        for kind in KINDS:
+            table, seen = getattr(features, kind), getattr(self._seen, kind)
+            tracks, missed = self._tracks[kind], self._missed[kind] + 1
+            pairs = getattr(matches, kind)
+            mine = np.full(len(table), -1, np.int64)
+            mine[pairs[:, 1]] = tracks[pairs[:, 0]]
+            new = np.flatnonzero(mine < 0)
+            mine[new] = self._next + np.arange(len(new))
+            self._next += len(new)
+            missed[pairs[:, 0]] = 0
+            kept = (missed > 0) & (missed <= self.max_missed)
+            born.append(mine[new])
+            ended.append(tracks[missed > self.max_missed])
+            numbers[kind], tables[kind] = mine, np.concatenate((table, seen[kept]))
+            self._tracks[kind] = np.concatenate((mine, tracks[kept]))
+            self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
+        self._seen = replace(features, **tables)
+        return Tracks(
+            **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
+        )
+
+
+def _nothing() -> Features:
+    tables: dict[str, Any] = {name: np.empty(0, dtype) for name, dtype in TABLES.items()}
+    return Features(**tables, clusters=np.empty(0, np.int32))

@@ -1,0 +1,142 @@
+"""Deskewing: by hand, against a standing sensor, and what must hold of any scan."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from naive_world import distance_to_walls, ring_sensor
+
+import lineament as ln
+from lineament.deskewing import beam_times
+from lineament.evaluation import CornerScores, corner_scores
+from lineament.evaluation.counts import rms
+from lineament.scan import RangeNoise
+from lineament.simulation import SENSORS, cast_rays, room, scene, truth
+
+NAN = math.nan
+QUIET = replace(SENSORS["utm30lx"], noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0, rate=10.0)
+
+
+def test_times_of_beams():
+    scan = ln.LaserScan([1.0] * 3, 0.0, 0.5, time_increment=0.01, scan_time=9.0)
+    np.testing.assert_allclose(beam_times(scan), [0, 0.01, 0.02])
+    # Half a circle in half the time of a turn, whatever the beams between.
+    scan = ln.LaserScan([1.0] * 3, angles=[-1.0, 0.0, math.pi - 1.0], scan_time=0.2)
+    np.testing.assert_allclose(beam_times(scan), [0, 0.1 / math.pi, 0.1])
+
+
+@pytest.mark.parametrize("twist", [None, (0.0, 0.0, 0.0)])
+def test_without_a_motion_the_scan_is_itself(twist):
+    scan = ln.LaserScan([1.0, 2.0], 0.0, 0.1, time_increment=0.01)
+    assert ln.deskew(scan, twist) is scan
+
+
+def test_without_times_or_readings_the_scan_is_itself():
+    for scan in (
+        ln.LaserScan([1.0, 2.0], 0.0, 0.1),
+        ln.LaserScan([NAN, 0.0], 0.0, 0.1, time_increment=0.1),
+        ln.LaserScan([], 0.0, 0.1, time_increment=0.1),
+    ):
+        assert ln.deskew(scan, (1.0, 2.0, 3.0)) is scan
+
+
+def test_a_turn_by_hand():
+    # Turning left at 0.5 rad/s, a beam each 0.1 s: each is 0.05 rad farther to the left.
+    scan = ln.LaserScan(
+        [1.0, NAN, 3.0], 0.0, 0.1, time_increment=0.1, stamp=7.0, frame_id="laser",
+        intensities=[5, 6, 7], range_max=9.0, pose=(1, 2, 3),
+    )  # fmt: skip
+    still = ln.deskew(scan, (0.0, 0.0, 0.5))
+    np.testing.assert_allclose(still.angles, [0.0, 0.15, 0.3])
+    np.testing.assert_array_equal(still.ranges, scan.ranges)
+    assert (still.stamp, still.frame_id, still.pose) == (7.0, "laser", (1, 2, 3))
+    assert (still.range_max, still.scan_time, still.time_increment) == (9.0, 0.0, 0.0)
+    assert still.intensities.tolist() == [5, 6, 7]
+    assert ln.deskew(still, (0.0, 0.0, 0.5)) is still
+
+
+def test_points_are_where_they_were_at_the_stamp():
+    for twist in ((2.0, 0.0, 3.0), (1.0, -0.5, -1.5), (0.0, 0.0, -4.0)):
+        pose = (0.0, 1.0, 0.0)
+        scan = QUIET.scan(room(), pose, np.random.default_rng(0), twist=twist)
+        still = ln.deskew(scan, twist)
+        points = still.points[still.valid] + pose[:2]
+        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-9)
+        assert scan.valid.sum() - still.valid.sum() <= 40
+        # They are what a sensor at rest can see: nothing is in front of any of them.
+        seen, _ = cast_rays(room(), pose, still.angles[still.valid])
+        behind = still.ranges[still.valid] > seen + 0.02
+        assert behind.mean() < 0.01
+
+
+def test_what_has_come_behind_two_neighbours_is_hidden():
+    """Driving on at 0.2 m/s: near beams to the left fall back past a far one."""
+    bearings = math.pi / 2 + np.array([-0.2, -0.11, 0.0, 0.02, 0.04])
+    scan = ln.LaserScan(
+        [9.0, 9.0, 9.0, 0.5, 0.5], angles=bearings, time_increment=0.1, intensities=range(5)
+    )
+    still = ln.deskew(scan, (0.2, 0.0, 0.0))
+    assert still.intensities.tolist() == [0, 4, 1, 3, 2]
+    assert np.isnan(still.ranges).tolist() == [False, False, True, False, False]
+    left = np.array([0, math.atan(0.06 / 0.5), 0, math.atan(0.05 / 0.5), math.atan(0.04 / 9)])
+    np.testing.assert_allclose(still.angles[[1, 3, 4]], math.pi / 2 - left[[1, 3, 4]], atol=2e-4)
+
+
+def test_an_edge_hides_nothing_of_the_wall_behind_it():
+    """The wall goes on, a little farther off, where a near beam has come across it."""
+    bearings = math.pi / 2 + np.array([-0.04, -0.02, 0.0, 0.02])
+    scan = ln.LaserScan([9.2, 9.1, 9.0, 0.5], angles=bearings, time_increment=0.1)
+    still = ln.deskew(scan, (0.2, 0.0, 0.0))
+    assert still.valid.all()
+    assert still.ranges.argmin() == 0
+
+
+def test_a_full_circle_that_turns_stays_within_one_turn():
+    ring = ring_sensor(360, rate=10.0)
+    for turn_rate in (2.0, -2.0):
+        twist = (0.5, 0.2, turn_rate)
+        scan = ring.scan(room(), (0, 1, 0), np.random.default_rng(0), twist=twist)
+        still = ln.deskew(scan, twist)
+        assert still.is_full_circle == (turn_rate > 0)
+        assert still.angles[-1] - still.angles[0] < 2 * math.pi
+        points = still.points[still.valid] + (0.0, 1.0)
+        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-6)
+
+
+@given(
+    st.lists(st.sampled_from([NAN, math.inf, 0.0, 0.01, 0.3, 2.0, 2.0, 30.0]), max_size=40),
+    st.tuples(*[st.floats(-20, 20)] * 3),
+    st.floats(-0.05, 0.05),
+)
+def test_any_scan_stays_a_scan(ranges, twist, increment):
+    scan = ln.LaserScan(ranges, -3.0, 0.15, time_increment=increment, range_max=20.0)
+    still = ln.deskew(scan, twist)
+    assert len(still) == len(scan)
+    assert (np.diff(still.angles) > 0).all()
+    assert still.valid.sum() <= scan.valid.sum()
+
+
+def test_a_twist_must_be_finite():
+    with pytest.raises(ValueError, match=r"twist is .*, expected three finite"):
+        ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, time_increment=0.1), (NAN, 0.0, 0.0))
+
+
+@pytest.mark.slow
+def test_corners_are_as_good_as_those_of_a_standing_sensor():
+    sensor, extract, twist = replace(SENSORS["utm30lx"], rate=10.0), ln.Extractor(), (1.0, 0.0, 1.5)
+    standing, deskewed = CornerScores(), CornerScores()
+    for seed in range(10_000, 10_030):
+        world, pose = scene("room", seed)
+        true = truth(world, pose, sensor)
+        still, moving = (
+            sensor.scan(world, pose, np.random.default_rng(seed), twist=t)
+            for t in ((0.0, 0.0, 0.0), twist)
+        )
+        standing += corner_scores(extract(still), true)
+        deskewed += corner_scores(extract(ln.deskew(moving, twist)), true)
+    assert rms(deskewed.distances) <= 1.3 * rms(standing.distances)
+    assert deskewed.summary()["recall_0.10"] > 0.97
+    assert deskewed.summary()["precision_0.10"] > 0.97
