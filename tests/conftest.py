@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from itertools import islice
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from lineament import LaserScan, open_log
 # The same examples in every run: a failure on one machine is one on all.
 settings.register_profile("lineament", derandomize=True, deadline=None)
 settings.load_profile("lineament")
+
+# A shell that runs the tests in the background has them, and what they start, ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

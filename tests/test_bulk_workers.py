@@ -154,7 +154,7 @@ def start(*arguments):
 
 
 def wait_for(condition):
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not condition() and time.monotonic() < deadline:
         time.sleep(0.02)
     assert condition()
@@ -179,7 +179,7 @@ def test_a_stopped_run_leaves_whole_files_and_is_resumed(how, workers, tmp_path)
         os.killpg(process.pid, how)
     else:
         process.kill()
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=120)
     assert process.returncode == (130 if how == signal.SIGINT else -how)
     assert "Traceback" not in errors
     if how == signal.SIGINT:
