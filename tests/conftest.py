@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 
@@ -35,3 +37,24 @@ def recorded_scans(data_dir: Path) -> list[LaserScan]:
     """Every sixtieth scan of a recording of offices and corridors."""
     log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
     return list(islice(log, 0, None, 60))
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folder of temporary files, which must be empty when all logs are gone."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """Write a text as a log, packed by a function of its bytes."""
+
+    def write_log(text: str, name: str = "a.txt", pack: Callable[[bytes], bytes] = bytes) -> Path:
+        path = tmp_path / name
+        path.write_bytes(pack(text.encode()))
+        return path
+
+    return write_log

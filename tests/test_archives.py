@@ -7,7 +7,6 @@ import io
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
@@ -22,15 +21,6 @@ from lineament.logs import archives, copies, find_logs, open_log, save_npz
 def npz_bytes(tmp_path):
     save_npz(tmp_path / "made.npz", [LaserScan([1.0, 2.0], 0.0, 0.1, stamp=7.5)])
     return (tmp_path / "made.npz").read_bytes()
-
-
-@pytest.fixture
-def temporary(tmp_path, monkeypatch):
-    """Folder of temporary files, which must be empty when all logs are gone."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
 
 
 @pytest.mark.parametrize("name", ["a.zip", "a.log", "a"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import sqlite3
-import tempfile
 import zipfile
 from pathlib import Path
 
@@ -31,15 +30,6 @@ def bags(tmp_path_factory):
         path = ros_bags.write_bag(folder / f"{kind}{ros_bags.ending(kind)}", kind, items)
         found[kind] = next(path.glob("*.db3")) if path.is_dir() else path
     return found
-
-
-@pytest.fixture
-def temporary(tmp_path, monkeypatch):
-    """Folder of temporary files, which must be empty when all logs are gone."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
 
 
 def read(path, **options):

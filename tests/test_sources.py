@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import os
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -12,16 +11,6 @@ from text_logs import BEAMS, FLASER, zipped
 
 from lineament import LogError
 from lineament.logs import copies, find_logs, open_log, remote
-
-
-@pytest.fixture
-def temporary(tmp_path, monkeypatch):
-    """Folder of temporary files, which must be empty when all logs are gone."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
-
 
 # Folders and patterns
 

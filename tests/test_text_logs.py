@@ -15,16 +15,6 @@ from lineament.logs import open_log
 UNITS = "rplidar_kitchenette"
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write_log(text, name="a.txt", pack=bytes):
-        path = tmp_path / name
-        path.write_bytes(pack(text.encode()))
-        return path
-
-    return write_log
-
-
 @pytest.mark.parametrize("pack", [bytes, gzip.compress, b"\xef\xbb\xbf".__add__])
 @pytest.mark.parametrize(
     ("name", "n", "topics"),
