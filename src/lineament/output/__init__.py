@@ -18,8 +18,8 @@ _WRITERS = {
     ".parquet": ("parquet", "ParquetWriter"),
     ".csv": ("csv", "CsvWriter"),
     ".jsonl": ("jsonl", "JsonLinesWriter"),
-    ".ros2.mcap": ("ros2", "Ros2Writer"),  # before the ending that it contains
-    ".mcap": ("foxglove", "FoxgloveWriter"),
+    ".ros2.mcap": ("mcap", "Ros2Writer"),  # before the ending that it contains
+    ".mcap": ("mcap", "FoxgloveWriter"),
     ".rrd": ("rrd", "RerunWriter"),
     ".svg": ("svg", "SvgWriter"),
     ".dxf": ("dxf", "DxfWriter"),
@@ -64,17 +64,18 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
     '{"scan": 0, "stamp": 0.0,'
     """
     name = Path(path).name.lower()
-    for ending, (module, writer) in _WRITERS.items():
+    for ending in _WRITERS:
         if name.endswith(ending):
-            return _writer(path, ending, module, writer)(path, topics)
+            return _make(path, topics, ending)
     own = Path(path).suffix.lower()
     told = f"the ending {own!r} is not known" if own else "the name has no ending"
     raise LineamentError(f"{path}: {told}, expected one of {', '.join(ENDINGS)}")
 
 
-def _writer(path: str | os.PathLike[str], ending: str, module: str, name: str) -> type[Writer]:
+def _make(path: str | os.PathLike[str], topics: Sequence[str], ending: str) -> Writer:
+    module, name = _WRITERS[ending]
     try:
-        writer: type[Writer] = getattr(import_module(f".{module}", __name__), name)
+        writer: Writer = getattr(import_module(f".{module}", __name__), name)(path, topics)
     except ModuleNotFoundError as error:
         raise LineamentError(
             f"{path}: files that end in {ending} need the package {error.name}, "

@@ -1,4 +1,4 @@
-"""MCAP with Foxglove's own messages: the file opens in its 3D panel as it is."""
+"""Foxglove's own messages, in Protobuf: its 3D panel draws them as they are."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ from foxglove import messages as fg
 
 from ..scan import LaserScan, Pose
 from .layers import Layer
-from .mcap import McapWriter, Message, Moment, cloud_of
+from .scene import Message, Moment, SceneMessages, cloud_of
 
-__all__ = ["FoxgloveWriter"]
+__all__ = ["FoxgloveMessages"]
 
 
-class FoxgloveWriter(McapWriter):
-    """Writes ``foxglove.LaserScan``, ``SceneUpdate`` and ``FrameTransform``, in Protobuf.
+class FoxgloveMessages(SceneMessages):
+    """Makes ``foxglove.LaserScan``, ``PointCloud``, ``SceneUpdate`` and ``FrameTransform``.
 
     Beams that are not valid are NaN: the message has no limits of the range to tell them by.
     """
 
-    profile, encoding = "", "protobuf"
+    encoding, profile = "protobuf", ""
 
-    def _schema(self, kind: str) -> tuple[str, str, bytes]:
+    def schema(self, kind: str) -> tuple[str, str, bytes]:
+        """Name, encoding and text of the schema of a message, by its name."""
         schema = getattr(fg, kind).get_schema()
         return schema.name, schema.encoding, schema.data
 
-    def _transform(self, topic: str, moment: Moment, pose: Pose) -> Message:
+    def transform(self, topic: str, moment: Moment, pose: Pose) -> Message:
+        """``FrameTransform``: where the frame of the scan is in the world."""
         x, y, theta = pose
         return _message(
             topic,
@@ -40,7 +42,8 @@ class FoxgloveWriter(McapWriter):
             ),
         )
 
-    def _scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
+    def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
+        """``LaserScan``; invalid beams are NaN."""
         intensities = scan.intensities
         return _message(
             topic,
@@ -55,7 +58,8 @@ class FoxgloveWriter(McapWriter):
             ),
         )
 
-    def _points(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
+    def points(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
+        """``PointCloud`` of the valid points: x, y, z and intensity."""
         names, cloud = cloud_of(scan)
         number = fg.PackedElementFieldNumericType.Float32
         return _message(
@@ -73,7 +77,8 @@ class FoxgloveWriter(McapWriter):
             ),
         )
 
-    def _features(self, topic: str, moment: Moment, layers: tuple[Layer, ...]) -> Message:
+    def features(self, topic: str, moment: Moment, layers: tuple[Layer, ...]) -> Message:
+        """``SceneUpdate``: one entity a layer."""
         # An entity takes the place of the one that had its name: nothing has to be deleted.
         entities = [
             fg.SceneEntity(

@@ -28,8 +28,8 @@ class Layer:
         Red, green, blue and opacity, 0 to 1.
     size : float
         Width of the lines, or diameter of the spheres [m].
-    strips : sequence of float64 arrays, shape (n, 2)
-        Vertices that are joined by lines [m].
+    strips : sequence of float64 arrays, shape (n, 2), or one array, shape (m, n, 2)
+        Vertices that are joined by lines [m]; in one array where all strips have as many.
     points : float64 array, shape (m, 2)
         Centres of spheres [m].
     """
@@ -37,7 +37,7 @@ class Layer:
     name: str
     color: Color
     size: float
-    strips: Sequence[Array]
+    strips: Sequence[Array] | Array
     points: Array
 
     @property
@@ -46,7 +46,11 @@ class Layer:
 
         What a list of lines takes, where one message has to hold many strips.
         """
-        pieces = [np.repeat(strip, 2, axis=0)[1:-1] for strip in self.strips]
+        strips = [self.strips] if isinstance(self.strips, np.ndarray) else self.strips
+        pieces = [
+            np.repeat(strip, 2, axis=-2)[..., 1:-1, :].reshape(-1, 2)
+            for strip in strips  # each of them one, or many of as many vertices
+        ]
         return np.concatenate(pieces) if pieces else np.zeros((0, 2))
 
 
@@ -64,8 +68,8 @@ def layers_of(markers: Markers) -> tuple[Layer, ...]:
     """
     none = np.zeros((0, 2))
     return (
-        Layer("segments", (0.16, 0.47, 0.84, 1.0), 0.03, list(markers.segments), none),
+        Layer("segments", (0.16, 0.47, 0.84, 1.0), 0.03, markers.segments, none),
         Layer("arcs", (0.51, 0.31, 0.87, 1.0), 0.03, markers.arc_strips(), none),
         Layer("corners", (0.82, 0.14, 0.18, 1.0), 0.08, (), markers.corners),
-        Layer("ellipses", (0.93, 0.60, 0.20, 1.0), 0.01, list(markers.ellipse_strips()), none),
+        Layer("ellipses", (0.93, 0.60, 0.20, 1.0), 0.01, markers.ellipse_strips(), none),
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..features import Features
 from ..scan import LaserScan
 
-__all__ = ["FARTHEST", "LEVEL", "Markers", "arc_span", "ellipses_of", "markers_of"]
+__all__ = ["FARTHEST", "LEVEL", "Markers", "arc_span", "ellipses_of", "is_drawn", "markers_of"]
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,8 @@ LEVEL = 0.95
 TURN = 48
 #: What is farther from the origin than this is not drawn [m]: no scanner sees so far.
 FARTHEST = 1e9
+#: Cosines and sines of the directions to the vertices of an ellipse.
+_COSINES, _SINES = (wave(np.linspace(0, 2 * math.pi, TURN + 1)) for wave in (np.cos, np.sin))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +72,20 @@ class Markers:
         strips = []
         for x, y, radius, first, last in self.arcs:
             n = max(math.ceil(TURN * (last - first) / (2 * math.pi)), 2) + 1
-            turn = np.linspace(first, last, n)
-            strips.append(np.column_stack((x + radius * np.cos(turn), y + radius * np.sin(turn))))
+            turn = first + (last - first) / (n - 1) * np.arange(n)
+            strip = np.empty((n, 2))
+            strip[:, 0], strip[:, 1] = x + radius * np.cos(turn), y + radius * np.sin(turn)
+            strips.append(strip)
         return strips
 
     def ellipse_strips(self) -> Array:
         """Make closed strips of vertices, shape (E, 49, 2); the last vertex is the first."""
         x, y, a, b, direction = self.ellipses.T[:, :, None]
-        turn = np.linspace(0, 2 * math.pi, TURN + 1)
-        u, v = a * np.cos(turn), b * np.sin(turn)
+        u, v = a * _COSINES, b * _SINES
         c, s = np.cos(direction), np.sin(direction)
-        return np.stack((x + c * u - s * v, y + s * u + c * v), axis=-1)
+        strips = np.empty((len(u), TURN + 1, 2))
+        strips[..., 0], strips[..., 1] = x + c * u - s * v, y + s * u + c * v
+        return strips
 
 
 def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
@@ -106,29 +111,26 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
     >>> markers_of(ln.extract(scan), scan).segments.round(2).tolist()
     [[[2.0, -0.02], [2.0, 0.02]]]
     """
-    lines = np.stack((features.segments["start"], features.segments["end"]), axis=1)
-    corners, arcs = features.corners, features.arcs
-    arcs = arcs[_is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
+    segments, corners, arcs = features.segments, features.corners, features.arcs
+    lines = np.empty((len(segments), 2, 2))
+    lines[:, 0], lines[:, 1] = segments["start"], segments["end"]
+    arcs = arcs[is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
     spans = [(0.0, 2 * math.pi) if scan is None else arc_span(arc, scan) for arc in arcs]
     return Markers(
-        segments=lines[_is_drawn(lines)],
-        corners=corners["position"][_is_drawn(corners["position"])],
+        segments=lines[is_drawn(lines)],
+        corners=corners["position"][is_drawn(corners["position"])],
         arcs=np.column_stack((arcs["center"], arcs["radius"], np.reshape(spans, (-1, 2)))),
-        ellipses=np.vstack(
-            (
-                ellipses_of(corners["position"], corners["covariance"]),
-                ellipses_of(arcs["center"], arcs["covariance"][:, :2, :2]),
-            )
+        ellipses=ellipses_of(
+            np.concatenate((corners["position"], arcs["center"])),
+            np.concatenate((corners["covariance"], arcs["covariance"][:, :2, :2])),
         ),
     )
 
 
-def _is_drawn(values: Array) -> NDArray[np.bool_]:
-    drawn: NDArray[np.bool_] = np.all(
-        np.abs(values) < FARTHEST,  # NaN is not
-        axis=tuple(range(1, values.ndim)),
-    )
-    return drawn
+def is_drawn(values: Array) -> NDArray[np.bool_]:
+    """Whether all values of each row are finite, and not too far away to be drawn."""
+    near = np.abs(values) < FARTHEST  # NaN is not
+    return np.asarray(near.all(axis=tuple(range(1, values.ndim))))
 
 
 def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
@@ -139,11 +141,16 @@ def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
     first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
     if not (0 <= first < n and 0 <= last < n):
         return 0.0, 2 * math.pi
-    beams = np.arange(first, last + 1 if first <= last else last + n + 1) % n
-    from_center = scan.points[beams[scan.valid[beams]]] - arc["center"]
-    if not len(from_center):
+    points = scan.points[first : last + 1]
+    if first > last:
+        points = np.concatenate((scan.points[first:], scan.points[: last + 1]))
+    x, y = arc["center"].tolist()
+    angles = np.arctan2(points[:, 1] - y, points[:, 0] - x)
+    angles = angles[~np.isnan(angles)]  # of beams that are not valid
+    if not len(angles):
         return 0.0, 2 * math.pi
-    angles = np.unwrap(np.arctan2(from_center[:, 1], from_center[:, 0]))
+    turns = np.rint((angles[1:] - angles[:-1]) / (2 * math.pi))
+    angles[1:] -= 2 * math.pi * turns.cumsum()
     return float(angles.min()), float(angles.max())
 
 
@@ -169,8 +176,15 @@ def ellipses_of(positions: Array, covariances: Array, level: float = LEVEL) -> A
     >>> ellipses_of(np.zeros((1, 2)), np.diag([0.01, 0.04])[None]).round(3).tolist()
     [[0.0, 0.0, 0.49, 0.245, 1.571]]
     """
-    known = _is_drawn(positions) & _is_drawn(covariances)
-    variances, axes = np.linalg.eigh(covariances[known])
-    half = np.sqrt(-2 * math.log1p(-level) * np.maximum(variances[:, ::-1], 0))
-    direction = np.arctan2(axes[:, 1, 1], axes[:, 0, 1]) % math.pi
-    return np.column_stack((positions[known], half, direction))
+    known = is_drawn(positions) & is_drawn(covariances)
+    centers, covariances = positions[known], covariances[known]
+    a, b, c = covariances[:, 0, 0], covariances[:, 1, 0], covariances[:, 1, 1]
+    # The eigenvalues of [[a, b], [b, c]] are mean ± spread.
+    mean, spread = (a + c) / 2, np.hypot((a - c) / 2, b)
+    scale = -2 * math.log1p(-level)
+    ellipses = np.empty((len(centers), 5))
+    ellipses[:, :2] = centers
+    ellipses[:, 2] = np.sqrt(scale * np.maximum(mean + spread, 0))
+    ellipses[:, 3] = np.sqrt(scale * np.maximum(mean - spread, 0))
+    ellipses[:, 4] = np.arctan2(2 * b, a - c) / 2 % math.pi
+    return ellipses
