@@ -9,6 +9,7 @@ import click
 
 from .experiments import bench, compare, reproduce, simulate
 from .extract import extract
+from .live import live
 from .method_options import METHODS, NOISE, SET, make_extractor
 from .options import LOG, LOG_PATH, PATH, QUIET, SCAN, check_ending, reading, wrong_usage
 from .view import view
@@ -112,5 +113,5 @@ def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
-_ALL = (extract, info, plot, view, demo, warmup, compare, reproduce, bench, simulate)
+_ALL = (extract, info, plot, view, live, demo, warmup, compare, reproduce, bench, simulate)
 COMMANDS = {command.name: command for command in _ALL if command.name}

@@ -12,7 +12,7 @@ from .options import wrong_usage
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
-__all__ = ["METHOD", "METHODS", "NOISE", "SET", "make_extractor"]
+__all__ = ["METHOD", "METHODS", "NOISE", "SET", "make_extractor", "settings_of"]
 
 METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
 METHODS = click.option(
@@ -47,8 +47,13 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
         return Extractor(
             DEFAULT_METHOD if method is None else method,
             noise=None if noise is None else RangeNoise(sigma=noise),
-            **dict(_setting(text) for text in settings),
+            **settings_of(settings),
         )
+
+
+def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Parameters of a method by name, as ``--set NAME=VALUE`` gives them."""
+    return dict(_setting(text) for text in settings)
 
 
 def _setting(text: str) -> tuple[str, Any]:

@@ -12,7 +12,7 @@ from ..scan import LaserScan, Pose
 from .ros_bag import Buffer, Connection
 from .ros_wire import Wire
 
-__all__ = ["POSE_TYPES", "TRANSFORMS", "PoseFinder"]
+__all__ = ["POSE_TYPES", "TRANSFORMS", "PoseFinder", "plane_pose"]
 
 #: Poses that are held of each track, and scans that wait for a pose after theirs.
 MAX_POSES = 4096
@@ -164,7 +164,7 @@ def _frame(name: str) -> str:
     return name.strip().removeprefix("/")
 
 
-def _plane_pose(wire: Wire) -> Pose:
+def plane_pose(wire: Wire) -> Pose:
     """Take a position and a quaternion: what they are in the plane."""
     x, y, _, qx, qy, qz, qw = wire.numbers("7d")
     return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
@@ -172,20 +172,20 @@ def _plane_pose(wire: Wire) -> Pose:
 
 def _stamped(wire: Wire) -> tuple[float, Pose]:
     stamp, _ = wire.header()
-    return stamp, _plane_pose(wire)
+    return stamp, plane_pose(wire)
 
 
 def _stamped_of_child(wire: Wire) -> tuple[float, Pose]:
     stamp, _ = wire.header()
     wire.text()
-    return stamp, _plane_pose(wire)
+    return stamp, plane_pose(wire)
 
 
 def _transforms(wire: Wire) -> Iterator[tuple[_Edge, float, Pose]]:
     for _ in range(wire.count()):
         stamp, parent = wire.header()
         child = wire.text()
-        yield (_frame(parent), _frame(child)), stamp, _plane_pose(wire)
+        yield (_frame(parent), _frame(child)), stamp, plane_pose(wire)
 
 
 #: How to read each type of message that is a pose of its own: the stamp and the pose.

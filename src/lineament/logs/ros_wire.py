@@ -61,7 +61,7 @@ class Wire:
         return seconds + 1e-9 * nanoseconds, self._string(length)
 
     def numbers(self, code: str) -> tuple[Any, ...]:
-        """Take numbers of one size, by the letters of `struct`: B, I, II, 7fI or 7d."""
+        """Take numbers of one size, by the letters of `struct`: B, I, II, 7fI, 6d or 7d."""
         unpack, size, alignment = self._form.numbers[code]
         at = self._at
         if alignment:  # Counted from behind the first four bytes.
@@ -128,7 +128,7 @@ class _Form(NamedTuple):
     @classmethod
     def prepare(cls, is_cdr: bool, order: str) -> _Form:
         # The header up to its frame; that of ROS 1 begins with a number of its own.
-        codes = {code: code for code in ("B", "I", "II", "7fI", "7d")}
+        codes = {code: code for code in ("B", "I", "II", "7fI", "6d", "7d")}
         codes["header"] = "iII" if is_cdr else "4xIII"
         numbers = {}
         for name, code in codes.items():

@@ -71,6 +71,10 @@ class RosMessages(SceneMessages):
         self._is_cdr = encoding == "cdr"
         self.encoding, self.profile = encoding, "ros2" if self._is_cdr else "ros1"
 
+    def kind(self, name: str) -> str:
+        """Name of a type in this ROS: ``sensor_msgs/LaserScan``, in ROS 2 with ``msg`` between."""
+        return name.replace("/", "/msg/") if self._is_cdr else name
+
     def schema(self, kind: str) -> tuple[str, str, bytes]:
         """Name, encoding and text of the definition of a type, such as `Message.kind`."""
         version = 2 if self._is_cdr else 1
@@ -190,7 +194,7 @@ class RosMessages(SceneMessages):
         return packer
 
     def _message(self, topic: str, kind: str, packer: Packer) -> Message:
-        return Message(topic, kind.replace("/", "/msg/") if self._is_cdr else kind, packer.data)
+        return Message(topic, self.kind(kind), packer.data)
 
     def _cloud(
         self, topic: str, moment: Moment, points: NDArray[np.void], is_dense: bool

@@ -1,0 +1,270 @@
+"""What a live node keeps up with, over loopback. Run: python benchmarks/live.py.
+
+Three processes: one that publishes scans of 1081 beams, the node (``lineament live``), and one that
+listens to its topics. The first and the last know nothing of the node but what is on the wire.
+Latency is from just before a scan is published until its features have come, by one clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+DOMAIN = 77
+BEAMS = 1081
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the run at 40 Hz")
+    parser.add_argument("--step", type=float, default=10.0, help="of each rate that is tried")
+    parser.add_argument("--minutes", type=float, default=10.0, help="of the run at 400 Hz")
+    parser.add_argument("--role", choices=["publish", "listen"], help=argparse.SUPPRESS)
+    parser.add_argument("--rate", type=float, help=argparse.SUPPRESS)
+    parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--topics", help=argparse.SUPPRESS)
+    parser.add_argument("--out", type=Path, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.role == "publish":
+        publish(given.rate, given.count, given.out)
+    elif given.role == "listen":
+        listen(given.topics.split(","), given.out)
+    else:
+        measure(given.seconds, given.step, given.minutes)
+
+
+def measure(seconds: float, step: float, minutes: float) -> None:
+    from lineament.evaluation.report import machine
+
+    print(f"{machine()}; scans of {BEAMS} beams, method optimal\n", flush=True)
+    print(f"cold start, kernels cached, to the first features: {cold_start():.2f} s\n", flush=True)
+    print(
+        "| rate | listening to | scans | features | dropped | p50 | p99 | largest | CPU of node |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|", flush=True)
+    for rate, duration, topics in (
+        (40, seconds, "features"),
+        (40, seconds, "features,corners,markers"),
+        *((rate, step, "features") for rate in (100, 200, 400, 800, 1200, 1600, 2000)),
+        *((rate, step, "features,corners,markers") for rate in (200, 400, 800)),
+    ):
+        print(row(run(rate, duration, topics), rate, topics), flush=True)
+    if minutes:
+        found = run(400, 60 * minutes, "features,corners,markers", samples=20)
+        sizes = " ".join(f"{size:.0f}" for size in found["memory"])
+        print(f"\n{minutes:g} minutes at 400 Hz: {row(found, 400, 'all')}\nmemory [MB]: {sizes}")
+
+
+def row(found: dict[str, Any], rate: float, topics: str) -> str:
+    p50, p99, worst = (f"{1e3 * value:.2f} ms" for value in found["latency"])
+    return (
+        f"| {rate} Hz | {topics} | {found['published']} | {found['features']} | {found['dropped']} "
+        f"| {p50} | {p99} | {worst} | {100 * found['cpu']:.0f} % |"
+    )
+
+
+def start_node(folder: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "lineament", "live", "--localhost", "--domain", str(DOMAIN)]
+    log = (folder / "node.log").open("w")
+    return subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, text=True)
+
+
+def start_role(role: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, __file__, "--role", role, *arguments], text=True)
+
+
+def run(rate: float, seconds: float, topics: str, samples: int = 0) -> dict[str, Any]:
+    """Publish at a rate for some time; what came of it."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        node = start_node(folder)
+        wait_for(folder / "node.log", "finds features")
+        listener = start_role("listen", "--topics", topics, "--out", str(folder / "heard.npy"))
+        count = int(rate * seconds)
+        publisher = start_role(
+            "publish", "--rate", str(rate), "--count", str(count), "--out", str(folder / "sent.npy")
+        )
+        wait_until((folder / "sent.npy.begun").exists)
+        used, begun, memory = cpu_time(node.pid), time.monotonic(), [memory_of(node.pid)]
+        while publisher.poll() is None:
+            time.sleep(seconds / samples if samples else 0.1)
+            memory.append(memory_of(node.pid))
+        share = (cpu_time(node.pid) - used) / (time.monotonic() - begun)
+        time.sleep(1.0)
+        for process in (listener, node):
+            process.send_signal(signal.SIGTERM)
+            process.wait(30)
+        sent, heard = np.load(folder / "sent.npy"), np.load(folder / "heard.npy")
+        totals = (folder / "node.log").read_text().splitlines()[-1]
+    index, arrived = heard[:, 0].astype(int), heard[:, 1]
+    latencies = (arrived - sent[index]) * 1e-9
+    return {
+        "published": len(sent),
+        "features": len(index),
+        "dropped": totals.split(" scans, ")[1].split(" dropped")[0],
+        "latency": (*np.quantile(latencies, (0.5, 0.99)), latencies.max()),
+        "cpu": share,
+        "memory": memory,
+    }
+
+
+def cold_start() -> float:
+    """Seconds from the start of the node's process until its first features have come."""
+    times = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for i in range(4):
+            heard = folder / f"heard{i}.npy"
+            listener = start_role("listen", "--topics", "features", "--out", str(heard))
+            sent = folder / f"sent{i}.npy"
+            publisher = start_role("publish", "--rate", "40", "--count", "400", "--out", str(sent))
+            wait_until((folder / f"sent{i}.npy.ready").exists)
+            time.sleep(1.0)
+            begun = time.monotonic_ns()
+            node = start_node(folder)
+            publisher.wait()
+            for process in (listener, node):
+                process.send_signal(signal.SIGTERM)
+                process.wait(30)
+            times.append((np.load(heard)[0, 1] - begun) * 1e-9)
+    return float(np.median(times[1:]))  # the first one may compile
+
+
+def wait_for(path: Path, text: str) -> None:
+    wait_until(lambda: path.exists() and text in path.read_text())
+
+
+def wait_until(is_so: Any, seconds: float = 120.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not is_so():
+        if time.monotonic() > deadline:
+            raise SystemExit("nothing came: is the node running?")
+        time.sleep(0.05)
+
+
+def cpu_time(pid: int) -> float:
+    """Seconds of processor time that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_of(pid: int) -> float:
+    """Resident memory of a process [MB]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def participant() -> tuple[Any, Any]:
+    from cyclonedds.domain import Domain, DomainParticipant
+    from dds_peer import CONFIGURATION
+
+    domain = Domain(DOMAIN, CONFIGURATION.format(lease="10s"))
+    return domain, DomainParticipant(DOMAIN)
+
+
+def publish(rate: float, count: int, out: Path) -> None:
+    """Publish simulated scans, as soon as somebody listens; keep when each was sent."""
+    import dds_types
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.qos import Policy, Qos
+    from cyclonedds.topic import Topic
+
+    scans = [bytearray(scan.serialize()) for scan in simulated(dds_types)]
+    # They are serialised already: only the stamp changes.
+    dds_types.LaserScan.serialize = lambda self, **_: self.data
+    domain, entity = participant()
+    qos = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(10))
+    writer = DataWriter(entity, Topic(entity, "rt/scan", dds_types.LaserScan), qos)
+    out.with_name(out.name + ".ready").touch()
+    wait_until(lambda: writer.get_publication_matched_status().current_count > 0)
+    sent = np.zeros(count, np.int64)
+    message = dds_types.LaserScan.__new__(dds_types.LaserScan)
+    out.with_name(out.name + ".begun").touch()
+    begun = time.monotonic()
+    for i in range(count):
+        pause = begun + i / rate - time.monotonic()
+        if pause > 0:
+            time.sleep(pause)
+        scan = scans[i % len(scans)]
+        scan[4:12] = np.array([i // 1000, 1_000_000 * (i % 1000)], "<u4").tobytes()
+        message.data = bytes(scan)
+        sent[i] = time.monotonic_ns()
+        writer.write(message)
+    time.sleep(0.5)
+    np.save(out, sent)
+    del domain
+
+
+def simulated(types: Any) -> list[Any]:
+    """Scans along a drive through a building."""
+    from lineament.simulation import SENSORS, building, drive
+
+    made = []
+    world, walk = building()
+    for scan in drive(world, walk[:3], SENSORS["utm30lx"], speed=1.0, rate=40.0):
+        header = types.Header(types.Time(0, 0), "laser")
+        ranges = np.where(np.isfinite(scan.ranges), scan.ranges, np.inf).tolist()
+        geometry = [scan.angle_min, -scan.angle_min, scan.angle_increment, 0.0, 0.025]
+        made.append(types.LaserScan(header, *geometry, 0.1, 30.0, ranges, []))
+    assert len(made[0].ranges) == BEAMS
+    return made
+
+
+def listen(topics: list[str], out: Path) -> None:
+    """Listen to topics of the node; keep when the features of each scan came."""
+    import struct
+
+    import dds_types
+    from cyclonedds.core import ReadCondition, SampleState, ViewState, InstanceState, WaitSet
+    from cyclonedds.qos import Policy, Qos
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+
+    kinds = {"features": "PointCloud2", "corners": "PoseArray", "markers": "MarkerArray"}
+    domain, entity = participant()
+    qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(100))
+    waiting, readers = WaitSet(entity), []
+    for topic in topics:
+        genuine = getattr(dds_types, kinds[topic])
+
+        # It is not taken apart: the listener must keep up.
+        genuine.deserialize = classmethod(kept)
+        readers.append(DataReader(entity, Topic(entity, f"rt/scan/{topic}", genuine), qos))
+        any_state = ViewState.Any | SampleState.NotRead | InstanceState.Any
+        waiting.attach(ReadCondition(readers[-1], any_state))
+    stopped = []
+    signal.signal(signal.SIGTERM, lambda *_: stopped.append(1))
+    heard = []
+    while not stopped:
+        waiting.wait(duration(milliseconds=100))
+        now = time.monotonic_ns()
+        for k, reader in enumerate(readers):
+            for sample in reader.take(100):
+                if k == 0 and hasattr(sample, "data"):
+                    seconds, nanoseconds = struct.unpack_from("<iI", sample.data, 4)
+                    heard.append((1000 * seconds + nanoseconds // 1_000_000, now))
+    np.save(out, np.array(heard, np.int64).reshape(-1, 2))
+    del domain
+
+
+def kept(kind: Any, data: bytes, **_: Any) -> Any:
+    """Keep a message as it came."""
+    message = kind.__new__(kind)
+    message.data = data
+    return message
+
+
+if __name__ == "__main__":
+    main()

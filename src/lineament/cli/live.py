@@ -1,0 +1,96 @@
+"""The command that turns a running scanner into a stream of features."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .method_options import METHOD, SET, settings_of
+from .options import PATH, QUIET, wrong_usage
+
+if TYPE_CHECKING:
+    from ..live import Report
+
+__all__ = ["live"]
+
+
+@click.command()
+@click.option("--config", type=PATH, help="TOML file of the options below; flags go before it.")
+@click.option("--topic", help="Topic of the scans.  [default: scan]")
+@click.option("--namespace", help="Put before topics that do not begin with /.")
+@click.option("--name", help="Name of the node.  [default: lineament]")
+@click.option(
+    "--type",
+    type=click.Choice(["LaserScan", "MultiEchoLaserScan"]),
+    help="Type of the messages.  [default: LaserScan]",
+)
+@click.option("--echo", type=click.Choice(["first", "last", "strongest"]), help="Which echo.")
+@click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
+@click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
+@click.option("--localhost", is_flag=True, default=None, help="Stay on this machine.")
+@click.option(
+    "--reliability",
+    type=click.Choice(["best-effort", "reliable"]),
+    help="Of the subscription.  [default: best-effort]",
+)
+@click.option("--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.")
+@METHOD
+@SET
+@click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+@click.option(
+    "--deskew",
+    metavar="off|scans|poses|TOPIC",
+    help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
+)
+@click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
+@click.option("--track", is_flag=True, default=None, help="Number features from scan to scan.")
+@click.option("--from", "log", metavar="LOG", help="Play a log in place of a topic.")
+@click.option("--log-topic", metavar="TOPIC", help="Which scans of the log.")
+@click.option("--poses", metavar="TOPIC", help="Which topic of the log gives the poses.")
+@click.option("--ring", type=click.IntRange(min=0), help="Which ring of a point cloud of the log.")
+@click.option(
+    "--keep-going", is_flag=True, default=None, help="Leave out what is faulty in the log."
+)
+@click.option("--rate", type=click.FloatRange(min=0), help="How many times faster; 0: at once.")
+@click.option("--loop", is_flag=True, default=None, help="Begin the log anew at its end.")
+@click.option(
+    "--foxglove",
+    type=click.IntRange(0, 65535),
+    is_flag=False,
+    flag_value=8765,
+    help="Serve Foxglove by WebSocket, at port 8765 or another.",
+)
+@click.option("--host", help="Address on which Foxglove is served.  [default: 127.0.0.1]")
+@QUIET
+def live(config: Path | None, settings: tuple[str, ...], quiet: bool, **given: Any) -> None:
+    """Turn a running scanner into a stream of features, over ROS 2 (or ROS 1), or play a log."""
+    from ..live import LiveConfig, read_config, run_live
+
+    told = {} if config is None else read_config(config)
+    told.update({name: value for name, value in given.items() if value is not None})
+    told["parameters"] = {**told.get("parameters", {}), **settings_of(settings)}
+    with wrong_usage():
+        checked = LiveConfig(**told)
+    report = run_live(checked, tell=_tell, show=_shown(quiet))
+    if not quiet:
+        click.echo(report.totals)
+
+
+def _tell(line: str) -> None:
+    click.echo(line, err=True)
+
+
+def _shown(quiet: bool) -> Callable[[Report], None]:
+    """Show reports in one line that changes, where there is a terminal."""
+    if quiet or not sys.stderr.isatty():
+        return lambda report: None  # noqa: ARG005
+    return lambda report: click.echo(f"\r\033[K{report}", nl=False, err=True)

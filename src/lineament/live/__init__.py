@@ -1,0 +1,59 @@
+"""A running scanner turned into a stream of features, over ROS 2, ROS 1, or from a log.
+
+One way: source → (the newest scan of each publisher) → deskewing → features → tracks → sinks.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .config import LiveConfig, read_config
+    from .counters import Report
+    from .node import Node
+    from .pipeline import Frame, Pipeline
+    from .received import Odometry, Received, Source
+    from .replay import ReplaySource
+    from .running import run_live
+    from .sinks import FoxgloveSink, RosSink, Sink
+
+_HOME = {
+    "FoxgloveSink": "sinks",
+    "Frame": "pipeline",
+    "LiveConfig": "config",
+    "Node": "node",
+    "Odometry": "received",
+    "Pipeline": "pipeline",
+    "Received": "received",
+    "ReplaySource": "replay",
+    "Report": "counters",
+    "RosSink": "sinks",
+    "Sink": "sinks",
+    "Source": "received",
+    "read_config": "config",
+    "run_live": "running",
+}
+
+__all__ = [
+    "FoxgloveSink",
+    "Frame",
+    "LiveConfig",
+    "Node",
+    "Odometry",
+    "Pipeline",
+    "Received",
+    "ReplaySource",
+    "Report",
+    "RosSink",
+    "Sink",
+    "Source",
+    "read_config",
+    "run_live",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)

@@ -1,0 +1,161 @@
+"""`Node`: takes the newest scans from a source, works at them, and tells what it found."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import one_line
+from ..scan import LaserScan
+from .counters import Counters, Report
+from .pipeline import Pipeline, check_beams
+from .received import Received, Source
+
+if TYPE_CHECKING:
+    from .sinks import Sink
+
+__all__ = ["Node"]
+
+#: Longest wait for a scan [s]: how soon a stop is seen.
+_WAIT = 0.1
+#: Time between two reports [s].
+_EACH = 1.0
+#: Time after which it is told that nothing comes [s].
+_PATIENCE = 2.0
+#: Publishers whose faults are told; there are few, unless names are made up.
+_MOST_TOLD = 64
+
+
+class Node:
+    """Turns a stream of scans into a stream of features.
+
+    There is no queue: of the scans that came while one was in work, only the newest of each
+    publisher is worked at, and the others are counted as dropped. What makes no sense is
+    counted, and told once for each publisher.
+
+    Parameters
+    ----------
+    source : Source
+        Where scans come from.
+    pipeline : Pipeline
+        What is done with them.
+    sinks : sequence of Sink
+        Where features go.
+    tell : callable
+        Is told in a line what a person should know.
+    show : callable
+        Is shown each report, each second.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from lineament.live import LiveConfig, ReplaySource
+    >>> from lineament.logs import save_npz
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "log.npz")
+    >>> save_npz(path, [LaserScan([2.0, 2.0, 2.0], 0.0, 0.01, stamp=i / 10) for i in range(3)])
+    >>> node = Node(ReplaySource(path, rate=0), Pipeline(LiveConfig()), [])
+    >>> node.run().total_scans
+    3
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        pipeline: Pipeline,
+        sinks: Sequence[Sink],
+        *,
+        tell: Callable[[str], None] = print,
+        show: Callable[[Report], None] = lambda report: None,  # noqa: ARG005
+    ) -> None:
+        self._source, self._pipeline, self._sinks = source, pipeline, tuple(sinks)
+        self._tell, self._show = tell, show
+        self._faulty: set[str] = set()
+        self._problems: set[str] = set()
+        self._publishers: int | None = None
+
+    def run(self, is_stopped: Callable[[], bool] = lambda: False) -> Report:
+        """Work until the source ends or `is_stopped` says so, which is asked ten times a second.
+
+        Returns
+        -------
+        Report
+            The last one; its totals are those of the whole run.
+        """
+        started = reported = time.monotonic()
+        counters = Counters(started)
+        while not is_stopped() and not self._source.ended:
+            for received in self._newest(self._source.receive(_WAIT), counters):
+                self._work(received, counters)
+            now = time.monotonic()
+            if now - reported >= _EACH:
+                reported = now
+                self._watch(now - started)
+                self._report(counters, now)
+        return self._report(counters, time.monotonic())
+
+    def _newest(self, received: list[Received], counters: Counters) -> list[Received]:
+        """Keep the newest scan of each publisher, in the order in which they came."""
+        for odometry in [item for item in received if item.is_odometry][-1:]:
+            self._read(odometry, counters)
+        scans = [item for item in received if not item.is_odometry]
+        newest = {item.publisher: item for item in scans}
+        counters.dropped += len(scans) - len(newest)
+        return list(newest.values())
+
+    def _read(self, received: Received, counters: Counters) -> LaserScan | None:
+        """Decode a message; None if it makes no sense, or is an odometry, which is heard."""
+        try:
+            read = received.read()
+            if isinstance(read, LaserScan):
+                check_beams(read)
+                return read
+            self._pipeline.hear(read)
+        except ValueError as error:
+            counters.malformed += 1
+            what = "an odometry" if received.is_odometry else "a scan"
+            self._tell_once(f"{what} of {received.publisher} makes no sense: {error}", received)
+        return None
+
+    def _work(self, received: Received, counters: Counters) -> None:
+        scan = self._read(received, counters)
+        if scan is None:
+            return
+        frame = self._pipeline(received.publisher, scan, received.time)
+        for sink in self._sinks:
+            sink.tell(frame)
+        counters.add(scan, frame.features, time.monotonic() - received.arrived)
+
+    def _tell_once(self, text: str, received: Received) -> None:
+        if received.publisher not in self._faulty and len(self._faulty) < _MOST_TOLD:
+            self._faulty.add(received.publisher)
+            self._tell(one_line(f"{text} (others like it are only counted)"))
+
+    def _watch(self, seconds: float) -> None:
+        """Tell when publishers come and go, and what keeps scans from coming."""
+        for problem in self._source.problems():
+            if problem not in self._problems:
+                self._problems.add(problem)
+                self._tell(one_line(problem))
+        publishers = self._source.publishers
+        if publishers == self._publishers or (not publishers and seconds < _PATIENCE):
+            return
+        if publishers:
+            self._tell(f"{publishers} publisher{'s' if publishers > 1 else ''} of scans")
+        else:
+            self._tell("no publisher of scans: waiting for one")
+            self._faulty.clear()
+        self._publishers = publishers
+
+    def _report(self, counters: Counters, now: float) -> Report:
+        report = counters.report(
+            now,
+            publishers=self._source.publishers,
+            lost=self._source.lost,
+            unsent=sum(sink.unsent for sink in self._sinks),
+        )
+        stamp = divmod(time.time_ns(), 1_000_000_000)
+        for sink in self._sinks:
+            sink.diagnose(report, stamp)
+        self._show(report)
+        return report

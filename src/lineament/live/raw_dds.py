@@ -1,0 +1,177 @@
+"""Topics of DDS whose messages are bytes, whatever they hold: as ROS 2 has them on the wire.
+
+The Python binding of Cyclone DDS reads and writes objects of classes that describe each field.
+Here the bytes are wanted: they are decoded elsewhere, and only if they are needed; a malformed
+message has to arrive, so that it can be counted and told; and the binding keeps all of Python
+waiting while a writer waits for a slow reader. So these few functions of Cyclone DDS are called
+directly. A topic is known by its name and that of its type, as ROS 2's own bindings do it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple
+
+from cyclonedds.core import DDSException, Entity, InstanceState, SampleState, ViewState
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import DDS, dds_c_t
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+__all__ = ["ANY_STATE", "RawReader", "RawTopic", "RawWriter", "Sample"]
+
+#: Every message, read or not.
+ANY_STATE = ViewState.Any | SampleState.Any | InstanceState.Any
+#: What a serialised message holds: data, not a key.
+_DATA = 2
+#: All that Cyclone DDS looks at: a message has one byte at least, and nothing of it is a key.
+_ONE_BYTE = (ctypes.c_uint32 * 3)(0x01_01_00_00, 0, 0)
+
+
+class _Meta(ctypes.Structure):
+    _fields_ = (("data", ctypes.c_void_p), ("size", ctypes.c_uint32))
+
+
+class _Description(ctypes.Structure):
+    """``dds_topic_descriptor_t``."""
+
+    _fields_ = (
+        ("size", ctypes.c_uint32),
+        ("alignment", ctypes.c_uint32),
+        ("flags", ctypes.c_uint32),
+        ("n_keys", ctypes.c_uint32),
+        ("type_name", ctypes.c_char_p),
+        ("keys", ctypes.c_void_p),
+        ("n_operations", ctypes.c_uint32),
+        ("operations", ctypes.POINTER(ctypes.c_uint32)),
+        ("meta", ctypes.c_char_p),
+        ("type_information", _Meta),
+        ("type_mapping", _Meta),
+        ("representations", ctypes.c_uint32),
+    )
+
+
+class _Piece(ctypes.Structure):
+    """``ddsrt_iovec_t``: a piece of memory."""
+
+    _fields_ = (("base", ctypes.c_char_p), ("size", ctypes.c_size_t))
+
+
+def _function(name: str, result: Any, *arguments: Any) -> Any:
+    function = getattr(DDS._dll_handle, name)
+    function.restype, function.argtypes = result, arguments
+    return function
+
+
+_P, _Entity = ctypes.POINTER, dds_c_t.entity
+_create_topic = _function(
+    "dds_create_topic",
+    _Entity,
+    *(_Entity, _P(_Description), ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p),
+)
+_get_type = _function("dds_get_entity_sertype", ctypes.c_int32, _Entity, _P(ctypes.c_void_p))
+_take = _function(
+    "dds_takecdr",
+    ctypes.c_int32,
+    *(_Entity, _P(ctypes.c_void_p), ctypes.c_uint32, _P(dds_c_t.sample_info), ctypes.c_uint32),
+)
+_size = _function("ddsi_serdata_size", ctypes.c_uint32, ctypes.c_void_p)
+_copy = _function(
+    "ddsi_serdata_to_ser",
+    None,
+    *(ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_char_p),
+)
+_release = _function("ddsi_serdata_unref", None, ctypes.c_void_p)
+_serialised = _function(
+    "ddsi_serdata_from_ser_iov",
+    ctypes.c_void_p,
+    *(ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t, _P(_Piece), ctypes.c_size_t),
+)
+_write = _function("dds_writecdr", ctypes.c_int32, _Entity, ctypes.c_void_p)
+
+
+class RawTopic(Topic[Any]):
+    """A topic by its name and that of its type, with messages of any bytes.
+
+    Raises
+    ------
+    DDSException
+        If there can be no such topic.
+    """
+
+    def __init__(self, participant: DomainParticipant, name: str, type_name: str) -> None:
+        description = _Description(
+            size=1, alignment=1, type_name=type_name.encode(), n_operations=2, operations=_ONE_BYTE
+        )
+        # The participant is kept as long as the topic.
+        self._keepalive_entities = [participant]
+        self.data_type = bytes
+        made = _create_topic(participant._ref, description, name.encode(), None, None)
+        Entity.__init__(self, made)
+
+
+class Sample(NamedTuple):
+    """A message as it came.
+
+    Attributes
+    ----------
+    data : bytes
+        The message in CDR, from its first four bytes on, which tell the encoding.
+    publisher : int
+        Handle of its publisher.
+    """
+
+    data: bytes
+    publisher: int
+
+
+class RawReader(DataReader[Any]):
+    """Reads a topic; `depth` is how many messages are taken at a time."""
+
+    def __init__(
+        self, participant: DomainParticipant, topic: RawTopic, qos: Qos, depth: int
+    ) -> None:
+        super().__init__(participant, topic, qos)
+        self._taken = (ctypes.c_void_p * depth)()
+        self._infos = (dds_c_t.sample_info * depth)()
+
+    def take_raw(self) -> list[Sample]:
+        """Take the messages that wait, oldest first."""
+        n = _take(self._ref, self._taken, len(self._taken), self._infos, ANY_STATE)
+        if n < 0:
+            raise DDSException(n, "while messages were taken")
+        samples = []
+        for i in range(n):
+            serialised, info = self._taken[i], self._infos[i]
+            if info.valid_data:  # What is none tells that a publisher has gone.
+                size = _size(serialised)
+                data = ctypes.create_string_buffer(size)
+                _copy(serialised, 0, size, data)
+                samples.append(Sample(data.raw, info.publication_handle))
+            _release(serialised)
+            self._taken[i] = None
+        return samples
+
+
+class RawWriter(DataWriter[Any]):
+    """Writes to a topic."""
+
+    def __init__(self, participant: DomainParticipant, topic: RawTopic, qos: Qos) -> None:
+        super().__init__(participant, topic, qos)
+        self._type = ctypes.c_void_p()
+        _get_type(self._ref, self._type)
+
+    def write_raw(self, data: bytes) -> bool:
+        """Write a message in CDR; tell whether it went out: a slow reader can be in the way."""
+        data += bytes(-len(data) % 4)  # Messages end on a full word.
+        serialised = _serialised(self._type, _DATA, 1, _Piece(data, len(data)), len(data))
+        if not serialised:
+            raise ValueError(f"message begins with {data[:4].hex()!r}, expected CDR: 0001")
+        result: int = _write(self._ref, serialised)
+        if result == DDSException.DDS_RETCODE_TIMEOUT:
+            return False
+        if result < 0:
+            raise DDSException(result, "while a message was written")
+        return True

@@ -1,0 +1,124 @@
+"""A log played as if its scanner were running."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ..logs import open_log
+from ..scan import LaserScan
+from .received import Received
+
+__all__ = ["ReplaySource"]
+
+#: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
+_LEAP = 10.0
+_STEP = 0.1
+
+
+class ReplaySource:
+    """Gives the scans of a log at the times of their stamps.
+
+    A scan is due when as much time has passed since the scan before as between their stamps,
+    divided by the rate. Scans that are due together come together: the node works at the newest
+    and counts the others as dropped, as it does on a robot.
+
+    Parameters
+    ----------
+    path : path-like
+        The log.
+    rate : float
+        How many times faster than it was recorded; 0 for one scan whenever one is asked for.
+    loop : bool
+        Whether to begin anew at the end; the stamps are then those of the log again.
+    clock : callable
+        The time [s].
+    **reading
+        How the log is read, as for `lineament.open_log`.
+
+    Raises
+    ------
+    LogError
+        If the log cannot be read, here or while it is played.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from lineament.logs import save_npz
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "log.npz")
+    >>> save_npz(path, [LaserScan([2.0, 2.0], 0.0, 0.01, stamp=i / 10) for i in range(3)])
+    >>> source = ReplaySource(path, rate=0)
+    >>> while not source.ended:
+    ...     print([received.read().stamp for received in source.receive(0.1)])
+    [0.0]
+    [0.1]
+    [0.2]
+    """
+
+    lost = 0
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        rate: float = 1.0,
+        *,
+        loop: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        **reading: Any,
+    ) -> None:
+        self._log = open_log(path, **reading)
+        self._rate, self._loop, self._clock = rate, loop, clock
+        self._items = iter(self._log.items())
+        self._next: tuple[str, LaserScan] | None = next(self._items, None)
+        self._due = clock()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the log is at its end."""
+        return self._next is None
+
+    @property
+    def publishers(self) -> int:
+        """The log, until its end."""
+        return int(not self.ended)
+
+    def receive(self, timeout: float) -> list[Received]:
+        """Wait until the next scan is due, up to `timeout` [s]; give those that are."""
+        if self._rate == 0:
+            return [self._take()] if self._next is not None else []
+        wait = min(self._due - self._clock(), timeout)
+        if wait > 0:
+            time.sleep(wait)
+        due = []
+        while self._next is not None and self._due <= self._clock():
+            due.append(self._take())
+        return due
+
+    def problems(self) -> list[str]:
+        """Tell what was skipped in the log."""
+        return [f"skipped: {fault}" for fault in self._log.faults]
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._items = iter(())
+        self._next = None
+
+    def _take(self) -> Received:
+        assert self._next is not None
+        topic, scan = self._next
+        self._next = self._following()
+        # Latency counts from when the scan was due: a node that comes late to it is late.
+        due = self._clock() if self._rate == 0 else self._due
+        if self._next is not None and self._rate:
+            step = self._next[1].stamp - scan.stamp
+            self._due += (step if 0 < step <= _LEAP else _STEP) / self._rate
+        return Received(topic, lambda: scan, due)
+
+    def _following(self) -> tuple[str, LaserScan] | None:
+        following = next(self._items, None)
+        if following is None and self._loop:
+            self._items = iter(self._log.items())
+            following = next(self._items, None)
+        return following

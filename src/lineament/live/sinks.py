@@ -1,0 +1,183 @@
+"""Where a live node tells what it found: topics of ROS, and Foxglove."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from ..output.layers import layers_of
+from ..output.markers import markers_of
+from ..output.ros_messages import RosMessages
+from ..output.scene import Message, Moment, SceneMessages
+from ..scan import LaserScan
+from .counters import Report
+from .pipeline import Frame
+from .received import Time
+
+__all__ = ["FoxgloveSink", "Publisher", "RosSink", "Sink"]
+
+#: Frame in which the poses of a log are told.
+WORLD = "map"
+DIAGNOSTICS = "/diagnostics"
+
+
+#: Topics below that of the scans, and their types.
+_BELOW = {
+    "features": "sensor_msgs/PointCloud2",
+    "corners": "geometry_msgs/PoseArray",
+    "markers": "visualization_msgs/MarkerArray",
+}
+
+
+class Publisher(Protocol):
+    """What carries messages: DDS, ROS 1, a WebSocket."""
+
+    @property
+    def unsent(self) -> int:
+        """Messages that could not be sent."""
+
+    def advertise(self, topic: str, kind: str) -> None:
+        """Make a topic known, so that others can listen to it before there is a message."""
+
+    def publish(self, message: Message) -> None:
+        """Send a message."""
+
+    def listeners(self, topic: str) -> int:
+        """How many listen to a topic: what nobody listens to need not be made."""
+
+    def close(self) -> None:
+        """Stop."""
+
+
+class Sink(Protocol):
+    """Where frames and reports go."""
+
+    @property
+    def unsent(self) -> int:
+        """Messages that could not be sent."""
+
+    def tell(self, frame: Frame) -> None:
+        """Tell what was found in a scan."""
+
+    def diagnose(self, report: Report, time: Time) -> None:
+        """Tell how the node is."""
+
+    def close(self) -> None:
+        """Stop."""
+
+
+class RosSink:
+    """Tells features as a cloud, corners as poses, and markers, each below the scan's topic.
+
+    Parameters
+    ----------
+    publisher : Publisher
+    messages : RosMessages
+        Makes the messages.
+    topic : str
+        Topic of the scans: what is found goes to ``TOPIC/features`` (a point a feature),
+        ``TOPIC/corners`` and ``TOPIC/markers``.
+    name : str
+        Name of the node, in diagnostics.
+    tells_scan : bool
+        Whether scans and their poses are told too, since a log has no publisher of its own.
+    """
+
+    def __init__(
+        self,
+        publisher: Publisher,
+        messages: RosMessages,
+        topic: str,
+        name: str,
+        *,
+        tells_scan: bool = False,
+    ) -> None:
+        self._publisher, self._messages = publisher, messages
+        self._topic, self._name, self._tells_scan = topic, name, tells_scan
+        for below, kind in _BELOW.items():
+            publisher.advertise(f"{topic}/{below}", messages.kind(kind))
+
+    @property
+    def unsent(self) -> int:
+        """Messages that could not be sent."""
+        return self._publisher.unsent
+
+    def tell(self, frame: Frame) -> None:
+        """Tell what was found in a scan; the cloud first, since programs wait for it."""
+        publisher, make, topic = self._publisher, self._messages, self._topic
+        moment = Moment(*frame.time, frame.scan.frame_id, WORLD)
+        features = frame.features
+        if publisher.listeners(f"{topic}/features"):
+            publisher.publish(make.cloud(f"{topic}/features", moment, features, frame.tracks))
+        if publisher.listeners(f"{topic}/corners"):
+            publisher.publish(make.corners(f"{topic}/corners", moment, features))
+        if publisher.listeners(f"{topic}/markers"):
+            layers = layers_of(markers_of(features, frame.straight))
+            publisher.publish(make.features(f"{topic}/markers", moment, layers))
+        if self._tells_scan:
+            self._tell_scan(moment, frame.scan)
+
+    def _tell_scan(self, moment: Moment, scan: LaserScan) -> None:
+        publisher, make, topic = self._publisher, self._messages, self._topic
+        if scan.pose is not None:
+            publisher.publish(make.transform("/tf", moment, scan.pose))
+        if scan.is_regular:
+            publisher.publish(make.scan(topic, moment, scan))
+        else:
+            publisher.publish(make.points(f"{topic}/points", moment, scan))
+
+    def diagnose(self, report: Report, time: Time) -> None:
+        """Tell how the node is, on ``/diagnostics``."""
+        moment = Moment(*time, "", WORLD)
+        self._publisher.publish(
+            self._messages.diagnostics(
+                DIAGNOSTICS,
+                moment,
+                name=f"{self._name}: {self._topic}",
+                hardware_id=self._topic,
+                level=report.level,
+                summary=str(report),
+                values=report.values,
+            )
+        )
+
+    def close(self) -> None:
+        """Stop."""
+        self._publisher.close()
+
+
+class FoxgloveSink:
+    """Tells scans, their poses and the layers of their features, as a recording of them has it.
+
+    Parameters
+    ----------
+    publisher : Publisher
+    messages : SceneMessages
+        Makes the messages.
+    topic : str
+        Topic of the scans; the layers go to ``TOPIC/features``.
+    """
+
+    def __init__(self, publisher: Publisher, messages: SceneMessages, topic: str) -> None:
+        self._publisher, self._messages, self._topic = publisher, messages, topic
+
+    @property
+    def unsent(self) -> int:
+        """Messages that could not be sent."""
+        return self._publisher.unsent
+
+    def tell(self, frame: Frame) -> None:
+        """Tell what was found in a scan."""
+        if not self._publisher.listeners(self._topic):
+            return
+        scan = frame.straight
+        moment = Moment(*frame.time, scan.frame_id or "laser", WORLD)
+        layers = layers_of(markers_of(frame.features, scan))
+        for message in self._messages.messages(self._topic, moment, scan, layers):
+            self._publisher.publish(message)
+
+    def diagnose(self, report: Report, time: Time) -> None:
+        """Tell nothing: the picture shows it."""
+
+    def close(self) -> None:
+        """Stop."""
+        self._publisher.close()

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament.errors import LogError
+from lineament.live import ReplaySource
+from lineament.logs import save_npz
+
+
+class Clock:
+    """A time that goes on only when it is told to, or slept through."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr("time.sleep", clock.sleep)
+    return clock
+
+
+@pytest.fixture
+def played(tmp_path, clock):
+    def play(stamps, **given):
+        path = tmp_path / "log.npz"
+        save_npz(path, [ln.LaserScan([2.0, 2.1], 0.0, 0.1, stamp=stamp) for stamp in stamps])
+        return ReplaySource(path, clock=clock, **given)
+
+    return play
+
+
+def times(source, clock, timeout=0.05, most=1000):
+    """When each scan came, and its stamp."""
+    came = []
+    for _ in range(most):
+        if source.ended:
+            break
+        came += [(round(clock(), 6), r.read().stamp) for r in source.receive(timeout)]
+    return came
+
+
+def test_scans_come_at_the_times_of_their_stamps(played, clock):
+    source = played([7.0, 7.1, 7.4])
+    assert source.publishers == 1
+    assert times(source, clock) == [(100.0, 7.0), (100.1, 7.1), (100.4, 7.4)]
+    assert source.publishers == 0
+
+
+def test_twice_as_fast(played, clock):
+    source = played([7.0, 7.1, 7.4], rate=2.0)
+    assert times(source, clock) == [(100.0, 7.0), (100.05, 7.1), (100.2, 7.4)]
+
+
+def test_what_is_due_comes_together(played, clock):
+    source = played([0.0, 0.1, 0.2, 0.3])
+    clock.now += 0.25
+    assert [r.read().stamp for r in source.receive(0.0)] == [0.0, 0.1, 0.2]
+    # When it was due, not when it was asked for: the delay is latency.
+    assert source.receive(1.0)[0].arrived == pytest.approx(100.3)
+
+
+def test_at_once_is_one_at_a_time(played, clock):
+    source = played([0.0, 5.0, 9.0], rate=0.0)
+    assert times(source, clock) == [(100.0, 0.0), (100.0, 5.0), (100.0, 9.0)]
+
+
+def test_a_loop_begins_anew(played, clock):
+    source = played([0.0, 0.5], loop=True)
+    came = times(source, clock, most=26)
+    # The stamps go back from 0.5 to 0: a tenth of a second goes by.
+    assert came[:4] == [(100.0, 0.0), (100.5, 0.5), (100.6, 0.0), (101.1, 0.5)]
+    assert not source.ended
+
+
+@pytest.mark.parametrize("stamps", [[5.0, 5.0], [5.0, 4.0], [5.0, 500.0]])
+def test_stamps_that_stand_go_back_or_leap(played, clock, stamps):
+    source = played(stamps)
+    assert times(source, clock) == [(100.0, stamps[0]), (100.1, stamps[1])]
+
+
+def test_close_ends_it(played):
+    source = played([0.0, 1.0])
+    source.close()
+    assert source.ended
+    assert source.receive(0.1) == []
+
+
+def test_a_log_that_breaks_says_where(tmp_path, clock):
+    path = tmp_path / "a.log"
+    line = "FLASER 2 1.5 1.6 0 0 0 0 0 0 7.5 robot 7.5\n"
+    path.write_text(2 * line + "FLASER 2 1.5\n" + line)
+    source = ReplaySource(path, clock=clock)
+    with pytest.raises(LogError, match=r"a\.log:3"):
+        times(source, clock)
+    source = ReplaySource(path, clock=clock, keep_going=True)
+    assert len(times(source, clock)) == 3
+    assert len(source.problems()) == 1
+
+
+def test_a_real_bag_is_played(data_dir, clock):
+    source = ReplaySource(data_dir / "mcap" / "scans_demo.mcap", rate=10.0, clock=clock)
+    came = times(source, clock, most=100)
+    gaps = np.diff([time for time, _ in came]) * 10
+    steps = np.diff([stamp for _, stamp in came])
+    ordinary = steps > 0
+    assert len(came) > 20
+    np.testing.assert_allclose(gaps[ordinary], steps[ordinary], atol=1e-4)
