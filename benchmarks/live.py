@@ -48,7 +48,7 @@ def measure(seconds: float, step: float, minutes: float) -> None:
     from lineament.evaluation.report import machine
 
     print(f"{machine()}; scans of {BEAMS} beams, method optimal\n", flush=True)
-    print(f"cold start, kernels cached, to the first features: {cold_start():.2f} s\n", flush=True)
+    print(f"cold start, kernels cached, to first features: {cold_start():.2f} s\n", flush=True)
     print(
         "| rate | listening to | scans | features | dropped | p50 | p99 | largest | CPU of node |"
     )
@@ -226,7 +226,7 @@ def listen(topics: list[str], out: Path) -> None:
     import struct
 
     import dds_types
-    from cyclonedds.core import ReadCondition, SampleState, ViewState, InstanceState, WaitSet
+    from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState, WaitSet
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.sub import DataReader
     from cyclonedds.topic import Topic

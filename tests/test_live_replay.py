@@ -61,11 +61,13 @@ def test_twice_as_fast(played, clock):
 
 
 def test_what_is_due_comes_together(played, clock):
-    source = played([0.0, 0.1, 0.2, 0.3])
-    clock.now += 0.25
+    source = played([-0.1, 0.0, 0.1, 0.2, 0.3])
+    clock.now += 70.0  # before it is first asked for
+    assert [r.read().stamp for r in source.receive(0.0)] == [-0.1]
+    clock.now += 0.35
     assert [r.read().stamp for r in source.receive(0.0)] == [0.0, 0.1, 0.2]
     # When it was due, not when it was asked for: the delay is latency.
-    assert source.receive(1.0)[0].arrived == pytest.approx(100.3)
+    assert source.receive(1.0)[0].arrived == pytest.approx(170.4)
 
 
 def test_at_once_is_one_at_a_time(played, clock):

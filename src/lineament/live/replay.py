@@ -72,7 +72,7 @@ class ReplaySource:
         self._rate, self._loop, self._clock = rate, loop, clock
         self._items = iter(self._log.items())
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
-        self._due = clock()
+        self._due: float | None = None  # The first one when it is asked for.
 
     @property
     def ended(self) -> bool:
@@ -88,6 +88,8 @@ class ReplaySource:
         """Wait until the next scan is due, up to `timeout` [s]; give those that are."""
         if self._rate == 0:
             return [self._take()] if self._next is not None else []
+        if self._due is None:
+            self._due = self._clock()
         wait = min(self._due - self._clock(), timeout)
         if wait > 0:
             time.sleep(wait)
@@ -109,9 +111,11 @@ class ReplaySource:
         assert self._next is not None
         topic, scan = self._next
         self._next = self._following()
+        if self._due is None:  # The rate is 0.
+            return Received(topic, lambda: scan, self._clock())
         # Latency counts from when the scan was due: a node that comes late to it is late.
-        due = self._clock() if self._rate == 0 else self._due
-        if self._next is not None and self._rate:
+        due = self._due
+        if self._next is not None:
             step = self._next[1].stamp - scan.stamp
             self._due += (step if 0 < step <= _LEAP else _STEP) / self._rate
         return Received(topic, lambda: scan, due)
