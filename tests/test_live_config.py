@@ -40,6 +40,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"topic": "/"}, "topic is '/', expected a name of letters, digits, _ and /"),
         ({"topic": "scan/"}, "topic is 'scan/', expected a name of letters, digits, _ and /"),
         ({"topic": 7}, "topic is 7, expected a text"),
+        ({"name": "a/b"}, "name is 'a/b', expected no /: for that there is namespace"),
         ({"namespace": "r\n"}, "namespace is 'r\\n', expected a name of"),
         ({"deskew": "up!"}, "deskew is 'up!', expected a name of letters"),
         ({"deskew": "poses"}, "deskew is 'poses', which only a log has; expected a topic, or"),

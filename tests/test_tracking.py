@@ -90,6 +90,11 @@ def test_a_gate_must_be_a_share():
         associate(FRAME, FRAME, gate=1)
 
 
+def test_the_covariance_of_the_motion_must_be_a_matrix():
+    with pytest.raises(ValueError, match=r"covariance is .* expected \(3, 3\)"):
+        associate(FRAME, FRAME, covariance=np.eye(2))
+
+
 def test_features_without_a_covariance_are_left_alone():
     unknown = features(corners=[corner(2, 1, sigma=math.nan)])
     assert associate(FRAME, unknown).corners.tolist() == []

@@ -11,7 +11,7 @@ __all__ = ["warm_up"]
 
 
 def warm_up(methods: Sequence[str] = ()) -> float:
-    """Compile the kernels of some methods, or load them from the cache.
+    """Compile the kernels of some methods and of the tracker, or load them from the cache.
 
     Parameters
     ----------
@@ -32,9 +32,12 @@ def warm_up(methods: Sequence[str] = ()) -> float:
     from .extractor import Extractor
     from .methods import DEFAULT_METHOD
     from .scan import LaserScan
+    from .tracking import Tracker
 
     bearings = np.linspace(-1.0, 1.0, 101)
     wall = LaserScan(2.0 / np.cos(bearings), angles=bearings, range_max=30.0)
+    tracker = Tracker()
     for extractor in [Extractor(name) for name in methods or (DEFAULT_METHOD,)]:
-        extractor(wall)
+        tracker(extractor(wall))
+    tracker(extractor(wall))
     return time.perf_counter() - started

@@ -70,17 +70,26 @@ __all__ = ["live"]
     help="Serve Foxglove by WebSocket, at port 8765 or another.",
 )
 @click.option("--host", help="Address on which Foxglove is served.  [default: 127.0.0.1]")
+@click.argument("remappings", nargs=-1, metavar="[NAME:=VALUE]...")
 @QUIET
-def live(config: Path | None, settings: tuple[str, ...], quiet: bool, **given: Any) -> None:
+def live(
+    config: Path | None,
+    settings: tuple[str, ...],
+    remappings: tuple[str, ...],
+    quiet: bool,
+    **given: Any,
+) -> None:
     """Turn a running scanner into a stream of features, over ROS 2 (or ROS 1), or play a log."""
     from ..live import LiveConfig, read_config, run_live
 
     told = {} if config is None else read_config(config)
     told.update({name: value for name, value in given.items() if value is not None})
+    for argument in remappings:  # What roslaunch adds is for rospy, which finds it by itself.
+        if told.get("ros") != 1 or ":=" not in argument:
+            raise click.UsageError(f"got an unexpected argument {argument!r}")
     told["parameters"] = {**told.get("parameters", {}), **settings_of(settings)}
     with wrong_usage():
-        checked = LiveConfig(**told)
-    report = run_live(checked, tell=_tell, show=_shown(quiet))
+        report = run_live(LiveConfig(**told), tell=_tell, show=_shown(quiet))
     if not quiet:
         click.echo(report.totals)
 

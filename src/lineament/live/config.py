@@ -127,6 +127,8 @@ class LiveConfig:
         _check_name("topic", self.topic)
         _check_name("namespace", self.namespace.strip("/") or "none")
         _check_name("name", self.name)
+        if "/" in self.name:
+            raise ValueError(f"name is {self.name!r}, expected no /: for that there is namespace")
         if self.deskew not in ("off", "scans", "poses"):
             _check_name("deskew", self.deskew)
         _check_between("depth", self.depth, 1, 1000)

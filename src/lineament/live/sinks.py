@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from ..output.layers import layers_of
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import Message, Moment, SceneMessages
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment
 from ..scan import LaserScan
 from .counters import Report
 from .pipeline import Frame
 from .received import Time
 
+if TYPE_CHECKING:
+    from ..output.foxglove import FoxgloveMessages
+
 __all__ = ["FoxgloveSink", "Publisher", "RosSink", "Sink"]
 
-#: Frame in which the poses of a log are told.
-WORLD = "map"
 DIAGNOSTICS = "/diagnostics"
-
 
 #: Topics below that of the scans, and their types.
 _BELOW = {
@@ -104,7 +104,7 @@ class RosSink:
     def tell(self, frame: Frame) -> None:
         """Tell what was found in a scan; the cloud first, since programs wait for it."""
         publisher, make, topic = self._publisher, self._messages, self._topic
-        moment = Moment(*frame.time, frame.scan.frame_id, WORLD)
+        moment = _moment(frame, frame.scan.frame_id)
         features = frame.features
         if publisher.listeners(f"{topic}/features"):
             publisher.publish(make.cloud(f"{topic}/features", moment, features, frame.tracks))
@@ -127,7 +127,7 @@ class RosSink:
 
     def diagnose(self, report: Report, time: Time) -> None:
         """Tell how the node is, on ``/diagnostics``."""
-        moment = Moment(*time, "", WORLD)
+        moment = Moment(*time, "", "")
         self._publisher.publish(
             self._messages.diagnostics(
                 DIAGNOSTICS,
@@ -151,14 +151,18 @@ class FoxgloveSink:
     Parameters
     ----------
     publisher : Publisher
-    messages : SceneMessages
+    messages : FoxgloveMessages
         Makes the messages.
     topic : str
         Topic of the scans; the layers go to ``TOPIC/features``.
     """
 
-    def __init__(self, publisher: Publisher, messages: SceneMessages, topic: str) -> None:
+    def __init__(self, publisher: Publisher, messages: FoxgloveMessages, topic: str) -> None:
         self._publisher, self._messages, self._topic = publisher, messages, topic
+        self._topics = {"/tf": "FrameTransform", topic: "LaserScan"}
+        self._topics[f"{topic}/features"] = "SceneUpdate"
+        for name, kind in self._topics.items():
+            publisher.advertise(name, kind)
 
     @property
     def unsent(self) -> int:
@@ -166,12 +170,12 @@ class FoxgloveSink:
         return self._publisher.unsent
 
     def tell(self, frame: Frame) -> None:
-        """Tell what was found in a scan."""
-        if not self._publisher.listeners(self._topic):
+        """Tell what was found in a scan, and the scan made straight, where somebody looks on."""
+        if not any(map(self._publisher.listeners, self._topics)):
             return
         scan = frame.straight
-        moment = Moment(*frame.time, scan.frame_id or "laser", WORLD)
         layers = layers_of(markers_of(frame.features, scan))
+        moment = _moment(frame, scan.frame_id or LASER_FRAME)
         for message in self._messages.messages(self._topic, moment, scan, layers):
             self._publisher.publish(message)
 
@@ -181,3 +185,8 @@ class FoxgloveSink:
     def close(self) -> None:
         """Stop."""
         self._publisher.close()
+
+
+def _moment(frame: Frame, name: str) -> Moment:
+    """When the scan was taken, exactly as its message says, in the frame of this name."""
+    return Moment(*frame.time, name, "world" if name == WORLD_FRAME else WORLD_FRAME)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
+from ..kernels.assignment import PATHS
+from ..kernels.association import associate as kernel
+from ..kernels.association import move
 from ..scan import Array
 
 __all__ = ["KINDS", "Matches", "associate"]
@@ -17,10 +21,8 @@ Pairs = NDArray[np.intp]
 
 #: The tables whose features are tracked.
 KINDS = ("segments", "corners", "arcs")
-#: Length over which a surface, or a sensor, is off by the same [m].
-_PATCH = 0.3
-#: Share of the shorter of two segments along which they must lie side by side.
-_OVERLAP = 0.5
+#: Words of segments, corners and arcs (see `kernels.records`).
+Words = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +56,7 @@ def associate(
     before: Features,
     now: Features,
     motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    covariance: Array | None = None,
+    covariance: ArrayLike | None = None,
     *,
     gate: float = 0.99,
     roughness: float = 0.0,
@@ -89,7 +91,7 @@ def associate(
     Raises
     ------
     ValueError
-        If the gate is not between 0 and 1.
+        If the gate is not between 0 and 1, or the covariance has another shape.
 
     Examples
     --------
@@ -99,166 +101,75 @@ def associate(
     >>> associate(features, features).segments.tolist()
     [[0, 0]]
     """
-    moved = now.transform(*motion)
-    about = _Uncertainty(np.array(motion[:2]), covariance, roughness)
-    return Matches(
-        before,
-        now,
-        _paired(*_segment_costs(before.segments, moved.segments, about), chi_square(gate, 2)),
-        _paired(*_corner_costs(before.corners, moved.corners, about), chi_square(gate, 2)),
-        _paired(*_arc_costs(before.arcs, moved.arcs, about), chi_square(gate, 3)),
+    gates = chi_square(gate, 2), chi_square(gate, 3)
+    spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
+    x, y, theta = map(float, motion)
+    earlier, moved = words_of(before), words_of(now)
+    move(*moved, x, y, theta)
+    rows, columns = max(map(len, moved)), max(map(len, earlier))
+    columns += rows + 1
+    owners = np.empty((len(KINDS), columns), np.int64)
+    kernel(
+        earlier,
+        moved,
+        (np.array(before.corners["convex"]), np.array(now.corners["convex"])),
+        spread,
+        (x, y),
+        float(roughness),
+        gates,
+        np.empty((rows, columns)),
+        np.empty((PATHS, columns)),
+        np.empty(rows),
+        np.empty(columns, np.int64),
+        owners,
     )
+    pairs = (_pairs(row[: len(table)]) for row, table in zip(owners, earlier, strict=True))
+    return Matches(before, now, *pairs)
 
 
-def segment_lengths(segments: NDArray[np.void]) -> Array:
-    """Length of each segment [m], more than 0."""
-    arm = segments["end"] - segments["start"]
-    return np.asarray(np.maximum(np.hypot(arm[:, 0], arm[:, 1]), np.finfo(float).eps))
+def words_of(features: Features) -> Words:
+    """Copy the tables of tracked features as matrices of words (see `kernels.records`)."""
+    segments, corners, arcs = (
+        # By way of bytes: numpy copies records field by field, several times slower.
+        np.frombuffer(bytearray(table.tobytes())).reshape(len(table), table.itemsize // 8)
+        for table in (features.segments, features.corners, features.arcs)
+    )
+    return segments, corners, arcs
 
 
-def rough_variances(lengths: Array, roughness: float) -> tuple[Array, Array]:
-    """Variances of offset [m²] and angle [rad²] of lines on surfaces that are not straight.
-
-    Deviations r are one over a patch of a surface, and independent from patch to patch: the mean
-    of 1 + L/patch of them is known to r²/(1 + L/patch), and their slope to 12/L² times that.
-    """
-    offset = roughness**2 / (1.0 + lengths / _PATCH)
-    return offset, np.asarray(12.0 * offset / lengths**2)
+def matrix_of(covariance: ArrayLike) -> Array:
+    """Copy a covariance of (x, y, theta); ValueError if it has another shape than (3, 3)."""
+    matrix = np.array(covariance, dtype=np.float64, order="C")
+    if matrix.shape != (3, 3):
+        raise ValueError(f"covariance is {matrix.tolist()}, expected (3, 3), of (x, y, theta)")
+    return matrix
 
 
-def turned(angle: Array) -> Array:
-    """Angles brought into [-π, π)."""
-    return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
-
-
+@lru_cache
 def chi_square(probability: float, degrees: int) -> float:
-    """Quantile of the χ² distribution; ValueError if `probability` is not between 0 and 1."""
+    """Quantile of the χ² distribution of 2 or 3 degrees of freedom.
+
+    Raises
+    ------
+    ValueError
+        If `probability` is not between 0 and 1.
+    """
     if not 0 < probability < 1:
         raise ValueError(f"gate is {probability}, expected a share between 0 and 1")
-    from scipy.special import gammaincinv
-
-    return 2.0 * float(gammaincinv(degrees / 2, probability))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Uncertainty:
-    """What makes features differ besides their own covariances."""
-
-    origin: Array
-    covariance: Array | None
-    roughness: float
-
-    def of_points(self, points: Array) -> Array:
-        """Covariance (…, 2, 2) of points that the motion has moved."""
-        spread = self.roughness**2 * np.eye(2)
-        if self.covariance is None:
-            return np.broadcast_to(spread, (*points.shape[:-1], 2, 2))
-        jacobian = np.zeros((*points.shape[:-1], 2, 3))
-        jacobian[..., 0, 0] = jacobian[..., 1, 1] = 1.0
-        jacobian[..., 0, 2] = self.origin[1] - points[..., 1]
-        jacobian[..., 1, 2] = points[..., 0] - self.origin[0]
-        moved = jacobian @ self.covariance @ np.swapaxes(jacobian, -1, -2)
-        return np.asarray(spread + moved)
-
-    def of_lines(self, points: Array, normals: Array, lengths: Array) -> Array:
-        """Covariance (…, 2, 2) of offset and angle of lines through moved points."""
-        rough = np.zeros((*lengths.shape, 2, 2))
-        rough[..., 0, 0], rough[..., 1, 1] = rough_variances(lengths, self.roughness)
-        if self.covariance is None:
-            return rough
-        arm = points - self.origin
-        jacobian = np.zeros((*lengths.shape, 2, 3))
-        jacobian[..., 0, :2] = normals
-        jacobian[..., 0, 2] = normals[..., 1] * arm[..., 0] - normals[..., 0] * arm[..., 1]
-        jacobian[..., 1, 2] = 1.0
-        return np.asarray(rough + jacobian @ self.covariance @ np.swapaxes(jacobian, -1, -2))
+    if degrees == 2:
+        return -2.0 * math.log1p(-probability)
+    low, high = 0.0, 100.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        beyond = math.erfc(math.sqrt(middle / 2)) + math.sqrt(2 * middle / math.pi) * math.exp(
+            -middle / 2
+        )
+        low, high = (middle, high) if beyond > 1 - probability else (low, middle)
+    return high
 
 
-def _segment_costs(
-    before: NDArray[np.void], now: NDArray[np.void], about: _Uncertainty
-) -> tuple[Array, Array]:
-    """d² (B, N) of all pairs, inf where they are not side by side; and the share they are not."""
-    tangent = np.column_stack((np.cos(before["angle"]), np.sin(before["angle"])))[:, np.newaxis]
-    normal = tangent[..., ::-1] * (-1.0, 1.0)
-    apart = now["centroid"] - before["centroid"][:, np.newaxis]
-    along = (apart * tangent).sum(axis=2)
-    error = np.stack(
-        ((apart * normal).sum(axis=2), turned(now["angle"] - before["angle"][:, np.newaxis])),
-        axis=2,
-    )
-    lever = np.zeros((*along.shape, 2, 2))
-    lever[..., 0, 0] = lever[..., 1, 1] = 1.0
-    lever[..., 0, 1] = along
-    lengths = np.minimum(segment_lengths(before)[:, np.newaxis], segment_lengths(now))
-    points = np.broadcast_to(now["centroid"], apart.shape)
-    spread = about.of_lines(points, np.broadcast_to(normal, apart.shape), lengths)
-    spread = spread + now["covariance"]
-    spread += lever @ before["covariance"][:, np.newaxis] @ np.swapaxes(lever, -1, -2)
-    slack = about.of_points(points)
-    slack = 2 * np.sqrt(((tangent[..., np.newaxis, :] @ slack)[..., 0, :] * tangent).sum(axis=2))
-    shared, union = _side_by_side(before, now, tangent)
-    beside = (shared + slack >= _OVERLAP * lengths) & (np.cos(error[..., 1]) > 0)
-    cost = np.where(beside, _mahalanobis(error, spread), np.inf)
-    return cost, 1.0 - np.clip(shared / union, 0.0, 1.0)
-
-
-def _side_by_side(
-    before: NDArray[np.void], now: NDArray[np.void], tangent: Array
-) -> tuple[Array, Array]:
-    """Length along which pairs lie side by side, less than 0 if they do not, and of both [m]."""
-    ends = np.stack([now["start"], now["end"]], axis=1) - before["start"][:, np.newaxis, np.newaxis]
-    along = (ends * tangent[:, :, np.newaxis]).sum(axis=3)
-    low, high = along.min(axis=2), along.max(axis=2)
-    length = segment_lengths(before)[:, np.newaxis]
-    shared = np.minimum(high, length) - np.maximum(low, 0.0)
-    return shared, np.maximum(high, length) - np.minimum(low, 0.0)
-
-
-def _corner_costs(
-    before: NDArray[np.void], now: NDArray[np.void], about: _Uncertainty
-) -> tuple[Array, Array]:
-    apart = now["position"] - before["position"][:, np.newaxis]
-    spread = before["covariance"][:, np.newaxis] + now["covariance"]
-    spread = spread + about.of_points(now["position"])
-    same = before["convex"][:, np.newaxis] == now["convex"]
-    return np.where(same, _mahalanobis(apart, spread), np.inf), np.zeros(same.shape)
-
-
-def _arc_costs(
-    before: NDArray[np.void], now: NDArray[np.void], about: _Uncertainty
-) -> tuple[Array, Array]:
-    apart = np.concatenate(
-        (
-            now["center"] - before["center"][:, np.newaxis],
-            (now["radius"] - before["radius"][:, np.newaxis])[..., np.newaxis],
-        ),
-        axis=2,
-    )
-    spread = before["covariance"][:, np.newaxis] + now["covariance"]
-    spread[..., :2, :2] += about.of_points(now["center"])
-    spread[..., 2, 2] += about.roughness**2
-    return _mahalanobis(apart, spread), np.zeros(apart.shape[:2])
-
-
-def _mahalanobis(error: Array, covariance: Array) -> Array:
-    """Squares e'S⁻¹e, shape (B, N); inf where the covariance is not known."""
-    usable = np.asarray(np.isfinite(covariance).all(axis=(-1, -2)))
-    usable &= np.isfinite(error).all(axis=-1)
-    usable &= np.linalg.det(np.where(usable[..., np.newaxis, np.newaxis], covariance, 0.0)) > 0
-    square = np.full(usable.shape, np.inf)
-    whitened = np.linalg.solve(covariance[usable], error[usable][..., np.newaxis])[..., 0]
-    square[usable] = (whitened * error[usable]).sum(axis=-1)
-    return square
-
-
-def _paired(cost: Array, unlike: Array, limit: float) -> Pairs:
-    """Pair one to one, within the limit; `unlike` (0 to 1) tells the pieces of one wall apart."""
-    from scipy.optimize import linear_sum_assignment
-
-    if not cost.size:
-        return np.empty((0, 2), np.intp)
-    allowed = cost <= limit
-    alone = 2 * limit
-    rows, columns = linear_sum_assignment(np.where(allowed, cost + limit * unlike, alone))
-    kept = allowed[rows, columns]
-    return np.column_stack((rows[kept], columns[kept]))
+def _pairs(owners: NDArray[np.int64]) -> Pairs:
+    """List the earlier features that are seen later, and what they are then, shape (m, 2)."""
+    before = np.flatnonzero(owners >= 0)
+    pairs = np.empty((len(before), 2), np.intp)
+    pairs[:, 0], pairs[:, 1] = before, owners[before]
+    return pairs

@@ -8,22 +8,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..features import noise_row
+from ..kernels.motion import MATRICES, NOT_POSITIVE, NOT_THERE
+from ..kernels.motion import estimate_motion as kernel
+from ..kernels.residuals import COLUMNS
 from ..poses import Twist, twist_between
 from ..scan import Array, Pose
-from .association import Matches, chi_square, turned
-from .residuals import residuals
+from .association import KINDS, Matches, chi_square, matrix_of, words_of
 
 __all__ = ["Motion", "estimate_motion"]
 
 #: Without a prior, the motion is known this badly [m, m, rad].
 _UNKNOWN = np.diag((10.0, 10.0, math.pi)) ** 2
-#: A direction that the features tell with a larger deviation than this counts as unobserved [m].
-_KNOWN = 0.1
-#: What the errors of the walls' own directions feign is this many deviations at most.
-_FEIGNED = 3.0
 #: Pairs beyond this quantile of χ² count less, the less the farther they are.
 _RIGHT = 0.99
-_ROUNDS, _SMALL = 20, 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +78,10 @@ def estimate_motion(
     where one is, its place along that one counts alone. Pairs beyond
     the 99 % quantile of χ² count less, by the square of how far they are off.
 
+    Walls are off straight lines, and their segments' covariances say so; but that is the same in
+    both frames. What the scatter of the readings accounts for counts whole, the rest as far as
+    one of the frames saw another stretch of the wall than the other.
+
     Directions of which the features tell nothing are found by the eigenvalues of their information
     (angles as the way at the features' distance): one counts as unobserved if its deviation is
     more than 0.1 m, or if the information is no more than what errors of the walls' own directions
@@ -104,7 +106,8 @@ def estimate_motion(
     Raises
     ------
     ValueError
-        If the covariance of the prior is not positive definite.
+        If the covariance of the prior is not positive definite, or a pair is not of features that
+        are there.
 
     Examples
     --------
@@ -119,58 +122,32 @@ def estimate_motion(
     >>> [round(value, 6) for value in motion.pose], motion.observable
     ([0.1, 0.0, 0.05], True)
     """
-    spread = _UNKNOWN if covariance is None else np.asarray(covariance, dtype=np.float64)
-    if spread.shape != (3, 3) or not _is_positive(spread):
+    spread = _UNKNOWN if covariance is None else matrix_of(covariance)
+    before, now = matches.before, matches.now
+    x, y, theta = map(float, prior)
+    count, found = len(matches), np.empty((3, 3, 3))
+    lost = kernel(
+        words_of(before),
+        words_of(now),
+        (np.array(before.segments["n_points"]), np.array(now.segments["n_points"])),
+        (noise_row(before.noise), noise_row(now.noise)),
+        np.array(now.corners["segments"], order="C"),
+        tuple(np.array(getattr(matches, kind), np.int64, order="C") for kind in KINDS),
+        (x, y, theta),
+        spread,
+        float(roughness),
+        (chi_square(_RIGHT, 2), chi_square(0.5, 2)),
+        np.empty(len(now.segments), np.bool_),
+        np.empty((count, COLUMNS)),
+        np.empty(count),
+        np.empty((MATRICES, 3, 3)),
+        found,
+    )
+    if lost == NOT_POSITIVE:
         raise ValueError(
             f"covariance of the prior is {spread.tolist()}, expected (3, 3), positive definite"
         )
-    prior_information = np.linalg.inv(spread)
-    start = state = np.array(prior, dtype=np.float64)
-    scale = np.array((1.0, 1.0, _distance(matches)))
-    for _ in range(_ROUNDS):
-        errors = residuals(matches, state, roughness)
-        information, gradient, feigned = errors.normal_equations(_weights(errors.squares))
-        unobserved = _unobserved(information, feigned, scale)
-        # Nothing is taken from the features in directions that they do not tell.
-        kept = np.eye(3) - (unobserved.T @ unobserved) * scale / scale[:, np.newaxis]
-        total = kept.T @ information @ kept + prior_information
-        off = state - start
-        off[2] = turned(off[2])
-        step = -np.linalg.solve(total, kept.T @ gradient + prior_information @ off)
-        state = state + step
-        if np.abs(step).max() < _SMALL:
-            break
-    x, y, theta = state.tolist()
-    theta = math.remainder(theta, 2 * math.pi)
-    return Motion(x, y, theta, np.linalg.inv(total), unobserved)
-
-
-def _weights(squares: Array) -> Array:
-    """Weigh pairs by their squares: 1 within the quantile, then falling; shape (m,)."""
-    limit, counted = chi_square(_RIGHT, 2), squares[squares > 0]
-    if len(counted):
-        # Far from the solution all are far off: what counts is which are more so than others.
-        limit *= max(1.0, float(np.median(counted)) / chi_square(0.5, 2))
-    return np.asarray(limit / np.maximum(squares, limit))
-
-
-def _unobserved(information: Array, feigned: Array, scale: Array) -> Array:
-    """Directions (m, 3) of which the information tells nothing, in scaled units."""
-    in_metres = 1.0 / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(information * in_metres)
-    seeming = np.einsum("ik,ij,jk->k", vectors, feigned * in_metres, vectors)
-    return np.asarray(vectors.T[values <= _KNOWN**-2 + _FEIGNED**2 * seeming])
-
-
-def _is_positive(matrix: Array) -> bool:
-    return bool(np.isfinite(matrix).all() and np.linalg.eigvalsh(matrix)[0] > 0)
-
-
-def _distance(matches: Matches) -> float:
-    """Root of the mean squared distance of what was matched, 1 m at least [m]."""
-    places = [
-        matches.tables(kind)[1][name]
-        for kind, name in (("segments", "centroid"), ("corners", "position"), ("arcs", "center"))
-    ]
-    points = np.concatenate(places)
-    return max(1.0, math.sqrt(np.square(points).sum() / max(len(points), 1)))
+    if lost == NOT_THERE:
+        raise ValueError("the pairs of the matches name features that are not there")
+    x, y, theta = found[0, 0].tolist()
+    return Motion(x, y, math.remainder(theta, 2 * math.pi), found[1], found[2, :lost])

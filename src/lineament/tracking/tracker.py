@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import TABLES, Features
+from ..kernels.association import move
 from ..poses import Twist, inverse, poses_along, relative
 from ..scan import Array, Pose
-from .association import KINDS, Matches, associate, chi_square
+from .association import KINDS, Matches, associate, chi_square, words_of
 from .motion import Motion, estimate_motion
 
 __all__ = ["Tracker", "Tracks"]
@@ -114,8 +115,8 @@ class Tracker:
         """
         if not self._twists:
             return None
-        forward, left, turn_rate = np.mean(self._twists, axis=0).tolist()
-        return forward, left, turn_rate
+        (x, y, turn), (other_x, other_y, other_turn) = self._twists[0], self._twists[-1]
+        return (x + other_x) / 2, (y + other_y) / 2, (turn + other_turn) / 2
 
     def __call__(self, features: Features, odometry: Pose | None = None) -> Tracks:
         """Take in the next frame.
@@ -145,7 +146,6 @@ class Tracker:
         else:
             duration = features.stamp - self._stamp
             motion, matches = self._follow(features, *self._expected(odometry, duration))
-            self._seen = self._seen.transform(*inverse(motion.pose))
             if duration > 0:
                 self._twists.append(motion.twist(duration))
             else:
@@ -155,9 +155,9 @@ class Tracker:
 
     def _follow(self, features: Features, prior: Pose, spread: Array) -> tuple[Motion, Matches]:
         """Find the tracks again, and the motion that they tell."""
-        motion = Motion(*prior, spread)
+        motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
-            matches = associate(
+            found = associate(
                 self._seen,
                 features,
                 motion.pose,
@@ -165,7 +165,11 @@ class Tracker:
                 gate=self.gate,
                 roughness=self.roughness,
             )
+            if matches is not None and _are_same(matches, found):
+                break
+            matches = found
             motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
+        assert matches is not None
         return motion, matches
 
     def _expected(self, odometry: Pose | None, duration: float) -> tuple[Pose, Array]:
@@ -188,32 +192,50 @@ class Tracker:
         """Keep the pairs whose track was seen in the very last frame."""
         kept = {kind: getattr(matches, kind) for kind in KINDS}
         fresh = {kind: pairs[self._missed[kind][pairs[:, 0]] == 0] for kind, pairs in kept.items()}
-        return replace(matches, **fresh)
+        return Matches(matches.before, matches.now, **fresh)
 
     def _renew(self, features: Features, matches: Matches, motion: Motion | None) -> Tracks:
         """Give the features their numbers, and keep them with the tracks that were missed."""
-        numbers, born, ended = {}, [], []
-        tables: dict[str, Any] = {}
+        numbers, born, ended, rest = {}, [], [], {}
         for kind in KINDS:
-            table, seen = getattr(features, kind), getattr(self._seen, kind)
             tracks, missed = self._tracks[kind], self._missed[kind] + 1
-            pairs = getattr(matches, kind)
-            mine = np.full(len(table), -1, np.int64)
-            mine[pairs[:, 1]] = tracks[pairs[:, 0]]
-            new = np.flatnonzero(mine < 0)
-            mine[new] = self._next + np.arange(len(new))
-            self._next += len(new)
-            missed[pairs[:, 0]] = 0
+            before, now = getattr(matches, kind).T
+            mine = np.full(len(getattr(features, kind)), -1, np.int64)
+            mine[now] = tracks[before]
+            born.append(np.arange(self._next, self._next + len(mine) - len(now)))
+            mine[mine < 0] = born[-1]
+            self._next += len(born[-1])
+            missed[before] = 0
             kept = (missed > 0) & (missed <= self.max_missed)
-            born.append(mine[new])
             ended.append(tracks[missed > self.max_missed])
-            numbers[kind], tables[kind] = mine, np.concatenate((table, seen[kept]))
+            numbers[kind], rest[kind] = mine, kept
             self._tracks[kind] = np.concatenate((mine, tracks[kept]))
             self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
-        self._seen = replace(features, **tables)
+        self._seen = _together(features, self._seen, rest, motion)
         return Tracks(
             **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
         )
+
+
+def _are_same(one: Matches, other: Matches) -> bool:
+    """Whether the pairs are those of another round: then so would be all that follows."""
+    return all(np.array_equal(getattr(one, kind), getattr(other, kind)) for kind in KINDS)
+
+
+def _together(
+    features: Features, seen: Features, kept: dict[str, NDArray[np.bool_]], motion: Motion | None
+) -> Features:
+    """Features of a frame, and behind them those of the frame before that are kept."""
+    words = dict(zip(KINDS, words_of(seen), strict=True))
+    missed = [words[kind][kept[kind]] for kind in KINDS]
+    if motion is not None:
+        move(*missed, *inverse(motion.pose))
+    # By way of bytes: numpy joins records field by field, several times slower.
+    tables: dict[str, Any] = {
+        kind: np.frombuffer(getattr(features, kind).tobytes() + words.tobytes(), TABLES[kind])
+        for kind, words in zip(KINDS, missed, strict=True)
+    }
+    return replace(features, **tables)
 
 
 def _nothing() -> Features:

@@ -1,0 +1,1 @@
+"""lineament as a node of rclpy."""
