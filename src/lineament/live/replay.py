@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable
@@ -16,6 +17,8 @@ __all__ = ["ReplaySource"]
 #: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
 _LEAP = 10.0
 _STEP = 0.1
+#: What is given so soon after it was due is given alone [s].
+_PUNCTUAL = 0.01
 
 
 class ReplaySource:
@@ -55,6 +58,7 @@ class ReplaySource:
     [0.0]
     [0.1]
     [0.2]
+    []
     """
 
     lost = 0
@@ -72,12 +76,10 @@ class ReplaySource:
         self._rate, self._loop, self._clock = rate, loop, clock
         self._items = iter(self._log.items())
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
-        self._due: float | None = None  # The first one when it is asked for.
-
-    @property
-    def ended(self) -> bool:
-        """Whether the log is at its end."""
-        return self._next is None
+        # The first scan is due when it is first asked for.
+        self._has_begun, self._due, self._stamp = False, 0.0, math.nan
+        #: Whether the log is at its end.
+        self.ended = False
 
     @property
     def publishers(self) -> int:
@@ -86,17 +88,15 @@ class ReplaySource:
 
     def receive(self, timeout: float) -> list[Received]:
         """Wait until the next scan is due, up to `timeout` [s]; give those that are."""
-        if self._rate == 0:
-            return [self._take()] if self._next is not None else []
-        if self._due is None:
-            self._due = self._clock()
-        wait = min(self._due - self._clock(), timeout)
-        if wait > 0:
-            time.sleep(wait)
-        due = []
-        while self._next is not None and self._due <= self._clock():
-            due.append(self._take())
-        return due
+        came: list[Received] = []
+        if self._read_ahead():
+            time.sleep(max(min(self._due - self._clock(), timeout), 0.0))
+        while self._read_ahead() and self._due <= self._clock():
+            came.append(self._take())
+            # When there is time, the scan at hand is worked at before the next one is read.
+            if self._clock() - came[-1].arrived < _PUNCTUAL:
+                break
+        return came
 
     def problems(self) -> list[str]:
         """Tell what was skipped in the log."""
@@ -104,21 +104,27 @@ class ReplaySource:
 
     def close(self) -> None:
         """Stop reading."""
-        self._items = iter(())
-        self._next = None
+        self._items, self._next, self._loop = iter(()), None, False
 
     def _take(self) -> Received:
         assert self._next is not None
-        topic, scan = self._next
-        self._next = self._following()
-        if self._due is None:  # The rate is 0.
-            return Received(topic, lambda: scan, self._clock())
+        (topic, scan), self._next = self._next, None
+        self._stamp = scan.stamp
         # Latency counts from when the scan was due: a node that comes late to it is late.
-        due = self._due
-        if self._next is not None:
-            step = self._next[1].stamp - scan.stamp
-            self._due += (step if 0 < step <= _LEAP else _STEP) / self._rate
-        return Received(topic, lambda: scan, due)
+        return Received(topic, lambda: scan, self._due)
+
+    def _read_ahead(self) -> bool:
+        """Have the next scan read, and know when it is due; False at the end."""
+        if self._next is None:
+            self._next = self._following()
+            if self._next is None:
+                self.ended = True
+                return False
+            step = self._next[1].stamp - self._stamp
+            self._due += (step if 0 < step <= _LEAP else _STEP) / (self._rate or math.inf)
+        if not (self._has_begun and self._rate):
+            self._has_begun, self._due = True, self._clock()
+        return True
 
     def _following(self) -> tuple[str, LaserScan] | None:
         following = next(self._items, None)
