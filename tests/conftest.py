@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -58,3 +61,47 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write_log
+
+
+@pytest.fixture
+def domain() -> int:
+    """Domain of DDS; those above have ports that the system lends to others."""
+    return random.SystemRandom().randint(1, 100)
+
+
+@pytest.fixture(scope="session")
+def compiled() -> None:
+    """Compile the kernels that processes load, of which none should wait for a compiler."""
+    from lineament.warmup import warm_up
+
+    warm_up(["iepf", "optimal"])
+
+
+@pytest.fixture
+def started(tmp_path: Path, domain: int, compiled: None) -> Iterator[Callable[..., Any]]:  # noqa: ARG001
+    """Start `lineament live` with some arguments, in the domain, on this machine."""
+    from live_driving import LiveNode
+
+    with ExitStack() as stack:
+
+        def start(*arguments: object) -> LiveNode:
+            node = LiveNode(tmp_path, *arguments, "--localhost", "--domain", domain)
+            stack.callback(node.kill)
+            return node
+
+        yield start
+
+
+@pytest.fixture
+def joined(domain: int) -> Iterator[Callable[..., Any]]:
+    """Start another program in the domain."""
+    from dds_driving import PeerProcess
+
+    with ExitStack() as stack:
+        yield lambda *given: stack.enter_context(closing(PeerProcess(domain, *given)))
+
+
+@pytest.fixture
+def peer(joined: Callable[..., Any]) -> Any:
+    """Another program in the domain, that is there from the beginning."""
+    return joined()

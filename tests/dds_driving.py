@@ -51,11 +51,11 @@ class PeerProcess:
         self.close()
 
 
-def eventually(condition: Callable[[], bool]) -> None:
+def eventually(condition: Callable[[], bool], pause: float = 0.01) -> None:
     end = time.monotonic() + DEADLINE
     while not condition():
         assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
+        time.sleep(pause)
 
 
 def receive(source: DdsSource, n: int = 1) -> list:

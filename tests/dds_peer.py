@@ -45,10 +45,10 @@ class Peer:
         known = Topic(self._participant, topic, getattr(dds_types, kind))
         self._writers[topic] = DataWriter(self._participant, known, _qos(reliable))
 
-    def listen(self, topic: str, kind: str, reliable: bool = True) -> None:
-        """Begin to listen."""
+    def listen(self, topic: str, kind: str, reliable: bool = True, depth: int = 10) -> None:
+        """Begin to listen; the newest messages wait until they are taken, `depth` of them."""
         known = Topic(self._participant, topic, getattr(dds_types, kind))
-        self._readers[topic] = DataReader(self._participant, known, _qos(reliable))
+        self._readers[topic] = DataReader(self._participant, known, _qos(reliable, depth))
 
     def garble(self, topic: str, kind: str) -> None:
         """Begin to publish bytes under the name of a type."""
@@ -86,7 +86,7 @@ class Peer:
 
     def take(self, topic: str) -> list[dict[str, Any]]:
         """Take what has come."""
-        messages = self._readers[topic].take(100)
+        messages = self._readers[topic].take(10_000)
         return [asdict(m) for m in messages if isinstance(m, IdlStruct)]
 
     def user_data(self, topic: str) -> list[str]:
@@ -150,11 +150,11 @@ class GarbageWriter(DataWriter[Any]):
             raise DDSException(result)
 
 
-def _qos(reliable: bool) -> Qos:
+def _qos(reliable: bool, depth: int = 10) -> Qos:
     reliability = Policy.Reliability.Reliable(duration(seconds=1))
     if not reliable:
         reliability = Policy.Reliability.BestEffort
-    return Qos(reliability, Policy.Durability.Volatile, Policy.History.KeepLast(10))
+    return Qos(reliability, Policy.Durability.Volatile, Policy.History.KeepLast(depth))
 
 
 def _made(kind: Any, value: Any) -> Any:

@@ -86,6 +86,16 @@ def test_scene_is_read_by_another_client(server, client):
     assert ends == [pytest.approx((2.0, -0.02), abs=1e-3), pytest.approx((2.0, 0.02), abs=1e-3)]
 
 
+@pytest.mark.parametrize(("stamp", "told"), [((-1, 5), 0), ((2**32 - 1, 2**32 - 1), 2**31 + 3)])
+def test_a_stamp_that_is_none_is_the_first_or_the_last(server, client, stamp, told):
+    message = FoxgloveMessages().transform("/tf", Moment(*stamp, "laser", "map"), (0.0, 0.0, 0.0))
+    server.advertise(message.topic, message.kind)
+    client.subscribe(message.topic)
+    until(lambda: server.listeners(message.topic) == 1)
+    server.publish(message)
+    assert read(client, "/tf")["timestamp"].get("seconds", 0) == told
+
+
 def test_scan_and_pose_beside_it(server, client):
     make = FoxgloveMessages()
     scan, _ = wall_of_three_beams()

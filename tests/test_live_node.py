@@ -160,6 +160,26 @@ def test_odometry_is_heard_and_never_a_scan():
     assert told[0].startswith("an odometry of o makes no sense: its twist is")
 
 
+def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
+    def scan(seconds):
+        sweep = ln.LaserScan(WALL, -0.5, 0.01, stamp=1.1, time_increment=seconds)
+        return Received("a", lambda: sweep, 0.0)
+
+    heard = Odometry(1.0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), "odom", "base")
+    motion = Received("o", lambda: heard, 0.0, is_odometry=True)
+    report, _, told = run([motion, scan(1e20)], [scan(0.001)], config=LiveConfig(deskew="/odom"))
+    assert (report.total_scans, report.total_malformed) == (1, 1)
+    assert told[0].startswith("a scan of a makes no sense: twist (1.0, 0.0, 0.0) for 1e+22 s")
+
+
+def test_what_was_skipped_in_a_log_is_told_at_its_end(tmp_path):
+    (tmp_path / "a.log").write_text("FLASER x\nFLASER 2 1 2 0 0 0 0 0 0 1 robot 1\n")
+    source, told = ReplaySource(tmp_path / "a.log", rate=0, keep_going=True), []
+    Node(source, Pipeline(LiveConfig()), [], tell=told.append).run()
+    assert len(told) == 1
+    assert told[0].startswith(f"skipped: {tmp_path / 'a.log'}:1: FLASER")
+
+
 def test_publishers_that_come_and_go_are_told(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
@@ -173,7 +193,7 @@ def test_publishers_that_come_and_go_are_told(monkeypatch):
 
     publishers = [0, 0, 0, 1, 1, 2, 0, 0, 1]
     steps = [after(1.0) for _ in publishers]
-    _, _, told = run(*steps, publishers=publishers)
+    _, _, told = run(*steps, [], publishers=publishers)
     waiting = "no publisher of scans: waiting for one"
     assert told == [
         waiting, "1 publisher of scans", "2 publishers of scans", waiting, "1 publisher of scans",

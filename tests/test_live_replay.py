@@ -33,7 +33,7 @@ def played(tmp_path, clock):
     def play(stamps, **given):
         path = tmp_path / "log.npz"
         save_npz(path, [ln.LaserScan([2.0, 2.1], 0.0, 0.1, stamp=stamp) for stamp in stamps])
-        return ReplaySource(path, clock=clock, **given)
+        return ReplaySource(path, **{"clock": clock, **given})
 
     return play
 
@@ -116,3 +116,12 @@ def test_a_real_bag_is_played(data_dir, clock):
     ordinary = steps > 0
     assert len(came) > 20
     np.testing.assert_allclose(gaps[ordinary], steps[ordinary], atol=1e-4)
+
+
+def test_a_rate_beyond_reading_does_not_hold_the_node(played, clock):
+    def goes_on() -> float:
+        clock.sleep(0.001)
+        return clock.now
+
+    source = played([7.0, 7.1], rate=1e6, loop=True, clock=goes_on)
+    assert all(len(source.receive(0.05)) <= 64 for _ in range(5))

@@ -72,7 +72,10 @@ def test_node_ends_though_a_listener_stands_still(other_node, peer):
 #: The whole node, as it is configured.
 LIVE = """
 from lineament.live import LiveConfig, run_live
-report = run_live(LiveConfig(ros=1, topic="/whole/scan"), tell=lambda line: print(line, flush=True))
+from lineament.live.stopping import stopping
+config = LiveConfig(ros=1, topic="/whole/scan")
+with stopping() as is_stopped:
+    report = run_live(config, is_stopped, tell=lambda line: print(line, flush=True))
 print("ended after", report.total_scans, flush=True)
 """
 

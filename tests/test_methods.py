@@ -40,7 +40,7 @@ NOT_NUMBERS = ["1", None, True, 1j, [1.0]]
 @pytest.mark.parametrize(
     ("name", "refused"),
     [
-        ("sigma_d", [0, 0.0, -1.0, NAN, INF, *NOT_NUMBERS]),
+        ("sigma_d", [0, 0.0, -1.0, NAN, INF, 10**400, *NOT_NUMBERS]),
         ("sigma_r", [0, -0.3, NAN, INF, *NOT_NUMBERS]),
         ("spacing_scale", [0, -6, NAN, INF, *NOT_NUMBERS]),
         ("noise_floor", [-1e-9, NAN, INF, *NOT_NUMBERS]),

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -235,3 +236,18 @@ def test_scans_tell_their_own_twist_for_deskewing():
     assert twists[0] is None
     errors = np.array(twists[6:-1]) - (0.8, 0.0, 0.0)
     assert np.abs(errors).max() < 0.06
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-4])
+def test_a_stamp_that_is_wrong_does_not_throw_the_tracks_off(gap):
+    # By its stamp the sensor has gone 10 cm in no time.
+    extract, tracker = ln.Extractor(), Tracker()
+    numbers = []
+    for i, scan in enumerate(drive(room(), [(-1, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)):
+        features = replace(extract(scan), stamp=0.9 + gap if i == 10 else scan.stamp)
+        numbers.append(set(tracker(features).segments.tolist()))
+        if i == 10:
+            assert tracker.twist is None
+    assert all(now & before for before, now in pairwise(numbers))
+    assert len(numbers[8] & numbers[16]) >= 4
+    assert tracker.twist == pytest.approx((1.0, 0.0, 0.0), abs=0.05)

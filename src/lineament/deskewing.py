@@ -14,6 +14,8 @@ __all__ = ["beam_times", "deskew"]
 
 #: Bearings that fall on each other are set apart by so much [rad].
 _APART = 1e-9
+#: No sensor moves so far during a sweep [m, rad].
+_FARTHEST = 1e6
 
 
 def beam_times(scan: LaserScan) -> Array | None:
@@ -69,7 +71,8 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     Raises
     ------
     ValueError
-        If the twist is not three finite numbers.
+        If the twist is not three finite numbers, or moves the sensor by a million metres or
+        radians during the sweep.
 
     Examples
     --------
@@ -79,10 +82,16 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     >>> deskew(scan, (1.0, 0.0, 0.0)).ranges.round(5).tolist()
     [2.0, 2.0, 2.0]
     """
-    times = beam_times(scan)
-    if twist is None or times is None or not any(twist) or not scan.valid.any():
+    if twist is None or not any(twist):
         return scan
-    bearings, ranges = _seen_from_the_stamp(scan, poses_along(twist, times))
+    times = beam_times(scan)
+    if times is None or not scan.valid.any():
+        return scan
+    with np.errstate(over="ignore", invalid="ignore"):
+        poses = poses_along(twist, times)
+    if not np.abs(poses).max() < _FARTHEST:
+        raise ValueError(f"twist {twist} for {np.ptp(times):g} s leads out of any world")
+    bearings, ranges = _seen_from_the_stamp(scan, poses)
     order = np.argsort(bearings, kind="stable")
     ranges[_hidden(order, np.where(scan.valid, ranges, np.inf))] = np.nan
     # What lies once around or more is put between the first beams.

@@ -11,7 +11,9 @@ __all__ = ["warm_up"]
 
 
 def warm_up(methods: Sequence[str] = ()) -> float:
-    """Compile the kernels of some methods and of the tracker, or load them from the cache.
+    """Compile the kernels of some methods, of the tracker and of `lineament live`.
+
+    They are cached: the next program loads them.
 
     Parameters
     ----------
@@ -31,6 +33,7 @@ def warm_up(methods: Sequence[str] = ()) -> float:
     started = time.perf_counter()
     from .extractor import Extractor
     from .methods import DEFAULT_METHOD
+    from .output.feature_points import feature_points
     from .scan import LaserScan
     from .tracking import Tracker
 
@@ -39,5 +42,6 @@ def warm_up(methods: Sequence[str] = ()) -> float:
     tracker = Tracker()
     for extractor in [Extractor(name) for name in methods or (DEFAULT_METHOD,)]:
         tracker(extractor(wall))
-    tracker(extractor(wall))
+    features = extractor(wall)
+    feature_points(features, tracker(features))
     return time.perf_counter() - started

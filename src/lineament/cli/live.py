@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,7 @@ from .method_options import METHOD, SET, settings_of
 from .options import PATH, QUIET, wrong_usage
 
 if TYPE_CHECKING:
-    from ..live import Report
+    from ..live import LiveConfig, Report
 
 __all__ = ["live"]
 
@@ -80,26 +82,52 @@ def live(
     **given: Any,
 ) -> None:
     """Turn a running scanner into a stream of features, over ROS 2 (or ROS 1), or play a log."""
-    from ..live import LiveConfig, read_config, run_live
+    from ..live.stopping import stopping
+
+    totals = "stopped before the first scan"
+    with stopping() as is_stopped:
+        configured = _configured(config, settings, remappings, given)
+        totals = _run(configured, is_stopped, quiet)
+    if not quiet:
+        click.echo(totals)
+
+
+def _configured(
+    config: Path | None,
+    settings: tuple[str, ...],
+    remappings: tuple[str, ...],
+    given: dict[str, Any],
+) -> LiveConfig:
+    from ..live import LiveConfig, read_config
 
     told = {} if config is None else read_config(config)
     told.update({name: value for name, value in given.items() if value is not None})
     for argument in remappings:  # What roslaunch adds is for rospy, which finds it by itself.
         if told.get("ros") != 1 or ":=" not in argument:
             raise click.UsageError(f"got an unexpected argument {argument!r}")
-    told["parameters"] = {**told.get("parameters", {}), **settings_of(settings)}
     with wrong_usage():
-        report = run_live(LiveConfig(**told), tell=_tell, show=_shown(quiet))
-    if not quiet:
-        click.echo(report.totals)
+        configured = LiveConfig(**told)
+    return replace(configured, parameters={**configured.parameters, **settings_of(settings)})
 
 
-def _tell(line: str) -> None:
-    click.echo(line, err=True)
+def _run(config: LiveConfig, is_stopped: Callable[[], bool], quiet: bool) -> str:
+    from ..live import run_live
 
+    # On a terminal reports are shown in one line that changes, and makes way for others.
+    is_shown = sys.stderr.isatty() and not quiet
+    beginning = "\r\033[K" if is_shown else ""
 
-def _shown(quiet: bool) -> Callable[[Report], None]:
-    """Show reports in one line that changes, where there is a terminal."""
-    if quiet or not sys.stderr.isatty():
-        return lambda report: None  # noqa: ARG005
-    return lambda report: click.echo(f"\r\033[K{report}", nl=False, err=True)
+    def tell(line: str) -> None:
+        if not quiet:
+            click.echo(beginning + line, err=True)
+
+    def show(report: Report) -> None:
+        if is_shown:
+            width = shutil.get_terminal_size().columns - 1
+            click.echo(beginning + str(report)[:width], nl=False, err=True)
+
+    try:
+        with wrong_usage():
+            return run_live(config, is_stopped, tell=tell, show=show).totals
+    finally:
+        click.echo(beginning, nl=False, err=True)

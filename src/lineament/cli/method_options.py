@@ -40,14 +40,14 @@ NOISE = click.option(
 def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
     """Make the extractor that the options ask for."""
     from ..extractor import Extractor
-    from ..methods import DEFAULT_METHOD
+    from ..methods import DEFAULT_METHOD, get_method
     from ..scan import RangeNoise
 
+    name = DEFAULT_METHOD if method is None else method
     with wrong_usage():
         return Extractor(
-            DEFAULT_METHOD if method is None else method,
+            get_method(name, **settings_of(settings)),
             noise=None if noise is None else RangeNoise(sigma=noise),
-            **settings_of(settings),
         )
 
 
@@ -62,5 +62,5 @@ def _setting(text: str) -> tuple[str, Any]:
         raise click.UsageError(f"--set {text!r}: expected NAME=VALUE")
     try:
         return name, ast.literal_eval(value)
-    except (ValueError, SyntaxError):
+    except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
         return name, value

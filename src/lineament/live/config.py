@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -134,15 +134,22 @@ class LiveConfig:
         _check_between("depth", self.depth, 1, 1000)
         _check_between("rate", self.rate, 0, 1e6)
         if self.noise is not None:
-            _check_between("noise", self.noise, 0, math.inf)
+            _check_between("noise", self.noise, 0, 1000)
         if self.domain is not None:
             _check_between("domain", self.domain, 0, 232)
         if self.foxglove is not None:
             _check_between("foxglove", self.foxglove, 0, 65535)
         if len(self.laser_pose) != 3 or not all(map(_is_finite, self.laser_pose)):
             raise ValueError(f"laser_pose is {self.laser_pose}, expected three finite numbers")
+        self._check_log()
+
+    def _check_log(self) -> None:
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
+        if self.log is not None and self.odometry_topic is not None:
+            raise ValueError(
+                f"deskew is {self.deskew!r}, but a log is played; expected poses or scans"
+            )
         if self.log is None and self.ros == 0:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
 
@@ -194,7 +201,7 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
             found = tomllib.load(file)
     except OSError as error:
         raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise LineamentError(f"{path}: is no TOML: {error}") from None
     known = [parameter.name for parameter in fields(LiveConfig)]
     for name, value in found.items():
@@ -232,7 +239,7 @@ def _check_choice(name: str, value: object, choices: tuple[object, ...]) -> None
 
 
 def _check_between(name: str, value: float, low: float, high: float) -> None:
-    if not (low <= value <= high and value < math.inf):
+    if not low <= value <= high:
         raise ValueError(f"{name} is {value}, expected {low} to {high}")
 
 
@@ -242,4 +249,4 @@ def _check_name(name: str, value: str) -> None:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value)
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

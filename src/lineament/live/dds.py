@@ -194,7 +194,7 @@ class DdsPublisher:
         """How many listen to a topic; 0 for one that is not advertised."""
         if topic not in self._writers:
             return 0
-        return int(self._writers[topic].get_publication_matched_status().current_count)
+        return self._writers[topic].listeners
 
     def publish(self, message: Message) -> None:
         """Send a message in CDR.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from functools import partial
+from functools import cache, partial
 
 from ..logs.ros_bag import Buffer
-from ..logs.ros_messages import decoders
+from ..logs.ros_messages import Decoder, decoders
 from ..logs.ros_poses import plane_pose
 from ..logs.ros_wire import Wire
 from .received import Odometry, Received, Time
@@ -48,11 +48,16 @@ def received_scan(
     Traceback (most recent call last):
     ValueError: ends early: 16 bytes expected from byte 0, 6 are left
     """
+    read = partial(_decoder(kind, echo), data, encoding)
+    return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
+
+
+@cache
+def _decoder(kind: str, echo: str) -> Decoder:
     known = decoders(echo, ring=None)
     if kind not in known:
         raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
-    read = partial(known[kind], data, encoding)
-    return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
+    return known[kind]
 
 
 def received_odometry(publisher: str, data: Buffer, encoding: str) -> Received:

@@ -88,55 +88,55 @@ class Node:
             for received in self._newest(self._source.receive(_WAIT), counters):
                 self._work(received, counters)
             now = time.monotonic()
-            if now - reported >= _EACH:
+            if now - reported >= _EACH and not self._source.ended:
                 reported = now
+                self._tell_problems()
                 self._watch(now - started)
                 self._report(counters, now)
+        self._tell_problems()
         return self._report(counters, time.monotonic())
 
     def _newest(self, received: list[Received], counters: Counters) -> list[Received]:
-        """Keep the newest scan of each publisher, in the order in which they came."""
-        for odometry in [item for item in received if item.is_odometry][-1:]:
-            self._read(odometry, counters)
+        """Keep the newest odometry, then the newest scan of each publisher, as they came."""
+        odometry = [item for item in received if item.is_odometry]
         scans = [item for item in received if not item.is_odometry]
         newest = {item.publisher: item for item in scans}
         counters.dropped += len(scans) - len(newest)
-        return list(newest.values())
-
-    def _read(self, received: Received, counters: Counters) -> LaserScan | None:
-        """Decode a message; None if it makes no sense, or is an odometry, which is heard."""
-        try:
-            read = received.read()
-            if isinstance(read, LaserScan):
-                check_beams(read)
-                return read
-            self._pipeline.hear(read)
-        except ValueError as error:
-            counters.malformed += 1
-            what = "an odometry" if received.is_odometry else "a scan"
-            self._tell_once(f"{what} of {received.publisher} makes no sense: {error}", received)
-        return None
+        return [*odometry[-1:], *newest.values()]
 
     def _work(self, received: Received, counters: Counters) -> None:
-        scan = self._read(received, counters)
-        if scan is None:
+        try:
+            read = received.read()
+            if not isinstance(read, LaserScan):
+                self._pipeline.hear(read)
+                return
+            check_beams(read)
+            # What can be read may still make no sense: a robot that turns a million times a sweep.
+            frame = self._pipeline(received.publisher, read, received.time)
+        except ValueError as error:
+            counters.malformed += 1
+            self._tell_fault(received, error)
             return
-        frame = self._pipeline(received.publisher, scan, received.time)
         for sink in self._sinks:
             sink.tell(frame)
-        counters.add(scan, frame.features, time.monotonic() - received.arrived)
+        counters.add(read, frame.features, time.monotonic() - received.arrived)
 
-    def _tell_once(self, text: str, received: Received) -> None:
+    def _tell_fault(self, received: Received, error: ValueError) -> None:
         if received.publisher not in self._faulty and len(self._faulty) < _MOST_TOLD:
             self._faulty.add(received.publisher)
+            what = "an odometry" if received.is_odometry else "a scan"
+            text = f"{what} of {received.publisher} makes no sense: {error}"
             self._tell(one_line(f"{text} (others like it are only counted)"))
 
-    def _watch(self, seconds: float) -> None:
-        """Tell when publishers come and go, and what keeps scans from coming."""
+    def _tell_problems(self) -> None:
+        """Tell what keeps scans from coming, each thing once."""
         for problem in self._source.problems():
             if problem not in self._problems:
                 self._problems.add(problem)
                 self._tell(one_line(problem))
+
+    def _watch(self, seconds: float) -> None:
+        """Tell when publishers come and go."""
         publishers = self._source.publishers
         if publishers == self._publishers or (not publishers and seconds < _PATIENCE):
             return

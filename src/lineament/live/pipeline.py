@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from ..deskewing import deskew
 from ..extractor import Extractor
 from ..features import Features
+from ..methods import get_method
 from ..scan import LaserScan, RangeNoise
 from ..tracking import Tracker, Tracks
+from ..tracking.tracker import FASTEST
 from .config import LiveConfig
 from .motion import OdometryMotion, PoseMotion, ScanMotion, StandingMotion
 from .received import Odometry, Time
@@ -116,9 +117,11 @@ class Pipeline:
         return Frame(scan, straight, features, tracks, time or time_of(scan.stamp))
 
     def hear(self, odometry: Odometry) -> None:
-        """Take in what the odometry tells of the motion; ValueError if it is not finite."""
-        if not all(map(math.isfinite, (odometry.stamp, *odometry.twist))):
-            raise ValueError(f"its twist is {odometry.twist}, expected finite numbers")
+        """Take in what the odometry tells of the motion; ValueError if nothing moves so."""
+        if not all(abs(speed) <= FASTEST for speed in odometry.twist):
+            raise ValueError(
+                f"its twist is {odometry.twist}, expected finite numbers, at most {FASTEST:g}"
+            )
         self._odometry = odometry
 
     def _line_of(self, publisher: str) -> _Line:
@@ -140,7 +143,8 @@ class _Line(NamedTuple):
     @classmethod
     def of(cls, config: LiveConfig) -> _Line:
         noise = None if config.noise is None else RangeNoise(sigma=config.noise)
-        extractor = Extractor(config.method, noise=noise, **config.parameters)
+        method = get_method(config.method, **config.parameters)
+        extractor = Extractor(method, noise=noise)
         needs_tracker = config.track or config.deskew == "scans"
         tracker = Tracker() if needs_tracker else None
         motion = StandingMotion()

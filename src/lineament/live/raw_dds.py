@@ -89,6 +89,9 @@ _serialised = _function(
     ctypes.c_void_p,
     *(ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t, _P(_Piece), ctypes.c_size_t),
 )
+_count_listeners = _function(
+    "dds_get_matched_subscriptions", ctypes.c_int32, *(_Entity, ctypes.c_void_p, ctypes.c_size_t)
+)
 _write = _function("dds_writecdr", ctypes.c_int32, _Entity, ctypes.c_void_p)
 
 
@@ -162,6 +165,12 @@ class RawWriter(DataWriter[Any]):
         super().__init__(participant, topic, qos)
         self._type = ctypes.c_void_p()
         _get_type(self._ref, self._type)
+
+    @property
+    def listeners(self) -> int:
+        """How many listen at the moment."""
+        n: int = _count_listeners(self._ref, None, 0)
+        return max(n, 0)
 
     def write_raw(self, data: bytes) -> bool:
         """Write a message in CDR; tell whether it went out: a slow reader can be in the way."""

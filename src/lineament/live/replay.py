@@ -19,6 +19,8 @@ _LEAP = 10.0
 _STEP = 0.1
 #: What is given so soon after it was due is given alone [s].
 _PUNCTUAL = 0.01
+#: Scans that are given at once, where reading is slower than the rate that is asked for.
+_MOST = 64
 
 
 class ReplaySource:
@@ -91,7 +93,8 @@ class ReplaySource:
         came: list[Received] = []
         if self._read_ahead():
             time.sleep(max(min(self._due - self._clock(), timeout), 0.0))
-        while self._read_ahead() and self._due <= self._clock():
+        now = self._clock()
+        while len(came) < _MOST and self._read_ahead() and self._due <= now:
             came.append(self._take())
             # When there is time, the scan at hand is worked at before the next one is read.
             if self._clock() - came[-1].arrived < _PUNCTUAL:
@@ -111,7 +114,7 @@ class ReplaySource:
         (topic, scan), self._next = self._next, None
         self._stamp = scan.stamp
         # Latency counts from when the scan was due: a node that comes late to it is late.
-        return Received(topic, lambda: scan, self._due)
+        return Received(topic, lambda: scan, self._due if self._rate else self._clock())
 
     def _read_ahead(self) -> bool:
         """Have the next scan read, and know when it is due; False at the end."""
@@ -122,7 +125,7 @@ class ReplaySource:
                 return False
             step = self._next[1].stamp - self._stamp
             self._due += (step if 0 < step <= _LEAP else _STEP) / (self._rate or math.inf)
-        if not (self._has_begun and self._rate):
+        if not self._has_begun:
             self._has_begun, self._due = True, self._clock()
         return True
 

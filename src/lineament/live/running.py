@@ -1,16 +1,17 @@
-"""`run_live`: a node as it is configured, until it is interrupted."""
+"""`run_live`: a node as it is configured, until it is stopped."""
 
 from __future__ import annotations
 
-import signal
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
-from types import FrameType, ModuleType
+from types import ModuleType
 
 import numpy as np
 
 from ..errors import LineamentError
+from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
 from ..scan import LaserScan
 from .config import LiveConfig
@@ -26,15 +27,18 @@ __all__ = ["run_live"]
 
 def run_live(
     config: LiveConfig,
+    is_stopped: Callable[[], bool] = lambda: False,
     *,
     tell: Callable[[str], None] = print,
     show: Callable[[Report], None] = lambda report: None,  # noqa: ARG005
 ) -> Report:
-    """Run a node until its log ends, or SIGINT or SIGTERM comes.
+    """Run a node until its log ends, or it is stopped.
 
     Parameters
     ----------
     config : LiveConfig
+    is_stopped : callable
+        Says whether to stop; it is asked ten times a second once the node runs.
     tell : callable
         Is told in a line what a person should know.
     show : callable
@@ -52,34 +56,35 @@ def run_live(
     LineamentError
         If the log cannot be read, or ROS or Foxglove cannot be reached.
     """
-    with ExitStack() as stack, _stopped() as is_stopped:
-        # Others are found over the network while the kernels are loaded.
-        source, sinks = _ends(config, stack, tell)
-        pipeline = Pipeline(config)
-        pipeline("", _WALL)
+    with ExitStack() as stack:
+        with _loading(stack):
+            # Others are found over the network while the kernels are loaded.
+            source, sinks = _ends(config, stack, tell)
+            pipeline = Pipeline(config)
+            frame = pipeline("", _WALL)
+            feature_points(frame.features, frame.tracks)
         tell(f"{config.name} finds features on {config.scan_topic} by {config.method}")
         return Node(source, pipeline, sinks, tell=tell, show=show).run(is_stopped)
+
+
+@contextmanager
+def _loading(stack: ExitStack) -> Iterator[None]:
+    """Load what stays as long as the node runs: it is not searched for garbage.
+
+    The search would make the start longer, and later hold up a scan for a twentieth of a second.
+    """
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+        stack.callback(gc.unfreeze)
+    finally:
+        gc.enable()
 
 
 #: What kernels are loaded with, so that the first scan need not wait for them.
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
 _WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)
-
-
-@contextmanager
-def _stopped() -> Iterator[Callable[[], bool]]:
-    """Ask whether SIGINT or SIGTERM has come; nothing is interrupted by them meanwhile."""
-    came: list[int] = []
-
-    def note(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
-        came.append(number)
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(came)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _ends(

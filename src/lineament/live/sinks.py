@@ -93,8 +93,13 @@ class RosSink:
     ) -> None:
         self._publisher, self._messages = publisher, messages
         self._topic, self._name, self._tells_scan = topic, name, tells_scan
-        for below, kind in _BELOW.items():
-            publisher.advertise(f"{topic}/{below}", messages.kind(kind))
+        topics = {f"{topic}/{below}": kind for below, kind in _BELOW.items()}
+        topics[DIAGNOSTICS] = "diagnostic_msgs/DiagnosticArray"
+        if tells_scan:
+            topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
+            topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
+        for name_of_topic, kind in topics.items():
+            publisher.advertise(name_of_topic, messages.kind(kind))
 
     @property
     def unsent(self) -> int:
@@ -104,7 +109,10 @@ class RosSink:
     def tell(self, frame: Frame) -> None:
         """Tell what was found in a scan; the cloud first, since programs wait for it."""
         publisher, make, topic = self._publisher, self._messages, self._topic
-        moment = _moment(frame, frame.scan.frame_id)
+        # A log may name no frame; where its scans are told too, all of it is in one that has a
+        # name, for /tf knows no other.
+        name = frame.scan.frame_id or (LASER_FRAME if self._tells_scan else "")
+        moment = _moment(frame, name)
         features = frame.features
         if publisher.listeners(f"{topic}/features"):
             publisher.publish(make.cloud(f"{topic}/features", moment, features, frame.tracks))
@@ -118,11 +126,11 @@ class RosSink:
 
     def _tell_scan(self, moment: Moment, scan: LaserScan) -> None:
         publisher, make, topic = self._publisher, self._messages, self._topic
-        if scan.pose is not None:
+        if scan.pose is not None and publisher.listeners("/tf"):
             publisher.publish(make.transform("/tf", moment, scan.pose))
-        if scan.is_regular:
+        if scan.is_regular and publisher.listeners(topic):
             publisher.publish(make.scan(topic, moment, scan))
-        else:
+        elif not scan.is_regular and publisher.listeners(f"{topic}/points"):
             publisher.publish(make.points(f"{topic}/points", moment, scan))
 
     def diagnose(self, report: Report, time: Time) -> None:
@@ -160,7 +168,8 @@ class FoxgloveSink:
     def __init__(self, publisher: Publisher, messages: FoxgloveMessages, topic: str) -> None:
         self._publisher, self._messages, self._topic = publisher, messages, topic
         self._topics = {"/tf": "FrameTransform", topic: "LaserScan"}
-        self._topics[f"{topic}/features"] = "SceneUpdate"
+        # A scan that was made straight is no regular one any more.
+        self._topics |= {f"{topic}/points": "PointCloud", f"{topic}/features": "SceneUpdate"}
         for name, kind in self._topics.items():
             publisher.advertise(name, kind)
 

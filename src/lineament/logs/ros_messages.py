@@ -14,7 +14,7 @@ from ..scan import LaserScan
 from .ros_bag import Buffer
 from .ros_wire import Wire
 
-__all__ = ["CLOUD", "decoders", "laser_scan", "multi_echo_scan", "ring_scan"]
+__all__ = ["CLOUD", "Decoder", "decoders", "laser_scan", "multi_echo_scan", "ring_scan"]
 
 CLOUD = "sensor_msgs/PointCloud2"
 

@@ -47,8 +47,8 @@ class Wire:
         if encoding == "ros1":
             self._at, self._form = 0, _ROS1
         elif encoding == "cdr":
-            form = _CDR.get(bytes(data[:2]))
-            if form is None or self._size < 4:
+            form = _CDR.get((data[0], data[1])) if self._size >= 4 else None
+            if form is None:
                 found = bytes(data[:4]).hex()
                 raise ValueError(f"begins with {found!r}, expected plain CDR: 0000 or 0001")
             self._at, self._form = 4, form
@@ -140,5 +140,5 @@ class _Form(NamedTuple):
 
 _ROS1 = _Form.prepare(False, "<")
 #: By the first two bytes of the message.
-_CDR = {b"\0\0": _Form.prepare(True, ">"), b"\0\1": _Form.prepare(True, "<")}
+_CDR = {(0, 0): _Form.prepare(True, ">"), (0, 1): _Form.prepare(True, "<")}
 _NO_FLOATS = np.zeros(0, dtype=np.float32)

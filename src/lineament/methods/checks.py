@@ -13,7 +13,10 @@ def check_number(name: str, value: object, *, above: float = 0.0, or_equal: bool
     """Refuse what is not a finite number above (or at) a bound."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"{name} is {value!r}, expected a number")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     if not math.isfinite(number) or number < above or (number == above and not or_equal):
         raise ValueError(
             f"{name} is {value}, expected a number {'≥' if or_equal else '>'} {above:g}"

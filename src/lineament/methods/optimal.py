@@ -45,6 +45,7 @@ PARTS = {
 
 
 class _Scratch(NamedTuple):
+    parts: int
     sums: NDArray[np.float64]
     costs: NDArray[np.float64]
     follow: NDArray[np.int64]
@@ -120,7 +121,10 @@ class Optimal(MethodBase):
         """Make room for running sums, and for the vertices of a map."""
         shape = (beams + 2, min(self.max_vertices, beams + 1) + 1)
         return _Scratch(
-            np.empty((2 * beams + 4, SUMS)), np.empty((PLANES, *shape)), np.empty(shape, np.int64)
+            sum(bit for part, bit in PARTS.items() if part not in self.without),
+            np.empty((2 * beams + 4, SUMS)),
+            np.empty((PLANES, *shape)),
+            np.empty(shape, np.int64),
         )
 
     def run(self, block: Block) -> None:
@@ -137,7 +141,7 @@ class Optimal(MethodBase):
             block.noise,
             self.evidence,
             self.max_missing,
-            sum(bit for part, bit in PARTS.items() if part not in self.without),
+            own.parts,
             own.follow.shape[1] - 1,
             block.floats,
             block.ints,

@@ -17,22 +17,14 @@ __all__ = ["ARC_POINT", "CORNER_POINT", "FEATURE_POINT", "SEGMENT_POINT", "featu
 #: What the field `kind` tells.
 SEGMENT_POINT, CORNER_POINT, ARC_POINT = range(3)
 
-#: The fields: those that are filled together, their type, their names.
+#: The fields in their order: names, with their type before them.
 _FIELDS = (
-    ("position", "<f4", ("x", "y", "z")),
-    ("kind", "<u4", ("kind",)),
-    ("track", "<i4", ("track",)),
-    ("start", "<f4", ("start_x", "start_y")),
-    ("end", "<f4", ("end_x", "end_y")),
-    ("angle", "<f4", ("angle",)),
-    ("radius", "<f4", ("radius",)),
-    ("opening", "<f4", ("opening",)),
-    ("convex", "<f4", ("convex",)),
-    ("rms", "<f4", ("rms",)),
-    ("covariance", "<f4", ("c00", "c01", "c02", "c11", "c12", "c22")),
-    ("beams", "<i4", ("first_beam", "last_beam")),
-    ("n_points", "<i4", ("n_points",)),
-    ("segments", "<i4", ("segment_a", "segment_b")),
+    ("<f4", "x", "y", "z"),
+    ("<u4", "kind"),
+    ("<i4", "track"),
+    ("<f4", "start_x", "start_y", "end_x", "end_y", "angle", "radius", "opening", "convex", "rms"),
+    ("<f4", "c00", "c01", "c02", "c11", "c12", "c22"),
+    ("<i4", "first_beam", "last_beam", "n_points", "segment_a", "segment_b"),
 )
 
 #: One feature, in 25 fields of four bytes: position (centroid of a segment, position of a corner,
@@ -41,19 +33,9 @@ _FIELDS = (
 #: of a corner, rms of a segment or arc [m], upper triangle of the covariance (segment: offset,
 #: angle; corner: x, y; arc: x, y, radius), beams (a corner has its own in both), number of points,
 #: and segments of a corner. A field that a kind does not fill is NaN, or -1 where it is an integer.
-FEATURE_POINT = np.dtype([(name, form) for _, form, names in _FIELDS for name in names])
-
-#: The same bytes, with the fields that are filled together as one.
-_GROUPED = np.dtype(
-    [(name, form, (len(fields),) if len(fields) > 1 else ()) for name, form, fields in _FIELDS]
-)
-#: A feature of which nothing is told but that z is 0.
-_NOTHING = np.zeros((), _GROUPED)
-for _name, _form, _ in _FIELDS[2:]:
-    _NOTHING[_name] = -1 if "i" in _form else np.nan
+FEATURE_POINT = np.dtype([(name, form) for form, *names in _FIELDS for name in names])
 
 
-@np.errstate(over="ignore")  # What is too large for single precision is infinite.
 def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[np.void]:
     """Make one record a feature: the segments, then the corners, then the arcs of a scan.
 
@@ -84,13 +66,12 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
     >>> [point[name].item() for name in ("kind", "n_points", "radius", "track")]
     [0, 3, nan, -1]
     """
+    from ..kernels.feature_words import fill_points  # Numba takes long to import.
+
     tables = features.segments, features.corners, features.arcs
-    points = np.full(sum(map(len, tables)), _NOTHING)
-    first_corner = len(features.segments)
-    first_arc = first_corner + len(features.corners)
-    _fill_segments(points[:first_corner], features.segments)
-    _fill_corners(points[first_corner:first_arc], features.corners)
-    _fill_arcs(points[first_arc:], features.arcs)
+    words = np.empty((sum(map(len, tables)), FEATURE_POINT.itemsize // 4), "<f4")
+    fill_points(*(form for table in tables for form in _forms(table)), words, words.view("<i4"))
+    points = words.view(FEATURE_POINT).reshape(len(words))
     if tracks is not None:
         numbers = tracks.segments, tracks.corners, tracks.arcs
         if [*map(len, numbers)] != [*map(len, tables)]:
@@ -99,41 +80,14 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
                 f"{_counts(tables)}, as the features"
             )
         points["track"] = np.concatenate(numbers)
-    return points.view(FEATURE_POINT)
+    return points
 
 
-def _fill_segments(points: NDArray[np.void], segments: NDArray[np.void]) -> None:
-    points["kind"] = SEGMENT_POINT
-    points["position"][:, :2] = segments["centroid"]
-    for name in ("start", "end", "angle", "rms", "n_points"):
-        points[name] = segments[name]
-    _fill_triangle(points, segments["covariance"])
-    points["beams"][:, 0], points["beams"][:, 1] = segments["first_beam"], segments["last_beam"]
-
-
-def _fill_corners(points: NDArray[np.void], corners: NDArray[np.void]) -> None:
-    points["kind"] = CORNER_POINT
-    points["position"][:, :2] = corners["position"]
-    for name in ("opening", "convex", "segments"):
-        points[name] = corners[name]
-    _fill_triangle(points, corners["covariance"])
-    points["beams"] = corners["beam"][:, None]
-
-
-def _fill_arcs(points: NDArray[np.void], arcs: NDArray[np.void]) -> None:
-    points["kind"] = ARC_POINT
-    points["position"][:, :2] = arcs["center"]
-    for name in ("radius", "rms", "n_points"):
-        points[name] = arcs[name]
-    _fill_triangle(points, arcs["covariance"])
-    points["beams"][:, 0], points["beams"][:, 1] = arcs["first_beam"], arcs["last_beam"]
-
-
-def _fill_triangle(points: NDArray[np.void], covariances: NDArray[np.float64]) -> None:
-    """Fill the upper triangle, row by row, with covariances (n, 2, 2) or (n, 3, 3)."""
-    triangles, size = points["covariance"], covariances.shape[1]
-    for row, at in zip(range(size), (0, 3, 5), strict=False):  # where the diagonal is
-        triangles[:, at : at + size - row] = covariances[:, row, row:]
+def _forms(table: NDArray[np.void]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Give the words of records as kernels take them: as floats, and as integers half as long."""
+    n, size = len(table), table.itemsize
+    data = table.tobytes()  # A copy has no gaps, and is always of the type the kernel is made for.
+    return np.ndarray((n, size // 8), np.float64, data), np.ndarray((n, size // 4), np.int32, data)
 
 
 def _counts(tables: tuple[NDArray[Any], ...]) -> str:

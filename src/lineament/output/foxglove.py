@@ -10,7 +10,7 @@ from foxglove import messages as fg
 
 from ..scan import LaserScan, Pose
 from .layers import Layer
-from .scene import Message, Moment, SceneMessages, cloud_of
+from .scene import LAST_STAMP, Message, Moment, SceneMessages, cloud_of
 
 __all__ = ["FoxgloveMessages"]
 
@@ -102,7 +102,9 @@ def _message(topic: str, message: Any) -> Message:
 
 
 def _time(moment: Moment) -> fg.Timestamp:
-    return fg.Timestamp(sec=moment.seconds, nsec=moment.nanoseconds)
+    # What comes live may have a stamp that is none: it is shown as the first or the last.
+    seconds = min(max(moment.seconds, 0), LAST_STAMP)
+    return fg.Timestamp(sec=seconds, nsec=moment.nanoseconds)
 
 
 def _color(layer: Layer) -> fg.Color:

@@ -141,11 +141,11 @@ def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
     first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
     if not (0 <= first < n and 0 <= last < n):
         return 0.0, 2 * math.pi
-    points = scan.points[first : last + 1]
-    if first > last:
-        points = np.concatenate((scan.points[first:], scan.points[: last + 1]))
+    beams = slice(first, last + 1) if first <= last else np.r_[first:n, : last + 1]
+    ranges = np.where(scan.valid[beams], scan.ranges[beams], np.nan)
+    bearings = scan.angles[beams]
     x, y = arc["center"].tolist()
-    angles = np.arctan2(points[:, 1] - y, points[:, 0] - x)
+    angles = np.arctan2(ranges * np.sin(bearings) - y, ranges * np.cos(bearings) - x)
     angles = angles[~np.isnan(angles)]  # of beams that are not valid
     if not len(angles):
         return 0.0, 2 * math.pi

@@ -141,7 +141,8 @@ class RosMessages(SceneMessages):
             If the tracks are those of other features.
         """
         points = feature_points(features, tracks)
-        is_dense = bool(np.isfinite(points["x"]).all() and np.isfinite(points["y"]).all())
+        # They are few: numpy would take longer.
+        is_dense = all(map(math.isfinite, points["x"].tolist() + points["y"].tolist()))
         return self._cloud(topic, moment, points, is_dense)
 
     def diagnostics(
@@ -203,8 +204,7 @@ class RosMessages(SceneMessages):
         packer.numbers("2I", 1, len(points))  # height, width
         packer.raw(_fields(self.encoding, points.dtype), 4)
         packer.numbers("B", False)  # not big-endian
-        packer.numbers("2I", points.itemsize, points.nbytes)
-        packer.count(points.nbytes)
+        packer.numbers("3I", points.itemsize, points.nbytes, points.nbytes)  # a point, all, data
         packer.raw(points.tobytes())
         packer.numbers("B", is_dense)
         return self._message(topic, "sensor_msgs/PointCloud2", packer)

@@ -25,6 +25,8 @@ Numbers = NDArray[np.int64]
 _ODOMETRY = (0.03, 0.01), (0.1, 0.1)
 #: The same of the motion that goes on as it was, or of none: no way is known to grow with.
 _CONTINUED = (0.1, 0.1), (0.5, 0.5)
+#: A motion that would be faster is one whose stamps are wrong [m/s, rad/s].
+FASTEST = 50.0
 #: How often pairs are looked for: with the expected motion, then with the estimated one.
 _ROUNDS = 3
 
@@ -111,7 +113,7 @@ class Tracker:
 
         The mean of the last two motions: if scans are deskewed by it, the error of one motion
         comes back in the next with the other sign. None before there were two frames with
-        increasing stamps.
+        increasing stamps, and after stamps by which the sensor would go at 50 m/s or more.
         """
         if not self._twists:
             return None
@@ -146,8 +148,9 @@ class Tracker:
         else:
             duration = features.stamp - self._stamp
             motion, matches = self._follow(features, *self._expected(odometry, duration))
-            if duration > 0:
-                self._twists.append(motion.twist(duration))
+            twist = motion.twist(duration) if duration > 0 else (math.inf,) * 3
+            if all(abs(speed) <= FASTEST for speed in twist):
+                self._twists.append(twist)
             else:
                 self._twists.clear()
         self._stamp, self._odometry = features.stamp, odometry

@@ -1,0 +1,66 @@
+"""`stopping`: SIGINT and SIGTERM end a node when it has done what it is at."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+__all__ = ["stopping"]
+
+
+class _Stop(BaseException):
+    """Ends a start; a KeyboardInterrupt that passes through `exec` would end all of Python."""
+
+
+@contextmanager
+def stopping() -> Iterator[Callable[[], bool]]:
+    """Give a function that says whether SIGINT or SIGTERM has come.
+
+    Once it has been asked, nothing is interrupted by them. Before, while a node starts, which may
+    compile for a minute, the first of them leaves the block at once. Those that come later change
+    nothing: a launcher may send one beside that of the terminal.
+
+    Examples
+    --------
+    >>> with stopping() as is_stopped:
+    ...     before = is_stopped()
+    ...     signal.raise_signal(signal.SIGTERM)
+    ...     before, is_stopped()
+    (False, True)
+    >>> with stopping() as is_stopped:
+    ...     signal.raise_signal(signal.SIGTERM)
+    ...     print("never printed")
+    """
+    is_running = has_come = False
+
+    def note(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        nonlocal has_come
+        is_first, has_come = not has_come, True
+        if is_first and not is_running:
+            raise _Stop
+
+    def is_stopped() -> bool:
+        nonlocal is_running
+        is_running = True
+        return has_come
+
+    def tell_unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+        # Raised within a callback of the compiler it is lost there, and found by `is_stopped`.
+        if unraisable.exc_type is not _Stop:
+            tell_before(unraisable)
+
+    tell_before, sys.unraisablehook = sys.unraisablehook, tell_unraisable
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield is_stopped
+    except BaseException:
+        # What a start fails with that was interrupted, in an import say, is of no interest.
+        if is_running or not has_come:
+            raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        sys.unraisablehook = tell_before
