@@ -83,12 +83,12 @@ def first_noise(scan, grows):
 
 
 def refined_noise(points, pieces):
-    """Estimate it again: e² = σ² + p² ρ² by least squares over the readings of long pieces."""
+    """Estimate it again: e² = σ² + p² ρ² by least squares over the readings of telling pieces."""
+    long = [(i, j) for i, j in pieces if j - i + 1 >= residual_noise._LEAST_POINTS]
+    telling, scale = telling_pieces(points, long)
     squares, at = [], []
-    for first, last in pieces:
+    for first, last in telling:
         n = last - first + 1
-        if n < residual_noise._LEAST_POINTS:
-            continue
         (a, b), _ = points.line(first, last)
         rho = points.rho[first : last + 1]
         with np.errstate(divide="ignore"):
@@ -97,7 +97,7 @@ def refined_noise(points, pieces):
         at += rho.tolist()
     q, x = np.array(squares), np.array(at) ** 2
     variance = range_variance(np.sqrt(x), points.noise)
-    near = q <= residual_noise._OUT * variance
+    near = q <= residual_noise._OUT * min(scale, 1.0) * variance
     q, x, w = q[near], x[near], 1 / variance[near] ** 2
     if len(q) < residual_noise._LEAST_READINGS:
         return points.noise
@@ -112,6 +112,29 @@ def refined_noise(points, pieces):
         elif both[1] >= 0:
             constant, growth = least, max(w @ ((q - least) * x), 0.0) / (w @ x**2)
     return parts_of(constant, growth, quantum)
+
+
+def telling_pieces(points, pieces):
+    """Leave out the pieces that are far more off their lines than most.
+
+    And χ² of what is left over its degrees of freedom; all, and inf, if it is hardly less.
+    """
+    if not pieces:
+        return pieces, math.inf
+    free = np.array([last - first - 1.0 for first, last in pieces])
+    costs = np.array([points.line(*piece)[1] for piece in pieces])
+    whole = scale = costs.sum() / free.sum()
+    for _ in range(residual_noise._PASSES - 1):
+        near = costs <= scale * (free + residual_noise._ABOVE * np.sqrt(2 * free))
+        most = max(residual_noise._MAJORITY * free.sum(), residual_noise._LEAST_READINGS)
+        if free[near].sum() <= most:
+            break
+        scale = costs[near].sum() / free[near].sum()
+    if not scale < residual_noise._CLEARLY_LESS * whole:
+        return pieces, math.inf
+    # The scale that is found last tells which are left out.
+    kept = costs <= scale * (free + residual_noise._ABOVE * np.sqrt(2 * free))
+    return [piece for piece, near in zip(pieces, kept, strict=True) if near], scale
 
 
 def wall_unevenness(points, cut):

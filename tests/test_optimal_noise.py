@@ -100,6 +100,19 @@ def test_ranges_that_hardly_change_or_jump_tell_no_lattice():
         assert found.sigma > 0.0
 
 
+def test_lines_through_clutter_are_no_noise():
+    """A room at 1 cm, and a heap of 200 beams in it, whose readings are 5 cm off any line."""
+    ring, heap = full_circle(720), slice(250, 450)
+    true = room(ring, BOX)
+    found = []
+    for seed in range(10):
+        ranges = noisy(true, 0.01, seed)
+        ranges[heap] = noisy(true[heap], 0.05, seed + 100)
+        noise = UNAWARE(scan_of(ranges, ring)).noise
+        found.append(math.sqrt(noise.range_variance(2.0)))
+    assert np.mean(found) == pytest.approx(0.01, rel=0.1)
+
+
 def test_an_oblique_wall_is_not_taken_for_noise():
     """At 80° the range bends so much from beam to beam that second differences are no noise."""
     angles = fan(80, math.radians(1.0))

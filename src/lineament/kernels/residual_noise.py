@@ -1,8 +1,10 @@
 """Range noise of a scan, from what its readings are off the lines through them."""
 
+import math
+
 from . import helper
 from .inverse_range import line_through
-from .layout import FIRST, LABEL, LAST, PIECES, RHO, X, Y
+from .layout import COST, FIRST, LABEL, LAST, PIECES, RHO, X, Y
 from .line_fit import range_variance
 from .noise import set_parts
 
@@ -10,19 +12,26 @@ from .noise import set_parts
 _LEAST_POINTS, _LEAST_READINGS = 8, 30
 #: Squares above so many variances are no noise.
 _OUT = 12.0
+#: Deviations that χ² of a piece may be above that of the others, and passes to find out which are.
+_ABOVE, _PASSES = 2.0, 6
+#: Pieces above it are left out where the others, of at least so much of all degrees of freedom,
+#: have less than so much of the variance: by chance some are above it in scans without clutter.
+_MAJORITY, _CLEARLY_LESS = 0.5, 0.6
 
 
 @helper
 def refine_noise(floats, ints, counts, noise, sums):
-    """Estimate the noise again: e² = σ² + p² ρ² by least squares over the readings of all pieces.
+    """Estimate the noise again: e² = σ² + p² ρ² by least squares over the readings of the pieces.
 
-    p stays 0 if it was.
+    Of those that are no more off their lines than most: what a line through clutter is off, is no
+    noise. p stays 0 if it was.
     """
+    scale = _least_scale(floats, ints, counts, sums)
     one, x_sum, xx_sum, q_sum, qx_sum, used = 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for k in range(counts[PIECES]):
         first, last = ints[FIRST, k], ints[LAST, k]
         n = last - first + 1
-        if n < _LEAST_POINTS:
+        if not _tells(floats, k, n, scale):
             continue
         a, b, _ = line_through(sums, ints[LABEL, first], first, last)
         for i in range(first, last + 1):
@@ -30,7 +39,7 @@ def refine_noise(floats, ints, counts, noise, sums):
             error = rho - rho / (a * floats[X, i] + b * floats[Y, i])
             # A line through n readings takes two of their degrees of freedom.
             q, variance = error * error * n / (n - 2.0), range_variance(rho, noise)
-            if q > _OUT * variance:
+            if q > _OUT * min(scale, 1.0) * variance:
                 continue
             w, x = 1.0 / (variance * variance), rho * rho
             one, x_sum, xx_sum = one + w, x_sum + w * x, xx_sum + w * x * x
@@ -48,3 +57,38 @@ def refine_noise(floats, ints, counts, noise, sums):
         elif constant < least:
             constant, growth = least, max(qx_sum - least * x_sum, 0.0) / xx_sum
     set_parts(noise, constant, growth)
+
+
+@helper
+def _least_scale(floats, ints, counts, sums):
+    """χ² of the pieces that are no more off their lines than most, over its degrees of freedom.
+
+    inf if these are hardly less off than all are: then all tell. COST of long pieces is filled.
+    """
+    for k in range(counts[PIECES]):
+        first, last = ints[FIRST, k], ints[LAST, k]
+        if last - first + 1 >= _LEAST_POINTS:
+            _, _, floats[COST, k] = line_through(sums, ints[LABEL, first], first, last)
+    scale, whole, least = math.inf, math.inf, 0.0
+    for step in range(_PASSES):
+        total, free = 0.0, 0.0
+        for k in range(counts[PIECES]):
+            n = ints[LAST, k] - ints[FIRST, k] + 1
+            if _tells(floats, k, n, scale):
+                total += floats[COST, k]
+                free += n - 2.0
+        # No fewer than most; and the same again, once none is left out any more.
+        if free <= least or not 0.0 < total < scale * free:
+            break
+        scale = total / free
+        if step == 0:
+            whole, least = scale, max(_MAJORITY * free, _LEAST_READINGS)
+    return scale if scale < _CLEARLY_LESS * whole else math.inf
+
+
+@helper
+def _tells(floats, k, n, scale):
+    """Whether a piece of n readings is long, and χ² of its line not far above `scale` for each."""
+    if n < _LEAST_POINTS:
+        return False
+    return floats[COST, k] <= scale * (n - 2.0 + _ABOVE * math.sqrt(2.0 * (n - 2.0)))

@@ -57,7 +57,7 @@ class Optimal(MethodBase):
 
     1. *Noise*: the lattice of the ranges, the constant part and that which grows with range are
        estimated, first from what readings are off the line through their neighbours, then from
-       what they are off the lines of pieces. Spikes are left out.
+       what they are off the lines of pieces, but for those through clutter. Spikes are left out.
     2. *Cluster*: neighbours part where too many beams are missing, or where they are farther
        apart than readings of one surface can be, almost edge-on.
     3. *Cut*: stretches of four readings are merged, the cheapest pair first, while one line

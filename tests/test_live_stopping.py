@@ -1,0 +1,72 @@
+"""Signals: before a node runs the first leaves the block, later they are only noted."""
+
+import signal
+
+import pytest
+
+from lineament.live.stopping import stopping
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_start_is_left_at_once(number):
+    before = [signal.getsignal(each) for each in SIGNALS]
+    reached = []
+    with stopping():
+        reached.append("begun")
+        signal.raise_signal(number)
+        reached.append("gone on")
+    assert reached == ["begun"]
+    assert [signal.getsignal(each) for each in SIGNALS] == before
+
+
+def test_once_it_runs_signals_are_noted():
+    with stopping() as is_stopped:
+        assert not is_stopped()
+        for number in SIGNALS:
+            signal.raise_signal(number)
+            assert is_stopped()
+
+
+def test_what_an_interrupted_start_fails_with_is_not_told():
+    with stopping():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except BaseException:
+            # As the import of an extension does.
+            raise SystemError("initialization failed") from None
+
+
+def test_later_signals_do_not_disturb_the_end():
+    with stopping():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_stop_that_is_lost_in_a_callback_is_found(capfd):
+    class Callback:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    with stopping() as is_stopped:
+        del (found := [Callback()])[0]
+        assert not found
+        assert is_stopped()
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("runs", [False, True])
+def test_other_errors_are_raised(runs):
+    def fail() -> None:
+        with stopping() as is_stopped:
+            if runs:
+                is_stopped()
+                signal.raise_signal(signal.SIGINT)
+            raise OSError("faulty")
+
+    with pytest.raises(OSError, match="faulty"):
+        fail()
