@@ -20,7 +20,7 @@ def test_garbage_is_searched_for_again_after_a_run(tmp_path):
     path = tmp_path / "log.npz"
     save_npz(path, [LaserScan([2.0] * 5, 0.0, 0.01, stamp=i / 10) for i in range(3)])
     config = LiveConfig(log=str(path), rate=0, ros=0, foxglove=0)
-    report = run_live(config, tell=lambda line: None, show=lambda report: None)
+    report = run_live(config, tell=[].append, show=[].append)
     assert report.total_scans == 3
     assert is_searched_for_garbage()
 
@@ -28,5 +28,5 @@ def test_garbage_is_searched_for_again_after_a_run(tmp_path):
 def test_garbage_is_searched_for_again_after_a_start_that_fails(tmp_path):
     config = LiveConfig(log=str(tmp_path / "missing.npz"), rate=0, ros=0, foxglove=0)
     with pytest.raises(LineamentError, match=r"missing\.npz"):
-        run_live(config, tell=lambda line: None)
+        run_live(config, tell=[].append)
     assert is_searched_for_garbage()
