@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -18,8 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 DOMAIN = 77
 BEAMS = 1081
@@ -172,25 +171,17 @@ def memory_of(pid: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def participant() -> tuple[Any, Any]:
-    from cyclonedds.domain import Domain, DomainParticipant
-    from dds_peer import CONFIGURATION
-
-    domain = Domain(DOMAIN, CONFIGURATION.format(lease="10s"))
-    return domain, DomainParticipant(DOMAIN)
-
-
 def publish(rate: float, count: int, out: Path) -> None:
     """Publish simulated scans, as soon as somebody listens; keep when each was sent."""
-    import dds_types
     from cyclonedds.pub import DataWriter
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.topic import Topic
+    from listening import dds_types, take_part
 
     scans = [bytearray(scan.serialize()) for scan in simulated(dds_types)]
     # They are serialised already: only the stamp changes.
     dds_types.LaserScan.serialize = lambda self, **_: self.data
-    domain, entity = participant()
+    domain, entity = take_part(DOMAIN)
     qos = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(10))
     writer = DataWriter(entity, Topic(entity, "rt/scan", dds_types.LaserScan), qos)
     out.with_name(out.name + ".ready").touch()
@@ -230,47 +221,20 @@ def simulated(types: Any) -> list[Any]:
 
 def listen(topics: list[str], out: Path) -> None:
     """Listen to topics of the node; keep when the features of each scan came."""
-    import struct
-
-    import dds_types
-    from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState, WaitSet
-    from cyclonedds.qos import Policy, Qos
-    from cyclonedds.sub import DataReader
-    from cyclonedds.topic import Topic
-    from cyclonedds.util import duration
+    from listening import Listener
 
     kinds = {"features": "PointCloud2", "corners": "PoseArray", "markers": "MarkerArray"}
-    domain, entity = participant()
-    qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(100))
-    waiting, readers = WaitSet(entity), []
-    for topic in topics:
-        genuine = getattr(dds_types, kinds[topic])
-
-        # It is not taken apart: the listener must keep up.
-        genuine.deserialize = classmethod(kept)
-        readers.append(DataReader(entity, Topic(entity, f"rt/scan/{topic}", genuine), qos))
-        any_state = ViewState.Any | SampleState.NotRead | InstanceState.Any
-        waiting.attach(ReadCondition(readers[-1], any_state))
-    stopped = []
+    listener = Listener(DOMAIN, {f"/scan/{topic}": kinds[topic] for topic in topics})
+    stopped: list[int] = []
     signal.signal(signal.SIGTERM, lambda *_: stopped.append(1))
     heard = []
     while not stopped:
-        waiting.wait(duration(milliseconds=100))
-        now = time.monotonic_ns()
-        for k, reader in enumerate(readers):
-            for sample in reader.take(100):
-                if k == 0 and hasattr(sample, "data"):
-                    seconds, nanoseconds = struct.unpack_from("<iI", sample.data, 4)
-                    heard.append((1000 * seconds + nanoseconds // 1_000_000, now))
+        messages, now = listener.hear(), time.monotonic_ns()
+        for topic, data in messages:
+            if topic == f"/scan/{topics[0]}":
+                seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+                heard.append((1000 * seconds + nanoseconds // 1_000_000, now))
     np.save(out, np.array(heard, np.int64).reshape(-1, 2))
-    del domain
-
-
-def kept(kind: Any, data: bytes, **_: Any) -> Any:
-    """Keep a message as it came."""
-    message = kind.__new__(kind)
-    message.data = data
-    return message
 
 
 if __name__ == "__main__":

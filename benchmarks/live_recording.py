@@ -14,12 +14,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
+from listening import Listener
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 DOMAIN = 78
 TOPICS = {
@@ -53,26 +51,8 @@ def main() -> None:
 
 def record(output: Path, seconds: float) -> tuple[dict[str, int], dict[str, str]]:
     """Write what comes on the topics; how many on each, and the last diagnostics."""
-    import dds_types
-    from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState, WaitSet
-    from cyclonedds.domain import Domain, DomainParticipant
-    from cyclonedds.qos import Policy, Qos
-    from cyclonedds.sub import DataReader
-    from cyclonedds.topic import Topic
-    from cyclonedds.util import duration
-    from dds_peer import CONFIGURATION
-
     store = get_typestore(Stores.ROS2_HUMBLE)
-    domain = Domain(DOMAIN, CONFIGURATION.format(lease="10s"))
-    participant = DomainParticipant(DOMAIN)
-    qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1000))
-    waiting, readers = WaitSet(participant), {}
-    for topic, kind in TOPICS.items():
-        known = getattr(dds_types, kind.rpartition("/")[2])
-        known.deserialize = classmethod(kept)
-        readers[topic] = DataReader(participant, Topic(participant, f"rt{topic}", known), qos)
-        state = ViewState.Any | SampleState.NotRead | InstanceState.Any
-        waiting.attach(ReadCondition(readers[topic], state))
+    listener = Listener(DOMAIN, TOPICS)
     counts, report = dict.fromkeys(TOPICS, 0), b""
     with output.open("wb") as stream:
         file = Writer(stream)
@@ -84,25 +64,14 @@ def record(output: Path, seconds: float) -> tuple[dict[str, int], dict[str, str]
             channels[topic] = file.register_channel(topic, "cdr", schema)
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            waiting.wait(duration(milliseconds=200))
-            for topic, reader in readers.items():
-                for sample in reader.take(100):
-                    if hasattr(sample, "data"):
-                        now = time.time_ns()
-                        file.add_message(channels[topic], now, sample.data, now)
-                        counts[topic] += 1
-                        report = sample.data if topic == "/diagnostics" else report
+            for topic, data in listener.hear():
+                now = time.time_ns()
+                file.add_message(channels[topic], now, data, now)
+                counts[topic] += 1
+                report = data if topic == "/diagnostics" else report
         file.finish()
-    del domain
     status = store.deserialize_cdr(report, TOPICS["/diagnostics"]).status[0]
     return counts, {value.key: value.value for value in status.values}
-
-
-def kept(kind: Any, data: bytes, **_: Any) -> Any:
-    """Keep a message as it came."""
-    message = kind.__new__(kind)
-    message.data = data
-    return message
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import arc, corner, features, segment
-from naive_tracking import residuals
+from naive_motion import residuals
 
 import lineament as ln
 from lineament.poses import compose, inverse

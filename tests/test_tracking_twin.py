@@ -3,13 +3,16 @@
 import math
 from dataclasses import replace
 
-import naive_tracking as naive
+import naive_association
+import naive_motion
 import numpy as np
 import pytest
 from handmade import arc, corner, features, random_features, segment, shaken
+from naive_tracking import NaiveTracker
 
 import lineament as ln
 from lineament.evaluation.experiments.tracking import LOGS, load_recording, stand_in_odometry
+from lineament.poses import inverse
 from lineament.tracking import Tracker, associate, estimate_motion
 from lineament.tracking.association import KINDS, chi_square
 
@@ -53,14 +56,16 @@ def test_pairs_and_motion_of_random_features(seed):
     before, rng = varied(seed), np.random.default_rng([seed, 1])
     motion = tuple((rng.normal(size=3) * (0.1, 0.1, 0.3 if seed % 3 else 3.0)).tolist())
     now = shaken(before, seed).transform(*motion)
-    back = naive.inverse(motion)
+    back = inverse(motion)
     for spread, roughness in ((None, 0.0), (SPREAD, 0.0), (SPREAD, 0.02)):
         found = associate(before, now, back, spread, gate=0.9, roughness=roughness)
-        expected = naive.associate(before, now, back, spread, gate=0.9, roughness=roughness)
+        expected = naive_association.associate(
+            before, now, back, spread, gate=0.9, roughness=roughness
+        )
         assert_same_pairs(found, expected)
         assert_same_motion(
             estimate_motion(found, back, spread, roughness=roughness),
-            naive.estimate_motion(expected, back, spread, roughness=roughness),
+            naive_motion.estimate_motion(expected, back, spread, roughness=roughness),
         )
 
 
@@ -78,12 +83,12 @@ def test_crowds_are_paired_at_the_least_cost(seed):
         )
         for _ in range(2)
     ]
-    assert_same_pairs(associate(*crowds), naive.associate(*crowds))
+    assert_same_pairs(associate(*crowds), naive_association.associate(*crowds))
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_tracker_of_random_features(seed):
-    tracker, twin, frame = Tracker(max_missed=2), naive.NaiveTracker(max_missed=2), varied(seed)
+    tracker, twin, frame = Tracker(max_missed=2), NaiveTracker(max_missed=2), varied(seed)
     for k in range(6):
         now = replace(shaken(frame, 10 * seed + k), stamp=0.1 * k)
         assert_same_tracks(tracker(now), twin(now))
@@ -103,7 +108,7 @@ def test_tracker_of_a_real_log(data_dir, log):
     frames = [extract(scan) for scan in recording.scans]
     odometry = stand_in_odometry(recording.poses, seed=1)
     for poses in (odometry, [None] * len(frames)):
-        tracker, twin = Tracker(), naive.NaiveTracker()
+        tracker, twin = Tracker(), NaiveTracker()
         for frame, pose in zip(frames, poses, strict=True):
             assert_same_tracks(tracker(frame, pose), twin(frame, pose))
 
@@ -111,5 +116,5 @@ def test_tracker_of_a_real_log(data_dir, log):
 @pytest.mark.parametrize("degrees", [2, 3])
 @pytest.mark.parametrize("probability", [1e-9, 0.1, 0.5, 0.99, 1 - 1e-12])
 def test_quantiles(probability, degrees):
-    expected = naive.chi_square(probability, degrees)
+    expected = naive_association.chi_square(probability, degrees)
     np.testing.assert_allclose(chi_square(probability, degrees), expected, rtol=1e-7)

@@ -5,16 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LaserScan", "RangeNoise"]
+from .fields import (
+    Array,
+    Pose,
+    checked_pose,
+    finite,
+    irregular_bearings,
+    number,
+    range_limits,
+    regular_bearings,
+    stamp_seconds,
+    vector,
+)
 
-Array = NDArray[np.float64]
-Pose = tuple[float, float, float]
+__all__ = ["Array", "LaserScan", "Pose", "RangeNoise"]
+
 Distance = TypeVar("Distance", float, Array)
 
 
@@ -57,7 +67,7 @@ class RangeNoise:
             value = getattr(self, name)
             if type(value) is float and 0 <= value < math.inf:
                 continue
-            value = _number(f"RangeNoise.{name}", value)
+            value = number(f"RangeNoise.{name}", value)
             if not 0 <= value < math.inf:
                 raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
             object.__setattr__(self, name, value)
@@ -142,24 +152,24 @@ class LaserScan:
         pose: Pose | None = None,
     ) -> None:
         own = self.__dict__
-        own["ranges"] = _vector("ranges", ranges)
+        own["ranges"] = vector("ranges", ranges)
         n = len(own["ranges"])
         own["is_regular"] = angles is None
         if angles is None:
-            first, step = _regular_bearings(angle_min, angle_increment, n)
+            first, step = regular_bearings(angle_min, angle_increment, n)
         elif angle_min is None and angle_increment is None:
-            own["angles"] = _vector("angles", angles, n)
-            first, step = _irregular_bearings(own["angles"])
+            own["angles"] = vector("angles", angles, n)
+            first, step = irregular_bearings(own["angles"])
         else:
             raise ValueError("angles are given together with angle_min or angle_increment")
         own["angle_min"], own["angle_increment"] = first, step
-        own["range_min"], own["range_max"] = _limits(range_min, range_max)
-        own["stamp"] = _finite("stamp", stamp)
-        own["scan_time"] = _finite("scan_time", scan_time)
-        own["time_increment"] = _finite("time_increment", time_increment)
+        own["range_min"], own["range_max"] = range_limits(range_min, range_max)
+        own["stamp"] = finite("stamp", stamp)
+        own["scan_time"] = finite("scan_time", scan_time)
+        own["time_increment"] = finite("time_increment", time_increment)
         own["frame_id"] = str(frame_id)
-        own["intensities"] = None if intensities is None else _vector("intensities", intensities, n)
-        own["pose"] = None if pose is None else _pose(pose)
+        own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
+        own["pose"] = None if pose is None else checked_pose(pose)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
@@ -226,7 +236,7 @@ class LaserScan:
         ((3.0, 4.0, 0.0), None)
         """
         other = LaserScan.__new__(LaserScan)
-        other.__dict__.update(self.__dict__, pose=None if pose is None else _pose(pose))
+        other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
         return other
 
     @classmethod
@@ -268,120 +278,10 @@ class LaserScan:
                 range_max=message.range_max,
                 scan_time=message.scan_time,
                 time_increment=message.time_increment,
-                stamp=0.0 if header is None else _stamp_seconds(header.stamp),
+                stamp=0.0 if header is None else stamp_seconds(header.stamp),
                 frame_id="" if header is None else header.frame_id,
                 intensities=intensities if has_intensities else None,
                 pose=pose,
             )
         except AttributeError as error:
             raise ValueError(f"message is no sensor_msgs/LaserScan: {error}") from None
-
-
-def _number(name: str, value: object) -> float:
-    if type(value) is float:
-        return value  # An isinstance of an abstract class takes a microsecond.
-    if isinstance(value, Real) and not isinstance(value, bool):
-        return float(value)
-    raise ValueError(f"{name} is {value!r}, expected a number")
-
-
-def _finite(name: str, value: object) -> float:
-    if type(value) is float and math.isfinite(value):
-        return value
-    number = _number(name, value)
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {number}, expected a finite number")
-    return number
-
-
-def _vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
-    """Copy `values` into a read-only float64 vector."""
-    try:
-        given = np.asarray(values)
-        if given.dtype.kind == "c":
-            raise TypeError
-        vector = _as_float64(given)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
-    if vector.ndim != 1:
-        raise ValueError(f"{name} has shape {vector.shape}, expected one dimension")
-    if length is not None and len(vector) != length:
-        raise ValueError(f"{name} has {len(vector)} values, expected {length}, one for each range")
-    vector.setflags(write=False)
-    return vector
-
-
-# A damaged file may hold a signalling NaN: it becomes a NaN like any other, without a warning.
-@np.errstate(invalid="ignore")
-def _as_float64(values: NDArray[Any]) -> Array:
-    return values.astype(np.float64)
-
-
-def _regular_bearings(first: object, step: object, n: int) -> tuple[float, float]:
-    if first is None or step is None:
-        raise ValueError("angle_min and angle_increment, or angles, must be given")
-    first, step = _finite("angle_min", first), _finite("angle_increment", step)
-    if n > 1 and not first + 0.5 * step > first:
-        if step > 0:
-            raise ValueError(f"angle_increment is {step}, too small for bearings from {first}")
-        raise ValueError(f"angle_increment is {step}, expected > 0: beams run counter-clockwise")
-    last = first + (n - 1) * step
-    if last - first > 2 * math.pi:  # Rare, and the check proper takes longer.
-        _check_turn("angle_increment", first, last, step)
-    return first, step
-
-
-@np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
-def _irregular_bearings(angles: Array) -> tuple[float, float]:
-    n = len(angles)
-    bad = np.flatnonzero(~np.isfinite(angles))
-    if len(bad):
-        raise ValueError(f"angles[{bad[0]}] is {angles[bad[0]]}, expected a finite bearing")
-    steps = np.diff(angles)
-    bad = np.flatnonzero(steps <= 0)
-    if len(bad):
-        i = int(bad[0]) + 1
-        raise ValueError(
-            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
-        )
-    if n == 0:
-        return 0.0, 0.0
-    step = float(np.median(steps)) if n > 1 else 0.0
-    _check_turn("angles", angles[0], angles[-1], step)
-    return float(angles[0]), step
-
-
-def _check_turn(name: str, first: float, last: float, step: float) -> None:
-    # Some drivers repeat the first bearing at the end of the turn, and round their increment.
-    if last - first > 2 * math.pi + min(1.5 * step, 0.1):
-        raise ValueError(
-            f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
-        )
-
-
-def _limits(low: object, high: object) -> tuple[float, float]:
-    range_min, range_max = _number("range_min", low), _number("range_max", high)
-    if not 0 <= range_min < math.inf:
-        raise ValueError(f"range_min is {range_min}, expected a finite number ≥ 0")
-    if not range_max > range_min:
-        raise ValueError(f"range_max is {range_max}, expected more than range_min = {range_min}")
-    return range_min, range_max
-
-
-def _pose(pose: Any) -> Pose:
-    try:
-        x, y, theta = (_finite("pose", value) for value in pose)
-    except TypeError:
-        raise ValueError(f"pose is {pose!r}, expected (x, y, theta)") from None
-    except ValueError:
-        raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
-    return x, y, theta
-
-
-def _stamp_seconds(stamp: Any) -> float:
-    """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
-    if hasattr(stamp, "sec"):
-        return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
-    if hasattr(stamp, "secs"):
-        return float(stamp.secs) + 1e-9 * float(stamp.nsecs)
-    return float(stamp)

@@ -1,0 +1,143 @@
+"""The fields of a scan and of its noise, as they are given: checked, and copied."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "Array",
+    "Pose",
+    "checked_pose",
+    "finite",
+    "irregular_bearings",
+    "number",
+    "range_limits",
+    "regular_bearings",
+    "stamp_seconds",
+    "vector",
+]
+
+Array = NDArray[np.float64]
+#: x, y [m], and heading [rad].
+Pose = tuple[float, float, float]
+
+
+def number(name: str, value: object) -> float:
+    """Give a real number as a float; ValueError names the field."""
+    if type(value) is float:
+        return value  # An isinstance of an abstract class takes a microsecond.
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value)
+    raise ValueError(f"{name} is {value!r}, expected a number")
+
+
+def finite(name: str, value: object) -> float:
+    """Give a finite number as a float."""
+    if type(value) is float and math.isfinite(value):
+        return value
+    given = number(name, value)
+    if not math.isfinite(given):
+        raise ValueError(f"{name} is {given}, expected a finite number")
+    return given
+
+
+def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
+    """Copy `values` into a read-only float64 vector."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind == "c":
+            raise TypeError
+        copy = _as_float64(given)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
+    if copy.ndim != 1:
+        raise ValueError(f"{name} has shape {copy.shape}, expected one dimension")
+    if length is not None and len(copy) != length:
+        raise ValueError(f"{name} has {len(copy)} values, expected {length}, one for each range")
+    copy.setflags(write=False)
+    return copy
+
+
+# A damaged file may hold a signalling NaN: it becomes a NaN like any other, without a warning.
+@np.errstate(invalid="ignore")
+def _as_float64(values: NDArray[Any]) -> Array:
+    return values.astype(np.float64)
+
+
+def regular_bearings(first: object, step: object, n: int) -> tuple[float, float]:
+    """First bearing and step of `n` beams [rad], which must go round once at most."""
+    if first is None or step is None:
+        raise ValueError("angle_min and angle_increment, or angles, must be given")
+    first, step = finite("angle_min", first), finite("angle_increment", step)
+    if n > 1 and not first + 0.5 * step > first:
+        if step > 0:
+            raise ValueError(f"angle_increment is {step}, too small for bearings from {first}")
+        raise ValueError(f"angle_increment is {step}, expected > 0: beams run counter-clockwise")
+    last = first + (n - 1) * step
+    if last - first > 2 * math.pi:  # Rare, and the check proper takes longer.
+        _check_turn("angle_increment", first, last, step)
+    return first, step
+
+
+@np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
+def irregular_bearings(angles: Array) -> tuple[float, float]:
+    """First bearing and median step [rad] of bearings that increase, and go round once at most."""
+    n = len(angles)
+    bad = np.flatnonzero(~np.isfinite(angles))
+    if len(bad):
+        raise ValueError(f"angles[{bad[0]}] is {angles[bad[0]]}, expected a finite bearing")
+    steps = np.diff(angles)
+    bad = np.flatnonzero(steps <= 0)
+    if len(bad):
+        i = int(bad[0]) + 1
+        raise ValueError(
+            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
+        )
+    if n == 0:
+        return 0.0, 0.0
+    step = float(np.median(steps)) if n > 1 else 0.0
+    _check_turn("angles", angles[0], angles[-1], step)
+    return float(angles[0]), step
+
+
+def _check_turn(name: str, first: float, last: float, step: float) -> None:
+    # Some drivers repeat the first bearing at the end of the turn, and round their increment.
+    if last - first > 2 * math.pi + min(1.5 * step, 0.1):
+        raise ValueError(
+            f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
+        )
+
+
+def range_limits(low: object, high: object) -> tuple[float, float]:
+    """Limits of valid ranges [m], in order."""
+    range_min, range_max = number("range_min", low), number("range_max", high)
+    if not 0 <= range_min < math.inf:
+        raise ValueError(f"range_min is {range_min}, expected a finite number ≥ 0")
+    if not range_max > range_min:
+        raise ValueError(f"range_max is {range_max}, expected more than range_min = {range_min}")
+    return range_min, range_max
+
+
+def checked_pose(pose: Any) -> Pose:
+    """Three finite numbers."""
+    try:
+        x, y, theta = (finite("pose", value) for value in pose)
+    except TypeError:
+        raise ValueError(f"pose is {pose!r}, expected (x, y, theta)") from None
+    except ValueError:
+        raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
+    return x, y, theta
+
+
+def stamp_seconds(stamp: Any) -> float:
+    """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
+    if hasattr(stamp, "sec"):
+        return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+    if hasattr(stamp, "secs"):
+        return float(stamp.secs) + 1e-9 * float(stamp.nsecs)
+    return float(stamp)
