@@ -70,7 +70,9 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
 
     tables = features.segments, features.corners, features.arcs
     words = np.empty((sum(map(len, tables)), FEATURE_POINT.itemsize // 4), "<f4")
-    fill_points(*(form for table in tables for form in _forms(table)), words, words.view("<i4"))
+    forms = [form for table in tables for form in _forms(table)]
+    with np.errstate(over="ignore"):  # What no float32 holds is infinite, whether compiled or not.
+        fill_points(*forms, words, words.view("<i4"))
     points = words.view(FEATURE_POINT).reshape(len(words))
     if tracks is not None:
         numbers = tracks.segments, tracks.corners, tracks.arcs
