@@ -31,6 +31,7 @@ from naive_optimal_pieces import (
     drop_round,
     excess,
     move_borders,
+    part_again,
     settle,
     straighten,
     stretches,
@@ -100,13 +101,14 @@ def measured(points, joined, labels, angles):
 
 
 def cut_roughly(points, classes, method, parts):
-    """Pieces of each class by merging alone."""
+    """Pieces of each class by merging, and parted again."""
     cut = []
     for span in classes:
         pieces = agglomerate(points, stretches(*span), optimal._FIRST_SHARE * method.evidence)
         if "borders" in parts:
             pieces = move_borders(points, pieces, optimal._MARGIN)
-        cut.append(agglomerate(points, pieces, method.evidence))
+        pieces = agglomerate(points, pieces, method.evidence)
+        cut.append(part_again(points, pieces, method.evidence))
     return cut
 
 

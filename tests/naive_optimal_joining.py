@@ -18,7 +18,7 @@ def end_share(points, piece):
 
 
 def meet(points, one, other, step):
-    """Whether two pieces meet between their readings, but for a beam and three deviations.
+    """Whether two pieces meet between their readings, but for half a beam and three deviations.
 
     If one is more than both are long together, they may meet anywhere.
     """
@@ -36,7 +36,7 @@ def meet(points, one, other, step):
     ends = points.xy[[*one, *other]]
     if deviation > np.linalg.norm(ends[1] - ends[0]) + np.linalg.norm(ends[3] - ends[2]):
         return False
-    tolerance = step * rho + 3 * deviation
+    tolerance = joining._MISSED * step * rho + 3 * deviation
     # Distances from the beams of both, positive between them.
     after = np.linalg.det([points.xy[i], at]) / points.rho[i]
     before = np.linalg.det([at, points.xy[j]]) / points.rho[j]

@@ -146,17 +146,24 @@ def wall_unevenness(points, cut):
                 walls[-1] = (walls[-1][0], piece[1])
             else:
                 walls.append(piece)
-    errors, free, variances = [], 0, []
+    errors, alike, free, variances = [], np.zeros(2), 0, []
     for first, last in walls:
         if last - first + 1 >= unevenness._LEAST_POINTS:
-            own = points.errors(points.line(first, last)[0], first, last)
+            span, (ab, _) = slice(first, last + 1), points.line(first, last)
+            own = points.errors(ab, first, last)
             near = own <= unevenness._OUT
             errors += own[near].tolist()
+            off = near * (1 - points.xy[span] @ ab)
+            for lag in (1, 2):
+                alike[lag - 1] += (points.weight[span] * off)[lag:] @ off[:-lag]
+            alike += 2 * own[near].sum() / max(near.sum(), 1)
             middle = points.rho[(first + last) // 2]
             variances.append((last - first - 1) * range_variance(middle, points.noise))
             free += near.sum() - 2
     if free < unevenness._LEAST_POINTS:
         return 0.0
-    excess = sum(errors) / free - 1 - unevenness._SURE * math.sqrt(2 / free)
+    is_alike = max(alike) * math.sqrt(free) > unevenness._ALIKE * sum(errors)
+    sure = unevenness._SURE if is_alike else unevenness._ALONE
+    excess = sum(errors) / free - 1 - sure * math.sqrt(2 / free)
     variance = unevenness._CUT_AWAY * max(excess, 0.0) * sum(variances) / free
     return min(variance, unevenness.MOST_UNEVEN**2)

@@ -97,10 +97,27 @@ def agglomerate(points, pieces, evidence):
             own[k : k + 2] = [joint[k]]
 
 
+def part_again(points, pieces, evidence):
+    """Part each piece, and its parts, where two lines explain it better by the evidence."""
+    out, rest = [], list(pieces)
+    while rest:
+        a, b = piece = rest.pop(0)
+        whole, keep = points.line(a, b)[1], agglomeration._LEAST
+        parts = [((a, k - 1), (k, b)) for k in range(a + keep, b - keep + 2)]
+        if parts and whole - (b - a + 1) > evidence:
+            costs = [points.line(*one)[1] + points.line(*other)[1] for one, other in parts]
+            k = next(k for k, cost in enumerate(costs) if cost <= min(costs) * (1 + 1e-12))
+            if whole - costs[k] > evidence:
+                rest[:0] = parts[k]
+                continue
+        out.append(piece)
+    return out
+
+
 def end_on(points, ab, inner, old, new, way):
     """Where a piece ends on its line, between `inner` and `new`, going to the right or left.
 
-    It ended at `old`, and gains points until two in a row are off.
+    It ended at `old`, and gains points until two in a row are off, or one far off.
     """
 
     def is_on(i):
@@ -112,7 +129,7 @@ def end_on(points, ab, inner, old, new, way):
     for i in range(end + way, new + way, way):
         if is_on(i):
             end = i
-        elif abs(i - end) == 2:
+        elif abs(i - end) == 2 or points.error(ab, i) > borders._GROSS * points.price:
             break
     return end
 
@@ -158,16 +175,19 @@ def shared(points, kept, piece, rest, evidence):
     nothing = np.full(b - a + 1, points.price)
     left = points.line(*kept[-1])[0] if kept else None
     right = points.line(*rest[0])[0] if rest else None
+    # What ends before is no neighbour.
+    goes_on = kept and end_on(points, left, kept[-1][1], kept[-1][1], a - 1, 1) >= a - 2
+    comes_on = rest and end_on(points, right, rest[0][0], rest[0][0], b + 1, -1) <= b + 2
     shift, least = best_border(
-        points.errors(left, a, b, points.price) if kept else nothing,
-        points.errors(right, a, b, points.price) if rest else nothing,
+        points.errors(left, a, b, points.price) if goes_on else nothing,
+        points.errors(right, a, b, points.price) if comes_on else nothing,
     )
     if least > evidence + min(points.line(a, b)[1], nothing.sum()):
         return False
-    if kept:
+    if goes_on:
         first, last = kept[-1]
         kept[-1] = (first, end_on(points, left, last, last, a + shift - 1, 1))
-    if rest:
+    if comes_on:
         first, last = rest[0]
         rest[0] = (end_on(points, right, first, first, a + shift, -1), last)
     return True

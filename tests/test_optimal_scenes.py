@@ -9,12 +9,11 @@ import pytest
 from worlds import NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor
-from lineament.simulation import Sensor, World
+from lineament.evaluation.segments import segment_scores
+from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 UNAWARE, AWARE = Extractor("optimal"), Extractor("optimal", noise=NOISE)
 SENSOR = Sensor("fan", 481, math.radians(-80), STEP, noise=NOISE)
-#: Of few walls some are uneven by chance, and ask more of a column of few beams.
-EVEN = Extractor("optimal", noise=NOISE, without=("unevenness",))
 #: Noise estimated, and given.
 extractors = pytest.mark.parametrize("extractor", [UNAWARE, AWARE], ids=["estimated", "given"])
 
@@ -83,7 +82,7 @@ def test_wall_of_four_beams_is_a_wall(extractor):
 # Columns and polygons
 
 
-@pytest.mark.parametrize("extractor", [UNAWARE, EVEN], ids=["estimated", "given"])
+@extractors
 @pytest.mark.parametrize("radius", [0.15, 0.25, 0.5])
 def test_column_in_front_of_a_wall_is_one_arc(extractor, radius):
     world = World([[4.5, -6, 4.5, 6]], [[2.5, 0.3, radius]])
@@ -158,6 +157,26 @@ def test_doorway_is_not_bridged(extractor, behind):
         assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
     kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
     assert features.breakpoints["kind"].tolist() == [*kinds, "scan_end", "scan_end"]
+
+
+@pytest.mark.parametrize("beams", [(6, 6), (6, 12), (8, 8), (8, 10), (10, 8), (10, 10)])
+def test_step_of_short_walls_parts_them_wherever_it_is(beams):
+    """As pieces begin with stretches of four readings: the step may be within one."""
+    first, n = beams[0], sum(beams)
+    angles = math.radians(1.0) * (np.arange(n) - n // 2)
+    ranges = np.where(np.arange(n) < first, wall(angles, 3.0, 0), wall(angles, 3.08, 0))
+    for seed in range(5):
+        features = AWARE(scan_of(noisy(ranges, seed), angles))
+        assert len(features.segments) == 2
+        assert abs(features.segments["first_beam"][1] - first) <= 1
+
+
+def test_wall_behind_a_doorway_is_not_lost():
+    """On one line with the wall before, and two readings of the frame on it by chance."""
+    (world, pose), sensor = scene("corridor", 20010), SENSORS["lms181"]
+    features = UNAWARE(sensor.scan(world, pose, np.random.default_rng(20010)))
+    scores = segment_scores(features, truth(world, pose, sensor)).counts
+    assert scores.correct == scores.true
 
 
 @extractors

@@ -8,6 +8,8 @@ from .layout import COST, FIRST, JOINT_COST, LAST
 
 #: χ² of a point that is still on a line.
 _GOOD = 4.0
+#: Points of either part of a piece.
+_LEAST = 3
 
 
 @helper
@@ -78,3 +80,42 @@ def _merge_cheapest(first, last, own, joint, low, high, evidence):
 def _rise(own, joint, k, high):
     """Tell what merging a piece with the one before raises χ² by."""
     return joint[k] - own[k - 1] - own[k] if k < high else math.inf
+
+
+@helper
+def part_again(ints, sums, c, low, high, evidence):
+    """Part pieces of class c where two lines explain them better, by more than `evidence`.
+
+    Merging begins with stretches: a step within one is in both its pairs, and raises neither.
+    Returns one more than the last piece.
+    """
+    first, last = ints[FIRST], ints[LAST]
+    k = low
+    while k < high:
+        i, j = first[k], last[k]
+        _, _, whole = line_through(sums, c, i, j)
+        # Most pieces are no more off than by noise, and need no closer look.
+        if whole - (j - i + 1) > evidence and j - i + 1 >= 2 * _LEAST:
+            border, parts = _best_border(sums, c, i, j)
+            if whole - parts > evidence:
+                for m in range(high, k + 1, -1):
+                    first[m], last[m] = first[m - 1], last[m - 1]
+                last[k], first[k + 1], last[k + 1] = border - 1, border, j
+                high += 1
+                continue  # Either part may be two.
+        k += 1
+    return high
+
+
+@helper
+def _best_border(sums, c, i, j):
+    """First point of the second of the two lines that explain points i..j best, and their χ²."""
+    border, least = i + _LEAST, math.inf
+    for k in range(i + _LEAST, j - _LEAST + 2):
+        _, _, before = line_through(sums, c, i, k - 1)
+        if before >= least:
+            break  # More points do not lessen it.
+        _, _, after = line_through(sums, c, k, j)
+        if before + after < least:
+            border, least = k, before + after
+    return border, least

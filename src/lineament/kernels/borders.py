@@ -10,6 +10,8 @@ from .layout import FIRST, LAST
 _LEAST = 3
 #: Ends that a piece may lose.
 _ENDS = 2
+#: Prices from which on a single reading that is off ends a piece: its line would bend to it.
+_GROSS = 8.0
 
 
 @helper
@@ -42,7 +44,7 @@ def _end_on(floats, a, b, inner, old, new, way, price):
     """Where a piece ends that goes on to the right (`way` 1) or the left (-1).
 
     It may go as far as point `new`, and ended at `old`. It keeps the points up to `inner`, and
-    gains others until two in a row are off its line.
+    gains others until two in a row are off its line, or one far off.
     """
     end = old if way * (new - old) > 0 else new
     while end != inner and squared_error(floats, a, b, end) > price:
@@ -50,10 +52,11 @@ def _end_on(floats, a, b, inner, old, new, way, price):
     i, off = end, 0
     while i != new and off < 2:
         i += way
-        if squared_error(floats, a, b, i) <= price:
+        error = squared_error(floats, a, b, i)
+        if error <= price:
             end, off = i, 0
         else:
-            off += 1
+            off += 2 if error > _GROSS * price else 1
     return end
 
 
@@ -90,15 +93,22 @@ def dissolve(floats, ints, sums, c, low, high, most, evidence, price):
 
 @helper
 def _share(floats, ints, sums, c, low, high, kept, k, price, most):
-    """Share the points of a piece between its neighbours, if that costs at most so much."""
+    """Share the points of a piece between its neighbours, if that costs at most so much.
+
+    A neighbour that ends before is none: the same wall may go on behind a doorway.
+    """
     first, last = ints[FIRST], ints[LAST]
     start, end = first[k], last[k]
     a1, b1, a2, b2 = 0.0, 0.0, 0.0, 0.0
     before, after = kept > low, k + 1 < high
     if before:
         a1, b1, _ = line_through(sums, c, first[kept - 1], last[kept - 1])
+        inner = last[kept - 1]
+        before = _end_on(floats, a1, b1, inner, inner, start - 1, 1, price) >= start - 2
     if after:
         a2, b2, _ = line_through(sums, c, first[k + 1], last[k + 1])
+        inner = first[k + 1]
+        after = _end_on(floats, a2, b2, inner, inner, end + 1, -1, price) <= end + 2
     total = 0.0
     for i in range(start, end + 1):
         total += min(squared_error(floats, a2, b2, i), price) if after else price

@@ -44,6 +44,8 @@ _BETWEEN = 8
 _NONE, _PIECE, _ARC = 0, 1, 2
 #: Sine of the least angle of a corner (5.7°).
 _LEAST_SINE = 0.1
+#: Beams beside their readings where neighbours may still meet.
+_MISSED = 0.5
 
 
 @helper
@@ -160,8 +162,8 @@ def _list_classes(ints, counts, classes):
 def _meet(floats, ints, noise, p, q, step):
     """Whether a piece and its neighbour meet between their readings.
 
-    Between, but for a beam and three standard deviations of where they meet. If one is more than
-    both are long together, they may meet anywhere.
+    Between, but for half a beam and three standard deviations of where they meet. If one is more
+    than both are long together, they may meet anywhere.
     """
     i, j = ints[LAST, p], ints[FIRST, q]
     a1, b1, a2, b2 = floats[LINE_A, p], floats[LINE_B, p], floats[LINE_A, q], floats[LINE_B, q]
@@ -177,7 +179,7 @@ def _meet(floats, ints, noise, p, q, step):
     deviation = math.sqrt(range_variance(rho, noise) * share) / sine
     if deviation > _length(floats, ints, p) + _length(floats, ints, q):
         return False
-    tolerance = step * rho + 3.0 * deviation
+    tolerance = _MISSED * step * rho + 3.0 * deviation
     after = (floats[X, i] * y - floats[Y, i] * x) / floats[RHO, i]
     before = (x * floats[Y, j] - y * floats[X, j]) / floats[RHO, j]
     ahead = floats[X, i] * x + floats[Y, i] * y > 0.0

@@ -3,7 +3,7 @@
 import math
 
 from . import helper, kernel
-from .agglomeration import agglomerate, list_stretches
+from .agglomeration import agglomerate, list_stretches, part_again
 from .arcs import find_arcs, fit_arc
 from .borders import dissolve, move_border, trim_ends
 from .budget import LINK
@@ -263,6 +263,7 @@ def _part(floats, ints, counts, noise, evidence, parts, sums, ends):
         for k in range(low + 1, n if parts & BORDERS else low):
             move_border(floats, ints, sums, c, k, _MARGIN, _PRICE)
         n = agglomerate(floats, ints, sums, c, low, n, evidence)
+        n = part_again(ints, sums, c, low, n, evidence)
         ends[c] = n
     counts[PIECES], counts[CANDIDATES], counts[ARCS] = n, 0, 0
 

@@ -23,7 +23,7 @@ from .layout import (
 from .line_fit import excess, range_variance
 
 #: Deviations from which on a reading, or a line, is behind another.
-OFF = 4.0
+OFF = 3.0
 #: Variance of a border between two pieces, in variances of a reading.
 _SHARE = 0.2
 #: Beams that a face between two pieces has at least: where readings lie between them, and where
