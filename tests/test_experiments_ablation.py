@@ -22,7 +22,12 @@ from lineament.evaluation.experiments import (
     speed_aims,
 )
 from lineament.evaluation.experiments.aims import Aim, Limits, aims_table
-from lineament.evaluation.experiments.ceilings import curved_arcs, line_misfit, within_gate
+from lineament.evaluation.experiments.ceilings import (
+    curved_arcs,
+    line_misfit,
+    lines_within_gates,
+    within_gate,
+)
 from lineament.evaluation.repeatability import Repeats
 from lineament.methods.optimal import PARTS
 from lineament.simulation import SENSORS, Sensor, room, scene, truth
@@ -79,6 +84,16 @@ class TestCeilings:
         assert within_gate(replace(true, corners=corners), 0.1) == pytest.approx(
             [drawn, 1.0], abs=0.005
         )
+
+    def test_a_segment_counts_as_often_as_drawn_errors_are_within_its_gates(self):
+        true = truth(room(), (0.0, 0.0, 0.0), SENSORS["paper"])
+        segments = true.segments.copy()
+        segments["covariance"] = np.diag([0.08**2, math.radians(7) ** 2])
+        off, turn = np.random.default_rng(0).normal(size=(2, 100_000))
+        drawn = ((abs(0.08 * off) <= 0.1) & (abs(7 * turn) <= 10)).mean()
+        within = lines_within_gates(replace(true, segments=segments))
+        assert len(within) == (segments["n_points"] >= 6).sum() > 0
+        assert within == pytest.approx(drawn, abs=0.005)
 
     def test_a_corner_with_a_small_side_is_not_demanded(self):
         true = features(

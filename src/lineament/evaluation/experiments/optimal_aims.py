@@ -15,7 +15,7 @@ from ...extractor import Extractor
 from ...simulation import SENSORS
 from ..scores import Scores, evaluate
 from .aims import TOLD, Limits, aims_table
-from .ceilings import curved_arcs, within_gate
+from .ceilings import curved_arcs, lines_within_gates, within_gate
 from .charts import dot_chart
 from .findings import Figure, Findings, Progress, Setting, Table
 from .frames import Frame, batch_of, scene_numbers, simulated_frames
@@ -69,6 +69,7 @@ _ROWS = (
     _Row("corner NEES", "corner_nees", Limits(0.9, 1.15)),
     _Row("its median", "corner_nees_median"),
     _Row("segment F1", "segment_f1", Limits(low=0.97)),
+    _Row("its ceiling", "segment_ceiling"),
     _Row("segments in pieces", "segment_fragmentation", Limits(high=0.02)),
     _Row("line offset ÷ bound, median", "segment_offset_over_bound_median", Limits(high=1.05)),
     _Row("line angle ÷ bound, median", "segment_angle_over_bound_median", Limits(high=1.05)),
@@ -87,11 +88,13 @@ class _Result:
 
     scores: Scores
     corner_ceiling: float
+    segment_ceiling: float
     curved: float
 
     def summary(self) -> dict[str, float]:
         return self.scores.summary() | {
             "corner_ceiling": self.corner_ceiling,
+            "segment_ceiling": self.segment_ceiling,
             "curved_arcs": self.curved,
         }
 
@@ -130,9 +133,10 @@ def _text(numbers: range) -> tuple[str, ...]:
         "‘÷ bound’ is the error over that of an estimate that reaches the Cramér-Rao bound; NEES "
         "is the mean of the squared errors over the method’s own covariance, divided by what it "
         "should be.",
-        "Ceilings: the largest F1 of corners that the bounds allow, as a corner whose place the "
-        "readings do not tell to 0.1 m is both missed and false; and the share of the arcs that "
-        f"differ from a line by at least {_EVIDENCE:g} in χ²: the others look straight.",
+        "Ceilings: the largest F1 of corners and segments that the bounds allow, as a corner whose "
+        "place the readings do not tell to 0.1 m is both missed and false, and a segment whose "
+        "angle they do not tell to 10°; and the share of the arcs that differ from a line by at "
+        f"least {_EVIDENCE:g} in χ²: the others look straight.",
     )
 
 
@@ -149,10 +153,12 @@ def _measure(extractor: Extractor, frames: list[Frame], sensor: str) -> _Result:
     found = batch_of(extractor, [frame.scan for frame in frames])
     truths = [frame.truth for frame in frames]
     within = np.concatenate([within_gate(truth, 0.1) for truth in truths])
+    lines = np.concatenate([lines_within_gates(truth) for truth in truths])
     curved = np.concatenate([curved_arcs(truth, SENSORS[sensor], _EVIDENCE) for truth in truths])
     return _Result(
         Scores.total(map(evaluate, found, truths)),
         float(within.mean()) if len(within) else math.nan,
+        float(lines.mean()) if len(lines) else math.nan,
         float(curved.mean()) if len(curved) else math.nan,
     )
 
