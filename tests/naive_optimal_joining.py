@@ -18,9 +18,10 @@ def end_share(points, piece):
 
 
 def meet(points, one, other, step):
-    """Whether two pieces meet between their readings, but for half a beam and three deviations.
+    """Whether two pieces meet between their readings, but for half a beam.
 
-    If one is more than both are long together, they may meet anywhere.
+    Or for three deviations more, if they are less than six apart at their readings. If one is more
+    than both are long together, they may meet anywhere.
     """
     lines = np.array([points.line(*piece)[0] for piece in (one, other)])
     norms = np.linalg.norm(lines, axis=1)
@@ -32,15 +33,16 @@ def meet(points, one, other, step):
     rho = (points.rho[i] + points.rho[j]) / 2
     # 1 is that of the reading at the border.
     share = 1 + end_share(points, one) + end_share(points, other)
-    deviation = math.sqrt(range_variance(rho, points.noise) * share) / sine
+    sigma = math.sqrt(range_variance(rho, points.noise) * share)
     ends = points.xy[[*one, *other]]
-    if deviation > np.linalg.norm(ends[1] - ends[0]) + np.linalg.norm(ends[3] - ends[2]):
+    if sigma / sine > np.linalg.norm(ends[1] - ends[0]) + np.linalg.norm(ends[3] - ends[2]):
         return False
-    tolerance = joining._MISSED * step * rho + 3 * deviation
     # Distances from the beams of both, positive between them.
     after = np.linalg.det([points.xy[i], at]) / points.rho[i]
     before = np.linalg.det([at, points.xy[j]]) / points.rho[j]
-    return points.xy[i] @ at > 0 and min(after, before) > -tolerance
+    outside = -min(after, before) - joining._MISSED * step * rho
+    is_near = abs(gap(points, one, other)) <= joining._APART * sigma
+    return points.xy[i] @ at > 0 and outside <= (3 * sigma / sine if is_near else 0)
 
 
 def gap(points, one, other):

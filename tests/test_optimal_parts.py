@@ -40,6 +40,16 @@ def test_a_step_that_is_hidden_parts_and_one_that_is_seen_does_not(seed):
     assert len(regions(found)) == len(regions(there)) == 1
 
 
+@pytest.mark.parametrize("behind", [3.2, 3.25, 3.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wall_seen_edge_on_that_ends_before_another_makes_no_corner_with_it(seed, behind):
+    # Their lines cross a beam from the end of the first, which is 0.3 m nearer there.
+    world = World([[-1.0, 0.65, 3.0, 0.65], [behind, -3.0, behind, 3.0]])
+    found, there = features(world, seed=seed)
+    assert len(found.corners) == len(there.corners) == 0
+    np.testing.assert_allclose(regions(found), regions(there), atol=1)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_ring_with_one_jump_is_one_region(seed):
     room = [(3.0, -2.0), (3.0, 2.0), (-2.0, 2.0), (-2.0, -2.6), (1.0, -2.6), (1.0, -2.0)]

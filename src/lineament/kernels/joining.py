@@ -46,6 +46,8 @@ _NONE, _PIECE, _ARC = 0, 1, 2
 _LEAST_SINE = 0.1
 #: Beams beside their readings where neighbours may still meet.
 _MISSED = 0.5
+#: Deviations that neighbours which meet may be apart at their readings: walls have frames.
+_APART = 6.0
 
 
 @helper
@@ -162,8 +164,9 @@ def _list_classes(ints, counts, classes):
 def _meet(floats, ints, noise, p, q, step):
     """Whether a piece and its neighbour meet between their readings.
 
-    Between, but for half a beam and three standard deviations of where they meet. If one is more
-    than both are long together, they may meet anywhere.
+    Between, but for half a beam; or three standard deviations of where they meet, if no reading
+    there is far off the other line. If a deviation is more than both are long together, they may
+    meet anywhere.
     """
     i, j = ints[LAST, p], ints[FIRST, q]
     a1, b1, a2, b2 = floats[LINE_A, p], floats[LINE_B, p], floats[LINE_A, q], floats[LINE_B, q]
@@ -176,14 +179,18 @@ def _meet(floats, ints, noise, p, q, step):
     rho = 0.5 * (floats[RHO, i] + floats[RHO, j])
     # The border was placed by a reading, with its own noise.
     share = 1.0 + end_share(floats, ints, p) + end_share(floats, ints, q)
-    deviation = math.sqrt(range_variance(rho, noise) * share) / sine
-    if deviation > _length(floats, ints, p) + _length(floats, ints, q):
+    sigma = math.sqrt(range_variance(rho, noise) * share)
+    if sigma > sine * (_length(floats, ints, p) + _length(floats, ints, q)):
         return False
-    tolerance = _MISSED * step * rho + 3.0 * deviation
+    if not floats[X, i] * x + floats[Y, i] * y > 0.0:
+        return False  # Behind the sensor.
     after = (floats[X, i] * y - floats[Y, i] * x) / floats[RHO, i]
     before = (x * floats[Y, j] - y * floats[X, j]) / floats[RHO, j]
-    ahead = floats[X, i] * x + floats[Y, i] * y > 0.0
-    return ahead and after > -tolerance and before > -tolerance
+    outside = -min(after, before) - _MISSED * step * rho
+    if outside <= 0.0:
+        return True
+    # Of a wall that is seen edge-on, little beside the beams is much along them.
+    return outside <= 3.0 * sigma / sine and abs(gap(floats, ints, p, q)) <= _APART * sigma
 
 
 @helper
