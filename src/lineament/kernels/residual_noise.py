@@ -16,7 +16,7 @@ _OUT = 12.0
 _ABOVE, _PASSES = 2.0, 6
 #: Pieces above it are left out where the others, of at least so much of all degrees of freedom,
 #: have less than so much of the variance: by chance some are above it in scans without clutter.
-_MAJORITY, _CLEARLY_LESS = 0.5, 0.6
+_MAJORITY, _CLEARLY_LESS = 0.5, 0.75
 
 
 @helper
