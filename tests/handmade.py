@@ -22,9 +22,9 @@ def segment(start, end, first, last, *, sigma=(0.01, 0.01), n_points=None):
     return row
 
 
-def corner(x, y, *, segments=(0, 0), sigma=0.01):
+def corner(x, y, *, segments=(0, 0), sigma=0.01, kind="corner"):
     row = np.zeros((), CORNER)
-    row["position"], row["segments"] = (x, y), segments
+    row["position"], row["segments"], row["kind"] = (x, y), segments, kind
     row["covariance"] = sigma**2 * np.eye(2)
     return row
 

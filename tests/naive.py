@@ -10,7 +10,16 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from naive_fit import along, breakpoints, corner_at_beam, fit_line, intersection, opening_and_side
+from naive_fit import (
+    along,
+    breakpoints,
+    corner_at_beam,
+    fit_line,
+    intersection,
+    misfit,
+    opening_and_side,
+    quality,
+)
 
 LEAST_SIGMA = 1e-4
 
@@ -256,6 +265,7 @@ def liu(scan, method, noise=None, filtered=None):
             line |= {"first_beam": own[0], "last_beam": own[-1], "cluster": label}
             line |= {"start": along(line, points[own[0]]), "end": along(line, points[own[-1]])}
             line["n_points"] = len(own)
+            line["misfit"] = misfit(line, measured[own], noise)
             segments.append(line)
         for k, (first, _, is_corner) in enumerate(pieces):
             if is_corner:
@@ -268,6 +278,8 @@ def liu(scan, method, noise=None, filtered=None):
     for corner in corners:
         a, b = (segments[k] for k in corner["segments"])
         corner["opening"], corner["convex"] = opening_and_side(a["angle"], b["angle"])
+        corner["kind"] = "corner"
+        corner["quality"] = quality(a["n_points"], b["n_points"], corner["opening"])
         at, spacing = corner["beam"], corner.pop("spacing").max()
         placed = None
         if method.corner == "intersection":

@@ -22,7 +22,7 @@ def associate(before, now, motion=(0.0, 0.0, 0.0), covariance=None, *, gate=0.99
         before,
         now,
         _paired(*_segment_costs(before.segments, moved.segments, about), chi_square(gate, 2)),
-        _paired(*_corner_costs(before.corners, moved.corners, about), chi_square(gate, 2)),
+        _paired(*_corner_costs(before.corners, moved, about), chi_square(gate, 2)),
         _paired(*_arc_costs(before.arcs, moved.arcs, about), chi_square(gate, 3)),
     )
 
@@ -105,6 +105,9 @@ def _segment_costs(before, now, about):
     spread = about.of_lines(points, np.broadcast_to(normal, apart.shape), lengths)
     spread = spread + now["covariance"]
     spread += lever @ before["covariance"][:, np.newaxis] @ np.swapaxes(lever, -1, -2)
+    bow = before["misfit"][:, np.newaxis] ** 2 + now["misfit"] ** 2
+    spread[..., 0, 0] += bow
+    spread[..., 1, 1] += 12 * bow / lengths**2
     slack = about.of_points(points)
     slack = 2 * np.sqrt(((tangent[..., np.newaxis, :] @ slack)[..., 0, :] * tangent).sum(axis=2))
     shared, union = _side_by_side(before, now, tangent)
@@ -123,11 +126,15 @@ def _side_by_side(before, now, tangent):
     return shared, np.maximum(high, length) - np.minimum(low, 0.0)
 
 
-def _corner_costs(before, now, about):
+def _corner_costs(before, frame, about):
+    now = frame.corners
+    squares = np.append(frame.segments["misfit"] ** 2, 0.0)
+    bows = 2 * squares[now["segments"]].sum(axis=1)
     apart = now["position"] - before["position"][:, np.newaxis]
     spread = before["covariance"][:, np.newaxis] + now["covariance"]
-    spread = spread + about.of_points(now["position"])
+    spread = spread + about.of_points(now["position"]) + bows[:, np.newaxis, np.newaxis] * np.eye(2)
     same = before["convex"][:, np.newaxis] == now["convex"]
+    same &= (before["kind"] != "edge")[:, np.newaxis] & (now["kind"] != "edge")
     return np.where(same, _mahalanobis(apart, spread), np.inf), np.zeros(same.shape)
 
 

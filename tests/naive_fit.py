@@ -79,6 +79,21 @@ def fit_line(points, bearings, rho, noise, fit, passes=2):
     }
 
 
+def misfit(line, own_rho, noise):
+    """What is left of the mean square beyond that of the noise, at the middle of the beams."""
+    n, middle = len(own_rho), own_rho[(len(own_rho) - 1) // 2]
+    u = np.array([math.cos(line["angle"]), math.sin(line["angle"])])
+    distance = u[0] * line["centroid"][1] - u[1] * line["centroid"][0]
+    share = max((distance / middle) ** 2, 1e-6)
+    expected = range_variance(middle, noise) * share + (middle * noise[2]) ** 2 * (1 - share)
+    return math.sqrt(max(line["rms"] ** 2 - (1 - 2 / n) * expected, 0.0))
+
+
+def quality(n, m, opening):
+    """Share of corners found again, by √(1/n + 1/m) over the sine of the turn."""
+    return 1 / (1 + (math.sqrt(1 / n + 1 / m) / max(math.sin(opening), 1e-9) / 0.78) ** 2.4)
+
+
 def along(line, point):
     """The point of a line nearest to `point`."""
     u = np.array([math.cos(line["angle"]), math.sin(line["angle"])])

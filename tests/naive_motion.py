@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from naive_association import chi_square, rough_variances, segment_lengths, turned
 
-from lineament.kernels.noise import LEAST_SIGMA
 from lineament.tracking import Motion
 
 _KNOWN, _FEIGNED, _RIGHT, _DIRECTED = 0.1, 3.0, 0.99, 0.1
@@ -51,20 +50,6 @@ def residuals(matches, motion, roughness):
     return Residuals(*together)
 
 
-def own_shares(segments, noise):
-    """Share of the covariance of segments that comes of the noise of their readings."""
-    if noise is None:
-        return np.ones(len(segments))
-    (x, y), angle, n = segments["centroid"].T, segments["angle"], segments["n_points"]
-    square = x**2 + y**2
-    near = np.maximum((np.cos(angle) * y - np.sin(angle) * x) ** 2, 1e-6 * square)
-    along_beam = noise.sigma**2 + noise.proportional**2 * square + noise.quantum**2 / 12
-    along_beam = np.maximum(along_beam, LEAST_SIGMA**2)
-    reading = along_beam * near / square + noise.bearing**2 * (square - near)
-    scatter = np.maximum(reading, segments["rms"] ** 2)
-    return np.minimum(scatter / n * (1 + 4 / n) / segments["covariance"][:, 0, 0], 1.0)
-
-
 def _of_segments(matches, motion, roughness):
     before, now = matches.tables("segments")
     moved, by_turn = _moved(now["centroid"], motion)
@@ -79,7 +64,7 @@ def _of_segments(matches, motion, roughness):
     # The offset of the earlier line is asked for where the later one has its centroid.
     lever = np.tile(np.eye(2), (len(now), 1, 1))
     lever[:, 0, 1] = (apart * tangent).sum(axis=1)
-    # What is not the readings' own is the same in both frames where both saw the same wall.
+    # The misfit is the same in both frames where both saw the same wall.
     ends = (_moved(now[end], motion)[0] - before["start"] for end in ("start", "end"))
     first, last = ((arm * tangent).sum(axis=1) for arm in ends)
     length = segment_lengths(before)
@@ -87,15 +72,12 @@ def _of_segments(matches, motion, roughness):
     shared = np.minimum(high, length) - np.maximum(low, 0.0)
     union = np.maximum(high, length) - np.minimum(low, 0.0)
     alone = 1.0 - np.clip(shared / union, 0.0, 1.0)
-    own, other = own_shares(before, matches.before.noise), own_shares(now, matches.now.noise)
-    covariance = lever @ before["covariance"] @ np.swapaxes(lever, 1, 2)
-    covariance *= (own + alone * (1.0 - own))[:, np.newaxis, np.newaxis]
-    share = (other + alone * (1.0 - other))[:, np.newaxis, np.newaxis]
-    covariance += share * now["covariance"]
+    covariance = lever @ before["covariance"] @ np.swapaxes(lever, 1, 2) + now["covariance"]
     lengths = np.minimum(segment_lengths(now), length)
     rough_offset, rough_angle = rough_variances(lengths, roughness)
-    covariance[:, 0, 0] += rough_offset
-    covariance[:, 1, 1] += rough_angle
+    bow = alone * (before["misfit"] ** 2 + now["misfit"] ** 2)
+    covariance[:, 0, 0] += rough_offset + bow
+    covariance[:, 1, 1] += rough_angle + 12 * bow / lengths**2
     information = np.linalg.inv(covariance)
     slope = np.sqrt(covariance[:, 1, 1] / covariance[:, 0, 0])
     too_short = covariance[:, 1, 1] > _DIRECTED**2

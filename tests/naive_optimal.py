@@ -1,170 +1,201 @@
-"""Slow twin of method optimal: whole runs, from the noise to what is measured.
-
-Steps are written from the docstrings of the kernels, whose constants are taken as they stand.
-"""
+"""Slow twins of method optimal: the model of ``docs/optimal.md``, with numbers of their own."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from naive import polar
-from naive_fit import (
-    along,
-    breakpoints,
-    fit_line,
-    intersection,
-    normal_variances,
-    opening_and_side,
-    principal_line,
-    range_variance,
-)
-from naive_optimal_arcs import find_arcs, fit_arc
-from naive_optimal_clusters import clusters, within_reach, without_spikes
-from naive_optimal_joining import join
-from naive_optimal_noise import first_noise, refined_noise, wall_unevenness
-from naive_optimal_pieces import (
-    Points,
-    agglomerate,
-    drop_crooked,
-    drop_radial,
-    drop_round,
-    excess,
-    move_borders,
-    part_again,
-    settle,
-    straighten,
-    stretches,
-)
 
-from lineament.kernels import line_fit, optimal
-from lineament.methods.optimal import PARTS
+from lineament import LaserScan
+
+#: Scale of the surface [m]; measurements of a line; deviations that differ; tangent of 86°.
+SURFACE, FEWEST, DEVIATIONS, STEEP = 0.03, 4, 3.0, 14.3
 
 
-def refined_line(points, piece, bearings, cuts):
-    """Maximum likelihood with the weights of the line that is known; what is far off is out.
+class Measured(NamedTuple):
+    """Usable measurements in the order of the partition, and where a break is before each."""
 
-    What χ² has too much is put down to the wall, that bows as a few parts. A cut at a corner is
-    chosen by the same readings, and costs some.
+    beam: np.ndarray
+    xy: np.ndarray
+    rho: np.ndarray
+    broken: np.ndarray
+
+
+def variance_of(rho, noise):
+    return noise[0] + noise[1] * rho**2
+
+
+# Noise
+
+
+def third_of(errors):
+    """Variance by the third of the squared errors that is least, of normal ones."""
+    least = np.sort(errors)[len(errors) // 3]
+    return 1.03 * errors[errors <= 9 * least / 0.4307**2].mean()
+
+
+def estimated_noise(scan: LaserScan) -> tuple[float, float]:
+    """Constant and growth, of measurements off the line through their neighbours."""
+    usable = np.flatnonzero(scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e6))
+    rho, bearing = scan.ranges, scan.angles
+    middle = [b for a, b, c in zip(usable, usable[1:], usable[2:], strict=False) if c - a == 2]
+    if len(middle) < 24:
+        return 1e-8, 0.0
+    i = np.array(middle)
+    whole = np.sin(bearing[i + 1] - bearing[i - 1])
+    through = np.sin(bearing[i + 1] - bearing[i]) / rho[i - 1]
+    through = (through + np.sin(bearing[i] - bearing[i - 1]) / rho[i + 1]) / whole
+    errors, squares = (rho[i] ** 2 * (through - 1 / rho[i])) ** 2 / 1.5, rho[i] ** 2
+    far = squares >= squares.mean()
+    constant, growth = 0.0, 0.0
+    halves = [(errors[half], squares[half]) for half in (~far, far)]
+    v = [third_of(e) if len(e) else 0.0 for e, _ in halves]
+    count, square = np.zeros(2), np.zeros(2)
+    for k, (e, s) in enumerate(halves):
+        if len(e):
+            kept = e <= 9 * np.sort(e)[len(e) // 3] / 0.4307**2
+            count[k], square[k] = kept.sum(), s[kept].mean()
+    constant = (v @ count) / count.sum()
+    if count.all() and v[1] > v[0] * (1 + 3 * math.sqrt(2 * 1.94 * (1 / count[0] + 1 / count[1]))):
+        growth = (v[1] - v[0]) / (square[1] - square[0])
+        constant = v[0] - growth * square[0]
+        if constant < 1e-8:
+            growth = 0.5 * (v[0] / square[0] + v[1] / square[1])
+    constant = min(max(constant, 1e-8), 0.01)
+    return constant, max(0.0, min(growth, (0.01 - constant) / rho[usable].max() ** 2))
+
+
+# Clustering
+
+
+def parts(scan, a, b, noise, max_missing):
+    """Whether no surface goes on from beam a to b."""
+    near, far = sorted((scan.ranges[a], scan.ranges[b]))
+    if (b - a) % len(scan) - 1 > max_missing:
+        return True
+    slope = STEEP * near * abs(math.sin(scan.angles[b] - scan.angles[a]))
+    return far - near > slope + 2 * DEVIATIONS * math.sqrt(variance_of(far, noise))
+
+
+def neighbours(scan, beams):
+    """List the pairs of neighbours among some beams, over the seam of a full circle."""
+    around = [(beams[-1], beams[0])] if scan.is_full_circle and beams else []
+    return [*pairwise(beams), *around]
+
+
+def spikes(scan: LaserScan, noise, max_missing) -> tuple[list[int], set[int]]:
+    """Usable beams, and those that are broken from both neighbours while these hold together."""
+    usable = scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e6)
+    beams, found = np.flatnonzero(usable).tolist(), set()
+    pairs = neighbours(scan, beams)
+    broken = {b: parts(scan, a, b, noise, max_missing) for a, b in pairs}
+    after = dict(pairs)
+    for a, b in pairs:
+        alone = b in after and broken[b] and broken[after[b]]
+        if alone and not parts(scan, a, after[b], noise, max_missing):
+            found.add(b)
+    return beams, found
+
+
+def measured(scan: LaserScan, beams: list[int], noise, max_missing) -> Measured:
+    """Measurements of some beams in their order."""
+    broken = {b: parts(scan, a, b, noise, max_missing) for a, b in neighbours(scan, sorted(beams))}
+    i = np.array(beams, int)
+    xy = scan.ranges[i, None] * np.column_stack((np.cos(scan.angles[i]), np.sin(scan.angles[i])))
+    return Measured(i, xy, scan.ranges[i], np.array([broken.get(b, True) for b in beams], bool))
+
+
+# Partition
+
+
+def chi_square(xy, rho, noise):
+    """χ² of a x + b y = 1 of least squares, at the scale of the surface, through points."""
+    weight = rho / np.sqrt(variance_of(rho, noise) + SURFACE**2)
+    line = np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
+    return float(np.sum((weight - weight * (xy @ line)) ** 2))
+
+
+def least_energies(points: Measured, noise, evidence) -> np.ndarray:
+    """Least energy of the measurements before each one: every beginning of every line is tried.
+
+    By sums of each line for itself, with more digits than a float has.
     """
-    first, last = piece
-    span, noise = slice(first, last + 1), points.noise
-    xy, rho = points.xy[span], points.rho[span]
-    (a, b), chi_square = points.line(first, last)
-    normal, distance = np.array([a, b]) / math.hypot(a, b), 1 / math.hypot(a, b)
-    angle, middle = math.atan2(-a, b), points.rho[(first + last) // 2]
-    cosine = min(distance / middle, 1.0)
-    uneven = excess(chi_square, len(xy)) * range_variance(middle, noise) * cosine**2
-    variances = normal_variances(angle, bearings, rho, noise) + uneven
-    near = (xy @ normal - distance) ** 2 <= line_fit.FAR_OFF * variances
-    if not near.any():
-        return fit_line(xy, bearings, rho, noise, "weighted")
-    weights = near / variances
-    centroid, angle = principal_line(xy, weights)
-    u = np.array([math.cos(angle), math.sin(angle)])
-    if u @ (xy[-1] - xy[0]) < 0:
-        u, angle = -u, math.remainder(angle + math.pi, 2 * math.pi)
-    t, e = (xy - centroid) @ u, (xy - centroid) @ [-u[1], u[0]]
-    total, spread, common = weights.sum(), weights @ t**2, uneven / line_fit.BOWS
-    scale = 1 + line_fit.CUT * cuts / len(xy)
-    # No angle is less known than one that may be any.
-    var_angle = min(scale * (1 + common * total) / spread, math.pi**2 / 12)
-    return {
-        "centroid": centroid,
-        "angle": angle,
-        "covariance": np.diag([scale * (1 / total + common), var_angle]),
-        "rms": math.sqrt(weights @ e**2 / total),
-    }
+    n, x, y = len(points.rho), *points.xy.T.astype(np.longdouble)
+    weight = points.rho**2 / (variance_of(points.rho, noise) + SURFACE**2)
+    terms = weight * np.array([x * x, x * y, y * y, x, y, np.ones_like(x)])
+    energy, begin = np.zeros(n + 1, np.longdouble), 0
+    sums = np.zeros((6, n), np.longdouble)
+    for j in range(n):
+        begin = j if points.broken[j] else begin
+        sums[:, begin : j + 1] += terms[:, j : j + 1]
+        energy[j + 1] = energy[j] + evidence / 2
+        if j + 1 - FEWEST >= begin:
+            some = slice(begin, j + 2 - FEWEST)
+            lines = energy[some] + evidence + cheapest(sums[:, some])
+            energy[j + 1] = min(energy[j + 1], lines.min())
+    return energy.astype(float)
 
 
-def measured(points, joined, labels, angles):
-    """Segments and corners as records."""
-    segments, corners, beams = [], [], points.beams
-    for k, own in enumerate(joined):
-        first, last = own["piece"]
-        cuts = (own["before"] >= 0) + sum(other["before"] == k for other in joined)
-        line = refined_line(points, own["piece"], angles[beams[first : last + 1]], cuts)
-        line |= {"first_beam": beams[first], "last_beam": beams[last], "n_points": last - first + 1}
-        line |= {"start": along(line, points.xy[first]), "end": along(line, points.xy[last])}
-        segments.append(line | {"cluster": labels[beams[first]]})
-    for k, own in enumerate(joined):
-        if own["before"] < 0:
-            continue
-        a, b, at = segments[own["before"]], segments[k], own["piece"][0]
-        opening, convex = opening_and_side(a["angle"], b["angle"])
-        corner = {"beam": beams[at], "segments": (own["before"], k), "response": own["response"]}
-        corner |= {"opening": opening, "convex": convex}
-        position, covariance = intersection(a, b, points.xy[at], math.inf)
-        a["end"] = b["start"] = position
-        corners.append(corner | {"position": position, "covariance": covariance})
-    return segments, corners
+def cheapest(sums):
+    """χ² of lines by sums of w (xx, xy, yy, x, y, 1); inf where bearings are all one."""
+    xx, xy, yy, x, y, s = sums
+    determinant = xx * yy - xy * xy
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chi = s - (x * x * yy - 2 * x * y * xy + y * y * xx) / determinant
+    return np.where(determinant > 1e-12 * xx * yy, np.maximum(chi, 0), np.inf)
 
 
-def cut_roughly(points, classes, method, parts):
-    """Pieces of each class by merging, and parted again."""
-    cut = []
-    for span in classes:
-        pieces = agglomerate(points, stretches(*span), optimal._FIRST_SHARE * method.evidence)
-        if "borders" in parts:
-            pieces = move_borders(points, pieces, optimal._MARGIN)
-        pieces = agglomerate(points, pieces, method.evidence)
-        cut.append(part_again(points, pieces, method.evidence))
-    return cut
+def energy_of(points: Measured, lines, noise, evidence) -> float:
+    """Energy of given lines (first, last): what it costs, whether or not it is the least."""
+    own = [chi_square(points.xy[a : b + 1], points.rho[a : b + 1], noise) for a, b in lines]
+    clutter = len(points.rho) - sum(b - a + 1 for a, b in lines)
+    return sum(own) + evidence * (len(lines) + clutter / 2)
 
 
-def settled(points, classes, cut, method, parts):
-    """Pieces that are left of each class, and arcs."""
-    kept, arcs = [], []
-    for span, pieces in zip(classes, cut, strict=True):
-        pieces = settle(points, pieces, method.evidence, parts)
-        if "arcs" in parts:
-            pieces, more = find_arcs(points, span, pieces, method.evidence)
-            arcs += more
-        if "straightening" in parts:
-            pieces = drop_crooked(points, straighten(points, pieces))
-        kept.append(drop_round(points, pieces))
-    return kept, arcs
+# Fits
 
 
-def optimal_features(scan, method, given=None):
-    """All of the method, without a budget of vertices."""
-    parts, scan = set(PARTS) - set(method.without), within_reach(scan)
-    noise = given or first_noise(scan, "growth" in parts)
-    reach = 2 * optimal._STEEPEST * scan.angle_increment if "spikes" in parts else -math.inf
-    ranges = without_spikes(scan, noise, reach)
-    found = clusters(scan, ranges, noise, method.max_missing)
-    beams = [b for members in found.classes for b in members]
-    classes = []
-    for members in found.classes:
-        start = classes[-1][1] + 1 if classes else 0
-        classes.append((start, start + len(members) - 1))
-    points = Points(polar(ranges, scan.angles)[beams], beams, noise)
-    cut = cut_roughly(points, classes, method, parts)
-    if given is None and beams:
-        noise = refined_noise(points, [piece for pieces in cut for piece in pieces])
-        points = Points(points.xy, beams, noise)
-    rough = points
-    if "unevenness" in parts and (uneven := wall_unevenness(points, cut)) > 0:
-        rough = Points(points.xy, beams, noise, uneven)
-    cut, arcs = settled(rough, classes, cut, method, parts)
-    arcs = [fit_arc(points, *arc["span"]) or arc for arc in arcs]
-    cut = [drop_radial(points, pieces) for pieces in cut]
-    points = points.decided_by(rough.noise)
-    joined, classes, found.closed = join(
-        points, classes, cut, arcs, scan.angle_increment, found.closed
-    )
-    found.classes = [beams[a : b + 1] for a, b in classes]
-    labels = found.labels(len(scan))
-    if found.closed:
-        labels[found.classes[-1]] = 0
-    points = points.decided_by(noise)
-    segments, corners = measured(points, joined, labels, scan.angles)
-    xy = polar(ranges, scan.angles)
-    return {
-        "noise": noise,
-        "clusters": labels,
-        "segments": segments,
-        "corners": corners,
-        "arcs": arcs,
-        "breakpoints": breakpoints(scan, found, ranges, xy, method.max_missing),
-    }
+def fitted_line(xy, rho, noise):
+    """Centroid, direction, variances of offset and angle, rms, misfit, number of what counts."""
+    weight = rho / np.sqrt(variance_of(rho, noise) + SURFACE**2)
+    normal = np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
+    distance = 1 / np.linalg.norm(normal)
+    normal = normal * distance
+    share = (xy @ normal / rho) ** 2
+    across = variance_of(rho, noise) * share
+    counts = (xy @ normal - distance) ** 2 <= DEVIATIONS**2 * (across + SURFACE**2 * share)
+    xy, across = xy[counts], across[counts]
+    centroid = np.average(xy, axis=0, weights=1 / across)
+    scatter = ((xy - centroid).T / across) @ (xy - centroid)
+    (_, along), axes = np.linalg.eigh(scatter)
+    direction = axes[:, 1] * (1 if axes[:, 1] @ (xy[-1] - xy[0]) > 0 else -1)
+    total = np.sum(1 / across)
+    off = (xy - centroid) @ [-direction[1], direction[0]]
+    square = np.average(off**2, weights=1 / across)
+    misfit = math.sqrt(max(square - (len(xy) - 2) / total, 0))
+    return centroid, direction, (1 / total, 1 / along), math.sqrt(square), misfit, len(xy)
+
+
+def arc_residuals(circle, xy, rho, noise, at):
+    """Errors along the normals of a circle, in deviations at the circle `at`."""
+    x, y, _ = at
+    normal = (xy - (x, y)) / np.linalg.norm(xy - (x, y), axis=1)[:, None]
+    variance = variance_of(rho, noise)
+    cosine = np.sum(normal * xy, axis=1) / rho
+    deviation = np.sqrt(variance * (cosine**2 + np.sqrt(variance) / (2 * at[2])))
+    return (np.linalg.norm(xy - circle[:2], axis=1) - circle[2]) / deviation
+
+
+def meeting(first, second):
+    """Where two segments cross, and Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ of that place."""
+    normals = np.array([[-math.sin(s["angle"]), math.cos(s["angle"])] for s in (first, second)])
+    offsets = [n @ s["centroid"] for n, s in zip(normals, (first, second), strict=True)]
+    place = np.linalg.solve(normals, offsets)
+    variances = []
+    for s in (first, second):
+        t = (place - s["centroid"]) @ [math.cos(s["angle"]), math.sin(s["angle"])]
+        variances.append([1, t] @ s["covariance"] @ [1, t])
+    inverse = np.linalg.inv(normals)
+    return place, inverse @ np.diag(variances) @ inverse.T

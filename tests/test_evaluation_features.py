@@ -191,3 +191,50 @@ def test_arc_by_hand():
 def test_arc_gates(found):
     truth = features(arcs=[arc(2, 0, 0.3, 10, 29)])
     assert arc_scores(features(arcs=[found]), truth).counts == Counts(0, 1, 1)
+
+
+@pytest.mark.parametrize(("sigma", "right"), [(0.04, (0, 0, 1)), (0.05, (1, 1, 1))])
+def test_a_corner_may_be_three_deviations_of_the_bound_off(sigma, right):
+    """14 cm are more than 3 · 4 cm, and less than 3 · 5 cm, of the larger axis of the ellipse."""
+    truth = corners((2, 0))
+    truth.corners["covariance"] = np.diag([0.01**2, sigma**2])
+    counts = corner_scores(corners((2, 0.14)), truth).counts
+    assert tuple(of.correct for of in counts.values()) == right
+
+
+@pytest.mark.parametrize(
+    ("sigma", "offset", "turn", "right"),
+    [
+        ((0.05, 0.01), 0.14, 0.0, 1),
+        ((0.04, 0.01), 0.14, 0.0, 0),
+        ((0.01, 0.08), 0.0, 0.2, 1),  # 11.5° of 13.8°
+        ((0.01, 0.06), 0.0, 0.2, 0),
+    ],
+)
+def test_a_segment_may_be_three_deviations_of_the_bound_off(sigma, offset, turn, right):
+    true = segment((2, -1), (2, 1), 0, 19, sigma=sigma)
+    found = segment((2 + offset, -1), (2 + offset, 1), 0, 19)
+    found["angle"] += turn
+    counts = segment_scores(features(segments=[found]), features(segments=[true])).counts
+    assert counts == Counts(right, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "center", "radius", "right"),
+    [
+        (0.04, 0.16, 0.0, 1),  # 3 √2 · 4 cm = 17 cm
+        (0.03, 0.16, 0.0, 0),
+        (0.04, 0.0, 0.11, 1),  # 3 · 4 cm = 12 cm
+        (0.03, 0.0, 0.11, 0),
+    ],
+)
+def test_an_arc_may_be_three_deviations_of_the_bound_off(sigma, center, radius, right):
+    true = features(arcs=[arc(2, 0, 0.5, 0, 9, sigma=sigma)])
+    found = features(arcs=[arc(2 + center, 0, 0.5 + radius, 0, 9)])
+    assert arc_scores(found, true).counts == Counts(right, 1, 1)
+
+
+def test_edges_are_no_corners():
+    found = corners((2, 0), (5, 5), (0, 2))
+    found.corners["kind"] = "corner", "edge", "slit"
+    assert corner_scores(found, corners((2, 0), (0, 2), (5, 5))).counts[0.10] == Counts(2, 2, 3)

@@ -18,6 +18,7 @@ from lineament.evaluation.beams import (
     overlap_ratios,
     shared_beams,
 )
+from lineament.evaluation.consistency import largest_variance, tolerance, usable_covariances
 
 
 def best_by_trying_all(cost, allowed):
@@ -175,3 +176,19 @@ def test_small_surfaces_by_hand():
     spans = beam_spans(np.array([10, 10, 10, 5]), np.array([14, 19, 20, 10]), 30)
     # 5 of 5, 5 of 10, 5 of 11, 1 of 6.
     assert on_small_surfaces(spans, truth).tolist() == [True, True, False, False]
+
+
+def test_share_in_an_ellipse():
+    """95 % of χ² with two degrees of freedom are below -2 ln 0.05 = 5.99."""
+    errors = np.sqrt([[5.98, 0.0], [0.0, 6.0], [3.0, 2.9], [3.0, 3.1]])
+    assert NormalisedErrors(errors).share_within(0.95) == 0.5
+    assert math.isnan(NormalisedErrors.none(2).share_within(0.95))
+
+
+def test_largest_variance_and_tolerance():
+    turned = np.array([[2.0, 1.0], [1.0, 2.0]])  # eigenvalues 1 and 3
+    indefinite = np.array([[1.0, 2.0], [2.0, 1.0]])
+    covariances = np.stack([turned, indefinite, np.full((2, 2), np.inf)])
+    assert usable_covariances(covariances).tolist() == [True, False, False]
+    assert largest_variance(covariances) == pytest.approx([3.0, 0.0, 0.0])
+    assert tolerance(np.array([0.04, np.nan])).tolist() == pytest.approx([0.6, 0.0])

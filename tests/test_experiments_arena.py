@@ -13,7 +13,7 @@ from lineament.evaluation.experiments import Setting, arena, repeatability
 from lineament.evaluation.experiments.arena import ARENA, arena_scores, load_arena
 from lineament.evaluation.experiments.repeatability import scan_pairs
 from lineament.logs import save_npz
-from lineament.simulation import Sensor, World
+from lineament.simulation import Sensor, World, truth
 
 #: A room of 4 m x 3 m whose fitted walls leave gaps at two corners; a board ends on a wall.
 WALLS = [[0, 0, 4, 0], [4, 0.05, 4, 3], [4, 3, 0.08, 3], [0, 3, 0, 0], [2, 3.02, 2, 2]]
@@ -57,6 +57,39 @@ def test_visible_corners_are_in_the_frame_of_the_scan(recording):
     for scan, true in zip(loaded.scans, loaded.truths, strict=True):
         for position in true.transform(*scan.pose).corners["position"]:
             assert min(np.hypot(*(np.array(CORNERS) - position).T)) < 1e-9
+
+
+@pytest.mark.parametrize(("kept", "shown"), [(3, False), (4, True)])
+def test_a_corner_is_demanded_where_both_its_walls_show(kept, shown):
+    """Of the wall x = 4 beside (4, 0) all measurements but a few are 5 cm before it.
+
+    Those that count are from 0.1 to 0.6 m from the corner, along the wall: the other faces and the
+    corner at (4, 3) are as they were.
+    """
+    walls = World([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]])
+    sensor, pose = Sensor("ring", 720, -math.pi, math.radians(0.5), 0.0, 30.0), (1.5, 1.5, 0.3)
+    scan = sensor.scan(walls, pose, np.random.default_rng(0))
+    visible = truth(walls, pose, sensor)
+    assert arena.faces_shown(scan, visible, walls).tolist() == [True] * 4
+    bearings = scan.angles + pose[2]
+    x, y = pose[0] + scan.ranges * np.cos(bearings), pose[1] + scan.ranges * np.sin(bearings)
+    on_face = np.flatnonzero((abs(x - 4) < 1e-3) & (y > 0.1) & (y < 0.6))
+    assert len(on_face) > 8
+    ranges = scan.ranges.copy()
+    ranges[on_face[kept:]] -= 0.05 / np.cos(bearings[on_face[kept:]])
+    before = LaserScan(ranges, sensor.angle_min, sensor.angle_increment, pose=pose)
+    corner_at = visible.transform(*pose).corners["position"]
+    demanded = arena.faces_shown(before, visible, walls)
+    there = np.hypot(*(corner_at - (4, 0)).T) < 1e-6
+    assert there.sum() == 1
+    assert demanded[there].tolist() == [shown]
+    assert demanded[~there].all()
+
+
+def test_a_scan_without_a_pose_shows_no_faces():
+    scan = LaserScan([2.0] * 9, angle_min=0.0, angle_increment=0.01)
+    with pytest.raises(ValueError, match="scan has no pose"):
+        arena.faces_shown(scan, features(n=9), World([[0, 0, 4, 0]]))
 
 
 def test_scores_of_found_corners_worked_by_hand(recording, monkeypatch):

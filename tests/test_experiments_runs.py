@@ -7,17 +7,17 @@ import json
 import numpy as np
 import pytest
 
-from lineament import Extractor
 from lineament.evaluation.experiments import (
     EXPERIMENTS,
     Setting,
-    ablation,
     all_methods,
+    contact_sheet,
     contenders,
     frames,
     layered,
     noise_points,
     optimal_aims,
+    real,
     recorded_aims,
     recordings,
     repeatability,
@@ -26,6 +26,7 @@ from lineament.evaluation.experiments import (
     scenes,
     similarity,
     speed_aims,
+    standing_still,
     success,
     tracking,
     two_corners,
@@ -35,8 +36,6 @@ from lineament.simulation import SENSORS, room
 
 #: Found on a small grid elsewhere; here it is only to be quick.
 CHOSEN = repetition_grid.Parameters("relative", 6, 0.25)
-#: Two rows of the ablation.
-TWO = {name: Extractor(name) for name in ("iepf", "hough")}
 
 
 @pytest.fixture
@@ -53,7 +52,7 @@ def small(monkeypatch):
         (scenes, {"KINDS": ("room",)}),
         (similarity, {"KINDS": ("room",)}),
         (layered, {"RULES": ("fixed", "dietmayer")}),
-        (ablation, {"SCANNERS": ("lms181",), "SCENES_A_FRAME": 1, "ladder": lambda *_: TWO}),
+        (real, {"DRAWN": "iepf"}),
         (optimal_aims, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES_A_FRAME": 1}),
         (optimal_aims, {"METHOD": "iepf"}),
         (speed_aims, {"BEAMS": (90, 180), "CALLS": 1, "BATCH": 4, "SCANS_A_FRAME": 1}),
@@ -83,10 +82,11 @@ def data(tmp_path, monkeypatch):
     monkeypatch.setattr(repeatability, "LOGS", {"Office": "room.npz"})
     monkeypatch.setattr(tracking, "LOGS", {"Office": ("room.npz", 0.0)})
     monkeypatch.setattr(success, "ARENA", "arena.npz")
-    monkeypatch.setattr(ablation, "ARENA", "arena.npz")
-    monkeypatch.setattr(ablation, "LOG", "room.npz")
+    monkeypatch.setattr(real, "ARENAS", {"arena": "arena.npz"})
+    monkeypatch.setattr(real, "LOGS", {"Office": "room.npz"})
+    monkeypatch.setattr(contact_sheet, "SHEET", (("room.npz", 1), ("missing.npz", 0)))
+    monkeypatch.setattr(standing_still, "STANDING", ("room.npz",))
     monkeypatch.setattr(recorded_aims, "ARENAS", {"arena": "arena.npz"})
-    monkeypatch.setattr(recorded_aims, "LOGS", {"Office": "room.npz"})
     return tmp_path
 
 

@@ -66,8 +66,9 @@ def test_a_spike_is_told_with_how_far_it_is_off():
     assert "off the mean of its neighbours by +1.00 m" in text or "by +999" in text
 
 
-def test_two_readings_before_a_wall_are_too_few_for_a_cluster():
+def test_two_readings_before_two_walls_are_too_few_for_a_cluster():
     ranges, bearings = wall()
+    ranges[32:] *= 2.0
     ranges[30:32] = 0.7
     explanation, text = told(LaserScan(ranges, angles=bearings), 30)
     assert explanation.outcome == "noise"
@@ -86,22 +87,26 @@ def test_missing_beams_part_and_the_end_of_the_scan_is_told():
 
 def test_clutter_between_walls_is_too_crooked():
     ranges, bearings = wall(121)
-    ranges[50:58] -= [0.05, 0.06, 0.2, 0.21, 0.05, 0.06, 0.2, 0.21]
+    ranges[50:58] -= [0.4, 0.6, 0.2, 0.5, 0.7, 0.3, 0.6, 0.25]
     explanation, text = told(LaserScan(ranges, angles=bearings), 53)
     assert explanation.outcome == "unexplained"
-    assert "too crooked" in explanation.summary or "too few" in explanation.summary
-    assert "off the line of segment" in text
+    assert "too crooked" in explanation.summary
+    assert "a line through them is off by" in text
 
 
 def test_the_verdict_on_a_corner():
     bearings = np.radians(np.arange(-40, 41))
     ranges = 2.0 / (np.cos(bearings) + abs(np.sin(bearings)))
-    _, text = told(LaserScan(ranges, angles=bearings), 41)
+    _, text = told(LaserScan(ranges, angles=bearings), 41, "iepf")
     assert "was examined as a corner" in text
-    assert "25 asked; a corner" in text
+    assert "asked; a corner" in text
     # Metres against metres: near walls have no corner by the paper's numbers.
     _, text = told(LaserScan(0.5 * ranges, angles=bearings), 40, "liu")
     assert "0.66 asked; rejected" in text
+    # All partitions are compared: no corner was examined for itself.
+    _, text = told(LaserScan(ranges, angles=bearings), 41)
+    assert "examined" not in text
+    assert "if it were one line with a neighbour (12 asked)" in text
 
 
 def test_a_reading_on_a_column_is_part_of_an_arc():

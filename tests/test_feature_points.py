@@ -20,10 +20,10 @@ from lineament.tracking import Tracks
 
 #: What a kind fills; everything else is NaN, or -1 where it is an integer.
 FILLED = {
-    SEGMENT_POINT: {"start_x", "start_y", "end_x", "end_y", "angle", "rms", "n_points"}
+    SEGMENT_POINT: {"start_x", "start_y", "end_x", "end_y", "angle", "rms", "misfit", "n_points"}
     | {"c00", "c01", "c11", "first_beam", "last_beam"},
     CORNER_POINT: {"opening", "convex", "c00", "c01", "c11", "first_beam", "last_beam"}
-    | {"segment_a", "segment_b"},
+    | {"segment_a", "segment_b", "quality", "corner"},
     ARC_POINT: {"radius", "rms", "c00", "c01", "c02", "c11", "c12", "c22"}
     | {"first_beam", "last_beam", "n_points"},
 }
@@ -44,7 +44,7 @@ def named(names, *values):
 
 
 def test_all_fields_are_words_without_gaps():
-    assert FEATURE_POINT.itemsize == 4 * len(FEATURE_POINT.names) == 100
+    assert FEATURE_POINT.itemsize == 4 * len(FEATURE_POINT.names) == 112
     for name in FEATURE_POINT.names:
         assert FEATURE_POINT[name].str in {"<f4", "<i4", "<u4"}
 
@@ -54,25 +54,29 @@ def test_segment():
     row["start"], row["end"], row["centroid"], row["angle"] = (1, 2), (4, 6), (2.5, 4.25), 0.75
     row["covariance"] = [[4, 1], [1, 2]]
     row["first_beam"], row["last_beam"], row["n_points"], row["rms"] = 90, 3, 14, 0.5
+    row["misfit"] = 0.25
     (point,) = feature_points(features(segments=[row]))
     assert told(point) == (
         named("x y z kind", 2.5, 4.25, 0, 0)
         | named("start_x start_y end_x end_y angle", 1, 2, 4, 6, 0.75)
-        | named("c00 c01 c11 rms", 4, 1, 2, 0.5)
+        | named("c00 c01 c11 rms misfit", 4, 1, 2, 0.5, 0.25)
         | named("first_beam last_beam n_points", 90, 3, 14)
     )
 
 
 @pytest.mark.parametrize("is_convex", [False, True])
-def test_corner(is_convex):
+@pytest.mark.parametrize(("kind", "number"), [("corner", 0), ("slit", 1), ("edge", 2), ("", -1)])
+def test_corner(is_convex, kind, number):
     row = np.zeros((), CORNER)
     row["position"], row["covariance"] = (1, 2), [[4, 1], [1, 2]]
     row["opening"], row["convex"], row["beam"], row["segments"] = 1.5, is_convex, 7, (3, 0)
+    row["quality"], row["kind"] = 0.75, kind
     (point,) = feature_points(features(corners=[row]))
     assert told(point) == (
         named("x y z kind opening convex", 1, 2, 0, 1, 1.5, float(is_convex))
         | named("c00 c01 c11", 4, 1, 2)
-        | named("first_beam last_beam segment_a segment_b", 7, 7, 3, 0)
+        | named("first_beam last_beam segment_a segment_b quality", 7, 7, 3, 0, 0.75)
+        | ({"corner": number} if kind else {})
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,6 +76,16 @@ def test_what_does_not_move(features):
             np.testing.assert_array_equal(found, expected)
 
 
+def test_new_columns_do_not_move(features):
+    segments, corners = features.segments.copy(), features.corners.copy()
+    segments["misfit"] = 0.001 * np.arange(len(segments))
+    corners["quality"], corners["kind"] = 0.25, "edge"
+    moved = replace(features, segments=segments, corners=corners).transform(1.0, 2.0, -3.0)
+    assert moved.segments["misfit"].tolist() == segments["misfit"].tolist()
+    assert set(moved.corners["quality"]) == {0.25}
+    assert set(moved.corners["kind"].tolist()) == {"edge"}
+
+
 def test_moved_covariance_is_that_of_moved_samples(features):
     corner = features.corners[0]
     rng = np.random.default_rng(0)
@@ -102,6 +113,9 @@ def test_dict_is_json(features):
     again = json.loads(text)
     assert again["segments"][0]["centroid"] == features.segments["centroid"][0].tolist()
     assert again["corners"][0]["convex"] is bool(features.corners["convex"][0])
+    assert again["corners"][0]["kind"] == "corner"
+    assert again["corners"][0]["quality"] == features.corners["quality"][0]
+    assert again["segments"][0]["misfit"] == features.segments["misfit"][0]
     assert again["breakpoints"][0]["kind"] == features.breakpoints["kind"][0]
     assert len(again["clusters"]) == len(RING)
     assert again["noise"] == {"sigma": 0.01, "proportional": 0, "bearing": 0, "quantum": 0}

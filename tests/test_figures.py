@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
 from matplotlib.collections import EllipseCollection
+from matplotlib.colors import to_rgb
 from test_tables import random_features
 
 import lineament as ln
@@ -192,6 +194,19 @@ def test_trace_has_four_panels(tmp_path):
     assert count_panels(image[middle:]) == 2
 
 
+def test_trace_without_candidates_shows_corners_and_edges(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(canvas, "save", lambda figure, _: written.append(figure))
+    scan, features = room()
+    features.corners = np.repeat(features.corners, 2)
+    features.corners["kind"][1] = "edge"
+    trace = replace(trace_of(scan, features), candidates=np.zeros(0, CANDIDATE))
+    figures.plot_trace(trace, tmp_path / "a.png")
+    panel = written[0].axes[3]
+    assert {"corner", "edge"} <= {line.get_label() for line in panel.get_lines()}
+    assert any("1 corner · 1 edge" in text.get_text() for text in panel.texts)
+
+
 def test_map_moves_features_by_their_poses(tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr(canvas, "save", lambda figure, _: written.append(figure))
@@ -210,6 +225,28 @@ def test_map_moves_features_by_their_poses(tmp_path, monkeypatch):
     monkeypatch.undo()
     figures.plot_map([], tmp_path / "empty.png")
     pixels(tmp_path / "empty.png")
+
+
+def test_edges_are_lighter_than_corners_and_have_no_number(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(canvas, "save", lambda figure, _: written.append(figure))
+    scan, features = room()
+    features.corners = np.repeat(features.corners, 2)
+    features.corners["kind"] = ["corner", "edge"]
+    features.corners["position"][1], features.corners["response"][1] = scan.points[0], 0.0
+    figures.plot_map([((0.0, 0.0, 0.0), features)], tmp_path / "a.png")
+    for figure, plural in ((figures.scan_figure(scan, {"a": features}), ""), (written[0], "s")):
+        (axes,) = figure.axes
+        drawn = {line.get_label(): line for line in axes.get_lines()}
+        corner, edge = drawn[f"corner{plural}"], drawn[f"edge{plural}"]
+        # The same hue, nearer to the white of the paper.
+        colors = [to_rgb(line.get_markeredgecolor()) for line in (corner, edge)]
+        assert colors[0] == pytest.approx(CORNER_RGB)
+        assert sum(colors[1]) > sum(colors[0]) + 0.5
+        texts = {text.get_text() for text in axes.texts}
+        assert any("1 corner · 1 " in text and "1 edge" in text for text in texts)
+        assert "0" not in texts
+        assert f"edge{plural}" in {text.get_text() for text in figure.legends[0].get_texts()}
 
 
 def test_wrong_arguments(tmp_path):

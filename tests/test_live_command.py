@@ -57,7 +57,7 @@ def test_what_is_found_is_told_with_the_stamp_of_the_scan(started, peer):
     np.testing.assert_array_equal(places, features.corners["position"])
 
     layers = {marker["ns"]: marker for marker in markers["markers"]}
-    assert list(layers) == ["segments", "arcs", "corners", "ellipses"]
+    assert list(layers) == ["segments", "arcs", "corners", "edges", "ellipses"]
     assert all(layer["header"] == header for layer in layers.values())
     ends = [(point["x"], point["y"]) for point in layers["segments"]["points"]]
     np.testing.assert_array_equal(ends[::2], features.segments["start"])
@@ -202,7 +202,7 @@ def test_a_log_is_shown_in_foxglove(started, log):
     viewer = FoxgloveClient(int(node.said[0].rpartition(":")[2]))
     scene_of_scan = take("/scan/features")
     entities = [entity["id"] for entity in scene_of_scan["entities"]]
-    assert entities == ["segments", "arcs", "corners", "ellipses"]
+    assert entities == ["segments", "arcs", "corners", "edges", "ellipses"]
     viewer.close()
     node.stop()
 

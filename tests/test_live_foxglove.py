@@ -50,9 +50,9 @@ def until(ask: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def wall_of_three_beams() -> tuple[ln.LaserScan, Message]:
+def wall_of_five_beams() -> tuple[ln.LaserScan, Message]:
     """A scan of a wall 2 m ahead, and the scene of what is found in it."""
-    scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     layers = layers_of(markers_of(ln.extract(scan), scan))
     return scan, FoxgloveMessages().features("/scan/features", MOMENT, layers)
 
@@ -70,20 +70,20 @@ def read(client: FoxgloveClient, topic: str) -> dict:
 def test_scene_is_read_by_another_client(server, client):
     assert client.server["op"] == "serverInfo"
     assert client.server["name"] == "test"
-    _, message = wall_of_three_beams()
+    _, message = wall_of_five_beams()
     server.advertise(message.topic, message.kind)
     client.subscribe(message.topic)
     until(lambda: server.listeners(message.topic) == 1)
     server.publish(message)
     scene = read(client, message.topic)
     entities = {entity["id"]: entity for entity in scene["entities"]}
-    assert list(entities) == ["segments", "arcs", "corners", "ellipses"]
+    assert list(entities) == ["segments", "arcs", "corners", "edges", "ellipses"]
     wall = entities["segments"]
     assert wall["frame_id"] == "laser"
     assert wall["timestamp"] == {"seconds": 5, "nanos": 500_000_000}
     (line,) = wall["lines"]
     ends = [(end.get("x", 0.0), end.get("y", 0.0)) for end in line["points"]]
-    assert ends == [pytest.approx((2.0, -0.02), abs=1e-3), pytest.approx((2.0, 0.02), abs=1e-3)]
+    assert ends == [pytest.approx((2.0, -0.04), abs=1e-3), pytest.approx((2.0, 0.04), abs=1e-3)]
 
 
 @pytest.mark.parametrize(("stamp", "told"), [((-1, 5), 0), ((2**32 - 1, 2**32 - 1), 2**31 + 3)])
@@ -98,7 +98,7 @@ def test_a_stamp_that_is_none_is_the_first_or_the_last(server, client, stamp, to
 
 def test_scan_and_pose_beside_it(server, client):
     make = FoxgloveMessages()
-    scan, _ = wall_of_three_beams()
+    scan, _ = wall_of_five_beams()
     sent = [make.transform("/tf", MOMENT, (1.0, 2.0, math.pi)), make.scan("/scan", MOMENT, scan)]
     for message in sent:
         server.advertise(message.topic, message.kind)
@@ -109,17 +109,17 @@ def test_scan_and_pose_beside_it(server, client):
     transform, told = read(client, "/tf"), read(client, "/scan")
     assert transform["translation"] == {"x": 1.0, "y": 2.0}
     assert transform["rotation"]["z"] == pytest.approx(1.0)
-    assert told["ranges"] == [2.0, 2.0, 2.0]
+    assert told["ranges"] == [2.0] * 5
 
 
 def test_first_message_advertises_its_topic(server, client):
-    _, message = wall_of_three_beams()
+    _, message = wall_of_five_beams()
     assert server.listeners(message.topic) == 0
     server.publish(message)
     client.subscribe(message.topic)
     until(lambda: server.listeners(message.topic))
     server.publish(message)
-    assert len(read(client, message.topic)["entities"]) == 4
+    assert len(read(client, message.topic)["entities"]) == 5
 
 
 def test_listeners_come_and_go(server, client):
@@ -153,7 +153,7 @@ def test_client_sees_the_end(client, server):
     server.close()
     with pytest.raises((EOFError, ConnectionError)):
         client.take_message()  # texts are passed over
-    server.publish(wall_of_three_beams()[1])  # nobody is there
+    server.publish(wall_of_five_beams()[1])  # nobody is there
 
 
 def test_port_that_is_taken():

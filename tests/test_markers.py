@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from handmade import arc, features
+from handmade import arc, corner, features
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lineament import LaserScan
-from lineament.output.layers import Layer
-from lineament.output.markers import arc_span, ellipses_of
+from lineament.output.layers import Layer, layers_of
+from lineament.output.markers import arc_span, ellipses_of, markers_of
 
 
 @given(st.integers(0, 10_000))
@@ -55,6 +55,22 @@ def test_span_of_an_arc_is_that_of_its_unwrapped_directions(seed, first, last):
         directions = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
         expected = directions.min(), directions.max()
     np.testing.assert_allclose(arc_span(record, scan), expected, atol=1e-12)
+
+
+def test_edges_are_marks_of_their_own():
+    kinds = ("corner", "edge", "slit", "edge")
+    found = features(corners=[corner(k, 1, kind=kind) for k, kind in enumerate(kinds)])
+    found.corners["position"][3] = np.nan
+    markers = markers_of(found)
+    assert markers.corners.tolist() == [[0, 1], [2, 1]]
+    assert markers.edges.tolist() == [[1, 1]]
+    assert markers.ellipses[:, 0].tolist() == [0, 1, 2]
+    assert [1, 1] in markers.points.tolist()
+    layers = {layer.name: layer for layer in layers_of(markers)}
+    corners, edges = layers["corners"], layers["edges"]
+    assert edges.points.tolist() == [[1, 1]]
+    assert edges.size < corners.size
+    assert min(edges.color) > min(corners.color)  # lighter
 
 
 def test_pieces_of_strips_are_the_same_in_one_array():

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
+from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor
 from lineament.evaluation.segments import segment_scores
@@ -31,28 +31,42 @@ def within(error, covariance, deviations=4.0):
     return error @ np.linalg.solve(covariance, error) < deviations**2
 
 
+def of_kind(features, kind):
+    return features.corners[features.corners["kind"] == kind]
+
+
 # Corners
 
 
 @extractors
 @pytest.mark.parametrize("convex", [True, False])
-@pytest.mark.parametrize("opening", [60, 90, 120, 150, 165])
+@pytest.mark.parametrize("opening", [60, 90, 120, 150, 160])
 def test_vertex_has_its_two_walls(extractor, opening, convex):
-    """Down to a turn of 15°."""
     angles = fan(25)
     for seed in range(5):
         ranges = noisy(vertex(angles, 3.0, opening, convex=convex), seed)
         features = extractor(scan_of(ranges, angles))
         (corner,), (first, second) = features.corners, features.segments
-        assert within(corner["position"] - (3.0, 0.0), corner["covariance"], 5.0)
+        assert within(corner["position"] - (3.0, 0.0), corner["covariance"], 4.0)
         assert corner["opening"] == pytest.approx(math.radians(opening), abs=0.05)
-        assert corner["convex"] == convex
+        assert (corner["convex"], corner["kind"]) == (convex, "corner")
         assert corner["segments"].tolist() == [0, 1]
         assert corner["response"] > extractor.method.evidence
+        assert 0.2 < corner["quality"] < 1
         assert first["end"].tolist() == second["start"].tolist() == corner["position"].tolist()
         assert (first["first_beam"], second["last_beam"]) == (0, len(angles) - 1)
         assert 1 <= second["first_beam"] - first["last_beam"] <= 4
-        assert (features.clusters >= 0).all()
+        assert (features.clusters == 0).all()
+
+
+@pytest.mark.parametrize(("opening", "corners"), [(165, 0), (150, 1)])
+def test_a_shallow_turn_is_a_wall_that_bends(opening, corners):
+    """By 15° with arms of half a metre; by 30° it is a corner."""
+    angles = fan(10)
+    scan = scan_of(noisy(vertex(angles, 3.0, opening, convex=False)), angles)
+    features = AWARE(scan)
+    assert (len(features.corners), len(features.segments)) == (corners, corners + 1)
+    assert (features.segments["misfit"] > 0.01).any() == (corners == 0)
 
 
 @extractors
@@ -68,6 +82,48 @@ def test_corner_next_to_the_end_of_a_cluster(extractor, arm):
 
 
 @extractors
+@pytest.mark.parametrize("beams", [2, 3])
+def test_faces_beside_a_hole_are_a_slit(extractor, beams):
+    """Their lines cross within 0.3 m of both, and they end where they were seen."""
+    angles = fan(25)
+    ranges, middle = vertex(angles, 2.0, 90, convex=True), len(angles) // 2
+    hole = slice(middle - 1, middle - 1 + beams)
+    ranges[hole] = wall(angles[hole], 5.0, 0.0)
+    features = extractor(scan_of(noisy(ranges), angles))
+    (corner,), (first, second) = of_kind(features, "slit"), features.segments
+    assert within(corner["position"] - (2.0, 0.0), corner["covariance"])
+    assert corner["segments"].tolist() == [0, 1]
+    assert min(np.hypot(*(s - (2.0, 0.0))) for s in (first["end"], second["start"])) > 0.005
+    assert (first["last_beam"], second["first_beam"]) == (hole.start - 1, hole.stop)
+    assert features.clusters[hole.start - 1] != features.clusters[hole.stop]
+    assert len(of_kind(features, "corner")) == 0
+
+
+@extractors
+def test_a_panel_before_a_wall_ends_in_edges(extractor):
+    angles = fan(25)
+    panel = abs(np.tan(angles)) < 0.2
+    ranges = np.where(panel, wall(angles, 2.0, 0.0), wall(angles, 4.0, 0.0))
+    features = extractor(scan_of(noisy(ranges, sigma=1e-4), angles))
+    edges, near = of_kind(features, "edge"), features.segments[1]
+    assert len(edges) == len(features.corners) == 2
+    assert edges["segments"].tolist() in ([[-1, 1], [1, -1]], [[1, -1], [-1, 1]])
+    assert (edges["opening"] == 0).all()
+    for edge in edges:
+        sign = 1 if edge["segments"][0] == 1 else -1
+        end, beam = ("end", "last_beam") if sign > 0 else ("start", "first_beam")
+        assert edge["position"].tolist() == near[end].tolist()
+        assert edge["beam"] == near[beam] == np.flatnonzero(panel)[-1 if sign > 0 else 0]
+        spacing = 2.0 * (math.tan(angles[edge["beam"]]) - math.tan(angles[edge["beam"] - sign]))
+        beyond = 2.0 * math.tan(angles[edge["beam"]]) + spacing / 2
+        assert edge["position"][1] == pytest.approx(beyond, abs=1e-3)
+        least = spacing**2 / 12
+        assert 0.9 * least < edge["covariance"][1, 1] < 1.1 * least + (0.2 * NOISE.sigma) ** 2
+        assert 0.0 < edge["quality"] < 1.0
+    assert features.breakpoints["occluder"].tolist()[:2] == [near["first_beam"], near["last_beam"]]
+
+
+@extractors
 def test_wall_of_four_beams_is_a_wall(extractor):
     angles = fan(25)
     ranges, middle = wall(angles, 3.0, 0.0), len(angles) // 2
@@ -75,7 +131,7 @@ def test_wall_of_four_beams_is_a_wall(extractor):
     features = extractor(scan_of(noisy(ranges), angles))
     assert features.segments["n_points"][1] == 4
     assert len(features.segments) == 3
-    assert len(features.corners) == 0
+    assert features.corners["kind"].tolist() == ["edge", "edge"]
     assert features.breakpoints["occluder"].tolist()[:2] == [middle - 2, middle + 1]
 
 
@@ -89,9 +145,8 @@ def test_column_in_front_of_a_wall_is_one_arc(extractor, radius):
     for seed in range(5):
         features = extractor(sweep(world, seed))
         (arc,) = features.arcs
-        assert within(
-            np.array([*arc["center"], arc["radius"]]) - (2.5, 0.3, radius), arc["covariance"]
-        )
+        error = np.array([*arc["center"], arc["radius"]]) - (2.5, 0.3, radius)
+        assert within(error, arc["covariance"])
         assert len(features.segments) == 2
         assert len(features.corners) == 0
         assert features.clusters.max() == 2
@@ -117,19 +172,21 @@ def test_polygon_is_no_arc(extractor, sides, radius, corners):
 
 
 @extractors
-@pytest.mark.parametrize(("waves", "amplitude"), [(0.5, 0.068), (1, 0.028), (2, 0.028)])
+@pytest.mark.parametrize(("waves", "amplitude"), [(0.5, 0.045), (1, 0.02), (2, 0.028)])
 @pytest.mark.parametrize("sigma", [0.003, 0.01])
 def test_bowed_wall_is_one(extractor, waves, amplitude, sigma):
-    """A wall of 4 m is off a line by 20 mm, root mean square."""
+    """A wall of 4 m is off a line by 14 to 20 mm, root mean square: that is its misfit."""
     angles = fan(45)
     bow = amplitude * np.cos(math.pi * waves * np.tan(angles))
+    bow -= bow.mean()
     scan = scan_of(noisy((2.0 + bow) / np.cos(angles), sigma=sigma), angles)
     features = extractor(scan)
     (line,) = features.segments
     assert len(features.corners) == len(features.arcs) == 0
     assert line["n_points"] >= len(angles) - 4
-    # The covariance is that of the wall, not of the readings alone.
-    assert line["covariance"][0, 0] > (0.2 * 0.02) ** 2
+    assert line["misfit"] == pytest.approx(np.std(bow), abs=0.0035)
+    # The covariance is that of the noise.
+    assert line["covariance"][0, 0] < 0.002**2
 
 
 @extractors
@@ -152,7 +209,7 @@ def test_doorway_is_not_bridged(extractor, behind):
     ranges = noisy(np.where(door, beyond, wall(angles, 2.0, 0.0)))
     features = extractor(scan_of(ranges, angles))
     assert len(features.segments) == (3 if behind == 5.0 else 2)
-    assert len(features.corners) == 0
+    assert features.corners["kind"].tolist() == (["edge"] * 2 if behind == 5.0 else [])
     for line in features.segments:
         assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
     kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
@@ -161,18 +218,18 @@ def test_doorway_is_not_bridged(extractor, behind):
 
 @pytest.mark.parametrize("beams", [(6, 6), (6, 12), (8, 8), (8, 10), (10, 8), (10, 10)])
 def test_step_of_short_walls_parts_them_wherever_it_is(beams):
-    """As pieces begin with stretches of four readings: the step may be within one."""
     first, n = beams[0], sum(beams)
     angles = math.radians(1.0) * (np.arange(n) - n // 2)
-    ranges = np.where(np.arange(n) < first, wall(angles, 3.0, 0), wall(angles, 3.08, 0))
+    ranges = np.where(np.arange(n) < first, wall(angles, 3.0, 0), wall(angles, 3.2, 0))
     for seed in range(5):
         features = AWARE(scan_of(noisy(ranges, seed), angles))
         assert len(features.segments) == 2
-        assert abs(features.segments["first_beam"][1] - first) <= 1
+        assert features.segments["first_beam"][1] == first
+        assert features.breakpoints["beam"][0].tolist() == [first - 1, first]
 
 
 def test_wall_behind_a_doorway_is_not_lost():
-    """On one line with the wall before, and two readings of the frame on it by chance."""
+    """On one line with the wall before, and two measurements of the frame on it by chance."""
     (world, pose), sensor = scene("corridor", 20010), SENSORS["lms181"]
     features = UNAWARE(sensor.scan(world, pose, np.random.default_rng(20010)))
     scores = segment_scores(features, truth(world, pose, sensor)).counts
@@ -186,19 +243,18 @@ def test_grazing_wall_is_not_cut(extractor):
         features = extractor(sweep(World([[0.3, 0.5, 12, 0.5]]), seed))
         (line,) = features.segments
         assert line["end"][0] == pytest.approx(0.3, abs=0.02)
-        assert line["start"][0] > 0.5 * math.tan(math.radians(86))
+        assert line["start"][0] > 0.49 * math.tan(math.radians(86))
         assert features.clusters.max() == 0
 
 
 @extractors
-@pytest.mark.parametrize("at", ["wall", "corner"])
-def test_room_all_around_is_closed_over_the_seam(extractor, at):
+@pytest.mark.parametrize("turn", [0.0, 0.3, math.atan2(1.7, 2.4)])
+def test_room_all_around_is_closed_over_the_seam(extractor, turn):
+    """Wherever the seam is: on a wall, or in a corner."""
     n = 720
     ring = full_circle(n)
-    box = [(2.0, 0.0), (1.3, 90.0), (2.4, 180.0), (1.7, 270.0)]
-    turn = 0.0 if at == "wall" else math.atan2(1.7, 2.4)
     for seed in range(5):
-        ranges = noisy(room(ring + turn, box), seed)
+        ranges = noisy(room(ring + turn, BOX), seed)
         features = extractor(scan_of(ranges, ring))
         corners, segments = features.corners, features.segments
         assert len(corners) == len(segments) == 4
@@ -211,77 +267,3 @@ def test_room_all_around_is_closed_over_the_seam(extractor, at):
             true = (2.0 if x > 0 else -2.4, 1.3 if y > 0 else -1.7)
             error = np.array(true) @ [[c, -s], [s, c]] - corner["position"]
             assert within(error, corner["covariance"], 5.0)
-
-
-# Readings that are on no surface
-
-
-@extractors
-@pytest.mark.parametrize("between", [(2.7,), (2.5, 3.2), (3.6,)])
-def test_mixed_pixels_between_two_depths_are_noise(extractor, between):
-    angles = fan(30)
-    ranges, edge = np.where(angles < 0, wall(angles, 2.0, 0.0), wall(angles, 4.0, 0.0)), 90
-    ranges[edge : edge + len(between)] = between
-    features = extractor(scan_of(noisy(ranges), angles))
-    assert len(features.segments) == 2
-    assert len(features.corners) == 0
-    assert (features.clusters[edge : edge + len(between)] == -1).all()
-    assert features.segments["last_beam"][0] == edge - 1
-    assert features.segments["first_beam"][1] == edge + len(between)
-
-
-@extractors
-@pytest.mark.parametrize("off", [-1.0, -0.3, 0.1, 0.3, 2.0])
-def test_spike_on_a_wall(extractor, off):
-    angles = fan(30)
-    ranges = noisy(wall(angles, 2.0, 10.0))
-    ranges[60] += off
-    features = extractor(scan_of(ranges, angles))
-    (line,) = features.segments
-    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
-    assert line["n_points"] == len(angles) - 1
-    assert features.clusters[60] == -1
-    assert (np.delete(features.clusters, 60) == 0).all()
-    assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
-
-
-@extractors
-def test_drop_outs_do_not_cut_a_wall(extractor):
-    angles = fan(30)
-    ranges = noisy(wall(angles, 2.0, 10.0))
-    lost = np.random.default_rng(1).random(len(angles)) < 0.2
-    ranges[lost] = np.inf
-    (line,) = extractor(scan_of(ranges, angles)).segments
-    assert line["n_points"] == (~lost).sum()
-    assert line["rms"] == pytest.approx(NOISE.sigma, rel=0.2)
-
-
-@pytest.mark.parametrize("max_missing", [0, 3, 6])
-def test_wall_goes_on_over_as_many_missing_beams_as_are_allowed(max_missing):
-    angles, extractor = fan(30), Extractor("optimal", max_missing=max_missing)
-    for missing, pieces in ((max_missing, 1), (max_missing + 1, 2)):
-        ranges = noisy(wall(angles, 2.0, 0.0))
-        ranges[50 : 50 + missing] = np.nan
-        assert len(extractor(scan_of(ranges, angles)).segments) == pieces
-
-
-@extractors
-@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
-def test_wall_ends_at_its_last_readings(extractor, normal):
-    angles = math.radians(normal) + fan(30)
-    scan = scan_of(noisy(wall(angles, 2.0, normal)), angles)
-    (line,) = extractor(scan).segments
-    direction = [math.cos(line["angle"]), math.sin(line["angle"])]
-    for end, point in ((line["start"], scan.points[0]), (line["end"], scan.points[-1])):
-        assert (end - point) @ direction == pytest.approx(0.0, abs=1e-9)
-        assert np.hypot(*(end - point)) < 4 * NOISE.sigma
-
-
-def test_evidence_is_what_a_corner_must_have():
-    """A faint corner is two walls for who asks for little, one wall for who asks for much."""
-    angles = fan(10)
-    scan = scan_of(noisy(vertex(angles, 3.0, 168, convex=False), 2), angles)
-    (corner,) = Extractor("optimal", evidence=10.0, noise=NOISE)(scan).corners
-    for evidence, corners in ((0.9 * corner["response"], 1), (1.1 * corner["response"], 0)):
-        found = Extractor("optimal", evidence=evidence, noise=NOISE)(scan)
-        assert len(found.corners) == corners

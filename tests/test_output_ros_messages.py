@@ -44,7 +44,7 @@ SCAN = LaserScan(
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
-    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3)],
+    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3), corner(0, 3, kind="edge")],
     arcs=[arc(2, 1, 0.25, 0, 1)],
 )
 
@@ -158,9 +158,11 @@ def test_markers(encoding):
     layers = layers_of(markers_of(FOUND, SCAN))
     message = RosMessages(encoding).features("/scan/features", MOMENT, layers)
     markers = read(message, encoding).markers
-    assert [marker.ns for marker in markers] == ["segments", "arcs", "corners", "ellipses"]
+    assert [marker.ns for marker in markers] == [
+        *("segments", "arcs", "corners", "edges", "ellipses")
+    ]
     for marker, layer in zip(markers, layers, strict=True):
-        is_spheres = layer.name == "corners"
+        is_spheres = layer.name in {"corners", "edges"}
         check_header(marker.header)
         assert marker.type == (marker.SPHERE_LIST if is_spheres else marker.LINE_LIST)
         assert (marker.id, marker.action) == (0, marker.ADD)
@@ -180,7 +182,7 @@ def test_markers(encoding):
 def test_markers_of_nothing_are_deleted(encoding):
     layers = layers_of(markers_of(features(6), SCAN))
     markers = read(RosMessages(encoding).features("/f", MOMENT, layers), encoding).markers
-    assert [(marker.action, len(marker.points)) for marker in markers] == [(2, 0)] * 4
+    assert [(marker.action, len(marker.points)) for marker in markers] == [(2, 0)] * 5
 
 
 def yaws_of(encoding, found):
@@ -201,14 +203,22 @@ def test_corners_point_to_where_they_open(encoding):
     corners = [
         corner(1, 1, segments=(1, 0)),  # arms to the right and upwards, of different lengths
         corner(1, 1, segments=(0, -1)),  # one side is not known
+        corner(1, 1.5, segments=(-1, 1), kind="edge"),  # along its only segment, downwards
+        corner(1, 1, segments=(-1, 1), kind="edge"),  # at its other end, upwards
+        corner(2, 1, segments=(-1, -1)),  # no side is known
         corner(np.nan, 1, segments=(0, 1)),  # nowhere
         corner(1e300, 1, segments=(0, 1)),  # where nothing is drawn
         corner(5, 5, segments=(1, 2)),  # in the middle of its own side
         corner(1, 1.25, segments=(1, 1)),  # likewise
     ]
     found = yaws_of(encoding, features(6, sides, corners))
-    assert [pose[:2] for pose in found] == [(1, 1), (1, 1), (5, 5), (1, 1.25)]
-    assert [pose[2] for pose in found] == pytest.approx([math.pi / 4, 0, 0, 0])
+    assert [pose[:2] for pose in found] == [
+        *[(1, 1), (1, 1), (1, 1.5), (1, 1), (2, 1), (5, 5), (1, 1.25)]
+    ]
+    quarter = math.pi / 2
+    assert [pose[2] for pose in found] == pytest.approx(
+        [quarter / 2, 0, -quarter, quarter, 0, 0, 0]
+    )
     assert yaws_of(encoding, features(6)) == []
 
 
@@ -288,7 +298,7 @@ def test_frames_of_all_lengths_leave_numbers_aligned(encoding, length):
     scan = LaserScan(np.full(200, 2.0), 0.0, 2 * math.pi / 200)
     moment, ros = MOMENT._replace(frame="f" * length, world="w" * length), RosMessages(encoding)
     layers = layers_of(markers_of(found, scan))
-    assert len(read(ros.features("/f", moment, layers), encoding).markers) == 4
+    assert len(read(ros.features("/f", moment, layers), encoding).markers) == 5
     assert len(read(ros.corners("/f", moment, found), encoding).poses) == len(found.corners)
     n = len(found.segments) + len(found.corners) + len(found.arcs)
     assert read(ros.cloud("/f", moment, found), encoding).width == n

@@ -29,6 +29,7 @@ def random_features(seed: int, n_beams: int = 40, counts=(3, 2, 1, 2), **fields)
                 "U": lambda shape=shape: rng.choice(["jump", "gap"], shape),
             }[kind]()
         tables[name] = table
+    tables["corners"]["kind"] = rng.choice(["corner", "slit", "edge"], counts[1])
     clusters = (np.arange(n_beams) // 9).astype(np.int32)
     clusters[rng.random(n_beams) < 0.1] = -1
     return Features(**tables, clusters=clusters, stamp=0.1 * seed, **fields)
@@ -65,6 +66,7 @@ def naive_rows(scans: list[Features], first_scan: int) -> list[dict]:  # noqa: C
                         row[f"{side}_x"], row[f"{side}_y"] = record[side]
                 if name == "corners":
                     row["segment_before"], row["segment_after"] = record.pop("segments")
+                    row["corner"] = record.pop("kind")
                 if name == "breakpoints":
                     row["first_beam"], row["last_beam"] = record.pop("beam")
                     row["breakpoint"] = record.pop("kind")
@@ -162,10 +164,29 @@ def test_numbers_stay_what_they_are_nan_too():
     assert rms[1:] == [np.inf, 1e-300]
 
 
-def test_unknown_kind_of_breakpoint_is_told():
+def test_columns_of_a_segment_a_slit_and_an_edge():
+    features = random_features(1)
+    features.segments["misfit"] = [0.0, 0.003, 0.02]
+    features.corners["kind"], features.corners["quality"] = ["slit", "edge"], [0.75, 0.1]
+    rows = features_table([features]).to_pylist()
+    by_kind = {kind: [row for row in rows if row["kind"] == kind] for kind in ("segment", "corner")}
+    assert [row["misfit"] for row in by_kind["segment"]] == [0.0, 0.003, 0.02]
+    assert [row["corner"] for row in by_kind["corner"]] == ["slit", "edge"]
+    assert [row["quality"] for row in by_kind["corner"]] == [0.75, 0.1]
+    for row in rows:
+        assert (row["misfit"] is None) == (row["kind"] != "segment")
+        assert (row["corner"] is None) == (row["quality"] is None) == (row["kind"] != "corner")
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [("corners", "corner, slit, edge"), ("breakpoints", "jump, gap, scan_end")],
+)
+def test_unknown_kind_is_told(table, expected):
     features = random_features(0)
-    features.breakpoints["kind"][1] = "cliff"
-    with pytest.raises(ValueError, match="'cliff', expected one of jump, gap, scan_end"):
+    getattr(features, table)["kind"][1] = "cliff"
+    message = f"^{table[:-1]} kind is 'cliff', expected one of {expected}$"
+    with pytest.raises(ValueError, match=message):
         features_table([features])
 
 

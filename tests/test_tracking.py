@@ -96,6 +96,21 @@ def test_the_covariance_of_the_motion_must_be_a_matrix():
         associate(FRAME, FRAME, covariance=np.eye(2))
 
 
+@pytest.mark.parametrize(
+    ("before", "now"), [("edge", "edge"), ("edge", "corner"), ("corner", "edge"), ("slit", "edge")]
+)
+def test_edges_have_no_pair(before, now):
+    frames = [features(corners=[corner(2, 1, kind=kind)]) for kind in (before, now)]
+    assert associate(*frames).corners.tolist() == []
+
+
+def test_corners_and_slits_pair_and_keep_their_rows_among_edges():
+    # An edge lies nearer to where the corner was than the corner itself.
+    rows = [corner(2, 1, kind="edge"), corner(2.01, 1, kind="slit"), corner(0, 0, kind="edge")]
+    assert associate(FRAME, features(corners=rows)).corners.tolist() == [[0, 1]]
+    assert associate(features(corners=rows), FRAME).corners.tolist() == [[1, 0]]
+
+
 def test_features_without_a_covariance_are_left_alone():
     unknown = features(corners=[corner(2, 1, sigma=math.nan)])
     assert associate(FRAME, unknown).corners.tolist() == []
@@ -131,6 +146,24 @@ def test_births_deaths_and_occlusion_of_a_few_frames():
     tracks = tracker(FRAME)
     assert (tracks.segments.tolist(), tracks.corners.tolist()) == ([4, 1], [5])
     assert tracks.born.tolist() == [4, 5]
+
+
+def test_edges_are_ignored():
+    # The silhouette of a column goes with the sensor; everything else stays.
+    plain, tracker, pose = Tracker(), Tracker(), (0.0, 0.0, 0.0)
+    for i in range(4):
+        frame = at(FRAME.transform(*inverse(pose)), 0.1 * i)
+        silhouettes = [corner(0.3, -2, segments=(-1, 1), kind="edge"), frame.corners[0]]
+        silhouettes.append(corner(-0.3, -2, segments=(1, -1), kind="edge"))
+        with_edges = replace(frame, corners=np.array(silhouettes))
+        expected, tracks = plain(frame), tracker(with_edges)
+        assert tracks.corners.tolist() == [-1, *expected.corners, -1]
+        for name in ("segments", "arcs", "born", "ended"):
+            assert getattr(tracks, name).tolist() == getattr(expected, name).tolist()
+        if i:
+            assert tracks.motion.pose == expected.motion.pose
+        pose = compose(pose, (0.05, 0.01, 0.02))
+    assert len(tracker._seen.corners) == 1
 
 
 def test_a_track_is_found_where_the_motion_has_brought_it():

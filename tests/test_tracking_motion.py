@@ -120,23 +120,23 @@ def test_pairs_must_be_there(pair):
         estimate_motion(Matches(walls, walls, np.array([pair]), NONE, NONE))
 
 
-def test_what_walls_are_off_straight_lines_is_the_same_in_both_frames():
-    # The direction is known to 10 mrad. Of (1 cm)² at the centroid, 100 readings of 1 mm account
-    # for 1e-4 · (1 + 4/100): that share is their own.
-    sigmas = {"sigma": (0.01, 0.01), "n_points": 100}
+def test_the_misfit_of_a_wall_counts_where_one_frame_saw_it_alone():
+    # Two directions known to 1 mrad each, and two misfits of 1 cm over 2 m: 12 (2 · 0.01²)/2².
+    noise, bow = 2e-6, 6e-4
 
     def frame(start, end):
-        noise = ln.RangeNoise(0.001)
-        return replace(features(segments=[segment(start, end, 0, 99, **sigmas)]), noise=noise)
+        row = segment(start, end, 0, 99, sigma=(0.001, 0.001))
+        row["misfit"] = 0.01
+        return features(segments=[row])
 
     def turn_variance(start, end):
         return estimate_motion(all_pairs(wall, frame(start, end))).covariance[2, 2]
 
-    wall, own = frame((2, -1), (2, 1)), 1.04e-4
-    assert turn_variance((2, -1), (2, 1)) == pytest.approx(2e-4 * own, rel=1e-3)
-    assert turn_variance((2, 1), (2, 3)) == pytest.approx(2e-4, rel=1e-3)
+    wall = frame((2, -1), (2, 1))
+    assert turn_variance((2, -1), (2, 1)) == pytest.approx(noise, rel=1e-3)
+    assert turn_variance((2, 1), (2, 3)) == pytest.approx(noise + bow, rel=1e-3)
     # Of three metres that were seen, one is common.
-    assert turn_variance((2, 0), (2, 2)) == pytest.approx(2e-4 * (2 + own) / 3, rel=1e-3)
+    assert turn_variance((2, 0), (2, 2)) == pytest.approx(noise + bow * 2 / 3, rel=1e-3)
 
 
 @pytest.mark.slow

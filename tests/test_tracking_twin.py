@@ -47,6 +47,7 @@ def varied(seed):
         table["covariance"][rng.random(len(table)) < 0.05] = math.nan
     noise = ln.RangeNoise(0.01, 0.002, 0.001, 0.01) if seed % 4 else None
     frame.corners["convex"] = rng.random(len(frame.corners)) < 0.3
+    frame.corners["kind"] = rng.choice(["corner", "slit", "edge"], len(frame.corners))
     frame.corners["segments"][:, 0] -= rng.random(len(frame.corners)) < 0.3
     return replace(frame, noise=noise)
 

@@ -200,6 +200,13 @@ def test_colours_of_clusters_are_those_of_the_figures(server):
     assert [part.strip(' \n",') for part in listed.split('"')[1::2]] == PALETTE.tolist()
 
 
+def test_colours_of_corners_and_edges_are_those_of_the_figures(server):
+    from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR
+
+    light = server.page["/style.css"].decode().partition("@media")[0]
+    assert f"--corner: {CORNER_COLOR}; --edge: {EDGE_COLOR};" in light
+
+
 @pytest.mark.parametrize(
     ("host", "status"),
     [

@@ -92,7 +92,7 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
     features = found(log, 0)
     assert page.text("h1") == "corner.npz"
     assert page.text("header p") == "ranges in npz, 25 scans"
-    assert f"{len(features.segments)} segments, 1 corner, 0 arcs" in caption(page)
+    assert f"{len(features.segments)} segments, 1 corner, 0 edges, 0 arcs" in caption(page)
     label = page.run("return document.querySelector('canvas').ariaLabel")
     assert label.startswith("Scan 0 by liu:scale_free: ")
     # Something is drawn: far more colours than those of a grid.
@@ -132,6 +132,7 @@ def test_hovering_tells_the_numbers_of_a_feature(page, log):
     told = page.text(".card")
     x, y = corner["position"]
     assert "corner 0" in told
+    assert f"kind corner quality {corner['quality']:.2f}" in " ".join(told.split())
     assert f"{x:.3f}, {y:.3f} m" in told
     segment = found(log, 0).segments[0]
     page.point(*page.run(PLACE, segment["centroid"].tolist()))

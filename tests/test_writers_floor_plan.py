@@ -150,6 +150,15 @@ def test_walls_are_bounded_in_number(monkeypatch):
     assert plan.walls()[0]["views"] == 299
 
 
+def test_edges_stay_apart_from_corners():
+    plan = FloorPlan()
+    for shift in (0.0, 0.02):
+        plan.add(features(corners=[corner(shift, 1), corner(0.05, 1 + shift, kind="edge")]))
+    markers, _ = plan.markers(min_views=2)
+    np.testing.assert_allclose(markers.corners, [(0.01, 1)])
+    np.testing.assert_allclose(markers.edges, [(0.05, 1.01)])
+
+
 def test_averages_join_what_is_near():
     means = Averages(2, 0.1)
     means.add(np.array([(0, 0), (1, 0), (np.nan, 0), (1e300, 0)]))
@@ -176,7 +185,7 @@ def test_ellipses_hold_95_percent(a, b, turn):
     covariance = rotation @ np.diag([a**2, b**2]) @ rotation.T
     ellipses = ellipses_of(np.array([[1.0, 2.0]]), covariance[None])
     none = np.zeros((0, 2))
-    markers = Markers(none.reshape(0, 2, 2), none, np.zeros((0, 5)), ellipses)
+    markers = Markers(none.reshape(0, 2, 2), none, none, np.zeros((0, 5)), ellipses)
     offset = markers.ellipse_strips()[0] - (1.0, 2.0)
     squared = np.einsum("ni,ij,nj->n", offset, np.linalg.inv(covariance), offset)
     np.testing.assert_allclose(squared, -2 * math.log(0.05), rtol=1e-6)

@@ -33,7 +33,7 @@ def scan_of(**fields):
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
-    corners=[corner(1, 2), corner(np.nan, 0)],
+    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3, kind="edge")],
     arcs=[arc(2, 1, 0.25, 0, 1)],
 )
 EMPTY = features(6)
@@ -104,15 +104,16 @@ def test_foxglove_has_scan_transform_and_scene(tmp_path):
 
     markers = markers_of(FOUND, scan)
     entities = {entity["id"]: entity for entity in scene[2]["entities"]}
-    assert list(entities) == ["segments", "arcs", "corners", "ellipses"]
+    assert list(entities) == ["segments", "arcs", "corners", "edges", "ellipses"]
     assert all(e["frame_id"] == "laser_link" for e in entities.values())
     lines = [points_of(line["points"]) for line in entities["segments"]["lines"]]
     np.testing.assert_array_equal(lines, markers.segments)
     (strip,) = entities["arcs"]["lines"]
     np.testing.assert_array_equal(points_of(strip["points"]), markers.arc_strips()[0])
-    (sphere,) = entities["corners"]["spheres"]
-    assert sphere["pose"]["position"] == {"x": 1.0, "y": 2.0}
-    assert len(entities["ellipses"]["lines"]) == 2
+    for name, x, y in (("corners", 1.0, 2.0), ("edges", -1.0, 3.0)):
+        (sphere,) = entities[name]["spheres"]
+        assert sphere["pose"]["position"] == {"x": x, "y": y}
+    assert len(entities["ellipses"]["lines"]) == 3
     assert all(line["color"]["a"] == 1 for line in entities["segments"]["lines"])
 
 
@@ -140,9 +141,10 @@ def test_ros2_has_scan_transform_and_markers(tmp_path):
     layers = {layer.name: layer for layer in layers_of(markers_of(FOUND, scan))}
     assert list(markers) == list(layers)
     for name, marker in markers.items():
-        expected = layers[name].points if name == "corners" else layers[name].pairs
+        is_spheres = name in {"corners", "edges"}
+        expected = layers[name].points if is_spheres else layers[name].pairs
         np.testing.assert_array_equal([(p.x, p.y) for p in marker.points], expected)
-        assert marker.type == (marker.SPHERE_LIST if name == "corners" else marker.LINE_LIST)
+        assert marker.type == (marker.SPHERE_LIST if is_spheres else marker.LINE_LIST)
         assert marker.action == marker.ADD
         assert marker.header.frame_id == "laser_link"
         assert marker.pose.orientation.w == 1
@@ -165,7 +167,7 @@ def test_foxglove_replaces_what_is_no_more(tmp_path):
     messages = read_foxglove(path)
     assert [m[0] for m in messages] == ["/scan", "/scan/features"] * 2
     entities = messages[-1][2]["entities"]
-    assert [e["id"] for e in entities] == ["segments", "arcs", "corners", "ellipses"]
+    assert [e["id"] for e in entities] == ["segments", "arcs", "corners", "edges", "ellipses"]
     assert not any(e["lines"] or e["spheres"] for e in entities)
 
 

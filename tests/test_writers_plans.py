@@ -14,6 +14,7 @@ from test_writers_floor_plan import line, turned
 
 from lineament import Extractor, LaserScan, LineamentError, open_log
 from lineament.output import open_writer
+from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR
 from lineament.output.dxf import DxfWriter
 from lineament.output.markers import markers_of
 from lineament.output.svg import SvgWriter
@@ -34,7 +35,7 @@ def scan_at(x, y, theta, *, ranges=(2.0,) * 100):
 ONE = features(
     100,
     segments=[line((1, -0.5), (1, 2.25)), line((1, 2.25), (-0.123456, 2.25))],
-    corners=[corner(1, 2.25)],
+    corners=[corner(1, 2.25), corner(-0.125, 2.25, kind="edge")],
     arcs=[arc(1.0, 0.0, 1.0, 0, 99)],
 )
 
@@ -52,10 +53,14 @@ def test_svg_of_one_scan_in_its_own_frame(tmp_path):
     scan = scan_at(5, 5, 1)
     write(tmp_path / "a.svg", (ONE, scan))
     root, groups = groups_of(tmp_path / "a.svg")
-    assert list(groups) == ["walls", "arcs", "ellipses", "corners"]
+    assert list(groups) == ["walls", "arcs", "ellipses", "edges", "corners"]
     lines = [numbers(e, "x1", "y1", "x2", "y2") for e in groups["walls"]]
     assert lines == [[1, -0.5, 1, 2.25], [1, 2.25, -0.123456, 2.25]]
-    assert numbers(groups["corners"][0], "cx", "cy") == [1, 2.25]
+    (dot,), (edge,) = groups["corners"], groups["edges"]
+    assert numbers(dot, "cx", "cy") == [1, 2.25]
+    assert numbers(edge, "cx", "cy") == [-0.125, 2.25]
+    fills = {e.get("id"): e.get("fill") for e in root.iter(f"{SVG}g")}
+    assert (fills["corners"], fills["edges"]) == (CORNER_COLOR, EDGE_COLOR)
     (arc_path,) = groups["arcs"]
     words = arc_path.get("d").split()
     first, last = markers_of(ONE, scan).arcs[0, 3:]
@@ -63,14 +68,14 @@ def test_svg_of_one_scan_in_its_own_frame(tmp_path):
     expected = [1 + math.cos(first), math.sin(first), 1 + math.cos(last), math.sin(last)]
     assert ends == pytest.approx(expected, abs=1e-6)
     assert words[4:9] == ["1", "1", "0", str(int(last - first > math.pi)), "1"]
-    assert len(groups["ellipses"]) == 2
+    assert len(groups["ellipses"]) == 3
     # A metre is as long on paper as the scale says.
     transform = next(e.get("transform") for e in root.iter(f"{SVG}g"))
     per_metre = float(transform.removeprefix("matrix(").split()[0])
     text = "".join(root.itertext())
     assert f"1 : {1000 / per_metre:.0f}" in text
     assert root.get("width").endswith("mm")
-    assert "2 walls and 1 corner of 1 scan" in text
+    assert "2 walls, 1 corner and 1 edge (lighter) of 1 scan" in text
 
 
 def test_dxf_of_one_scan_is_whole_and_clean(tmp_path):
@@ -81,20 +86,22 @@ def test_dxf_of_one_scan_is_whole_and_clean(tmp_path):
     assert not audit.errors
     assert not audit.fixes
     assert drawing.header["$INSUNITS"] == 6  # metres
-    assert {"WALLS", "CORNERS", "ARCS", "ELLIPSES"} <= {la.dxf.name for la in drawing.layers}
+    layers = {layer.dxf.name for layer in drawing.layers}
+    assert {"WALLS", "CORNERS", "EDGES", "ARCS", "ELLIPSES"} <= layers
     space = drawing.modelspace()
     lines = [(tuple(e.dxf.start)[:2], tuple(e.dxf.end)[:2]) for e in space.query("LINE")]
     assert lines == [((1, -0.5), (1, 2.25)), ((1, 2.25), (-0.123456, 2.25))]
     assert all(e.dxf.layer == "WALLS" for e in space.query("LINE"))
-    (point,) = space.query("POINT[layer=='CORNERS']")
-    assert tuple(point.dxf.location)[:2] == (1, 2.25)
+    for layer, place in (("CORNERS", (1, 2.25)), ("EDGES", (-0.125, 2.25))):
+        (point,) = space.query(f"POINT[layer=='{layer}']")
+        assert tuple(point.dxf.location)[:2] == place
     (found,) = space.query("ARC[layer=='ARCS']")
     _, _, _, first, last = markers_of(ONE, scan).arcs[0]
     assert found.dxf.radius == 1
     assert math.radians(found.dxf.start_angle) == pytest.approx(first % (2 * math.pi))
     assert math.radians(found.dxf.end_angle) == pytest.approx(last % (2 * math.pi))
     ellipses = space.query("ELLIPSE[layer=='ELLIPSES']")
-    assert [e.dxf.ratio for e in ellipses] == pytest.approx([1, 1])
+    assert [e.dxf.ratio for e in ellipses] == pytest.approx([1, 1, 1])
 
 
 @pytest.mark.parametrize("writer", [SvgWriter, DxfWriter])

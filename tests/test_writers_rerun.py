@@ -19,7 +19,7 @@ pytest.importorskip("rerun")
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
-    corners=[corner(1, 2)],
+    corners=[corner(1, 2), corner(-1, 3, kind="edge")],
     arcs=[arc(2, 1, 0.25, 0, 1)],
 )
 
@@ -37,9 +37,9 @@ def test_recording_is_whole_and_has_everything(tmp_path):
             writer.write(FOUND, scan)
     rerun("verify", path)
     told = rerun("stats", path)
-    for entity in ("", "/points", "/segments", "/arcs", "/corners", "/ellipses"):
+    for entity in ("", "/points", "/segments", "/arcs", "/corners", "/edges", "/ellipses"):
         assert f"/world/scan{entity}: " in told
-    assert "num_rows = 1 500" in told.replace("\u2009", " ")
+    assert "num_rows = 1 750" in told.replace("\u2009", " ")
     assert "log_time" not in told
     assert "stamp" in told
 

@@ -71,8 +71,8 @@ def test_parquet_has_a_column_of_topics_where_they_are_told(tmp_path):
     write(tmp_path / "two.parquet", scans, TOPICS)
     table = pq.read_table(tmp_path / "two.parquet")
     assert table.schema.names == [*SCHEMA.names, "topic"]
-    # The columns of version 1 are what they are without it.
-    assert table.schema.metadata[b"lineament.schema"] == b"1"
+    # The other columns are what they are without it.
+    assert table.schema.metadata[b"lineament.schema"] == b"2"
     assert table.drop_columns("topic").combine_chunks().equals(features_table(scans))
     told = np.array(TOPICS)[table["scan"].to_numpy() % 2]
     assert table["topic"].to_pylist() == told.tolist()

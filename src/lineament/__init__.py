@@ -6,7 +6,7 @@ neither numba nor pyarrow.
 Examples
 --------
 >>> import lineament as ln
->>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+>>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.01, angle_increment=0.01)
 >>> ln.extract(scan)
 Features(1 segments, 0 corners, 0 arcs, 2 breakpoints, 1 clusters, stamp=0.000)
 """

@@ -16,8 +16,8 @@ __all__ = ["Explanation", "explain"]
 _FEW = 4
 #: The method that finds clusters alone.
 _PARTS_ONLY = "pdbs"
-#: Angle below which neighbouring lines may be taken for one wall that bows [°].
-_SHALLOW = 10.0
+#: Angle below which neighbouring lines may be taken for one wall that bends [°].
+_SHALLOW = 20.0
 #: Beams within which an examined corner still tells something about a beam.
 _NEAR = 3
 
@@ -246,7 +246,7 @@ class _Question:
         """Tell why there is no corner here: what two lines in place of one would gain."""
         beams = self.readings.of(segment)
         at = beams.index(self.beam) if self.beam in beams else 0
-        if at < 3 or len(beams) - at < 3:
+        if at < _FEW or len(beams) - at < _FEW:
             return
         whole, left, right = (
             Line.through(self.trace, part) for part in (beams, beams[:at], beams[at:])
@@ -256,7 +256,7 @@ class _Question:
         if gain > self.trace.threshold:
             turn = left.turn(right)
             text += f"; yet it was not cut, and the two lines turn by {turn:.1f}°"
-            text += ": one wall that bows" if turn < _SHALLOW else ""
+            text += ": one wall that bends" if turn < _SHALLOW else ""
         self._note("evidence", text)
 
     def _tell_arc(self, k: int) -> str:

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 __all__ = ["ARC", "BREAKPOINT", "CORNER", "SEGMENT", "FeatureBatch", "Features"]
 
 #: A straight piece of a surface. `covariance` is that of (offset at the centroid along the left
-#: normal of the direction [m], angle [rad]). Beams run from `first_beam` to `last_beam`, over the
-#: seam of a full circle where the first is larger than the last.
+#: normal of the direction [m], angle [rad]), of what is random: the noise. `misfit` is what the
+#: surface itself is off a straight line, a root mean square [m], the same in every scan. Beams run
+#: from `first_beam` to `last_beam`, over the seam of a full circle where the first is larger.
 SEGMENT = np.dtype(
     [
         ("start", "f8", 2),
@@ -31,13 +32,17 @@ SEGMENT = np.dtype(
         ("last_beam", "i4"),
         ("n_points", "i4"),
         ("rms", "f8"),
+        ("misfit", "f8"),
         ("cluster", "i4"),
     ],
     align=True,
 )
 
-#: A vertex between two segments. `opening` is the angle between its two arms [rad], `convex`
-#: tells that it points towards the sensor, `segments` are indices into the scan's segments or -1.
+#: A vertex between two segments. `opening` is the angle between its two arms [rad], `convex` says
+#: that it points towards the sensor, `segments` are indices into the scan's segments or -1.
+#: `quality` is the share of such corners that are found again from another place. `kind` is
+#: "corner", "slit" (the segments end beside a hole at their vertex) or "edge" (a segment ends, and
+#: few measurements show its face, before a jump).
 CORNER = np.dtype(
     [
         ("position", "f8", 2),
@@ -47,6 +52,8 @@ CORNER = np.dtype(
         ("beam", "i4"),
         ("response", "f8"),
         ("segments", "i4", 2),
+        ("quality", "f8"),
+        ("kind", "U6"),
     ],
     align=True,
 )
@@ -145,7 +152,7 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
         >>> moved = ln.extract(scan).transform(1.0, 0.0, math.pi / 2)
         >>> moved.segments["centroid"].round(2).tolist()
         [[1.0, 2.0]]
@@ -186,7 +193,7 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
         >>> ln.extract(scan).to_arrow()["kind"].to_pylist()
         ['segment', 'breakpoint', 'breakpoint', 'cluster']
         """

@@ -82,10 +82,11 @@ class Line(NamedTuple):
 
     @classmethod
     def through(cls, trace: Trace, beams: list[int]) -> Line:
-        """Fit the line of some beams of a trace, weighted by the noise that was used."""
+        """Fit the line of some beams of a trace, weighted by the noise and the scale it used."""
         xy, noise = trace.scan.points[beams], trace.features.noise
         rho = trace.scan.ranges[beams]
-        weight = rho**2 / noise.range_variance(rho) if noise else np.ones(len(beams))
+        variance = noise.range_variance(rho) if noise else rho**2
+        weight = rho**2 / (variance + trace.scale**2)
         root = np.sqrt(weight)
         (a, b), *_ = np.linalg.lstsq(xy * root[:, None], root, rcond=None)
         off = 1.0 - xy @ (a, b)

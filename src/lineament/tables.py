@@ -17,8 +17,8 @@ __all__ = ["SCHEMA", "batch_table", "features_table"]
 
 #: Values of the column `kind`, in the order in which the rows of a scan come.
 KINDS = ("segment", "corner", "arc", "breakpoint", "cluster")
-#: Values of the column `breakpoint`.
-BREAKPOINT_KINDS = ("jump", "gap", "scan_end")
+#: Values of the columns that tell the kind of a corner, and of a breakpoint.
+TEXTS = {"corner": ("corner", "slit", "edge"), "breakpoint": ("jump", "gap", "scan_end")}
 LABEL = np.dtype(np.int32)
 
 Columns = dict[str, NDArray[Any]]
@@ -53,6 +53,8 @@ SCHEMA = pa.schema(
         _field("opening", _F, "rad", "corner: interior angle between its arms"),
         _field("convex", pa.bool_(), "", "corner: points towards the sensor"),
         _field("response", _F, "", "corner: strength, in the unit of the method"),
+        _field("quality", _F, "", "corner: share found again from another place, 0 to 1"),
+        _field("corner", _TEXT, "", "corner: corner, slit or edge"),
         _field("beam", _I, "", "corner: its beam"),
         _field("segment_before", _I, "", "corner: index of the segment before it, or -1"),
         _field("segment_after", _I, "", "corner: index of the segment after it, or -1"),
@@ -60,11 +62,12 @@ SCHEMA = pa.schema(
         _field("last_beam", _I, "", "segment, arc, cluster: last beam; breakpoint: beam after"),
         _field("n_points", _I, "", "segment, arc, cluster: number of valid beams"),
         _field("rms", _F, "m", "segment, arc: rms distance of its points"),
+        _field("misfit", _F, "m", "segment: rms distance of its surface from a straight line"),
         _field("cluster", _I, "", "segment: index of its cluster"),
         _field("breakpoint", _TEXT, "", "breakpoint: jump, gap or scan_end"),
         _field("occluder", _I, "", "breakpoint: beam of the nearer side of a jump, or -1"),
     ],
-    metadata={"lineament.schema": "1", "lineament.version": __version__},
+    metadata={"lineament.schema": "2", "lineament.version": __version__},
 )
 
 
@@ -86,7 +89,7 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     Raises
     ------
     ValueError
-        If a breakpoint is of a kind that the schema does not have.
+        If a corner or a breakpoint is of a kind that the schema does not have.
 
     Examples
     --------
@@ -169,7 +172,7 @@ def _scatter(
     for k in np.flatnonzero(~is_null):
         values[rows[k]] = columns[k][field.name]
     array = pa.array(values, mask=is_null[kind])
-    return pa.DictionaryArray.from_arrays(array, BREAKPOINT_KINDS) if is_text else array
+    return pa.DictionaryArray.from_arrays(array, TEXTS[field.name]) if is_text else array
 
 
 def _segment_columns(s: NDArray[np.void]) -> Columns:
@@ -178,7 +181,7 @@ def _segment_columns(s: NDArray[np.void]) -> Columns:
         **_xy(s["start"], "start_"),
         **_xy(s["end"], "end_"),
         **_covariance(s["covariance"]),
-        **{name: s[name] for name in ("angle", "rms", "cluster")},
+        **{name: s[name] for name in ("angle", "rms", "misfit", "cluster")},
         **_span(s),
     }
 
@@ -187,7 +190,8 @@ def _corner_columns(c: NDArray[np.void]) -> Columns:
     return {
         **_xy(c["position"]),
         **_covariance(c["covariance"]),
-        **{name: c[name] for name in ("opening", "convex", "response", "beam")},
+        **{name: c[name] for name in ("opening", "convex", "response", "quality", "beam")},
+        "corner": _codes(c["kind"], "corner"),
         "segment_before": c["segments"][:, 0],
         "segment_after": c["segments"][:, 1],
     }
@@ -203,21 +207,26 @@ def _arc_columns(a: NDArray[np.void]) -> Columns:
 
 
 def _breakpoint_columns(b: NDArray[np.void]) -> Columns:
-    codes = np.full(len(b), -1, dtype=np.int32)
-    for code, name in enumerate(BREAKPOINT_KINDS):
-        codes[b["kind"] == name] = code
-    if len(b) and codes.min() < 0:
-        raise ValueError(
-            f"breakpoint kind is {str(b['kind'][codes.argmin()])!r}, "
-            f"expected one of {', '.join(BREAKPOINT_KINDS)}"
-        )
     return {
         **_xy(b["position"]),
         "first_beam": b["beam"][:, 0],
         "last_beam": b["beam"][:, 1],
-        "breakpoint": codes,
+        "breakpoint": _codes(b["kind"], "breakpoint"),
         "occluder": b["occluder"],
     }
+
+
+def _codes(kinds: NDArray[np.str_], column: str) -> NDArray[np.int32]:
+    """Return the index of each kind among the texts of its column."""
+    codes = np.full(len(kinds), -1, dtype=np.int32)
+    for code, name in enumerate(TEXTS[column]):
+        codes[kinds == name] = code
+    if len(kinds) and codes.min() < 0:
+        raise ValueError(
+            f"{column} kind is {str(kinds[codes.argmin()])!r}, "
+            f"expected one of {', '.join(TEXTS[column])}"
+        )
+    return codes
 
 
 def _has_ends(breakpoints: NDArray[np.void], counts: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -58,6 +58,9 @@ class Trace:
     evidence : dict of str to float64 array
         By table ("segments", "corners", "arcs"), how much χ² would rise without each feature;
         empty where a method does not decide by that.
+    scale : float
+        Standard deviation of surfaces from straight lines [m] that χ² allows for, besides the
+        noise; 0 where a method has none.
     """
 
     scan: LaserScan
@@ -72,6 +75,7 @@ class Trace:
     threshold: float
     cuts: NDArray[np.int32]
     evidence: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    scale: float = 0.0
 
 
 def trace_of(

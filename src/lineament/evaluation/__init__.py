@@ -20,36 +20,46 @@ from .beams import MIN_BEAMS
 from .consistency import NormalisedErrors
 from .corners import CornerScores, corner_scores
 from .counts import Counts, Summable
+from .free_space import FreeSpaceScores, free_space_scores
 from .matching import match
 from .partition import PartitionScores, partition_scores
+from .ranked import RankedRepeats, ranked_repeats
 from .repeatability import Repeatability, Repeats, repeatability
 from .scores import Scores, evaluate
 from .segments import SegmentScores, segment_scores
 from .similarity import SimilarityScores, similarity_errors, similarity_scores
 from .stability import Stability, rotation_stability
+from .standing import ScatterScores, StandingScores, standing_scores
 
 __all__ = [
     "MIN_BEAMS",
     "ArcScores",
     "CornerScores",
     "Counts",
+    "FreeSpaceScores",
     "NormalisedErrors",
     "PartitionScores",
+    "RankedRepeats",
     "Repeatability",
     "Repeats",
+    "ScatterScores",
     "Scores",
     "SegmentScores",
     "SimilarityScores",
     "Stability",
+    "StandingScores",
     "Summable",
     "arc_scores",
     "corner_scores",
     "evaluate",
+    "free_space_scores",
     "match",
     "partition_scores",
+    "ranked_repeats",
     "repeatability",
     "rotation_stability",
     "segment_scores",
     "similarity_errors",
     "similarity_scores",
+    "standing_scores",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from ..features import Features
 from ..scan import Array
 from .beams import MIN_BEAMS, beams_of, common_beams, on_small_surfaces, overlap_ratios
-from .consistency import NormalisedErrors
+from .consistency import NormalisedErrors, tolerance
 from .counts import Counts, Summable, rms
 from .matching import match
 
@@ -53,10 +53,10 @@ class ArcScores(Summable):
 def arc_scores(found: Features, truth: Features) -> ArcScores:
     """Compare the arcs of one scan with the true ones.
 
-    A found arc may be a true one if centre and radius are each within 0.10 m and the overlap of
-    their beams (intersection over union) is at least 0.5. They are matched by that overlap. One
-    that is not matched, and has at least half of its beams on surfaces too small to be demanded,
-    is left out of the count.
+    A found arc may be a true one if centre and radius are each within 0.10 m, or three deviations
+    of the bound if that is more, and the overlap of their beams (intersection over union) is at
+    least 0.5. They are matched by that overlap. One that is not matched, and has at least half of
+    its beams on surfaces too small to be demanded, is left out of the count.
 
     Parameters
     ----------
@@ -85,8 +85,11 @@ def arc_scores(found: Features, truth: Features) -> ArcScores:
     overlap = overlap_ratios(spans, beams_of(true_arcs, n), n)
     demanded = true_arcs["n_points"] >= MIN_BEAMS
     difference = _parameters(found)[:, np.newaxis] - _parameters(truth)
-    near = np.hypot(difference[..., 0], difference[..., 1]) <= CENTER
-    near &= (abs(difference[..., 2]) <= RADIUS) & (overlap >= OVERLAP) & demanded
+    spread = tolerance(np.diagonal(true_arcs["covariance"], axis1=1, axis2=2))
+    center = np.maximum(CENTER, np.hypot(spread[:, 0], spread[:, 1]))
+    near = np.hypot(difference[..., 0], difference[..., 1]) <= center
+    near &= abs(difference[..., 2]) <= np.maximum(RADIUS, spread[:, 2])
+    near &= (overlap >= OVERLAP) & demanded
     rows, columns = match(1.0 - overlap, near)
     errors = difference[rows, columns]
     return ArcScores(

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ..scan import Array
 from .counts import Summable, quantile, ratio
 
-__all__ = ["NormalisedErrors"]
+__all__ = ["NormalisedErrors", "largest_variance", "tolerance", "usable_covariances"]
 
 #: A covariance whose eigenvalues have a smaller ratio than this has lost all its digits.
 _LEAST_EIGENVALUE = 1e-14
+#: Deviations of the bound within which a feature is right.
+_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,12 +56,9 @@ class NormalisedErrors(Summable):
     @classmethod
     def of(cls, errors: Array, covariances: Array) -> Self:
         """Normalise errors (m, k) by their covariances (m, k, k), in the same units."""
-        finite = np.isfinite(errors).all(axis=1) & np.isfinite(covariances).all(axis=(1, 2))
-        kept, covariances = errors[finite], covariances[finite]
-        eigenvalues = np.linalg.eigvalsh(covariances)
-        definite = eigenvalues[:, 0] > _LEAST_EIGENVALUE * eigenvalues[:, -1]
-        factors = np.linalg.cholesky(covariances[definite])
-        whitened = np.linalg.solve(factors, kept[definite, :, np.newaxis])[:, :, 0]
+        kept = usable_covariances(covariances) & np.isfinite(errors).all(axis=1)
+        factors = np.linalg.cholesky(covariances[kept])
+        whitened = np.linalg.solve(factors, errors[kept, :, np.newaxis])[:, :, 0]
         return cls(whitened, len(errors) - len(whitened))
 
     @property
@@ -76,6 +75,11 @@ class NormalisedErrors(Summable):
     def median_ratio(self) -> float:
         """Median of the squares over that of chi-square; a few gross errors do not move it."""
         return quantile(self.squares, 0.5) / _chi_square(0.5, self.whitened.shape[1])
+
+    def share_within(self, probability: float) -> float:
+        """Share of the errors in the ellipse that should hold this share of them."""
+        limit = _chi_square(probability, self.whitened.shape[1])
+        return ratio(int((self.squares <= limit).sum()), len(self.whitened))
 
     @property
     def over_bound(self) -> float:
@@ -112,6 +116,34 @@ class NormalisedErrors(Summable):
             "nees_median": self.median_ratio,
             "nees_unusable": self.unusable,
         }
+
+
+def usable_covariances(covariances: Array) -> NDArray[np.bool_]:
+    """Whether each of some covariances (m, k, k) is finite and positive definite.
+
+    Examples
+    --------
+    >>> covariances = np.array([np.eye(2), np.zeros((2, 2)), np.full((2, 2), np.nan)])
+    >>> usable_covariances(covariances).tolist()
+    [True, False, False]
+    """
+    usable: NDArray[np.bool_] = np.asarray(np.isfinite(covariances).all(axis=(1, 2)))
+    eigenvalues = np.linalg.eigvalsh(covariances[usable])
+    usable[usable] = eigenvalues[:, 0] > _LEAST_EIGENVALUE * eigenvalues[:, -1]
+    return usable
+
+
+def largest_variance(covariances: Array) -> Array:
+    """Largest eigenvalue of each of some covariances (m, k, k); 0 of one that is not usable."""
+    usable = usable_covariances(covariances)
+    largest = np.zeros(len(covariances))
+    largest[usable] = np.linalg.eigvalsh(covariances[usable])[:, -1]
+    return largest
+
+
+def tolerance(variance: Array) -> Array:
+    """Three deviations: how far off the best estimate there is may be; 0 where it is not known."""
+    return np.asarray(_DEVIATIONS * np.sqrt(np.nan_to_num(variance)))
 
 
 def _chi_square(probability: float, degrees: int) -> float:

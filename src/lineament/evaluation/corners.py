@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from ..features import Features
 from ..scan import Array
 from .beams import MIN_BEAMS
-from .consistency import NormalisedErrors
+from .consistency import NormalisedErrors, largest_variance, tolerance
 from .counts import Counts, Summable, quantile, rms
 from .matching import match
 
-__all__ = ["CornerScores", "corner_scores", "demanded_corners"]
+__all__ = ["CornerScores", "corner_scores", "demanded_corners", "vertices"]
 
 #: A found corner is right within one of these distances of a true one [m].
 GATES = (0.05, 0.10, 0.25)
@@ -63,10 +63,12 @@ class CornerScores(Summable):
 def corner_scores(found: Features, truth: Features) -> CornerScores:
     """Compare the corners of one scan with the true ones.
 
-    They are matched by distance. A true corner is demanded if both its segments have at least
-    `MIN_BEAMS` beams; demanded ones are matched first, and a found corner that is then matched
-    with one of the others is left out of the count. All others that are found, on a round
-    column or anywhere else, are mistakes.
+    They are matched by distance, within each gate or three deviations of the bound, if that is
+    more: no estimate can be asked to be nearer. A true corner is demanded if both its segments
+    have at least `MIN_BEAMS` beams; demanded ones are matched first, and a found corner that is
+    then matched with one of the others is left out of the count. All others that are found, on a
+    round column or anywhere else, are mistakes. Edges at jumps are no vertices, and are not
+    compared.
 
     Parameters
     ----------
@@ -86,12 +88,14 @@ def corner_scores(found: Features, truth: Features) -> CornerScores:
     >>> corner_scores(features, features).counts[0.10]
     Counts(correct=1, found=1, true=1)
     """
-    difference = found.corners["position"][:, np.newaxis] - truth.corners["position"]
+    corners = vertices(found)
+    difference = corners["position"][:, np.newaxis] - truth.corners["position"]
     distance = np.hypot(difference[..., 0], difference[..., 1])
+    spread = tolerance(largest_variance(truth.corners["covariance"]))
     demanded = demanded_corners(truth)
     counts = {}
     for gate in GATES:
-        near = distance <= gate
+        near = distance <= np.maximum(gate, spread)
         rows, columns = match(distance, near & demanded)
         unmatched = np.ones(len(distance), dtype=np.bool_)
         unmatched[rows] = False
@@ -105,8 +109,13 @@ def corner_scores(found: Features, truth: Features) -> CornerScores:
         counts,
         errors,
         NormalisedErrors.of(errors, truth.corners["covariance"][pairs[1]]),
-        NormalisedErrors.of(errors, found.corners["covariance"][pairs[0]]),
+        NormalisedErrors.of(errors, corners["covariance"][pairs[0]]),
     )
+
+
+def vertices(features: Features) -> NDArray[np.void]:
+    """Corners without the edges at jumps, which are ends of segments and no vertices."""
+    return np.asarray(features.corners[features.corners["kind"] != "edge"])
 
 
 def demanded_corners(truth: Features) -> NDArray[np.bool_]:

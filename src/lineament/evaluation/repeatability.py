@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..poses import relative
-from ..scan import Array, LaserScan
+from ..scan import Array, LaserScan, Pose
+from .corners import vertices
 from .counts import Summable, ratio, rms
 from .matching import match
 from .segments import ANGLE
@@ -83,7 +84,7 @@ def repeatability(
     found again within the gate. A segment is expected if it shows this scanner its front, and at
     least half of 16 places along it are in sight; it is found again as one whose direction
     differs by at most 10° and which is within the gate of at least half of those in sight. Both
-    are matched one to one.
+    are matched one to one. Edges at jumps are left out.
 
     Swap the scans for the other direction. A corner of which only one side is in sight from here
     is expected all the same.
@@ -119,14 +120,19 @@ def repeatability(
     """
     if not gate > 0:
         raise ValueError(f"gate is {gate}, expected a distance > 0")
+    moved = other_features.transform(*relative(*checked_poses(scan, other_scan)))
+    return Repeatability(
+        _corners_again(scan, vertices(features)["position"], vertices(moved)["position"], gate),
+        _segments_again(scan, features.segments, moved.segments, gate),
+    )
+
+
+def checked_poses(scan: LaserScan, other_scan: LaserScan) -> tuple[Pose, Pose]:
+    """Return the poses of two scans; a ValueError if one has none."""
     if scan.pose is None or other_scan.pose is None:
         which = "scan" if scan.pose is None else "other_scan"
         raise ValueError(f"{which} has no pose, expected (x, y, theta)")
-    moved = other_features.transform(*relative(scan.pose, other_scan.pose))
-    return Repeatability(
-        _corners_again(scan, features.corners["position"], moved.corners["position"], gate),
-        _segments_again(scan, features.segments, moved.segments, gate),
-    )
+    return scan.pose, other_scan.pose
 
 
 def _corners_again(scan: LaserScan, positions: Array, others: Array, gate: float) -> Repeats:

@@ -19,7 +19,7 @@ from .beams import (
     overlap_ratios,
     shared_beams,
 )
-from .consistency import NormalisedErrors
+from .consistency import NormalisedErrors, tolerance
 from .counts import Counts, Summable, quantile, ratio, rms
 from .matching import match
 
@@ -92,9 +92,10 @@ def segment_scores(found: Features, truth: Features) -> SegmentScores:
     """Compare the segments of one scan with the true ones.
 
     A found segment may be a true one if its centroid is within 0.10 m of the true line, the
-    angle between their directions is at most 10°, and the overlap of their beams (intersection
-    over union) is at least 0.5. They are matched by that overlap. One that is not matched, and
-    has at least half of its beams on surfaces too small to be demanded, is left out of the count.
+    angle between their directions is at most 10°, each or three deviations of the bound if that is
+    more, and the overlap of their beams (intersection over union) is at least 0.5. They are
+    matched by that overlap. One that is not matched, and has at least half of its beams on
+    surfaces too small to be demanded, is left out of the count.
 
     A true segment is fragmented where several found ones each have more than half of their beams
     in it, and together more than half of its own; a found one is merged where that holds the
@@ -128,7 +129,9 @@ def segment_scores(found: Features, truth: Features) -> SegmentScores:
     demanded = true_lines["n_points"] >= MIN_BEAMS
     offset, turn = line_errors(lines[:, np.newaxis], true_lines)
     overlap = overlap_ratios(spans, true_spans, n)
-    near = (abs(offset) <= DISTANCE) & (abs(turn) <= ANGLE) & (overlap >= OVERLAP)
+    spread = tolerance(np.diagonal(true_lines["covariance"], axis1=1, axis2=2))
+    near = abs(offset) <= np.maximum(DISTANCE, spread[:, 0])
+    near &= (abs(turn) <= np.maximum(ANGLE, spread[:, 1])) & (overlap >= OVERLAP)
     rows, columns = match(1.0 - overlap, near & demanded)
     one, other = lines[rows], true_lines[columns]
     # The other way round: how far the true centroid is from the found line.

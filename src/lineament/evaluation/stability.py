@@ -10,6 +10,7 @@ import numpy as np
 
 from ..features import Features
 from ..scan import Array, LaserScan, Pose
+from .corners import vertices
 from .counts import Summable, ratio, rms
 from .matching import match
 
@@ -155,8 +156,9 @@ def corner_stability(
     """
     if not gate > 0:
         raise ValueError(f"gate is {gate}, expected a distance > 0")
-    position = reference.corners["position"]
-    difference = position[:, np.newaxis] - turned.transform(0.0, 0.0, turn).corners["position"]
+    position = vertices(reference)["position"]
+    others = vertices(turned.transform(0.0, 0.0, turn))["position"]
+    difference = position[:, np.newaxis] - others
     distance = np.hypot(difference[..., 0], difference[..., 1])
     repeated = distance[match(distance, distance <= gate)]
-    return Stability(len(position), len(turned.corners), repeated)
+    return Stability(len(position), len(others), repeated)

@@ -139,7 +139,8 @@ def track_scores(
     The features of a frame are moved by the known poses into the frame before. Corners are the
     same within 0.10 m; segments if the centroids of both are within 0.10 m of the other's line,
     the directions within 10°, and they lie side by side along half of the shorter one. They are
-    matched one to one, without any of the tracker's own gates.
+    matched one to one, without any of the tracker's own gates. Features without a track, the edges,
+    are left out.
 
     Parameters
     ----------
@@ -157,10 +158,13 @@ def track_scores(
     scores = {}
     for kind, same in (("segments", _same_segments), ("corners", _same_corners)):
         numbers: list[NDArray[np.int64]] = [getattr(track, kind) for track in tracks]
+        tracked = [of_frame >= 0 for of_frame in numbers]
+        numbers = [of_frame[kept] for of_frame, kept in zip(numbers, tracked, strict=True)]
         pairs = switched = lost = 0
         for i in range(len(frames) - 1):
             moved = frames[i + 1].transform(*relative(poses[i], poses[i + 1]))
-            one, other = same(getattr(frames[i], kind), getattr(moved, kind))
+            before, now = getattr(frames[i], kind), getattr(moved, kind)
+            one, other = same(before[tracked[i]], now[tracked[i + 1]])
             changed = numbers[i][one] != numbers[i + 1][other]
             new = np.isin(numbers[i + 1][other], tracks[i + 1].born)
             pairs += len(one)

@@ -14,6 +14,7 @@ from .records import (
     S_CENTROID,
     S_COVARIANCE,
     S_END,
+    S_MISFIT,
     S_START,
 )
 
@@ -58,7 +59,7 @@ def _move_point(row, at, covariance, size, c, s, x, y):
 
 @kernel
 def associate(
-    before, now, convex, spread, origin, roughness, gates, cost, paths, prices, via, owners
+    before, now, sides, spread, origin, roughness, gates, cost, paths, prices, via, owners
 ):
     """Find which features of two frames are the same.
 
@@ -66,8 +67,8 @@ def associate(
     ----------
     before, now : (segments, corners, arcs)
         Words of the features (see `records`), the later ones moved into the earlier frame.
-    convex : (before, now)
-        Bool arrays: which of the corners are convex.
+    sides : (before, now)
+        int8 arrays: 1 for convex corners, 0 for others. Only corners with the same number pair.
     spread : float64 array, shape (3, 3)
         Covariance of the motion by which they were moved.
     origin : (x, y)
@@ -94,7 +95,7 @@ def associate(
         x, y = b[i, C_POSITION], b[i, C_POSITION + 1]
         xx, xy, yy = _point_spread(x - origin[0], y - origin[1], spread, roughness)
         for j in range(len(a)):
-            if convex[0][j] == convex[1][i]:
+            if sides[0][j] == sides[1][i]:
                 square = _square(
                     x - a[j, C_POSITION],
                     y - a[j, C_POSITION + 1],
@@ -147,10 +148,11 @@ def _compare_segment(a, now, j, spread, origin, roughness, gate, cost):
         ax, ay = b[S_CENTROID] - a[S_CENTROID], b[S_CENTROID + 1] - a[S_CENTROID + 1]
         normal = (-ty, tx, tx * px + ty * py)
         of_offset, of_angle = rough_variances(shorter, roughness)
-        oo, oa, aa = offset_spread(a, ax * tx + ay * ty, 1.0)
-        oo += b[S_COVARIANCE] + of_offset
+        oo, oa, aa = offset_spread(a, ax * tx + ay * ty)
+        bow = a[S_MISFIT] * a[S_MISFIT] + b[S_MISFIT] * b[S_MISFIT]
+        oo += b[S_COVARIANCE] + of_offset + bow
         oa += b[S_COVARIANCE + 1]
-        aa += b[S_COVARIANCE + 3] + of_angle + spread[2, 2]
+        aa += b[S_COVARIANCE + 3] + of_angle + 12.0 * bow / (shorter * shorter) + spread[2, 2]
         for k in range(3):
             oa += normal[k] * spread[k, 2]
             for m in range(3):
@@ -227,18 +229,15 @@ def rough_variances(length, roughness):
 
 
 @helper
-def offset_spread(row, along, share):
-    """Share of the covariance of a segment's offset and angle, so far along its line.
+def offset_spread(row, along):
+    """Covariance of a segment's offset and angle, so far along its line.
 
     The offset is the less known the farther it is from the centroid.
     """
     both = row[S_COVARIANCE + 1] + row[S_COVARIANCE + 2]
-    angle = share * row[S_COVARIANCE + 3]
-    return (
-        share * (row[S_COVARIANCE] + along * both) + along * along * angle,
-        share * row[S_COVARIANCE + 1] + along * angle,
-        angle,
-    )
+    angle = row[S_COVARIANCE + 3]
+    offset = row[S_COVARIANCE] + along * both + along * along * angle
+    return offset, row[S_COVARIANCE + 1] + along * angle, angle
 
 
 @helper

@@ -19,16 +19,10 @@ CHORD_DISTANCE, CANDIDATE_RESPONSE = 9, 10
 # By point: what is measured [m].
 MEASURED_X, MEASURED_Y, MEASURED_RHO = 11, 12, 13
 SPARE = 14  # for whoever needs it, until the next
-# By point: what its range counts, ρ²/σ² [-].
-WEIGHT = 15
-# By piece: χ² of its line, that of one line through it and the piece before, what that is more
-# than their own (inf without a neighbour before), and its line a x + b y = 1 [1/m].
-COST, JOINT_COST, RISE, LINE_A, LINE_B = 16, 17, 18, 19, 20
-# By arc: centre and radius [m], root mean square [m], χ², what lines cost more, and the six
-# covariances [m²].
-ARC_X, ARC_Y, ARC_R, ARC_RMS, ARC_COST, ARC_GAIN = 21, 22, 23, 24, 25, 26
-ARC_XX, ARC_XY, ARC_XR, ARC_YY, ARC_YR, ARC_RR = 27, 28, 29, 30, 31, 32
-FLOATS = 33
+# By piece of a map: pivot, right side and cross term of its normal equations, and the inverse range
+# of the line before each vertex and after it [1/m].
+PIVOT, RIGHT, CROSS, U_BEFORE, U_AFTER = 15, 16, 17, 18, 19
+FLOATS = 20
 
 # Lines of ints, by point.
 BEAM, LABEL = 0, 1  # beam; class, -1 for noise
@@ -39,9 +33,8 @@ CLASS_FIRST, CLASS_LAST = 2, 3
 FIRST, LAST, BEFORE = 4, 5, 6
 CANDIDATE = 7  # by candidate: its point
 STACK_FIRST, STACK_LAST = 8, 9  # by piece that waits for its search: first and last point
-ARC_FIRST, ARC_LAST = 10, 11  # by arc: first and last point
-INTS = 12
+INTS = 10
 
 # Counts.
-POINTS, CLOSED, CLASSES, PIECES, CANDIDATES, ARCS = 0, 1, 2, 3, 4, 5
-COUNTS = 6
+POINTS, CLOSED, CLASSES, PIECES, CANDIDATES = 0, 1, 2, 3, 4
+COUNTS = 5

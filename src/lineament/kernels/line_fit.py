@@ -2,21 +2,11 @@
 
 import math
 
-import numpy as np
-
 from . import helper, sums
 from .noise import LEAST_SIGMA
 
 #: How a line is fitted (equations 23, 24, and what is better).
-TOTAL, Y_OF_X, WEIGHTED, REFINED = 0, 1, 2, 3
-#: Squares above so many variances do not count in a refined line.
-FAR_OFF = 16.0
-#: Deviations of χ² from which on a wall is taken for uneven.
-FAIR = 4.0
-#: Parts of a wall that bow each for itself.
-BOWS = 3.0
-#: Readings that a cut costs.
-CUT = 2.0
+TOTAL, Y_OF_X, WEIGHTED = 0, 1, 2
 
 
 @sums
@@ -79,61 +69,6 @@ def fit_line(x, y, rho, first, last, noise, kind):
     return cx, cy, c, s, var_offset, oa / (w_sum * t_sum), aa / (t_sum * t_sum), rms
 
 
-@helper
-def excess(chi_square, points):
-    """Tell what a line's χ² has too much for noise alone, over its degrees of freedom."""
-    free = points - 2.0
-    if free < 1.0 or chi_square < free + FAIR * math.sqrt(2.0 * free):
-        return 0.0
-    return chi_square / free - 1.0
-
-
-@sums
-def refine_line(x, y, rho, first, last, noise, a, b, uneven, cuts):
-    """Fit a line to the points `first`..`last` by maximum likelihood, from one near it.
-
-    That is a x + b y = 1, and gives the weights. As `fit_line`, by one pass; readings that are
-    far off do not count. The wall is `uneven`, a variance [m²]: so much is added to that of each
-    reading, and to the covariance, as neighbours are off together. `cuts` is at how many of its
-    ends it was cut at a corner: by the same readings, which costs about two of them each.
-    """
-    span = slice(first, last + 1)
-    x, y, rho = x[span], y[span], rho[span]
-    norm = math.sqrt(a * a + b * b)
-    distance, nx, ny = 1.0 / norm, a / norm, b / norm
-    x0, y0 = x[0], y[0]
-    total, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(len(x)):
-        across = nx * x[i] + ny * y[i]
-        variance = normal_variance(across, rho[i], noise) + uneven
-        off = across - distance
-        w = 1.0 / variance if off * off <= FAR_OFF * variance else 0.0
-        dx, dy = x[i] - x0, y[i] - y0
-        total += w
-        sx += w * dx
-        sy += w * dy
-        sxx += w * dx * dx
-        sxy += w * dx * dy
-        syy += w * dy * dy
-    if total == 0.0:
-        return fit_line(x, y, rho, np.int64(0), len(x) - 1, noise, WEIGHTED)
-    sxx -= sx * sx / total
-    sxy -= sx * sy / total
-    syy -= sy * sy / total
-    c, s = _direction(sxx, sxy, syy, TOTAL)
-    if c * (x[-1] - x0) + s * (y[-1] - y0) < 0.0:
-        c, s = -c, -s
-    along = c * c * sxx + 2.0 * c * s * sxy + s * s * syy
-    across = max(sxx + syy - along, 0.0)
-    cx, cy, rms = x0 + sx / total, y0 + sy / total, math.sqrt(across / total)
-    common, scale = uneven / BOWS, 1.0 + CUT * cuts / len(x)
-    var_offset, var_angle = scale * (1.0 / total + common), math.pi**2 / 12.0
-    # Points that all but coincide have no direction: any angle is as good.
-    if along > 0.0:
-        var_angle = min(var_angle, scale * (1.0 + common * total) / along)
-    return cx, cy, c, s, var_offset, 0.0, var_angle, rms
-
-
 @sums
 def _line(x, y, rho, noise, c, s, weighted, kind):
     """Centroid and direction of least squares, of orthogonal or axial distances.
@@ -156,13 +91,13 @@ def _line(x, y, rho, noise, c, s, weighted, kind):
     sxx -= sx * sx / total
     sxy -= sx * sy / total
     syy -= sy * sy / total
-    c, s = _direction(sxx, sxy, syy, kind)
+    c, s = direction(sxx, sxy, syy, kind)
     return x0 + sx / total, y0 + sy / total, c, s
 
 
 @helper
-def _direction(sxx, sxy, syy, kind):
-    """Tell the unit vector along a line, from the second moments of its points."""
+def direction(sxx, sxy, syy, kind):
+    """Return the unit vector along a line, from the second moments of its points."""
     if kind == Y_OF_X:
         u, v = (sxx, sxy) if sxx >= syy else (sxy, syy)
     else:

@@ -23,8 +23,6 @@ _ROUNDS, _SMALL = 20, 1e-7
 def estimate_motion(
     before,
     now,
-    points,
-    noises,
     sides,
     pairs,
     prior,
@@ -43,10 +41,6 @@ def estimate_motion(
     ----------
     before, now : (segments, corners, arcs)
         Words of the features (see `records`), each in the frame of its own sensor.
-    points : (before, now)
-        int32 arrays: numbers of readings of the segments.
-    noises : (before, now)
-        float64 arrays of shape (4,): noise of either scan, NaN where it is not known.
     sides : int32 array, shape (number of later corners, 2)
         Indices of the segments between which the later corners are.
     pairs : (segments, corners, arcs)
@@ -90,9 +84,7 @@ def estimate_motion(
     scale[2] = _distance(now, pairs)
     lost = 0
     for _ in range(_ROUNDS):
-        n = fill_residuals(
-            before, now, points, noises, sides, pairs, matched, state, roughness, rows
-        )
+        n = fill_residuals(before, now, sides, pairs, matched, state, roughness, rows)
         _add_up(rows, n, _limit(rows, n, squares, quantiles), information, gradient, feigned)
         lost = _unobserved(information, feigned, scale, total, kept, directions)
         # Nothing is taken from the features in directions that they do not tell.

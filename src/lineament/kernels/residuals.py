@@ -11,7 +11,6 @@ from .association import (
     side_by_side,
     turned,
 )
-from .line_fit import CUT, normal_variance
 from .records import (
     A_CENTER,
     A_COVARIANCE,
@@ -19,9 +18,8 @@ from .records import (
     C_POSITION,
     S_ANGLE,
     S_CENTROID,
-    S_COVARIANCE,
     S_END,
-    S_RMS,
+    S_MISFIT,
     S_START,
 )
 
@@ -36,20 +34,17 @@ _DIRECTED = 0.1
 
 
 @helper
-def fill_residuals(before, now, points, noises, sides, pairs, matched, motion, roughness, rows):
+def fill_residuals(before, now, sides, pairs, matched, motion, roughness, rows):
     """Fill a line of `rows` for each pair, of segments first, then corners and arcs.
 
-    `points` are the numbers of readings of the earlier and of the later segments, `noises` those
-    of their scans; `matched` tells of each later segment whether it is in a pair, `sides` between
-    which segments the later corners are. A pair whose covariance is not known tells nothing.
+    `matched` says of each later segment whether it is in a pair, `sides` between which segments the
+    later corners are. A pair whose covariance is not known does not count.
     """
     c, s = math.cos(motion[2]), math.sin(motion[2])
     n = 0
     for k in range(len(pairs[0])):
         i, j = pairs[0][k, 0], pairs[0][k, 1]
-        a, b = before[0][i], now[0][j]
-        own_a, own_b = _own(a, points[0][i], noises[0]), _own(b, points[1][j], noises[1])
-        _of_segments(a, b, own_a, own_b, motion, c, s, roughness, rows[n])
+        _of_segments(before[0][i], now[0][j], motion, c, s, roughness, rows[n])
         n += 1
     for k in range(len(pairs[1])):
         i, j = pairs[1][k, 0], pairs[1][k, 1]
@@ -70,26 +65,11 @@ def fill_residuals(before, now, points, noises, sides, pairs, matched, motion, r
 
 
 @helper
-def _own(row, points, noise):
-    """Share of a segment's covariance that comes of its readings; all where it is not known.
-
-    The rest is that of walls that are not straight. Readings at up to two ends may have placed
-    a cut, and count less.
-    """
-    c, s = math.cos(row[S_ANGLE]), math.sin(row[S_ANGLE])
-    distance = c * row[S_CENTROID + 1] - s * row[S_CENTROID]
-    rho = math.hypot(row[S_CENTROID], row[S_CENTROID + 1])
-    scatter = max(normal_variance(distance, rho, noise), row[S_RMS] * row[S_RMS])
-    variance = scatter * (1.0 + 2.0 * CUT / points) / points
-    return variance / row[S_COVARIANCE] if variance < row[S_COVARIANCE] else 1.0
-
-
-@helper
-def _of_segments(a, b, own_a, own_b, motion, c, s, roughness, row):
+def _of_segments(a, b, motion, c, s, roughness, row):
     """Offset of the later centroid from the earlier line, and the angle between the two.
 
-    What walls are off straight lines is the same in both frames, so far as both saw the same of
-    them: of what is not the readings' own, only the part counts that one of them saw alone.
+    The misfit of a wall is the same in both frames, so far as both saw the same of it: it counts by
+    the part that one of them saw alone.
     """
     tx, ty = math.cos(a[S_ANGLE]), math.sin(a[S_ANGLE])
     px, py = c * b[S_CENTROID] - s * b[S_CENTROID + 1], s * b[S_CENTROID] + c * b[S_CENTROID + 1]
@@ -103,11 +83,13 @@ def _of_segments(a, b, own_a, own_b, motion, c, s, roughness, row):
     shared, union = side_by_side(length, first, last)
     alone = 1.0 - max(shared / union, 0.0)
     # The offset of the earlier line is asked for where the later one has its centroid.
-    oo, oa, aa = offset_spread(a, ax * tx + ay * ty, own_a + alone * (1.0 - own_a))
-    other_oo, other_oa, other_aa = offset_spread(b, 0.0, own_b + alone * (1.0 - own_b))
+    oo, oa, aa = offset_spread(a, ax * tx + ay * ty)
+    other_oo, other_oa, other_aa = offset_spread(b, 0.0)
     oo, oa, aa = oo + other_oo, oa + other_oa, aa + other_aa
-    of_offset, of_angle = rough_variances(min(length, segment_length(b)), roughness)
-    oo, aa = oo + of_offset, aa + of_angle
+    shorter = min(length, segment_length(b))
+    of_offset, of_angle = rough_variances(shorter, roughness)
+    bow = alone * (a[S_MISFIT] * a[S_MISFIT] + b[S_MISFIT] * b[S_MISFIT])
+    oo, aa = oo + of_offset + bow, aa + of_angle + 12.0 * bow / (shorter * shorter)
     for k in range(COLUMNS):
         row[k] = 0.0
     determinant = oo * aa - oa * oa

@@ -7,27 +7,11 @@ import math
 
 import numpy as np
 
-from . import helper
+from . import helper, kernel
 from .layout import (
-    BEAM,
-    BEFORE,
-    CLOSED,
-    COST,
-    FIRST,
-    JOINT_COST,
-    LAST,
-    LINE_A,
-    LINE_B,
-    PIECES,
-    POINTS,
-    RESPONSE,
-    RHO,
-    RISE,
-    STACK_FIRST,
-    STACK_LAST,
-    X,
-    Y,
-)
+    BEAM, BEFORE, CLOSED, CROSS, FIRST, LAST, PIECES, PIVOT, POINTS, RESPONSE, RHO, RIGHT,
+    STACK_FIRST, STACK_LAST, U_AFTER, U_BEFORE, X, Y,
+)  # fmt: skip
 from .records import C_POSITION, S_ANGLE, S_CENTROID, S_END, S_START
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
@@ -108,7 +92,7 @@ def _leaves(k, vertices):
 def _move_points(floats, ints, bearings, vertices, ring):
     """Move the points of the vertices to where their lines meet, or end."""
     at, kind, x, y = ints[STACK_FIRST], ints[STACK_LAST], floats[X], floats[Y]
-    before, after = floats[LINE_A], floats[LINE_B]
+    before, after = floats[U_BEFORE], floats[U_AFTER]
     for k in range(vertices):
         i, b, tangent = at[k], ints[BEAM, at[k]], 0.0
         m = _leaves(k, vertices)
@@ -143,7 +127,12 @@ def _meeting(floats, ints, bearings, k, m):
     Tangent of the angle from that ray, and 1/ρ times its cosine; NaN if they do not meet between
     the readings next to it.
     """
-    at, beam, before, after = ints[STACK_FIRST], ints[BEAM], floats[LINE_A], floats[LINE_B]
+    at, beam, before, after = (
+        ints[STACK_FIRST],
+        ints[BEAM],
+        floats[U_BEFORE],
+        floats[U_AFTER],
+    )
     b = beam[at[k]]
     c, s = _turn(bearings, b, beam[at[k - 1]])
     slope = (after[k - 1] - before[k] * c) / s
@@ -161,12 +150,12 @@ def _meeting(floats, ints, bearings, k, m):
 
 @helper
 def _solve(floats, ints, bearings, vertices, again):
-    """Inverse range of the line before each vertex (LINE_A) and of that after it (LINE_B).
+    """Inverse range of the line before each vertex (U_BEFORE) and of that after it (U_AFTER).
 
     Of least squared range errors; with weights from the lines that are there, if `again`.
     """
-    kind, before, after = ints[STACK_LAST], floats[LINE_A], floats[LINE_B]
-    pivot, right, cross = floats[COST], floats[JOINT_COST], floats[RISE]
+    kind, before, after = ints[STACK_LAST], floats[U_BEFORE], floats[U_AFTER]
+    pivot, right, cross = floats[PIVOT], floats[RIGHT], floats[CROSS]
     d, h = 0.0, 0.0
     for k in range(vertices):
         if kind[k] == BEGIN or kind[k] > HELD:
@@ -204,7 +193,7 @@ def _normal_equations(floats, ints, bearings, k, again):
         a, b, r = rest / whole, s / whole, rho[i]
         mapped = r
         if again:
-            u = a * floats[LINE_B, k] + b * floats[LINE_A, k + 1]
+            u = a * floats[U_AFTER, k] + b * floats[U_BEFORE, k + 1]
             mapped = 1.0 / u if u * r > 0.5 else 2.0 * r
         w = r * r * mapped * mapped
         aa, ab, bb = aa + w * a * a, ab + w * a * b, bb + w * b * b
@@ -212,7 +201,7 @@ def _normal_equations(floats, ints, bearings, k, again):
     return aa, ab, bb, ua, ub
 
 
-@helper
+@kernel
 def hold_together(floats, ints, counts, row, segments, corners, offsets):
     """Let the segments of a scan end in the vertices of its polylines, and corners be there.
 

@@ -83,7 +83,7 @@ class Pipeline:
     Examples
     --------
     >>> pipeline = Pipeline(LiveConfig(track=True))
-    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> scan = LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     >>> frame = pipeline("front", scan)
     >>> len(frame.features.segments), frame.tracks.segments.tolist()
     (1, [0])

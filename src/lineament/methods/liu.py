@@ -191,7 +191,6 @@ class Liu(MethodBase):
             block.noises,
             block.segments,
             block.corners,
-            block.arcs,
             block.breakpoints,
             block.clusters,
             block.offsets,

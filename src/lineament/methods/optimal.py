@@ -1,12 +1,12 @@
-"""The project's own method: evidence in place of thresholds.
+"""The project's own method: one energy, minimised exactly.
 
-The stages are those of Liu et al. 2023: denoise, cluster, cut at corners, fit. Each decides by
-χ², in units of the noise of the scan and of the spacing of its beams; ``docs/methods.md`` tells the
-story of each step, and ``docs/results.md`` what each is worth.
+Where Liu et al. 2023 cluster, cut and fit by thresholds, one energy decides here.
+``docs/optimal.md`` leads from the model of a scan to the recurrence that finds its minimum.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -14,141 +14,138 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..block import Block
-from ..kernels import layout
-from ..kernels.inverse_range import SUMS
-from ..kernels.optimal import (
-    ARCS_TOO,
-    BORDERS,
-    DISSOLVING,
-    GROWTH,
-    SPIKES,
-    STRAIGHTENING,
-    UNEVENNESS,
-    extract_rows,
-)
-from ..kernels.polylines import PLANES
+from ..features import Features
+from ..kernels.line_fit import WEIGHTED
+from ..kernels.optimal import layout
+from ..kernels.optimal.extraction import extract_rows
+from ..kernels.polylines import PLANES, fit_polylines
+from ..kernels.vertices import hold_together
+from ..scan import LaserScan
+from ..tracing import Trace
 from .base import MethodBase
-from .checks import check_choice, check_count, check_number
+from .checks import check_count, check_number
+from .optimal_trace import evidence_of, trace_of
+from .pdbs import part
+from .steps import measure
 
-__all__ = ["PARTS", "Optimal"]
+__all__ = ["Optimal"]
 
-#: Parts of the method that can be left out.
-PARTS = {
-    "spikes": SPIKES,
-    "growth": GROWTH,
-    "borders": BORDERS,
-    "dissolving": DISSOLVING,
-    "arcs": ARCS_TOO,
-    "straightening": STRAIGHTENING,
-    "unevenness": UNEVENNESS,
-}
+#: Error of a range beyond which a measurement is better left out of a map [m]; distance of
+#: neighbours beyond which no line of a map joins them [m]; spacings from a vertex of a map within
+#: which its fitted lines meet, for their covariance to be that of the vertex.
+_WORST, _LINK, _NEAR = 0.31, 1.0, 2.0
+#: Angle of the steepest incidence that parts the scan for a map, from the beam [rad].
+_GRAZING = math.radians(4.0)
 
 
-class _Scratch(NamedTuple):
-    parts: int
+class Workspace(NamedTuple):
+    """Arrays of one scan, see `kernels.optimal.layout`; the last two are those of maps."""
+
+    points: NDArray[np.float64]
+    beams: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    pieces: NDArray[np.float64]
     sums: NDArray[np.float64]
+    noise: NDArray[np.float64]
     costs: NDArray[np.float64]
     follow: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optimal(MethodBase):
-    """Lines, corners and arcs by how much evidence there is for them.
+    """Lines, corners and arcs: the partition of a scan that has the least energy.
 
-    1. *Noise*: the lattice of the ranges, the constant part and that which grows with range are
-       estimated, first from what readings are off the line through their neighbours, then from
-       what they are off the lines of pieces, but for those through clutter. Spikes are left out.
-    2. *Cluster*: neighbours part where too many beams are missing, or where they are farther
-       apart than readings of one surface can be, almost edge-on.
-    3. *Cut*: stretches of four readings are merged, the cheapest pair first, while one line
-       through both costs less than `evidence` more in χ² (bottom-up, by running sums of the
-       inverse-range regression, each in O(1)). Borders are moved to where χ² is least; small
-       pieces that neighbours explain dissolve, and readings that are on neither side (mixed
-       pixels) are left out. Runs of pieces that one circle explains better are arcs, with
-       their steep ends. Neighbours at a shallow angle are one wall: real walls bow. Where they are
-       more uneven than the noise, that is added to it for all that is decided from then on.
-    4. *Fit* each line by maximum likelihood to the raw ranges. What χ² has too much is put down
-       to the wall, and added to its covariance. Neighbours that meet between their readings make
-       a corner where they meet; where they do not, and an edge hides what is behind it, the
-       cluster ends with the surface.
+    1. *Noise*: the constant part and that which grows with range, from what measurements are off
+       the line through their neighbours.
+    2. *Cluster*: a surface breaks where more than `max_missing` beams are missing, or where the
+       range steps by more than a surface met at 86° and the noise allow.
+    3. *Partition*: each measurement is on a line or on none. A line costs `evidence` and the χ² of
+       its measurements, a measurement on no line costs half of `evidence`. The partition that costs
+       the least is found exactly, by dynamic programming (Jackson et al. 2005). Neighbouring lines
+       that turn by less than 20° and meet are one wall that bends; runs of lines that one circle
+       explains for less are arcs.
+    4. *Fit* each line by maximum likelihood to the ranges.
+    5. *Join* neighbouring lines at a corner where they meet between their measurements.
 
     Parameters
     ----------
     evidence : float
-        How much χ² must rise, if two pieces are taken for one, for them to be two. The response
-        of a corner is this rise. More finds less.
+        Price of a line, β: by so much χ² must rise where two lines are taken for one. More finds
+        less.
     max_missing : int
         Missing beams in a row over which a surface goes on.
     max_vertices : int
-        If not 0, a map instead of features: polylines of at most so many vertices in all, such
-        that their range error is the least. Their vertices are the corners, and `evidence` and
-        `without` do not matter.
-    without : tuple of str
-        Parts of `PARTS` that are left out, to see what they are worth.
+        If not 0, a map instead of features: polylines of at most so many vertices in all, with
+        the least range error. Their vertices are the corners, and `evidence` does not matter.
 
     Raises
     ------
     ValueError
         If a parameter is out of bounds. The message names it and its value.
 
+    References
+    ----------
+    B. Jackson et al., "An algorithm for optimal partitioning of data on an interval", *IEEE Signal
+    Processing Letters* 12 (2005).
+
     Examples
     --------
     >>> import lineament as ln
     >>> from lineament.simulation import SENSORS, room
     >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
-    >>> ln.extract(scan, method="optimal").corners["position"].round(2).tolist()
+    >>> corners = ln.extract(scan, method="optimal").corners
+    >>> corners["position"][corners["kind"] == "corner"].round(2).tolist()
     [[1.4, -0.5], [3.0, 2.0]]
     """
 
     name: ClassVar[str] = "optimal"
 
-    evidence: float = 25.0
+    evidence: float = 12.0
     max_missing: int = 6
     max_vertices: int = 0
-    without: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_number("evidence", self.evidence)
         check_count("max_missing", self.max_missing, least=0)
         check_count("max_vertices", self.max_vertices, least=0)
-        if not isinstance(self.without, tuple):
-            raise ValueError(f"without is {self.without!r}, expected a tuple of names")
-        for part in self.without:
-            check_choice("without", part, PARTS)
         self._settle_types()
 
-    def own_arrays(self, beams: int) -> _Scratch:
-        """Make room for running sums, and for the vertices of a map."""
-        shape = (beams + 2, min(self.max_vertices, beams + 1) + 1)
-        return _Scratch(
-            sum(bit for part, bit in PARTS.items() if part not in self.without),
-            np.empty((2 * beams + 4, SUMS)),
-            np.empty((PLANES, *shape)),
-            np.empty(shape, np.int64),
+    def own_arrays(self, beams: int) -> Workspace:
+        """Make the workspace of a scan."""
+        n, vertices = beams + 2, min(self.max_vertices, beams + 1) + 1
+        return Workspace(
+            np.zeros((layout.POINTS, n)),
+            np.zeros((layout.BEAMS, n), np.int64),
+            np.zeros((layout.SPANS, n), np.int64),
+            np.zeros((n, layout.PIECES)),
+            np.zeros((n, layout.SUMS)),
+            np.zeros(3),
+            np.empty((PLANES, n, vertices)),
+            np.empty((n, vertices), np.int64),
         )
 
     def run(self, block: Block) -> None:
         """Find and measure the features of the scans of a block."""
-        own: _Scratch = block.own
+        if self.max_vertices:
+            MethodBase.run(self, block)
+            return
+        own: Workspace = block.own
         extract_rows(
             block.ranges,
             block.rows,
             block.range_min,
             block.range_max,
             block.bearings,
-            block.step,
             block.circular,
             block.noise,
             self.evidence,
             self.max_missing,
-            own.parts,
-            own.follow.shape[1] - 1,
-            block.floats,
-            block.ints,
-            block.counts,
+            own.points,
+            own.beams,
+            own.spans,
+            own.pieces,
             own.sums,
-            own.costs,
-            own.follow,
+            own.noise,
             block.noises,
             block.segments,
             block.corners,
@@ -156,25 +153,42 @@ class Optimal(MethodBase):
             block.breakpoints,
             block.clusters,
             block.offsets,
+            block.counts,
         )
+
+    def find(self, block: Block, row: int) -> None:
+        """Lay the polylines of a map through the scan in a block's workspace."""
+        own: Workspace = block.own
+        floats, ints, counts = block.floats, block.ints, block.counts
+        part(block, row, angle=_GRAZING, max_missing=self.max_missing, min_points=3)
+        fit_polylines(
+            floats, ints, counts, block.bearings, own.follow.shape[1] - 1, self.max_missing, _LINK,
+            _WORST, own.costs, own.follow,
+        )  # fmt: skip
+        measure(block, row, fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))
+        hold_together(floats, ints, counts, row, block.segments, block.corners, block.offsets)
 
     @property
     def least_response(self) -> float:
-        """What the response of a candidate exceeds: the evidence that is asked for."""
+        """Least response of a corner: the price of a line."""
         return self.evidence
 
+    def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
+        """Run again on a scan of which these features came, and keep every intermediate.
+
+        It has no candidates: all partitions are compared.
+        """
+        if self.max_vertices:
+            return MethodBase.trace(self, scan, features, noise)
+        block = Block(scan, noise, 1, self.own_arrays(len(scan)))
+        block.load(scan.ranges)
+        self.run(block)
+        return trace_of(block, self, scan, features)
+
     def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:
-        """Tell how much χ² would rise without each feature of the last scan.
+        """Rise of χ² without each feature of the last scan.
 
         Of a corner, if its two segments were one; of a segment, if it were one with the neighbour
         that it is most like (inf without neighbours); of an arc, if lines were in its place.
         """
-        if self.max_vertices:
-            return {}
-        pieces = block.counts[layout.PIECES]
-        rise = np.append(block.floats[layout.RISE, :pieces], np.inf)
-        return {
-            "segments": np.minimum(rise[:-1], rise[1:]),
-            "corners": block.written()[1]["response"],
-            "arcs": block.floats[layout.ARC_GAIN, : block.counts[layout.ARCS]].copy(),
-        }
+        return {} if self.max_vertices else evidence_of(block)

@@ -58,7 +58,6 @@ def measure(
         gap,
         block.segments,
         block.corners,
-        block.arcs,
         block.breakpoints,
         block.clusters,
         block.offsets,

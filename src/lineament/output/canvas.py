@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, FAINT, GRID = "#1b1f24", "#9aa1a9", "#e9ecef"
-CORNER_COLOR, BREAK_COLOR, ARC_COLOR = "#d1242f", "#8a5a00", "#8250df"
+CORNER_COLOR, EDGE_COLOR = "#d1242f", "#eba0a5"
+BREAK_COLOR, ARC_COLOR = "#8a5a00", "#8250df"
 
 #: Colours of clusters; neighbours in this list are easy to tell apart, also with colour blindness.
 PALETTE = np.array(

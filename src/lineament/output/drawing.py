@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import LaserScan
-from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, FAINT, INK, colors_of, style
+from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, colors_of, style
 from .markers import arc_span
 
 if TYPE_CHECKING:
@@ -127,24 +127,32 @@ def draw_segments(axes: Axes, segments: NDArray[np.void]) -> None:
 
 
 def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
-    """Markers, with 3 σ ellipses where they can be seen in a plan of some extent [m]."""
+    """Markers, with 3 σ ellipses where they can be seen in a plan of some extent [m].
+
+    Edges are smaller and lighter than corners, and have no ellipse.
+    """
     from matplotlib.patches import Ellipse
 
     finite = np.isfinite(corners["position"]).all(axis=1)
     corners = corners[finite]
-    if not len(corners):
-        return
-    axes.plot(
-        *corners["position"].T,
-        marker="D",
-        markersize=5.5,
-        markerfacecolor="none",
-        markeredgecolor=CORNER_COLOR,
-        markeredgewidth=1.4,
-        linestyle="none",
-        label="corner",
-        zorder=5,
-    )
+    is_edge = corners["kind"] == "edge"
+    corners, edges = corners[~is_edge], corners[is_edge]
+    for drawn, size, color, name in (
+        (edges, 4.0, EDGE_COLOR, "edge"),
+        (corners, 5.5, CORNER_COLOR, "corner"),
+    ):
+        if len(drawn):
+            axes.plot(
+                *drawn["position"].T,
+                marker="D",
+                markersize=size,
+                markerfacecolor="none",
+                markeredgecolor=color,
+                markeredgewidth=size / 4,
+                linestyle="none",
+                label=name,
+                zorder=5,
+            )
     label = "3 σ of a corner"
     for corner in corners[np.isfinite(corners["covariance"]).all(axis=(1, 2))]:
         variances, axes_of = np.linalg.eigh(corner["covariance"])

@@ -1,4 +1,4 @@
-"""DXF: a plan for CAD, in metres, with the layers WALLS, CORNERS, ARCS and ELLIPSES."""
+"""DXF: a plan for CAD, in metres, with the layers WALLS, CORNERS, EDGES, ARCS, ELLIPSES."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .plans import Plan, PlanWriter
 
 __all__ = ["DxfWriter"]
 
-#: Layers and their colours, as numbers of AutoCAD: black or white, red, magenta, grey.
-LAYERS = {"WALLS": 7, "CORNERS": 1, "ARCS": 6, "ELLIPSES": 8}
+#: Layers and their colours, as numbers of AutoCAD: black or white, red, light red, magenta, grey.
+LAYERS = {"WALLS": 7, "CORNERS": 1, "EDGES": 11, "ARCS": 6, "ELLIPSES": 8}
 #: Name under which each wall tells in how many views it was seen.
 APPLICATION = "LINEAMENT"
 #: Points are drawn as crosses of this size [m].
@@ -40,8 +40,9 @@ def _add(drawing: Drawing, plan: Plan) -> None:
     for (start, end), views in zip(markers.segments.tolist(), plan.views.tolist(), strict=True):
         line = space.add_line(start, end, {"layer": "WALLS"})
         line.set_xdata(APPLICATION, [(1000, "views"), (1071, views)])
-    for corner in markers.corners.tolist():
-        space.add_point(corner, {"layer": "CORNERS"})
+    for layer, points in (("CORNERS", markers.corners), ("EDGES", markers.edges)):
+        for point in points.tolist():
+            space.add_point(point, {"layer": layer})
     for x, y, radius, first, last in markers.arcs.tolist():
         if last - first >= 2 * math.pi - 1e-6:
             space.add_circle((x, y), radius, {"layer": "ARCS"})

@@ -23,16 +23,18 @@ _FIELDS = (
     ("<u4", "kind"),
     ("<i4", "track"),
     ("<f4", "start_x", "start_y", "end_x", "end_y", "angle", "radius", "opening", "convex", "rms"),
+    ("<f4", "misfit", "quality"),
     ("<f4", "c00", "c01", "c02", "c11", "c12", "c22"),
-    ("<i4", "first_beam", "last_beam", "n_points", "segment_a", "segment_b"),
+    ("<i4", "first_beam", "last_beam", "n_points", "segment_a", "segment_b", "corner"),
 )
 
-#: One feature, in 25 fields of four bytes: position (centroid of a segment, position of a corner,
+#: One feature, in 28 fields of four bytes: position (centroid of a segment, position of a corner,
 #: centre of an arc; z = 0) [m], kind (0 segment, 1 corner, 2 arc), track (-1 without tracking),
 #: ends [m] and angle [rad] of a segment, radius of an arc [m], opening [rad] and convexity (0 or 1)
-#: of a corner, rms of a segment or arc [m], upper triangle of the covariance (segment: offset,
-#: angle; corner: x, y; arc: x, y, radius), beams (a corner has its own in both), number of points,
-#: and segments of a corner. A field that a kind does not fill is NaN, or -1 where it is an integer.
+#: of a corner, rms of a segment or arc [m], misfit of a segment [m], quality of a corner (0 to 1),
+#: upper triangle of the covariance (segment: offset, angle; corner: x, y; arc: x, y, radius), beams
+#: (a corner has its own in both), number of points, segments of a corner and its kind (0 corner,
+#: 1 slit, 2 edge). A field that a kind does not fill is NaN, or -1 where it is an integer.
 FEATURE_POINT = np.dtype([(name, form) for form, *names in _FIELDS for name in names])
 
 
@@ -61,10 +63,10 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
     Examples
     --------
     >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     >>> point = feature_points(ln.extract(scan))[0]
     >>> [point[name].item() for name in ("kind", "n_points", "radius", "track")]
-    [0, 3, nan, -1]
+    [0, 5, nan, -1]
     """
     from ..kernels.feature_words import fill_points  # Numba takes long to import.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..features import TABLES, Features
 from ..scan import LaserScan, Pose
 from . import canvas, drawing, stage_panels
-from .canvas import ARC_COLOR, CORNER_COLOR, INK, count
+from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK, count
 from .labels import label_points
 
 if TYPE_CHECKING:
@@ -59,7 +59,8 @@ def scan_figure(
     """Draw what some methods found in one scan, one panel a method, side by side.
 
     Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
-    data tell where nothing came back. The number beside a corner is its response.
+    data tell where nothing came back. The number beside a corner is its response. Edges are drawn
+    lighter than corners, without a number.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def scan_figure(
     _legend(figure)
     canvas.settle(figure)
     for axes, features in zip(panels, features_by_method.values(), strict=False):
-        corners = features.corners[features.corners["response"] != 0]  # as in the truth
+        corners = features.corners[features.corners["response"] != 0]  # edges, the truth
         texts = [f"{response:.3g}" for response in corners["response"]]
         label_points(axes, corners["position"], texts, scan.points[scan.valid])
     return figure
@@ -113,6 +114,8 @@ def scan_figure(
 
 def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
     """Draw the stages of one run: filter, spacing against its thresholds, classes, corners.
+
+    Of a method that examines no candidates, the corners and edges that it found are drawn.
 
     Parameters
     ----------
@@ -149,7 +152,11 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
         f"{count(len(candidates), 'candidate')} · {n_accepted} accepted · "
         f"threshold {trace.threshold:.4g} · {count(len(trace.features.segments), 'segment')}"
     )
+    if not len(candidates):  # a method that examines none
+        about = _counts(trace.features)
     canvas.style_plane(panels[1, 1], "d  Corners", about, shown)
+    if not len(candidates):
+        drawing.draw_corners(panels[1, 1], trace.features.corners, _extent(panels[1, 1]))
     for axes in panels.ravel():
         if axes.get_legend_handles_labels()[0]:
             axes.legend(
@@ -172,6 +179,8 @@ def plot_map(
 ) -> None:
     """Draw segments, corners and arcs of many scans in the world, with the way of the sensor.
 
+    Edges are drawn lighter than corners.
+
     Parameters
     ----------
     posed : iterable of ((x, y, theta), Features)
@@ -189,22 +198,23 @@ def plot_map(
     from matplotlib.collections import EllipseCollection, LineCollection
 
     canvas.check_ending(path)
-    way, lines, corners, arcs = _in_the_world(posed)
-    shown = np.vstack([lines.reshape(-1, 2), corners, way])
+    way, lines, corners, edges, arcs = _in_the_world(posed)
+    shown = np.vstack([lines.reshape(-1, 2), corners, edges, way])
     figure = canvas.new_figure(9, canvas.plane_size(shown, 9) + 1.3)
     axes = figure.subplots()
     # Walls that were seen often come out dark, what was seen once stays faint.
     alpha = float(np.clip(60 / max(len(way), 1), 0.08, 0.9))
-    about = (
-        f"{count(len(way), 'scan')} · {count(len(lines), 'segment')} · "
-        f"{count(len(corners), 'corner')} · {count(len(arcs), 'arc')}"
-    )
+    counts = [count(len(way), "scan"), count(len(lines), "segment"), count(len(corners), "corner")]
+    counts += [count(len(edges), "edge")] if len(edges) else []
+    about = " · ".join([*counts, count(len(arcs), "arc")])
     canvas.style_plane(axes, title, about, shown)
     axes.add_collection(LineCollection(list(lines), colors=INK, linewidths=0.9, alpha=alpha))
     axes.plot([], [], color=INK, linewidth=1.2, label="segments")  # for the legend, not faint
-    x, y = corners.T
-    axes.plot(x, y, "o", markersize=2.2, color=CORNER_COLOR, alpha=max(alpha, 0.2), mew=0, zorder=3)
-    axes.plot([], [], "o", markersize=4, color=CORNER_COLOR, label="corners")
+    for points, color, name in ((edges, EDGE_COLOR, "edges"), (corners, CORNER_COLOR, "corners")):
+        x, y = points.T
+        axes.plot(x, y, "o", markersize=2.2, color=color, alpha=max(alpha, 0.2), mew=0, zorder=3)
+        if len(points) or points is corners:
+            axes.plot([], [], "o", markersize=4, color=color, label=name)
     if len(arcs):
         radius = arcs[:, 2]
         circles = EllipseCollection(
@@ -224,25 +234,27 @@ def plot_map(
 def _in_the_world(
     posed: Iterable[tuple[Pose, Features]],
 ) -> tuple[NDArray[np.float64], ...]:
-    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners (k, 2), arcs x y r (a, 3).
+    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners, edges (k, 2), arcs x y r (a, 3).
 
     Only what is finite.
     """
-    way, lines, corners = [np.zeros((0, 2))], [np.zeros((0, 2, 2))], [np.zeros((0, 2))]
-    arcs = [np.zeros((0, 3))]
+    way, lines, arcs = [np.zeros((0, 2))], [np.zeros((0, 2, 2))], [np.zeros((0, 3))]
+    corners, edges = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for pose, features in posed:
         with np.errstate(invalid="ignore"):  # what is not finite is not drawn
             moved = features.transform(*pose)
         way.append(np.array([pose[:2]], dtype=np.float64))
         lines.append(np.stack((moved.segments["start"], moved.segments["end"]), axis=1))
-        corners.append(moved.corners["position"])
+        is_edge = moved.corners["kind"] == "edge"
+        corners.append(moved.corners["position"][~is_edge])
+        edges.append(moved.corners["position"][is_edge])
         arcs.append(np.column_stack((moved.arcs["center"], moved.arcs["radius"])))
-    line, corner, arc = np.concatenate(lines), np.concatenate(corners), np.concatenate(arcs)
+    line = np.concatenate(lines)
+    corner, edge, arc = (np.concatenate(parts) for parts in (corners, edges, arcs))
     return (
         np.concatenate(way),
         line[np.isfinite(line).all(axis=(1, 2))],
-        corner[np.isfinite(corner).all(axis=1)],
-        arc[np.isfinite(arc).all(axis=1)],
+        *(points[np.isfinite(points).all(axis=1)] for points in (corner, edge, arc)),
     )
 
 
@@ -274,5 +286,10 @@ def _legend(figure: Figure) -> None:
 
 def _counts(features: Features) -> str:
     n_clusters = len(np.unique(features.clusters[features.clusters >= 0]))
-    counts = [count(len(getattr(features, name)), name[:-1]) for name in TABLES]
+    numbers = {name[:-1]: len(getattr(features, name)) for name in TABLES}
+    n_edges = int((features.corners["kind"] == "edge").sum())
+    numbers["corner"] -= n_edges
+    counts = [count(number, name) for name, number in numbers.items()]
+    if n_edges:
+        counts.insert(2, count(n_edges, "edge"))
     return " · ".join([*counts, count(n_clusters, "cluster")])

@@ -71,7 +71,8 @@ class FloorPlan:
     def __init__(self) -> None:
         self._walls: list[Wall] = []
         self._ends = np.zeros((0, 2, 2))
-        self._corners, self._arcs = Averages(2, CORNER_RADIUS), Averages(3, ARC_RADIUS)
+        self._corners, self._edges = Averages(2, CORNER_RADIUS), Averages(2, CORNER_RADIUS)
+        self._arcs = Averages(3, ARC_RADIUS)
 
     def add(self, features: Features) -> None:
         """Add the features of a scan, moved into the frame of the plan."""
@@ -83,7 +84,10 @@ class FloorPlan:
         is_sure = offset + (lengths / 2) ** 2 * angle <= OFFSET**2
         good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN is none of these
         self._add_lines(lines[good], 3 * np.sqrt(np.maximum(angle[good], (ANGLE / 3) ** 2)))
-        self._corners.add(features.corners["position"])
+        corners = features.corners
+        is_edge = corners["kind"] == "edge"
+        self._corners.add(corners["position"][~is_edge])
+        self._edges.add(corners["position"][is_edge])
         self._arcs.add(np.column_stack((features.arcs["center"], features.arcs["radius"])))
         if len(self._walls) > MOST_WALLS:
             self._merge()
@@ -154,7 +158,7 @@ class FloorPlan:
         return np.array(found, dtype=WALL)
 
     def markers(self, min_views: int = 1) -> tuple[Markers, NDArray[np.int64]]:
-        """Give what is drawn: walls, corners, and arcs as whole circles, seen so often.
+        """Give what is drawn: walls, corners, edges, and arcs as whole circles, seen so often.
 
         The second array (n,) tells the mean views of each wall, rounded.
         """
@@ -163,6 +167,7 @@ class FloorPlan:
         markers = Markers(
             segments=np.stack((walls["start"], walls["end"]), axis=1),
             corners=self._corners.seen(min_views),
+            edges=self._edges.seen(min_views),
             arcs=np.hstack((arcs, turn)),
             ellipses=np.zeros((0, 5)),
         )

@@ -55,21 +55,22 @@ class Layer:
 
 
 def layers_of(markers: Markers) -> tuple[Layer, ...]:
-    """Make the layers segments, arcs, corners and ellipses; those without marks too.
+    """Make the layers segments, arcs, corners, edges and ellipses; those without marks too.
 
     Examples
     --------
     >>> import lineament as ln
     >>> from lineament.output.markers import markers_of
-    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     >>> layers = layers_of(markers_of(ln.extract(scan), scan))
     >>> [(layer.name, len(layer.strips), len(layer.points)) for layer in layers]
-    [('segments', 1, 0), ('arcs', 0, 0), ('corners', 0, 0), ('ellipses', 0, 0)]
+    [('segments', 1, 0), ('arcs', 0, 0), ('corners', 0, 0), ('edges', 0, 0), ('ellipses', 0, 0)]
     """
     none = np.zeros((0, 2))
     return (
         Layer("segments", (0.16, 0.47, 0.84, 1.0), 0.03, markers.segments, none),
         Layer("arcs", (0.51, 0.31, 0.87, 1.0), 0.03, markers.arc_strips(), none),
         Layer("corners", (0.82, 0.14, 0.18, 1.0), 0.08, (), markers.corners),
+        Layer("edges", (0.94, 0.65, 0.67, 1.0), 0.05, (), markers.edges),
         Layer("ellipses", (0.93, 0.60, 0.20, 1.0), 0.01, markers.ellipse_strips(), none),
     )

@@ -37,17 +37,20 @@ class Markers:
     segments : float64 array, shape (L, 2, 2)
         Start and end of each segment.
     corners : float64 array, shape (K, 2)
-        Positions.
+        Positions of the corners and slits.
+    edges : float64 array, shape (J, 2)
+        Positions of the corners of kind "edge": these are drawn lighter.
     arcs : float64 array, shape (A, 5)
         x, y of the centre, radius, and the directions from the centre in which what was seen
         begins and ends, counter-clockwise; a whole turn apart where that is not known.
     ellipses : float64 array, shape (E, 5)
         x, y, half axes (the longer first), direction of the longer: within them lie 95 % of the
-        errors of the corners, then of the centres of the arcs.
+        errors of the corners and edges, then of the centres of the arcs.
     """
 
     segments: Array
     corners: Array
+    edges: Array
     arcs: Array
     ellipses: Array
 
@@ -56,7 +59,7 @@ class Markers:
         """Points (n, 2) that a picture of all of it must show."""
         circles = np.repeat(self.arcs[:, :2], 4, axis=0)
         circles += np.kron(self.arcs[:, 2:3], [[1, 0], [-1, 0], [0, 1], [0, -1]])
-        return np.vstack([self.segments.reshape(-1, 2), self.corners, circles])
+        return np.vstack([self.segments.reshape(-1, 2), self.corners, self.edges, circles])
 
     def arc_strips(self) -> list[Array]:
         """Make strips of vertices (n, 2), one an arc, at least 48 to a turn.
@@ -65,7 +68,7 @@ class Markers:
         --------
         >>> nothing = np.zeros((0, 2))
         >>> arcs = np.array([[1.0, 0.0, 0.5, 0.0, math.pi / 2]])
-        >>> quarter = Markers(nothing.reshape(0, 2, 2), nothing, arcs, np.zeros((0, 5)))
+        >>> quarter = Markers(nothing.reshape(0, 2, 2), nothing, nothing, arcs, np.zeros((0, 5)))
         >>> quarter.arc_strips()[0][[0, -1]].round(3).tolist()
         [[1.5, 0.0], [1.0, 0.5]]
         """
@@ -107,18 +110,21 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
     Examples
     --------
     >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     >>> markers_of(ln.extract(scan), scan).segments.round(2).tolist()
-    [[[2.0, -0.02], [2.0, 0.02]]]
+    [[[2.0, -0.04], [2.0, 0.04]]]
     """
     segments, corners, arcs = features.segments, features.corners, features.arcs
     lines = np.empty((len(segments), 2, 2))
     lines[:, 0], lines[:, 1] = segments["start"], segments["end"]
+    drawn = corners[is_drawn(corners["position"])]
+    is_edge = drawn["kind"] == "edge"
     arcs = arcs[is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
     spans = [(0.0, 2 * math.pi) if scan is None else arc_span(arc, scan) for arc in arcs]
     return Markers(
         segments=lines[is_drawn(lines)],
-        corners=corners["position"][is_drawn(corners["position"])],
+        corners=drawn["position"][~is_edge],
+        edges=drawn["position"][is_edge],
         arcs=np.column_stack((arcs["center"], arcs["radius"], np.reshape(spans, (-1, 2)))),
         ellipses=ellipses_of(
             np.concatenate((corners["position"], arcs["center"])),

@@ -28,7 +28,7 @@ class ParquetWriter(RowWriter):
                 self._schema,
                 compression="zstd",
                 # Of numbers a dictionary costs more time than it saves space.
-                use_dictionary=["kind", "breakpoint", "topic"],
+                use_dictionary=["kind", "corner", "breakpoint", "topic"],
                 # What rows are looked for by.
                 write_statistics=["kind", "scan", "stamp", "topic"],
             )

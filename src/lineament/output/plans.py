@@ -99,9 +99,14 @@ class PlanWriter(Writer):
             markers, views = self._floor.markers(least)
             told = f", each seen {count(least, 'time')} at least" if least > 1 else ""
         walls = count(len(markers.segments), "wall")
-        corners = count(len(markers.corners), "corner")
+        corners, edges = count(len(markers.corners), "corner"), count(len(markers.edges), "edge")
+        found = (
+            f"{walls}, {corners} and {edges} (lighter)"
+            if len(markers.edges)
+            else f"{walls} and {corners}"
+        )
         scans = count(self._written, "scan")
-        return Plan(markers, views, f"{walls} and {corners} of {scans}{told}")
+        return Plan(markers, views, f"{found} of {scans}{told}")
 
     @abstractmethod
     def _draw(self, temporary: Path, plan: Plan) -> None:

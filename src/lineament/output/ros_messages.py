@@ -124,7 +124,7 @@ class RosMessages(SceneMessages):
         """``geometry_msgs/PoseArray`` of the corners that are finite.
 
         The x axis of each points to where the corner opens: halfway between its two sides. A
-        corner of which two sides are not known is not turned.
+        corner with one segment, as an edge, looks along it; one without segments is not turned.
         """
         packer = self._begin(moment)
         packer.sequence(_corner_poses(features))
@@ -289,12 +289,14 @@ def _corner_poses(features: Features) -> Array:
 
 @np.errstate(over="ignore", invalid="ignore")  # What is not finite has no direction.
 def _yaws(positions: Array, sides: NDArray[np.int32], centroids: Array) -> Array:
-    """Direction halfway between the two sides of each corner [rad]; 0 where they are not known."""
+    """Direction halfway between the sides of each corner that are known [rad]; 0 if none is."""
     # A side that is not known is the last of the centroids.
     arms = np.concatenate((centroids, _NOWHERE))[sides] - positions[:, None]
     lengths = np.hypot(arms[..., 0], arms[..., 1])
+    unknown = ~np.isfinite(lengths)
+    arms[unknown], lengths[unknown] = 0.0, 1.0  # the other arm stays as it is
     # Both arms made as long as their product: nothing is divided by a length of zero.
     x, y = (arms * lengths[:, ::-1, None]).sum(axis=1).T
-    yaws = np.asarray(np.arctan2(y, x))
+    yaws: Array = np.arctan2(y, x)
     yaws[np.isnan(yaws)] = 0
     return yaws

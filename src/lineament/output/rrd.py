@@ -108,7 +108,7 @@ def _told_as_os_error() -> Iterator[None]:
 
 def _marks(layer: Layer) -> Any:
     color = [round(255 * part) for part in layer.color]
-    if layer.name == "corners":
+    if layer.name in {"corners", "edges"}:
         return rr.Points3D(_flat(layer.points), radii=layer.size / 2, colors=color)
     return rr.LineStrips3D(
         [_flat(strip) for strip in layer.strips], radii=layer.size / 2, colors=color

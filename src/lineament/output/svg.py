@@ -8,8 +8,9 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .canvas import ARC_COLOR, CORNER_COLOR, INK
+from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
 from .plans import Plan, PlanWriter
 
 __all__ = ["SvgWriter"]
@@ -21,7 +22,7 @@ WALL_LINE, THIN_LINE, CORNER_DOT = 0.45, 0.2, 0.4
 
 
 class SvgWriter(PlanWriter):
-    """Writes walls, arcs, corners and ellipses in metres, x to the right and y upwards.
+    """Writes walls, arcs, corners, edges and ellipses in metres, x to the right and y upwards.
 
     The group that they are in is turned and scaled to the paper. Numbers are rounded to 1 µm.
     """
@@ -31,7 +32,8 @@ class SvgWriter(PlanWriter):
 
 
 def _document(plan: Plan) -> str:
-    points = plan.markers.points
+    markers = plan.markers
+    points = markers.points
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else np.zeros((2, 2))
     extent = np.maximum(high - low, 1e-3)
     scale = _scale(max(1000 * extent[0] / WIDTH, 1000 * extent[1] / HEIGHT))
@@ -39,7 +41,7 @@ def _document(plan: Plan) -> str:
     width = max(per_metre * extent[0], 120.0) + 2 * MARGIN  # room for the caption
     height = per_metre * extent[1] + 2 * MARGIN + FOOT
     left, top = MARGIN - per_metre * low[0], MARGIN + per_metre * high[1]
-    x, y = MARGIN, height - MARGIN
+    x, y, dot = MARGIN, height - MARGIN, CORNER_DOT / per_metre
     return "\n".join(
         [
             '<svg xmlns="http://www.w3.org/2000/svg"'
@@ -57,7 +59,8 @@ def _document(plan: Plan) -> str:
                 f'stroke="{CORNER_COLOR}" stroke-width="{_n(THIN_LINE / per_metre)}"',
                 _ellipses(plan),
             ),
-            *_layer("corners", f'fill="{CORNER_COLOR}"', _corners(plan, CORNER_DOT / per_metre)),
+            *_layer("edges", f'fill="{EDGE_COLOR}"', _dots(markers.edges, dot)),
+            *_layer("corners", f'fill="{CORNER_COLOR}"', _dots(markers.corners, dot)),
             "</g>",
             *_foot(x, y, scale, float(extent[0]), plan.caption),
             "</svg>\n",
@@ -106,8 +109,8 @@ def _arcs(plan: Plan) -> Iterator[str]:
         yield f'<path d="M {begin} A {_n(r)} {_n(r)} 0 {is_large} 1 {end}"/>'
 
 
-def _corners(plan: Plan, radius: float) -> Iterator[str]:
-    for x, y in plan.markers.corners:
+def _dots(points: NDArray[np.float64], radius: float) -> Iterator[str]:
+    for x, y in points:
         yield f'<circle cx="{_n(x)}" cy="{_n(y)}" r="{_n(radius)}"/>'
 
 

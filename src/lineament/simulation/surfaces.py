@@ -39,7 +39,8 @@ class Surfaces:
     circles : ndarray, shape (C, 3)
         The circles ``x y r`` [m].
     joints : dict of (int, int) to ndarray, shape (k, 2)
-        Vertices at which two straight surfaces meet, in the world frame [m].
+        Vertices at which two straight surfaces meet, end to end or where one crosses or ends on
+        the other, in the world frame [m].
     """
 
     of_world: NDArray[np.int64]
@@ -71,6 +72,9 @@ class Surfaces:
         for i, a, j, _ in meetings:
             if label[i] != label[j]:
                 joints[int(label[i]), int(label[j])].append(ends[i, a])
+        for i, j, vertex in _crossings(ends):
+            if label[i] != label[j]:
+                joints[int(label[i]), int(label[j])].append(vertex)
         return Surfaces(
             np.concatenate((label, len(numbers) + np.arange(len(world.circles)))),
             np.array([_extent(ends[label == k]) for k in range(len(numbers))]).reshape(-1, 2, 2),
@@ -87,6 +91,34 @@ def _meetings(ends: Array) -> list[tuple[int, int, int, int]]:
     other = first // 2 != second // 2
     pairs = zip(first[other].tolist(), second[other].tolist(), strict=True)
     return [(m // 2, m % 2, n // 2, n % 2) for m, n in pairs]
+
+
+def _crossings(ends: Array) -> list[tuple[int, int, Array]]:
+    """List (i, j, vertex) where wall i crosses another wall j, or one ends on it; each both ways.
+
+    Walls that meet end to end are left to `_meetings`.
+    """
+    start, arm = ends[:, 0], ends[:, 1] - ends[:, 0]
+    length = np.hypot(*arm.T)
+    between = start - start[:, np.newaxis]
+    determinant = _cross(arm[:, np.newaxis], arm)
+    parallel = abs(determinant) < _STRAIGHT * length[:, np.newaxis] * length
+    scale = np.where(parallel, 1.0, determinant)
+    # Wall i is met at this share of its length, and wall j at that.
+    share, other_share = _cross(between, arm) / scale, _cross(between, arm[:, np.newaxis]) / scale
+    slack = _SAME_VERTEX / length
+    inside = abs(share - 0.5) <= 0.5 + slack[:, np.newaxis]
+    inside &= (abs(other_share - 0.5) <= 0.5 + slack) & ~parallel
+    at_end = abs(share - 0.5) >= 0.5 - slack[:, np.newaxis]
+    at_end &= abs(other_share - 0.5) >= 0.5 - slack
+    return [
+        (i, j, start[i] + share[i, j] * arm[i])
+        for i, j in zip(*(k.tolist() for k in np.nonzero(inside & ~at_end)), strict=True)
+    ]
+
+
+def _cross(u: Array, v: Array) -> Array:
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
 
 
 def _goes_on(wall: Array, a: int, other: Array, b: int) -> bool:

@@ -49,11 +49,11 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
         its visible extent: a vertex where there is a corner; else the end of the wall, if the
         next beam passes it by; else half-way to the next beam, which an occluder took. They end
         at the last beam where the scan ends. `covariance` is the bound, `centroid` that of the
-        readings' information, `rms` 0.
+        readings' information, `rms` and `misfit` 0.
 
         `corners` are the vertices between two neighbouring beams that meet its two walls.
         `segments` has -1 for a side of one beam, and `covariance` is then NaN. `response`
-        is 0.
+        is 0, `quality` 1, `kind` "corner".
 
         `arcs` are runs of neighbouring beams, 2 or more, on one circle; the covariance of 2 is
         NaN.
@@ -169,6 +169,7 @@ def _segment(view: View, run: _Run, bound: LineBound, label: NDArray[np.int32]) 
         run.last,
         run.n_beams,
         0.0,
+        0.0,
         label[run.first],
     )
 
@@ -211,7 +212,7 @@ def _corners(view: View, runs: list[_Run], bounds: dict[_Run, LineBound]) -> lis
         nearest = view.bearing_from(before.last, vertex) <= view.steps[before.last] / 2
         beam = before.last if nearest else after.first
         sides = (index.get(before, -1), index.get(after, -1))
-        corners.append((vertex, covariance, *shape, beam, 0.0, sides))
+        corners.append((vertex, covariance, *shape, beam, 0.0, sides, 1.0, "corner"))
     return corners
 
 

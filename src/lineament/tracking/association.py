@@ -13,6 +13,7 @@ from ..features import Features
 from ..kernels.assignment import PATHS
 from ..kernels.association import associate as kernel
 from ..kernels.association import move
+from ..kernels.records import C_COVARIANCE
 from ..scan import Array
 
 __all__ = ["KINDS", "Matches", "associate"]
@@ -21,6 +22,8 @@ Pairs = NDArray[np.intp]
 
 #: The tables whose features are tracked.
 KINDS = ("segments", "corners", "arcs")
+#: What stands for an edge among the sides to which corners point: none is equal to another.
+_EDGE_BEFORE, _EDGE_NOW = -1, -2
 #: Words of segments, corners and arcs (see `kernels.records`).
 Words = tuple[Array, Array, Array]
 
@@ -65,11 +68,11 @@ def associate(
 
     The later ones are moved by the expected motion into the earlier frame. A pair is possible
     where d² = e'S⁻¹e is within the quantile `gate` of its χ² distribution, with S the sum of both
-    covariances, that of the motion, and the roughness: for corners of the same convexity, e is
-    their distance (2 degrees); for arcs, that of their centres and radii (3); for segments, the
-    offset from the earlier line and the angle (2), if they lie side by side along half of the
-    shorter one. The pairs are one to one and at the least total cost, where to leave a feature
-    alone costs as much as the gate.
+    covariances, that of the motion, the misfits, and the roughness: for corners of the same
+    convexity, e is their distance (2 degrees); for arcs, that of their centres and radii (3); for
+    segments, the offset from the earlier line and the angle (2), if they lie side by side along
+    half of the shorter one. The pairs are one to one and at the least total cost, where to leave a
+    feature alone costs as much as the gate. Corners of kind "edge" have no pair: see `is_landmark`.
 
     Parameters
     ----------
@@ -96,7 +99,7 @@ def associate(
     Examples
     --------
     >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
     >>> features = ln.extract(scan)
     >>> associate(features, features).segments.tolist()
     [[0, 0]]
@@ -105,6 +108,7 @@ def associate(
     spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
     x, y, theta = map(float, motion)
     earlier, moved = words_of(before), words_of(now)
+    _add_misfits(moved[1], now)
     move(*moved, x, y, theta)
     rows, columns = max(map(len, moved)), max(map(len, earlier))
     columns += rows + 1
@@ -112,7 +116,7 @@ def associate(
     kernel(
         earlier,
         moved,
-        (np.array(before.corners["convex"]), np.array(now.corners["convex"])),
+        (_sides(before.corners, _EDGE_BEFORE), _sides(now.corners, _EDGE_NOW)),
         spread,
         (x, y),
         float(roughness),
@@ -125,6 +129,30 @@ def associate(
     )
     pairs = (_pairs(row[: len(table)]) for row, table in zip(owners, earlier, strict=True))
     return Matches(before, now, *pairs)
+
+
+def _add_misfits(words: Array, features: Features) -> None:
+    """Add to the covariances of corners by what their walls are off straight lines, seen twice."""
+    squares = np.append(features.segments["misfit"] ** 2, 0.0)
+    both = 2.0 * squares[features.corners["segments"]].sum(axis=1)
+    words[:, C_COVARIANCE] += both
+    words[:, C_COVARIANCE + 3] += both
+
+
+def is_landmark(corners: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether each corner stays where it is: all but the edges.
+
+    An edge is where a segment ends before a jump. On a round or turned surface that is a
+    silhouette, which moves with the sensor.
+    """
+    return np.asarray(corners["kind"] != "edge")
+
+
+def _sides(corners: NDArray[np.void], edge: int) -> NDArray[np.int8]:
+    """Return 1 for convex corners, 0 for others, and `edge` for edges."""
+    sides = corners["convex"].astype(np.int8)
+    sides[~is_landmark(corners)] = edge
+    return sides
 
 
 def words_of(features: Features) -> Words:

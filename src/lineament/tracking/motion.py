@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..features import noise_row
 from ..kernels.motion import MATRICES, NOT_POSITIVE, NOT_THERE
 from ..kernels.motion import estimate_motion as kernel
 from ..kernels.residuals import COLUMNS
@@ -78,9 +77,8 @@ def estimate_motion(
     where one is, its place along that one counts alone. Pairs beyond
     the 99 % quantile of χ² count less, by the square of how far they are off.
 
-    Walls are off straight lines, and their segments' covariances say so; but that is the same in
-    both frames. What the scatter of the readings accounts for counts whole, the rest as far as
-    one of the frames saw another stretch of the wall than the other.
+    The covariances of the segments, of noise alone, count whole. The misfit of a wall is the same
+    in both frames: it counts by the part of the wall that one frame saw alone.
 
     Directions of which the features tell nothing are found by the eigenvalues of their information
     (angles as the way at the features' distance): one counts as unobserved if its deviation is
@@ -90,7 +88,8 @@ def estimate_motion(
     Parameters
     ----------
     matches : Matches
-        Pairs of features, each in the frame of its own sensor.
+        Pairs of features, each in the frame of its own sensor. Edges are not among those of
+        `associate`; others are taken as they are.
     prior : (x, y, theta)
         The motion as known before [m, m, rad]: from odometry or from the last frames.
     covariance : array_like, shape (3, 3), optional
@@ -129,8 +128,6 @@ def estimate_motion(
     lost = kernel(
         words_of(before),
         words_of(now),
-        (np.array(before.segments["n_points"]), np.array(now.segments["n_points"])),
-        (noise_row(before.noise), noise_row(now.noise)),
         np.array(now.corners["segments"], order="C"),
         tuple(np.array(getattr(matches, kind), np.int64, order="C") for kind in KINDS),
         (x, y, theta),

@@ -14,7 +14,7 @@ from ..features import TABLES, Features
 from ..kernels.association import move
 from ..poses import Twist, inverse, poses_along, relative
 from ..scan import Array, Pose
-from .association import KINDS, Matches, associate, chi_square, words_of
+from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
 from .motion import Motion, estimate_motion
 
 __all__ = ["Tracker", "Tracks"]
@@ -39,7 +39,7 @@ class Tracks:
     ----------
     segments, corners, arcs : ndarray of int64
         Number of the track of each feature, parallel to the tables of the frame. A number belongs
-        to one track alone, of whatever kind, for good.
+        to one track alone, of whatever kind, for good. Corners of kind "edge" have -1.
     born : ndarray of int64
         Tracks that begin with this frame.
     ended : ndarray of int64
@@ -64,7 +64,8 @@ class Tracker:
     that were seen in the very last frame). The expected motion is that of the odometry; without
     it, the sensor goes on as it did. A feature without a pair begins a track; a track ends when it
     is missed in more than `max_missed` frames in a row. The world is taken to stand still: what
-    moves by more than its gate from frame to frame gets a new number.
+    moves by more than its gate from frame to frame gets a new number. Corners of kind "edge" are
+    ignored: they may be silhouettes, which move with the sensor.
 
     Parameters
     ----------
@@ -142,6 +143,17 @@ class Tracker:
         """
         if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
             raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
+        corners = features.corners
+        kept = is_landmark(corners)
+        if kept.all():
+            return self._take(features, odometry)
+        tracks = self._take(replace(features, corners=corners[kept]), odometry)
+        numbers = np.full(len(corners), -1, np.int64)
+        numbers[kept] = tracks.corners
+        return replace(tracks, corners=numbers)
+
+    def _take(self, features: Features, odometry: Pose | None) -> Tracks:
+        """Take in a frame without edges."""
         motion = None
         if self._stamp is None:
             matches = associate(self._seen, features)

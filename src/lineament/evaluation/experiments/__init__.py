@@ -30,7 +30,7 @@ EXPERIMENTS: dict[str, str] = {
     "all_methods": "all_methods",
     "repeatability": "repeatability",
     "tracking": "tracking",
-    "ablation": "ablation",
+    "real": "real",
     "aims": "optimal_aims",
 }
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...extractor import Extractor
 from ...features import Features
@@ -15,7 +16,7 @@ from ...output import canvas
 from ...scan import Array, LaserScan, Pose
 from ...simulation import Sensor, World, truth
 from ...simulation.placing import clearance
-from ..corners import CornerScores, corner_scores
+from ..corners import CornerScores, corner_scores, vertices
 from ..counts import quantile, ratio
 from .findings import Figure, Table
 from .frames import batch_of
@@ -39,6 +40,9 @@ GATE = 0.10
 _JOINED = 0.15
 #: Within so much of an open end of a fitted wall nothing is known [m].
 _UNKNOWN = 0.3
+#: A corner is demanded where both its walls show at least so many measurements within so much of
+#: the fitted wall [m], between so far and so far from the corner [m].
+FACE_BEAMS, FACE_WIDTH, FACE_FROM, FACE_TO = 4, 0.04, 0.1, 0.6
 #: Flatter corners may be bends of panels, which the fitted walls do not have [rad].
 FLAT = math.radians(150)
 
@@ -52,7 +56,8 @@ class Arena:
     scans : list of LaserScan
         With their poses in the world frame.
     truths : list of Features
-        What there is to find in each, in its own frame; corners are those that are visible.
+        What there is to find in each, in its own frame; corners are those that are visible, and
+        of which the scan shows both walls: see `faces_shown`.
     walls : World
         The fitted walls, made to end at the corners that they are near to.
     corners : ndarray, shape (K, 2)
@@ -86,9 +91,45 @@ def load_arena(path: Path, count: int) -> Arena:
     scans = [
         LaserScan(ranges[i], first, step, range_max=range_max, pose=_pose(poses[i])) for i in chosen
     ]
-    truths = [truth(world, _pose(poses[i]), sensor) for i in chosen]
+    truths = [
+        _demanded(scan, truth(world, _pose(poses[i]), sensor), world)
+        for i, scan in zip(chosen, scans, strict=True)
+    ]
     on_walls, open_ends = _lonely_ends(ends, corners)
     return Arena(scans, truths, world, np.vstack((corners, on_walls)), open_ends)
+
+
+def _demanded(scan: LaserScan, visible: Features, walls: World) -> Features:
+    """Keep the corners of which the scan shows both walls."""
+    return replace(visible, corners=visible.corners[faces_shown(scan, visible, walls)])
+
+
+def faces_shown(scan: LaserScan, visible: Features, walls: World) -> NDArray[np.bool_]:
+    """Whether a scan shows both walls of each corner.
+
+    What stands there need not be what was fitted, and a thing that nobody fitted may hide one of
+    the walls, so that the corner is a mere silhouette. A wall shows by at least 4 measurements
+    within 4 cm of it, between 0.1 and 0.6 m from the corner.
+    """
+    if scan.pose is None:
+        raise ValueError("scan has no pose, expected (x, y, theta)")
+    c, s = math.cos(scan.pose[2]), math.sin(scan.pose[2])
+    points = scan.points[scan.valid] @ np.array([[c, s], [-s, c]]) + scan.pose[:2]
+    ends = walls.segments.reshape(-1, 2, 2)
+    shown = []
+    for corner in visible.transform(*scan.pose).corners["position"]:
+        faces = 0
+        for wall in (*ends, *ends[:, ::-1]):
+            arm = wall[1] - wall[0]
+            if np.hypot(*(wall[0] - corner)) > FACE_WIDTH:
+                continue
+            arm /= np.hypot(*arm)
+            along = (points - corner) @ arm
+            off = abs((points - corner) @ np.array([-arm[1], arm[0]]))
+            near = (off <= FACE_WIDTH) & (along >= FACE_FROM) & (along <= FACE_TO)
+            faces += near.sum() >= FACE_BEAMS
+        shown.append(faces >= 2)
+    return np.array(shown, dtype=np.bool_)
 
 
 def _pose(row: Array) -> Pose:
@@ -128,7 +169,7 @@ class ArenaScores:
     corners : CornerScores
         Against the visible corners of the single scans.
     positions : ndarray, shape (m, 2)
-        All found corners, in the world frame [m].
+        All found corners but edges, in the world frame [m].
     false : int
         How many of them lie on no real corner.
     judged, sharp_false : int
@@ -160,13 +201,13 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
     """Score a method on the scans of the arena."""
     found = batch_of(extractor, arena.scans)
     positions = [
-        features.transform(*scan.pose).corners["position"]
+        vertices(features.transform(*scan.pose))["position"]
         for features, scan in zip(found, arena.scans, strict=True)
         if scan.pose is not None
     ]
     together = np.concatenate(positions)
     false = _nearest(together, arena.corners)[1] > GATE
-    sharp = np.concatenate([features.corners["opening"] for features in found]) < FLAT
+    sharp = np.concatenate([vertices(features)["opening"] for features in found]) < FLAT
     known = (_apart(together, arena.open_ends) > _UNKNOWN).all(axis=1)
     sharp_false = false & sharp & known
     return ArenaScores(

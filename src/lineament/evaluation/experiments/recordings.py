@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import islice
+from pathlib import Path
 
 from ...logs import open_log
 from ...scan import LaserScan
 from .findings import Setting
 
-__all__ = ["recorded_scans"]
+__all__ = ["recorded_scans", "spread_scans"]
 
 #: The recordings, by name.
 LOGS = {
@@ -24,6 +25,11 @@ def recorded_scans(setting: Setting, count: int) -> Iterator[tuple[str, list[Las
     for name, file in LOGS.items():
         path = setting.recording(file)
         if path is not None:
-            log = open_log(path, keep_going=True)
-            step = max(len(log) // count, 1)
-            yield name, list(islice(log, step // 2, None, step))[:count]
+            yield name, spread_scans(path, count)
+
+
+def spread_scans(path: str | Path, count: int) -> list[LaserScan]:
+    """Read so many scans of a log, from equal parts of it."""
+    log = open_log(path, keep_going=True)
+    step = max(len(log) // count, 1)
+    return list(islice(log, step // 2, None, step))[:count]

@@ -12,6 +12,7 @@ from ...extractor import Extractor
 from ...features import Features
 from ...logs import open_log
 from ...scan import LaserScan
+from ..corners import vertices
 from ..repeatability import Repeatability, repeatability
 from ..similarity import SimilarityScores, similarity_scores
 from .charts import dot_chart
@@ -144,7 +145,7 @@ def _measure(pairs: list[Pair], extractor: Extractor) -> _Result:
     return _Result(
         repeats_of(pairs, extractor),
         SimilarityScores.total(map(similarity_scores, scans, found)),
-        sum(len(features.corners) for features in found) / len(pairs),
+        sum(len(vertices(features)) for features in found) / len(pairs),
     )
 
 

@@ -12,6 +12,7 @@ from ...features import Features
 from ...output import canvas, drawing
 from ...scan import Array, LaserScan, Pose
 from ...simulation import SENSORS, World, truth
+from ..corners import vertices
 from ..counts import rms
 from .contenders import LITERAL, LIU_BEST, LIU_NOTE, LIU_PAPER, feature_methods
 from .findings import Figure, Findings, Progress, Setting, Table
@@ -114,7 +115,7 @@ def found_distances(views: list[Features], pose: Pose) -> Array:
     """Distances from A to B in the views from one pose that have both of them [m]."""
     distances = []
     for features in views:
-        positions = features.transform(*pose).corners["position"]
+        positions = vertices(features.transform(*pose))["position"]
         pair = [_nearest(positions, vertex) for vertex in (A, B)]
         if pair[0] is not None and pair[1] is not None:
             distances.append(math.dist(pair[0], pair[1]))

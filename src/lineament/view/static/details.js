@@ -28,6 +28,7 @@ const WORDS = {
         ["offset", `± ${millimetres(offset)} mm at ${place(s.centroid)} m`],
         ["beams", `${s.first_beam} to ${s.last_beam}, ${s.n_points} readings`],
         ["rms", `${millimetres(s.rms)} mm`],
+        ["misfit", `${millimetres(s.misfit)} mm`],
         ["cluster", s.cluster],
       ],
       cells: [
@@ -40,16 +41,19 @@ const WORDS = {
     const { major, minor, direction } = isKnown(c.covariance)
       ? ellipseOf(c.covariance) : { major: NaN, minor: NaN, direction: NaN };
     const axes = `${millimetres(major)} ×\u00a0${millimetres(minor)}`, sides = c.segments;
+    const isEdge = c.kind === "edge", opening = isEdge ? "" : fixed(degrees(c.opening), 1);
     return {
       rows: [
+        ["kind", c.kind],
+        ["quality", fixed(c.quality, 2)],
         ["position", `${place(c.position)} m`],
         ["1 σ", `${axes} mm, longer at ${fixed(degrees(direction), 0)}°`],
-        ["opening", `${fixed(degrees(c.opening), 1)}°, ${c.convex ? "convex" : "concave"}`],
+        ...(isEdge ? [] : [["opening", `${opening}°, ${c.convex ? "convex" : "concave"}`]]),
         ["beam", c.beam],
         ["response", c.response === null ? "–" : Number(c.response.toPrecision(4))],
         ["segments", sides.map((k) => (k < 0 ? "none" : k)).join(" and ")],
       ],
-      cells: [place(c.position), "", fixed(degrees(c.opening), 1), axes, ""],
+      cells: [place(c.position), "", opening, axes, ""],
     };
   },
   arc(a) {

@@ -6,7 +6,7 @@ export const PALETTE = [
   "#aa7744", "#8866bb", "#a3a22a", "#dd6655", "#44aa88",
 ];
 
-const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "accent", "corner", "break", "arc"];
+const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "accent", "corner", "edge", "break", "arc"];
 
 /** The colours of the page, light or dark. */
 export function readTheme() {
@@ -24,6 +24,9 @@ export function placeBeams(scan) {
   });
   scan.reach = Math.max(0, ...scan.ranges); // of the farthest reading [m]
 }
+
+/** The layer in which a row of the corners is shown. */
+export const layerOf = (corner) => (corner.kind === "edge" ? "edges" : "corners");
 
 /** Beams of a feature in order, over the seam where the first is larger than the last. */
 export function beamsOf(feature, scan) {
@@ -80,7 +83,7 @@ export class Drawing {
     if (shown.arcs) scan.arcs.forEach((arc) => this.#arc(arc, scan));
     if (shown.segments) scan.segments.forEach((segment) => this.#segment(segment));
     if (shown.breakpoints) scan.breakpoints.forEach((b) => this.#breakpoint(b));
-    if (shown.corners) scan.corners.forEach((c) => this.#corner(c, sigmas, scan.reach));
+    for (const c of scan.corners) if (shown[layerOf(c)]) this.#corner(c, sigmas, scan.reach);
   }
 
   /** Make a feature stand out, with the band or ellipse of its covariance. */
@@ -177,14 +180,15 @@ export class Drawing {
     this.ctx.fill();
   }
 
-  #corner({ position, covariance }, sigmas, reach) {
-    const { ctx, theme, plane } = this;
+  // A diamond; of an edge a square, smaller and lighter.
+  #corner({ kind, position, covariance }, sigmas, reach) {
+    const { ctx, theme, plane } = this, isEdge = kind === "edge";
     if (!position.every(Number.isFinite)) return;
-    const [u, v] = this.at(position);
-    ctx.strokeStyle = theme.corner;
-    ctx.lineWidth = 1.6;
-    this.#trace([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
-    ctx.stroke();
+    const [u, v] = this.at(position), color = isEdge ? theme.edge : theme.corner;
+    ctx.strokeStyle = color;
+    ctx.lineWidth = isEdge ? 1.2 : 1.6;
+    if (isEdge) ctx.strokeRect(u - 3, v - 3, 6, 6);
+    else this.#path([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
     if (!sigmas || !covariance.flat().every(Number.isFinite)) return;
     const { major, minor, direction } = ellipseOf(covariance);
     const [a, b] = [major, minor].map((sigma) => sigmas * sigma * plane.scale);
@@ -195,7 +199,7 @@ export class Drawing {
     ctx.lineWidth = 1;
     ctx.stroke();
     ctx.globalAlpha = 0.15;
-    ctx.fillStyle = theme.corner;
+    ctx.fillStyle = color;
     ctx.fill();
     ctx.globalAlpha = 1;
   }

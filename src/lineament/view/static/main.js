@@ -8,7 +8,7 @@ import { Plane } from "./plane.js";
 import { Timeline } from "./timeline.js";
 
 const $ = (id) => document.getElementById(id);
-const LAYERS = ["clusters", "segments", "corners", "arcs", "breakpoints"];
+const LAYERS = ["clusters", "segments", "corners", "edges", "arcs", "breakpoints"];
 const NARROW = "(max-width: 60rem)"; // where the answers stand below the panels
 const PATIENCE = 700; // milliseconds after which the page says what it waits for
 

@@ -1,7 +1,7 @@
 // One panel: a method's choice, its canvas, and what the pointer does there.
 
 import { describe } from "./details.js";
-import { Drawing } from "./drawing.js";
+import { Drawing, layerOf } from "./drawing.js";
 import { drawGrid, drawScaleBar } from "./plane.js";
 
 const NEAR = 12; // pixels within which something is meant
@@ -52,9 +52,10 @@ export class Panel {
     const clusters = new Set(scan.clusters.filter((c) => c >= 0)).size;
     const noise = scan.noise ? `noise ${(1000 * scan.noise.sigma).toFixed(1)} mm` : "nothing valid";
     const count = (n, one) => `${n} ${one}${n === 1 ? "" : "s"}`;
+    const edges = scan.corners.filter((c) => layerOf(c) === "edges").length;
     const found = [
-      count(scan.segments.length, "segment"), count(scan.corners.length, "corner"),
-      count(scan.arcs.length, "arc"), count(clusters, "cluster"),
+      count(scan.segments.length, "segment"), count(scan.corners.length - edges, "corner"),
+      count(edges, "edge"), count(scan.arcs.length, "arc"), count(clusters, "cluster"),
     ].join(", ");
     this.caption.textContent = `${found}; ${noise}`;
     this.canvas.setAttribute("aria-label", `Scan ${scan.index} by ${scan.method}: ${found}`);
@@ -179,7 +180,8 @@ export class Panel {
       });
       return best;
     };
-    return (shown.corners && nearest("corner", scan.corners, (c) => away(c.position)))
+    const offCorner = (c) => (shown[layerOf(c)] ? away(c.position) : Infinity);
+    return nearest("corner", scan.corners, offCorner)
       || (shown.breakpoints && nearest("breakpoint", scan.breakpoints, (b) => away(b.position), 6))
       || (shown.arcs && nearest("arc", scan.arcs, (a) => this.#offArc(pixel, a), 7))
       || (shown.segments && nearest("segment", scan.segments, (s) => this.#offLine(pixel, s), 7))

@@ -1,0 +1,1 @@
+"""The kernels of method `optimal`; ``docs/optimal.md`` derives them."""

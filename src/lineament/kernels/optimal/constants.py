@@ -1,0 +1,31 @@
+"""The constants of method `optimal`: each with its unit and what it means.
+
+``docs/results.md`` has a table of what happens where one is halved or doubled. Lengths of the
+world are `TAU`, `REACH`, `MOST_DEVIATION` and `ARC_RADIUS`; all else is in units of the noise, of
+the beams, or a ratio.
+"""
+
+import math
+
+#: Scale of the surface [m]: what walls are off straight lines (plaster, panels, frames, bow).
+TAU = 0.03
+#: Price of a measurement that is on no surface, in units of the evidence for one.
+CLUTTER = 0.5
+#: Measurements of a line, at least.
+LEAST = 4
+#: Deviations beyond which two quantities differ.
+SIGMAS = 3.0
+#: Tangent of the steepest incidence at which a surface is expected to be seen (86°).
+STEEPEST = 14.3
+#: Cosine of the turn below which two lines may be one wall that bends (20°).
+BEND = math.cos(math.radians(20.0))
+#: Evidence, in units of that for a surface, against what buildings seldom have: a corner as
+#: shallow as that, or a round wall that goes on as a straight one.
+RARE = 8.0
+#: Distance of a corner from the measurements on both its sides [m], at most.
+REACH = 0.3
+#: Standard deviation of a corner, of the radius of an arc, and of the noise at the farthest
+#: measurement [m], at most.
+MOST_DEVIATION = 0.1
+#: Radius of an arc [m], at most, and the turn that it shows [rad], at least.
+ARC_RADIUS, ARC_TURN = 1.5, 0.7

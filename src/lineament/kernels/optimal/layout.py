@@ -1,0 +1,28 @@
+"""Rows of the workspace of method `optimal`, by what indexes them."""
+
+#: Of `points`, by measurement in beam order (on a full circle from any beam on): place and range
+#: [m]; least energy of the measurements before; least energy of those of its group; what keeps it
+#: from counting for its group; χ² of the blocks that end by it and that begin before it; two rows
+#: of scratch, by measurement or by group.
+X, Y, RHO, ENERGY, LOWEST, RUNNING, ENDS, BEGINS, KEY, SCRATCH = range(10)
+POINTS = 10
+#: Of `beams`, by measurement: its beam; whether a break is before it; the measurement at which the
+#: line that ends before it begins, or -1; first and last measurement of each cluster.
+BEAM, BROKEN, ORIGIN, CLUSTER_FIRST, CLUSTER_LAST = range(5)
+BEAMS = 5
+#: The candidates that run along, and their energies.
+RUNNER, VALUE = CLUSTER_FIRST, SCRATCH
+#: Of a row of `pieces`, by surface: the line a x + b y = 1 [1/m]; its centroid [m] and direction;
+#: the covariance of its offset there and its angle; root mean square and misfit [m]. Of an arc:
+#: centre, radius [m], six covariances, root mean square [m], and by how much lines are worse.
+A, B, CX, CY, UX, UY, OO, OA, AA, RMS, MISFIT = range(11)
+RADIUS, XX, XY, XR, YY, YR, RR, GAIN = UX, UY, OO, OA, AA, A, B, MISFIT
+PIECES = 11
+#: Of `spans`, by surface: its first and last measurement, how many of those count, what it is, the
+#: number of its segment, and whether there is a corner at its start and its end.
+FIRST, LAST, COUNT, KIND, SEGMENT, START, END = range(7)
+SPANS = 7
+#: Kinds of surfaces.
+LINE, ARC = 0, 1
+#: Columns of the running sums: w (xx, xy, yy, x, y, 1).
+SUMS = 6
