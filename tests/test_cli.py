@@ -65,7 +65,7 @@ def test_extract_writes_the_features_of_each_scan(npz, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "7 scans" in said
     assert "0.0 % of beams invalid" in said
-    assert "7 segments, 0 corners, 0 arcs, 14 breakpoints" in said
+    assert "7 segments, 0 corners, 0 edges, 0 arcs, 14 breakpoints" in said
     assert "scans/s" in said
 
 

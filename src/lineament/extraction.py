@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .extractor import Extractor
-from .features import TABLES
+from .features import COUNTED
 from .logs import open_log
 from .output import open_writer
 from .track import Track, untracked
@@ -117,7 +117,7 @@ def extract_log(
     if topic_column is None:
         topic_column = len(topics) > 1
     scans, beams, valid = 0, 0, 0
-    found = dict.fromkeys(TABLES, 0)
+    found = dict.fromkeys(COUNTED, 0)
     with open_writer(output, topics if topic_column else ()) as writer:
         for topic, scan in track(log.items(), Path(log.name).name, len(log)):
             features = extractor(scan)
@@ -127,8 +127,8 @@ def extract_log(
             scans += 1
             beams += len(scan)
             valid += int(np.count_nonzero(scan.valid))
-            for name in TABLES:
-                found[name] += len(getattr(features, name))
+            for name, count in features.counts().items():
+                found[name] += count
     return Extraction(
         log=str(path),
         output=str(output),

@@ -88,6 +88,8 @@ BREAKPOINT = np.dtype(
 
 #: The tables of a scan, in the order in which they are written.
 TABLES = {"segments": SEGMENT, "corners": CORNER, "arcs": ARC, "breakpoints": BREAKPOINT}
+#: What is counted: edges apart from the corners.
+COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
 
 
 @dataclass(slots=True, eq=False, repr=False)
@@ -129,6 +131,21 @@ class Features:
         counts = ", ".join(f"{len(getattr(self, name))} {name}" for name in TABLES)
         n_clusters = int(self.clusters.max(initial=-1)) + 1
         return f"Features({counts}, {n_clusters} clusters, stamp={self.stamp:.3f})"
+
+    def counts(self) -> dict[str, int]:
+        """Return how many features there are, by the names of `COUNTED`.
+
+        Examples
+        --------
+        >>> import lineament as ln
+        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
+        >>> ln.extract(scan).counts()
+        {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
+        """
+        edges = int(np.count_nonzero(self.corners["kind"] == "edge"))
+        corners = len(self.corners) - edges
+        found = len(self.segments), corners, edges, len(self.arcs), len(self.breakpoints)
+        return dict(zip(COUNTED, found, strict=True))
 
     def transform(
         self, x: float, y: float, theta: float, *, frame_id: str | None = None

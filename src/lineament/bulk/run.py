@@ -17,7 +17,7 @@ from typing import Any, cast
 from .. import __version__
 from ..atomic import made_folder
 from ..extractor import Extractor
-from ..features import TABLES
+from ..features import COUNTED
 from ..logs import find_logs, open_log
 from ..logs.base import ReadOptions
 from ..output import open_writer
@@ -180,7 +180,7 @@ def extract_logs(
         whole=len(rows) - len(todo),
         failed=sum(row.outcome != "done" for row in done),
         scans=sum(row.scans for row in done),
-        features={name: sum(row.features.get(name, 0) for row in done) for name in TABLES},
+        features={name: sum(row.features.get(name, 0) for row in done) for name in COUNTED},
         seconds=time.perf_counter() - started,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..features import TABLES, Features
+from ..features import COUNTED, Features
 from ..scan import LaserScan
 
 __all__ = ["Counters", "Report"]
@@ -143,7 +143,7 @@ class Counters:
     def _begin(self) -> None:
         self._latencies: deque[float] = deque(maxlen=_MOST)
         self._beams = self._invalid = 0
-        self._found = dict.fromkeys(TABLES, 0)
+        self._found = dict.fromkeys(COUNTED, 0)
 
     def add(self, scan: LaserScan, features: Features, latency: float) -> None:
         """Count a scan whose features were told `latency` seconds after it came."""
@@ -151,8 +151,8 @@ class Counters:
         self._latencies.append(latency)
         self._beams += len(scan)
         self._invalid += len(scan) - int(np.count_nonzero(scan.valid))
-        for name in TABLES:
-            self._found[name] += len(getattr(features, name))
+        for name, count in features.counts().items():
+            self._found[name] += count
 
     def report(self, now: float, *, publishers: int, lost: int = 0, unsent: int = 0) -> Report:
         """Report on what was counted since the last report.
