@@ -1,14 +1,17 @@
 # make demo: simulate a drive, extract its features, make a page.   make demo LOG=path: of your log.
-# make test: everything that is checked.                            make bench: the README's figures.
+# make test: what is checked before each commit.                    make bench: the README's figures.
+# make test-all: what takes longer, besides.                        make lines: what there is to read.
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint types tests coverage wheel bench browser clean
+.PHONY: demo test test-all lint types tests coverage wheel bench lines browser clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
-test: lint types tests coverage wheel
+test: lint types tests wheel
+
+test-all: coverage
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -30,9 +33,7 @@ browser:
 	then apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver >/dev/null; \
 	else echo "no chromium: the tests of the page will be skipped"; fi
 
-# Numba sees a change in a kernel's own file, but not in those that it calls: compile anew.
 tests: .venv/ready browser
-	find src -name '*.nb[ic]' -delete
 	$(BIN)/python -m pytest --durations=5
 
 coverage: .venv/ready
@@ -50,6 +51,12 @@ wheel: .venv/ready
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py
+
+# Lines of source and of tests, by folder.
+lines:
+	@for top in src/lineament tests; do git ls-files "$$top/*.py" "$$top/*.js" "$$top/*.css" "$$top/*.html" | xargs wc -l | \
+	awk -v top="$$top" '$$2 != "total" { sub(top "/", "", $$2); n = split($$2, at, "/"); folder = n > 1 ? at[1] "/" : "."; of[folder] += $$1; all += $$1 } \
+	END { for (folder in of) printf "%7d  %s/%s\n", of[folder], top, folder | "sort -rn"; close("sort -rn"); printf "%7d  %s in all\n\n", all, top }'; done
 
 clean:
 	rm -rf .venv dist build demo .coverage
