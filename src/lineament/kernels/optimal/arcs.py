@@ -44,7 +44,7 @@ def find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence)
                     better += price
                     for line in range(k, m + 1):
                         a, b = solve(sums, first[line], last[line] + 1)
-                        better += _misfit(points, first[line], last[line] + 1, a, b, noise)
+                        better += _noise_cost(points, first[line], last[line] + 1, a, b, noise)
                 if better > gain:
                     gain, end, i, j = better, m, low, high
         first[kept], last[kept], kind[kept] = i, j, ARC if gain > 0.0 else LINE
@@ -56,7 +56,7 @@ def find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence)
 
 
 @sums
-def _misfit(points, first, end, a, b, noise):
+def _noise_cost(points, first, end, a, b, noise):
     """χ² of a line at the scale of the noise."""
     x, y, rho, total = points[X, first:end], points[Y, first:end], points[RHO, first:end], 0.0
     for i in range(len(x)):

@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import helper, sums, usable
 from .constants import SIGMAS, STEEPEST
-from .layout import BEAM, BROKEN, CLUSTER_FIRST, CLUSTER_LAST, RHO, X, Y
+from .layout import BEAM, BROKEN, CLUSTER_FIRST, CLUSTER_LAST, RHO, SPIKE, X, Y
 
 #: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
 _NEAREST, _FARTHEST = 1e-6, 1e3
@@ -69,7 +69,7 @@ def cluster(points, beams, count, n, circular, noise, most_missing):
     _mark_breaks(
         x[:count], y[:count], rho[:count], beam[:count], broken[:count], noise, n, most_missing
     )
-    first, last, kept, spikes = np.int64(0), count - 1, 0, beams[CLUSTER_FIRST]
+    first, last, kept, spikes = np.int64(0), count - 1, 0, beams[SPIKE]
     if count > 0:
         broken[0] = not circular or is_broken(points, beams, last, first, n, noise, most_missing)
     for i in range(count):

@@ -20,7 +20,7 @@ from .partition import fill_sums, joint_cost, merge_lines, partition, solve
 
 
 @kernel
-def extract_rows(  # noqa: C901
+def extract_rows(
     ranges, rows, range_min, range_max, bearings, circular, given_noise, evidence, missing,
     points, beams, spans, pieces, sums, noise, noises, segments, corners, arcs, breaks, clusters,
     offsets, counts,
@@ -50,31 +50,10 @@ def extract_rows(  # noqa: C901
         surfaces = find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence)
         surfaces = _measure(points, beams, spans, pieces, sums, surfaces, noise, estimated)
         _write_surfaces(points, beams, spans, pieces, surfaces, row, segments, arcs, offsets)
-        corner = offsets[row, 1]
-        for k in range(surfaces):
-            m = (k + 1) % surfaces
-            if m > k or (closed and m < k):
-                corner = join(
-                    points, beams, spans, pieces, sums, k, m, count, n, missing, noise, segments,
-                    corners, corner, offsets[row, 0], evidence,
-                )  # fmt: skip
-        # Through a slit, a surface behind may show between two lines.
-        for k in range(surfaces):
-            m = (k + 2) % surfaces
-            both_end = (m > k or (closed and m != k)) and spans[END, k] == spans[START, m] == 0
-            if both_end and are_near(points, spans, k, m):
-                _, corner = cross(
-                    points, beams, spans, pieces, sums, k, m, count, noise, segments, corners,
-                    corner, offsets[row, 0], evidence,
-                )  # fmt: skip
-        for k in range(surfaces):
-            for way in (-1, 1):
-                if spans[KIND, k] == LINE and not spans[END if way > 0 else START, k]:
-                    corner = add_edge(
-                        points, beams, spans, pieces, k, way, count, n, circular, missing, noise,
-                        segments, corners, corner, offsets[row, 0],
-                    )  # fmt: skip
-        offsets[row + 1, 1] = corner
+        offsets[row + 1, 1] = _write_corners(
+            points, beams, spans, pieces, sums, surfaces, count, n, circular, closed, missing,
+            noise, segments, corners, offsets[row, 1], offsets[row, 0], evidence,
+        )  # fmt: skip
         found = list_clusters(beams, count, clusters[row])
         for k in range(surfaces):
             if spans[KIND, k] == LINE:
@@ -91,6 +70,41 @@ def extract_rows(  # noqa: C901
             noises[row, 0] = math.sqrt(noise[0]) if count > 0 else math.nan
             noises[row, 1] = math.sqrt(noise[1])
         counts[0], counts[1], counts[2] = count, lines, surfaces
+
+
+@helper
+def _write_corners(
+    points, beams, spans, pieces, sums, surfaces, count, n, circular, closed, missing, noise,
+    segments, corners, row, base, evidence,
+):  # fmt: skip
+    """Write the corners where surfaces meet, and the edges where they end.
+
+    The scan's own segments begin at row `base`. Returns the number of the next row of `corners`.
+    """
+    for k in range(surfaces):
+        m = (k + 1) % surfaces
+        if m > k or (closed and m < k):
+            row = join(
+                points, beams, spans, pieces, sums, k, m, count, n, missing, noise, segments,
+                corners, row, base, evidence,
+            )  # fmt: skip
+    # Through a slit, a surface behind may show between two lines.
+    for k in range(surfaces):
+        m = (k + 2) % surfaces
+        both_end = (m > k or (closed and m != k)) and spans[END, k] == spans[START, m] == 0
+        if both_end and are_near(points, spans, k, m):
+            _, row = cross(
+                points, beams, spans, pieces, sums, k, m, count, noise, segments, corners, row,
+                base, evidence,
+            )  # fmt: skip
+    for k in range(surfaces):
+        for way in (-1, 1):
+            if spans[KIND, k] == LINE and not spans[END if way > 0 else START, k]:
+                row = add_edge(
+                    points, beams, spans, pieces, k, way, count, n, circular, missing, noise,
+                    segments, corners, row, base,
+                )  # fmt: skip
+    return row
 
 
 @helper

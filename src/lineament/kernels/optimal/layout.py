@@ -10,8 +10,8 @@ POINTS = 10
 #: line that ends before it begins, or -1; first and last measurement of each cluster.
 BEAM, BROKEN, ORIGIN, CLUSTER_FIRST, CLUSTER_LAST = range(5)
 BEAMS = 5
-#: The candidates that run along, and their energies.
-RUNNER, VALUE = CLUSTER_FIRST, SCRATCH
+#: The candidates that run along, and their energies; before, whether a measurement is a spike.
+RUNNER, VALUE, SPIKE = CLUSTER_FIRST, SCRATCH, CLUSTER_FIRST
 #: Of a row of `pieces`, by surface: the line a x + b y = 1 [1/m]; its centroid [m] and direction;
 #: the covariance of its offset there and its angle; root mean square and misfit [m]. Of an arc:
 #: centre, radius [m], six covariances, root mean square [m], and by how much lines are worse.
