@@ -22,11 +22,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 import lineament as ln
-from lineament.bulk import Processes, Threads, extract_logs
-from lineament.evaluation.report import machine
-from lineament.extraction import extract_log
 from lineament.logs import open_log
+from lineament.reproduce.report import machine
 from lineament.simulation import SENSORS, building, drive
+from lineament.tasks.bulk import Processes, Threads, extract_logs
+from lineament.tasks.extract import extract_log
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import ros_bags
@@ -43,7 +43,7 @@ RECORDINGS = (
 #: Peak memory of a worker process [MB], told by a process that waited for it.
 PEAK = """
 import resource, sys, lineament as ln
-from lineament.bulk import Processes, extract_logs
+from lineament.tasks.bulk import Processes, extract_logs
 if __name__ == "__main__":
     with Processes(1) as executor:
         extract_logs(sys.argv[1:-1], sys.argv[-1], ln.Extractor(), executor=executor)

@@ -23,14 +23,14 @@ from lineament.evaluation import (
     ranked_repeats,
     standing_scores,
 )
-from lineament.evaluation.experiments.arena import load_arena
-from lineament.evaluation.experiments.frames import Frame, scene_numbers, simulated_frames
-from lineament.evaluation.experiments.real import LOGS
-from lineament.evaluation.experiments.recorded_aims import ARENAS
-from lineament.evaluation.experiments.recordings import spread_scans
-from lineament.evaluation.experiments.repeatability import scan_pairs
-from lineament.evaluation.experiments.standing_still import STANDING, still_pairs
 from lineament.logs import find_logs
+from lineament.reproduce.arena import load_arena
+from lineament.reproduce.frames import Frame, scene_numbers, simulated_frames
+from lineament.reproduce.real import LOGS
+from lineament.reproduce.recorded_aims import ARENAS
+from lineament.reproduce.recordings import spread_scans
+from lineament.reproduce.repeatability import scan_pairs
+from lineament.reproduce.standing_still import STANDING, still_pairs
 from lineament.simulation import SENSORS
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lineament.evaluation.report import machine
 from lineament.logs import open_log
+from lineament.reproduce.report import machine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import ros_bags

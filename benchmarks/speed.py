@@ -18,9 +18,9 @@ import numba
 import numpy as np
 
 import lineament as ln
-from lineament.evaluation.report import machine
-from lineament.extraction import extract_log
+from lineament.reproduce.report import machine
 from lineament.simulation import SENSORS, building, drive
+from lineament.tasks.extract import extract_log
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 

@@ -1,4 +1,4 @@
-"""Small logs for the tests of `lineament.bulk`, and a method that its worker does not survive."""
+"""Small logs for the tests of bulk extraction, and a method that its worker does not survive."""
 
 from __future__ import annotations
 

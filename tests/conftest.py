@@ -24,7 +24,10 @@ collect_ignore = ["ros1_peer.py"]
 # Numba caches a kernel by its own file, and does not see changes in those that it calls: a folder
 # for each state of all kernels, which the commands that the tests start share.
 _ROOT = Path(__file__).parents[1]
-_SOURCES = [_ROOT / "src/lineament/features.py", *(_ROOT / "src/lineament/kernels").rglob("*.py")]
+_SOURCES = [
+    _ROOT / "src/lineament/features/records.py",
+    *(_ROOT / "src/lineament/kernels").rglob("*.py"),
+]
 _STATE = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_SOURCES))).hexdigest()[:16]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "build" / "numba" / _STATE))
 
@@ -83,7 +86,7 @@ def domain() -> int:
 @pytest.fixture(scope="session")
 def compiled() -> None:
     """Compile the kernels that processes load, of which none should wait for a compiler."""
-    from lineament.warmup import warm_up
+    from lineament.tasks.warmup import warm_up
 
     warm_up(["iepf", "optimal"])
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.special import gammaincinv
 
-from lineament.tracking import Matches
+from lineament.motion import Matches
 
 _PATCH, _OVERLAP = 0.3, 0.5
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from naive_association import chi_square, rough_variances, segment_lengths, turned
 
-from lineament.tracking import Motion
+from lineament.motion import Motion
 
 _KNOWN, _FEIGNED, _RIGHT, _DIRECTED = 0.1, 3.0, 0.99, 0.1
 _ROUNDS, _SMALL = 20, 1e-7

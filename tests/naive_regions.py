@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 from naive_fit import principal_line, range_variance
 
-from lineament.block import Block
 from lineament.features import noise_row
 from lineament.kernels import layout
+from lineament.methods.workspace import Block
 
 
 @dataclass

@@ -8,8 +8,8 @@ import numpy as np
 from naive_association import associate
 from naive_motion import estimate_motion
 
-from lineament.poses import inverse
-from lineament.tracking import Motion, Tracker, Tracks
+from lineament.motion import Motion, Tracker, Tracks
+from lineament.motion.poses import inverse
 
 KINDS = ("segments", "corners", "arcs")
 

@@ -14,8 +14,8 @@ import pytest
 from bulk_logs import corner_log, halves, outcomes, rows_of, table_of
 
 import lineament as ln
-from lineament.bulk import MANIFEST, Threads, extract_logs
-from lineament.extraction import extract_log
+from lineament.tasks.bulk import MANIFEST, Threads, extract_logs
+from lineament.tasks.extract import extract_log
 
 IEPF = ln.Extractor("iepf")
 
@@ -285,6 +285,6 @@ def test_a_disk_without_room_for_the_manifest_is_one_clear_error(small_disk, log
 
 
 def test_the_package_imports_bulk_only_when_asked():
-    code = "import sys, lineament; print('lineament.bulk' in sys.modules)"
+    code = "import sys, lineament; print('lineament.tasks.bulk' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -15,9 +15,9 @@ import pytest
 from bulk_logs import Deadly, corner_log, flaser_log, halves, outcomes, rows_of, table_of
 
 import lineament as ln
-from lineament.bulk import Processes, Row, dask_executor, extract_logs
-from lineament.bulk.parts import Task, extract_part
 from lineament.cli import run
+from lineament.tasks.bulk import Processes, Row, dask_executor, extract_logs
+from lineament.tasks.bulk.parts import Task, extract_part
 
 IEPF = ln.Extractor("iepf")
 
@@ -72,7 +72,7 @@ def test_threads_processes_and_dask_make_the_same_table(logs, cluster, tmp_path)
 
 def test_a_dask_cluster_that_does_not_answer_is_named(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("lineament.bulk.workers._ANSWER", 0.3)
+    monkeypatch.setattr("lineament.tasks.bulk.workers._ANSWER", 0.3)
     for address in ("tcp://127.0.0.1:9", "nonsense://a"):
         with (
             pytest.raises(ln.LineamentError, match=f"{address}: no Dask scheduler answers"),
@@ -208,7 +208,7 @@ def outcomes_so_far(folder):
 def test_memory_of_a_worker_does_not_grow_with_the_log(tmp_path):
     code = (
         "import resource, sys, lineament as ln; "
-        "from lineament.bulk import Processes, extract_logs\n"
+        "from lineament.tasks.bulk import Processes, extract_logs\n"
         "if __name__ == '__main__':\n"
         "    with Processes(1) as one:\n"
         "        extract_logs(sys.argv[1], sys.argv[2], ln.Extractor('iepf'), executor=one)\n"

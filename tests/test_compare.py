@@ -7,9 +7,9 @@ import pytest
 
 import lineament as ln
 from lineament import LineamentError
-from lineament.evaluation.compare import compare_log, compare_scan, write_comparison
-from lineament.evaluation.experiments.contenders import region_lines
 from lineament.logs import LogError, save_npz
+from lineament.reproduce.compare import compare_log, compare_scan, write_comparison
+from lineament.reproduce.contenders import region_lines
 from lineament.simulation import SENSORS, room
 
 PNG = b"\x89PNG\r\n\x1a\n"

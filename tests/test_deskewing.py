@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from naive_world import distance_to_walls, ring_sensor
 
 import lineament as ln
-from lineament.deskewing import beam_times
 from lineament.evaluation import CornerScores, corner_scores
 from lineament.evaluation.counts import rms
+from lineament.motion.deskew import beam_times
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room, scene, truth
 

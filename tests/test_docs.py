@@ -5,9 +5,8 @@ from dataclasses import fields
 from pathlib import Path
 
 import lineament as ln
-from lineament import stages
 from lineament.cli.commands import COMMANDS
-from lineament.methods import METHODS
+from lineament.methods import METHODS, stages
 from lineament.methods.liu import Liu
 
 ROOT = Path(__file__).parent.parent

@@ -9,8 +9,9 @@ import pytest
 from handmade import corner, features, segment
 
 import lineament as ln
-from lineament.evaluation import Repeatability, Stability, repeatability, rotation_stability
+from lineament.evaluation import Repeatability, repeatability
 from lineament.evaluation.repeatability import in_sight
+from lineament.reproduce.stability import Stability, rotation_stability
 from lineament.simulation import SENSORS, Sensor, World, room
 
 PAPER = SENSORS["paper"]

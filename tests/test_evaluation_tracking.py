@@ -9,14 +9,14 @@ import pytest
 from handmade import corner, features, segment
 
 import lineament as ln
-from lineament.evaluation.experiments import Setting, tracking
 from lineament.evaluation.icp import icp
 from lineament.evaluation.tracking import MotionErrors, motion_errors, track_scores
 from lineament.logs import save_npz
-from lineament.poses import compose, inverse, relative
+from lineament.motion import Tracker, Tracks
+from lineament.motion.poses import compose, inverse, relative
+from lineament.reproduce import Setting, tracking
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, drive, room
-from lineament.tracking import Tracker, Tracks
 
 NONE = np.empty(0, np.int64)
 

@@ -11,16 +11,16 @@ import pytest
 from handmade import arc, segment
 
 from lineament import LaserScan, RangeNoise
-from lineament.evaluation.experiments import (
+from lineament.reproduce import (
     Setting,
     frames,
     optimal_aims,
     recorded_aims,
     speed_aims,
 )
-from lineament.evaluation.experiments.aims import Aim, Limits, aims_table
-from lineament.evaluation.experiments.curved_arcs import curved_arcs, line_misfit
-from lineament.evaluation.experiments.findings import cell_text
+from lineament.reproduce.aims import Aim, Limits, aims_table
+from lineament.reproduce.curved_arcs import curved_arcs, line_misfit
+from lineament.reproduce.findings import cell_text
 from lineament.simulation import SENSORS, Sensor, scene, truth
 
 

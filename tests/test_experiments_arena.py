@@ -9,10 +9,10 @@ import pytest
 from handmade import corner, features
 
 from lineament import Extractor, LaserScan
-from lineament.evaluation.experiments import Setting, arena, repeatability
-from lineament.evaluation.experiments.arena import ARENA, arena_scores, load_arena
-from lineament.evaluation.experiments.repeatability import scan_pairs
 from lineament.logs import save_npz
+from lineament.reproduce import Setting, arena, repeatability
+from lineament.reproduce.arena import ARENA, arena_scores, load_arena
+from lineament.reproduce.repeatability import scan_pairs
 from lineament.simulation import Sensor, World, truth
 
 #: A room of 4 m x 3 m whose fitted walls leave gaps at two corners; a board ends on a wall.

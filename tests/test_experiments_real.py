@@ -11,10 +11,10 @@ import pytest
 from matplotlib.image import imread
 
 from lineament import Extractor, LaserScan
-from lineament.evaluation.experiments import Setting, contact_sheet, real, standing_still
-from lineament.evaluation.experiments.contact_sheet import sheet_scans
-from lineament.evaluation.experiments.standing_still import still_pairs
 from lineament.logs import save_npz
+from lineament.reproduce import Setting, contact_sheet, real, standing_still
+from lineament.reproduce.contact_sheet import sheet_scans
+from lineament.reproduce.standing_still import still_pairs
 from lineament.simulation import SENSORS, room
 
 #: Bins of arm lengths with their numbers of pairs.

@@ -7,8 +7,8 @@ import json
 import pytest
 
 from lineament.evaluation import Counts
-from lineament.evaluation.experiments import Setting, repetition
-from lineament.evaluation.experiments.repetition_grid import (
+from lineament.reproduce import Setting, repetition
+from lineament.reproduce.repetition_grid import (
     Parameters,
     Repetition,
     best_parameters,
@@ -16,7 +16,7 @@ from lineament.evaluation.experiments.repetition_grid import (
     repetition_grid,
     repetition_scenes,
 )
-from lineament.evaluation.experiments.repetition_grid import repetition as measure
+from lineament.reproduce.repetition_grid import repetition as measure
 
 
 def silent(about: str) -> None:

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from lineament.evaluation.experiments import (
+from lineament.logs import save_npz
+from lineament.reproduce import (
     EXPERIMENTS,
     Setting,
     all_methods,
@@ -31,7 +32,6 @@ from lineament.evaluation.experiments import (
     tracking,
     two_corners,
 )
-from lineament.logs import save_npz
 from lineament.simulation import SENSORS, room
 
 #: Found on a small grid elsewhere; here it is only to be quick.

@@ -10,16 +10,16 @@ import pytest
 
 from lineament import Extractor
 from lineament.evaluation import evaluate
-from lineament.evaluation.experiments import Setting, all_methods, repeatability, success
-from lineament.evaluation.experiments.charts import dot_chart
-from lineament.evaluation.experiments.contenders import drawn_methods, every_method, feature_methods
-from lineament.evaluation.experiments.frames import (
+from lineament.methods import METHODS
+from lineament.reproduce import Setting, all_methods, repeatability, success
+from lineament.reproduce.charts import dot_chart
+from lineament.reproduce.contenders import drawn_methods, every_method, feature_methods
+from lineament.reproduce.frames import (
     batch_of,
     frame_times,
     scene_numbers,
     simulated_frames,
 )
-from lineament.methods import METHODS
 from lineament.simulation import SENSORS
 
 

@@ -8,8 +8,8 @@ import pytest
 from lineament import LaserScan
 from lineament.evaluation import ArcScores, CornerScores, Counts, Scores, SimilarityScores
 from lineament.evaluation.consistency import NormalisedErrors
-from lineament.evaluation.experiments import all_methods, layered, similarity, two_corners
 from lineament.output import canvas, drawing
+from lineament.reproduce import all_methods, layered, similarity, two_corners
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ import pytest
 from handmade import corner, features
 
 import lineament as ln
-from lineament.evaluation.experiments import Setting, two_corners
-from lineament.evaluation.experiments.frames import batch_of
-from lineament.evaluation.experiments.two_corners import (
+from lineament.reproduce import Setting, two_corners
+from lineament.reproduce.frames import batch_of
+from lineament.reproduce.two_corners import (
     DISTANCE,
     POSES,
     WORLD,

@@ -7,7 +7,7 @@ import pytest
 from worlds import degenerate_scans, random_scan
 
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.explaining import explain
+from lineament.explain.explain import explain
 from lineament.methods import METHODS
 from lineament.simulation import SENSORS, scene
 

@@ -12,10 +12,10 @@ import ros_bags
 from mcap.reader import make_reader
 
 import lineament as ln
-from lineament.bulk import extract_logs
 from lineament.cli import run
-from lineament.extraction import extract_log
 from lineament.logs import save_npz
+from lineament.tasks.bulk import extract_logs
+from lineament.tasks.extract import extract_log
 
 IEPF = ln.Extractor("iepf")
 

@@ -40,7 +40,7 @@ def test_huge_ranges_do_not_drown_their_neighbours():
 
 
 def test_a_jump_without_noise_is_no_lattice():
-    from lineament.stages import estimate_noise
+    from lineament.methods.stages import estimate_noise
 
     scan = LaserScan([2.0] * 20 + [4.0] * 20, 0.0, 0.01)
     assert estimate_noise(scan).sigma == pytest.approx(1e-4)

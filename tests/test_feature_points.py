@@ -9,6 +9,7 @@ import pytest
 from handmade import arc, corner, features, random_features, segment
 
 from lineament.features import ARC, CORNER, SEGMENT
+from lineament.motion import Tracks
 from lineament.output.feature_points import (
     ARC_POINT,
     CORNER_POINT,
@@ -16,7 +17,6 @@ from lineament.output.feature_points import (
     SEGMENT_POINT,
     feature_points,
 )
-from lineament.tracking import Tracks
 
 #: What a kind fills; everything else is NaN, or -1 where it is an integer.
 FILLED = {

@@ -18,8 +18,8 @@ from test_tables import random_features
 import lineament as ln
 from lineament import LineamentError
 from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
+from lineament.methods.trace import CANDIDATE, Trace
 from lineament.output import canvas, figures, labels
-from lineament.tracing import CANDIDATE, Trace
 
 CORNER_RGB = np.array([0xD1, 0x24, 0x2F]) / 255
 

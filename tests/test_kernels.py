@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import BOX, degenerate_scans, fan, full_circle, random_scan, room, scan_of, wall
 
-from lineament import LaserScan, RangeNoise, stages
+from lineament import LaserScan, RangeNoise
+from lineament.methods import stages
 
 DEGENERATE = degenerate_scans()
 seeds = st.integers(0, 2**32 - 1)

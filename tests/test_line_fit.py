@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from naive_fit import fit_line, jacobian_covariance
 from worlds import STEP, fan, wall
 
-from lineament import RangeNoise, stages
+from lineament import RangeNoise
+from lineament.methods import stages
 
 seeds = st.integers(0, 2**32 - 1)
 

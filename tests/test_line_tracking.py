@@ -12,12 +12,12 @@ from naive_partition import clusters_of, noise_of, parted, track
 from worlds import NOISE, degenerate_scans, fan, random_scan, scan_of, vertex, wall
 
 from lineament import Extractor, RangeNoise
-from lineament.block import Block
 from lineament.features import noise_row
 from lineament.kernels.layout import BEAM, FIRST, LAST, PIECES
-from lineament.kernels.line_tracking import track_lines
+from lineament.kernels.rivals.line_tracking import track_lines
 from lineament.methods.pdbs import part
 from lineament.methods.steps import estimate_noise
+from lineament.methods.workspace import Block
 
 DEGENERATE = degenerate_scans()
 SENSOR = RangeNoise(0.01, 0.01, 0.002, 0.01)

@@ -22,7 +22,8 @@ from worlds import (
     wall,
 )
 
-from lineament import Extractor, LaserScan, RangeNoise, open_log, stages
+from lineament import Extractor, LaserScan, RangeNoise, open_log
+from lineament.methods import stages
 
 DEGENERATE = degenerate_scans()
 EXTRACTORS = {

@@ -21,11 +21,11 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.block import Block
 from lineament.features import noise_row
 from lineament.kernels.optimal import layout
 from lineament.logs import open_log
 from lineament.methods.optimal import Optimal
+from lineament.methods.workspace import Block
 from lineament.simulation import SENSORS, scene
 
 EVIDENCE, MISSING = 12.0, 6

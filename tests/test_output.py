@@ -17,9 +17,9 @@ import pytest
 from test_tables import random_features
 
 from lineament import LaserScan, LineamentError, RangeNoise
+from lineament.features.tables import SCHEMA, features_table
 from lineament.output import ENDINGS, open_writer, written_beside
 from lineament.output.page import write_page
-from lineament.tables import SCHEMA, features_table
 
 try:
     import resource

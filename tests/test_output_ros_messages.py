@@ -19,15 +19,15 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import lineament as ln
 from lineament import LaserScan
-from lineament.logs.ros_messages import laser_scan
+from lineament.motion import Tracker
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment
+from lineament.rosmsg.messages import laser_scan
 from lineament.simulation import SENSORS, drive, room
-from lineament.tracking import Tracker
 
 both = pytest.mark.parametrize("encoding", ["cdr", "ros1"])
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lineament.logs.ros_wire import Wire
-from lineament.output.ros_wire import Packer
+from lineament.rosmsg.packing import Packer
+from lineament.rosmsg.wire import Wire
 
 both = pytest.mark.parametrize("encoding", ["cdr", "ros1"])
 

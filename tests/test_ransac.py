@@ -10,7 +10,7 @@ from naive_regions import assert_same_pieces, sample
 from worlds import NOISE, STEP, degenerate_scans, fan, random_scan, scan_of, wall
 
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.kernels.ransac import PERIOD, draw
+from lineament.kernels.rivals.ransac import PERIOD, draw
 from lineament.methods.ransac import Ransac
 
 DEGENERATE = degenerate_scans()

@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from lineament import LaserScan, LineamentError
-from lineament.evaluation import experiments, ple
-from lineament.evaluation.experiments import (
+from lineament import reproduce as experiments
+from lineament.evaluation.counts import plain
+from lineament.evaluation.ple import benchmark as ple
+from lineament.evaluation.ple.benchmark import Benchmark, BenchmarkResult
+from lineament.logs import save_npz
+from lineament.output.canvas import figure_bytes, new_figure
+from lineament.reproduce import (
     ALIASES,
     EXPERIMENTS,
     Figure,
@@ -19,12 +24,9 @@ from lineament.evaluation.experiments import (
     recordings,
     scenes,
 )
-from lineament.evaluation.experiments.findings import cell_text, plain
-from lineament.evaluation.experiments.noise_points import _near
-from lineament.evaluation.ple import Benchmark, BenchmarkResult
-from lineament.evaluation.report import benchmark_tables, reproduce, write_report
-from lineament.logs import save_npz
-from lineament.output.canvas import figure_bytes, new_figure
+from lineament.reproduce.findings import cell_text
+from lineament.reproduce.noise_points import _near
+from lineament.reproduce.report import benchmark_tables, reproduce, write_report
 
 
 def quiet(about):

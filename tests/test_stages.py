@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from worlds import NOISE, degenerate_scans, random_scan
 
-from lineament import Extractor, LaserScan, RangeNoise, stages
+from lineament import Extractor, LaserScan, RangeNoise
+from lineament.methods import stages
 
 SCAN = LaserScan([2.0] * 9, 0.0, 0.01)
 POINTS = [(2.0, 0.1 * i) for i in range(9)]

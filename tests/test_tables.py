@@ -10,7 +10,7 @@ import pytest
 
 import lineament as ln
 from lineament.features import BREAKPOINT, TABLES, FeatureBatch, Features
-from lineament.tables import SCHEMA, batch_table, features_table
+from lineament.features.tables import SCHEMA, batch_table, features_table
 
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
 

@@ -9,9 +9,9 @@ import pytest
 from handmade import arc, corner, features, random_features, segment, shaken
 
 import lineament as ln
-from lineament.poses import compose, inverse, relative
+from lineament.motion import Tracker, associate
+from lineament.motion.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, building, drive, drive_poses, room, truth
-from lineament.tracking import Tracker, associate
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 1), (-1, 1), 31, 60))
 CORNER = corner(2, 1, segments=(0, 1))

@@ -9,9 +9,9 @@ from handmade import arc, corner, features, segment
 from naive_motion import residuals
 
 import lineament as ln
-from lineament.poses import compose, inverse
+from lineament.motion import Matches, associate, estimate_motion
+from lineament.motion.poses import compose, inverse
 from lineament.simulation import SENSORS, World, scene
-from lineament.tracking import Matches, associate, estimate_motion
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 3), (-1, 3), 31, 60))
 NONE = np.empty((0, 2), np.intp)

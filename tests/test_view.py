@@ -16,7 +16,7 @@ from view_scans import walls
 
 from lineament import Extractor
 from lineament.errors import LineamentError
-from lineament.explaining import explain
+from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
 from lineament.view.api import MOST_STAMPS, RequestError, answer

@@ -9,7 +9,7 @@ from browser import MISSING, open_browser
 from view_scans import corners
 
 from lineament import Extractor
-from lineament.explaining import explain
+from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
 

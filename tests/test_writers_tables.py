@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 from test_tables import random_features
 
+from lineament.features.tables import SCHEMA, features_table
 from lineament.output import open_writer
 from lineament.output.rows import TOPIC
-from lineament.tables import SCHEMA, features_table
 
 TOPICS = ("/front", '/re"ar,\n')
 

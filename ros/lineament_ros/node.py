@@ -16,7 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from lineament import LineamentError
 from lineament.live import LiveConfig, Node, Pipeline, RosSink
 from lineament.output.ros_messages import RosMessages
-from lineament.warmup import warm_up
+from lineament.tasks.warmup import warm_up
 
 from .bridge import RclpyPublisher, RclpySource
 

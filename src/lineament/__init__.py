@@ -11,19 +11,20 @@ Examples
 Features(1 segments, 0 corners, 0 arcs, 2 breakpoints, 1 clusters, stamp=0.000)
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+from ._lazy import lazily
+from ._version import __version__
 
 if TYPE_CHECKING:
-    from .deskewing import deskew
     from .errors import LineamentError, LogError
     from .extractor import Extractor, extract, trace
     from .features import FeatureBatch, Features
     from .logs import open_log
+    from .methods.trace import Trace
+    from .motion.deskew import deskew
+    from .motion.tracker import Tracker
     from .scan import LaserScan, RangeNoise
-    from .tracing import Trace
 
 _HOME = {
     "Extractor": "extractor",
@@ -33,8 +34,9 @@ _HOME = {
     "LineamentError": "errors",
     "LogError": "errors",
     "RangeNoise": "scan",
-    "Trace": "tracing",
-    "deskew": "deskewing",
+    "Trace": "methods.trace",
+    "Tracker": "motion.tracker",
+    "deskew": "motion.deskew",
     "extract": "extractor",
     "open_log": "logs",
     "trace": "extractor",
@@ -43,11 +45,8 @@ _HOME = {
 __all__ = [*_HOME, "__version__"]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'lineament' has no attribute {name!r}")
-    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+__getattr__ = lazily(__name__, _HOME)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

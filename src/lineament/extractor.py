@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .batching import block_capacity, run_batch
-from .block import Block
 from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
+from .methods.batching import block_capacity, run_batch
+from .methods.trace import Trace
+from .methods.workspace import Block
 from .scan import LaserScan, RangeNoise
-from .tracing import Trace
 
 __all__ = ["Extractor", "extract", "trace"]
 

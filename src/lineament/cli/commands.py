@@ -83,7 +83,7 @@ def plot(
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
     """Compile and cache the kernels of a method."""
-    from ..warmup import warm_up
+    from ..tasks.warmup import warm_up
 
     with wrong_usage():
         seconds = warm_up(methods)
@@ -104,7 +104,7 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 @QUIET
 def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
     """Make a page of a simulated drive, or of LOG."""
-    from ..demo import run_demo
+    from ..tasks.demo import run_demo
     from .progress import tracker
 
     facts = run_demo(output, log, track=tracker(quiet))

@@ -32,7 +32,7 @@ def compare(
     quiet: bool,
 ) -> None:
     """Put methods side by side on a scan of LOG."""
-    from ..evaluation.compare import ENDINGS, compare_log, write_comparison
+    from ..reproduce.compare import ENDINGS, compare_log, write_comparison
     from .progress import tracker
 
     check_ending(output, ENDINGS)
@@ -73,8 +73,8 @@ def reproduce(
     output: Path, names: tuple[str, ...], frames: int, seed: int, data: Path | None, quiet: bool
 ) -> None:
     """Make the paper's experiments again: a page and all figures as JSON."""
-    from ..evaluation.experiments import Setting, experiment_names
-    from ..evaluation.report import reproduce
+    from ..reproduce import Setting, experiment_names
+    from ..reproduce.report import reproduce
     from .progress import telling
 
     with wrong_usage():
@@ -100,9 +100,9 @@ def ple(
     data: Path, methods: tuple[str, ...], sparing: bool, output: Path | None, quiet: bool
 ) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
-    from ..atomic import write_text
-    from ..evaluation.ple import load_benchmark, method_map, run_benchmark, sparing_map
-    from ..evaluation.report import benchmark_tables
+    from ..evaluation.ple.benchmark import load_benchmark, method_map, run_benchmark, sparing_map
+    from ..files import write_text
+    from ..reproduce.report import benchmark_tables
     from .progress import tracker
 
     if output is not None and len(methods) > 1:

@@ -92,8 +92,8 @@ def _extract_into_file(
     reading: dict[str, Any],
     quiet: bool,
 ) -> None:
-    from ..extraction import extract_log
     from ..logs import find_logs
+    from ..tasks.extract import extract_log
     from .progress import tracker
 
     found = find_logs(logs)
@@ -117,7 +117,7 @@ def _extract_into_folder(
     threads: int | None,
     dask: str | None,
 ) -> None:
-    from ..bulk import extract_logs
+    from ..tasks.bulk import extract_logs
     from .progress import telling
 
     with _executor(processes, threads, dask) as executor, telling(quiet) as tell:
@@ -139,7 +139,7 @@ def _extract_into_folder(
 
 @contextmanager
 def _executor(processes: int | None, threads: int | None, dask: str | None) -> Iterator[Executor]:
-    from ..bulk import Processes, Threads, dask_executor
+    from ..tasks.bulk import Processes, Threads, dask_executor
 
     if sum(value is not None for value in (processes, threads, dask)) > 1:
         raise click.UsageError("expected one of --processes, --threads and --dask")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from ..track import Track, untracked
+from ..progress import Track, untracked
 
 __all__ = ["telling", "tracker"]
 

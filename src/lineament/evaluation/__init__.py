@@ -28,7 +28,6 @@ from .repeatability import Repeatability, Repeats, repeatability
 from .scores import Scores, evaluate
 from .segments import SegmentScores, segment_scores
 from .similarity import SimilarityScores, similarity_errors, similarity_scores
-from .stability import Stability, rotation_stability
 from .standing import ScatterScores, StandingScores, standing_scores
 
 __all__ = [
@@ -46,7 +45,6 @@ __all__ = [
     "Scores",
     "SegmentScores",
     "SimilarityScores",
-    "Stability",
     "StandingScores",
     "Summable",
     "arc_scores",
@@ -57,7 +55,6 @@ __all__ = [
     "partition_scores",
     "ranked_repeats",
     "repeatability",
-    "rotation_stability",
     "segment_scores",
     "similarity_errors",
     "similarity_scores",

@@ -130,3 +130,23 @@ def rms(values: NDArray[np.float64]) -> float:
 def quantile(values: NDArray[np.float64], share: float) -> float:
     """Value that a share of them does not exceed; NaN of nothing."""
     return float(np.quantile(values, share)) if len(values) else math.nan
+
+
+def plain(value: object) -> Any:
+    """Make what JSON takes of numbers, arrays and what holds them; not finite becomes None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> plain({"rms": np.float64(0.5), "errors": np.array([1.0, np.nan])})
+    {'rms': 0.5, 'errors': [1.0, None]}
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..poses import relative
+from ..motion.poses import relative
 from ..scan import Array, LaserScan
 from .counts import Summable, ratio
 from .matching import match

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..poses import compose, relative
+from ..motion import Tracks
+from ..motion.poses import compose, relative
 from ..scan import Array, Pose
-from ..tracking import Tracks
 from .counts import Summable, quantile, ratio, rms
 from .matching import Indices, match
 from .segments import ANGLE, line_errors

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import helper, kernel
-from .records import (
+from ..features.records import (
     A_CENTER,
     A_COVARIANCE,
     A_FIRST,

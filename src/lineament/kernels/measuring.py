@@ -10,7 +10,15 @@ from .layout import (
     MEASURED_X, MEASURED_Y, PIECES, POINTS, RESPONSE,
 )  # fmt: skip
 from .line_fit import fit_line, normal_variance, range_variance
-from .records import C_BEAM, C_COVARIANCE, C_POSITION, C_RESPONSE, C_SEGMENTS, S_CLUSTER, SHARP
+from ..features.records import (
+    C_BEAM,
+    C_COVARIANCE,
+    C_POSITION,
+    C_RESPONSE,
+    C_SEGMENTS,
+    S_CLUSTER,
+    SHARP,
+)
 from .writing import grade_corner, intersect, write_breaks, write_opening, write_segment
 
 

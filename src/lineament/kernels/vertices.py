@@ -12,7 +12,7 @@ from .layout import (
     BEAM, BEFORE, CLOSED, CROSS, FIRST, LAST, PIECES, PIVOT, POINTS, RESPONSE, RHO, RIGHT,
     STACK_FIRST, STACK_LAST, U_AFTER, U_BEFORE, X, Y,
 )  # fmt: skip
-from .records import C_POSITION, S_ANGLE, S_CENTROID, S_END, S_START
+from ..features.records import C_POSITION, S_ANGLE, S_CENTROID, S_END, S_START
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
 #: its ray; or they are free to meet beside it, and its reading is on neither as long as it is open

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from . import helper
-from .records import (
+from ..features.records import (
     A_CENTER, A_COVARIANCE, A_FIRST, A_LAST, A_POINTS, A_RADIUS, A_RMS, B_BEAM, B_KIND, B_OCCLUDER,
     B_POSITION, C_CONVEX, C_COVARIANCE, C_KIND, C_OPENING, C_POSITION, C_QUALITY, CORNER_WORDS,
     EDGE, GAP, JUMP, KIND_WORDS, S_ANGLE, S_CENTROID, S_COVARIANCE, S_END, S_FIRST, S_LAST,

@@ -7,9 +7,9 @@ import time
 from functools import cache, partial
 
 from ..logs.ros_bag import Buffer
-from ..logs.ros_messages import Decoder, decoders
 from ..logs.ros_poses import plane_pose
-from ..logs.ros_wire import Wire
+from ..rosmsg.messages import Decoder, decoders
+from ..rosmsg.wire import Wire
 from .received import Odometry, Received, Time
 
 __all__ = ["odometry", "received_odometry", "received_scan"]

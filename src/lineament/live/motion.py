@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..poses import Twist, twist_between
+from ..motion import Tracker
+from ..motion.poses import Twist, twist_between
 from ..scan import LaserScan, Pose
-from ..tracking import Tracker
 from .received import Odometry
 
 __all__ = ["OdometryMotion", "PoseMotion", "ScanMotion", "StandingMotion", "twist_of_laser"]

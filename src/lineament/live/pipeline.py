@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..deskewing import deskew
 from ..extractor import Extractor
 from ..features import Features
 from ..methods import get_method
+from ..motion import Tracker, Tracks
+from ..motion.deskew import deskew
+from ..motion.tracker import FASTEST
 from ..scan import LaserScan, RangeNoise
-from ..tracking import Tracker, Tracks
-from ..tracking.tracker import FASTEST
 from .config import LiveConfig
 from .motion import OdometryMotion, PoseMotion, ScanMotion, StandingMotion
 from .received import Odometry, Time

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from ..poses import Twist
+from ..motion.poses import Twist
 from ..scan import LaserScan, Pose
 
 __all__ = ["Odometry", "Received", "Source", "Time"]

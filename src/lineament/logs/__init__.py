@@ -10,6 +10,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from .._lazy import lazily
 from ..errors import LogError
 from .base import Head, Log, ReadOptions
 
@@ -124,7 +125,4 @@ def readers() -> list[type[Log]]:
     return [getattr(import_module(f".{module}", __name__), name) for module, name in READERS]
 
 
-def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+__getattr__ = lazily(__name__, _HOME)

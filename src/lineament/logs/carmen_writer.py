@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..atomic import naming_errors, written_beside
+from ..files import naming_errors, written_beside
 from ..scan import LaserScan
 
 __all__ = ["save_carmen"]

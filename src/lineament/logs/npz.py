@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..atomic import naming_errors, written_beside
 from ..errors import LogError
+from ..files import naming_errors, written_beside
 from ..scan import LaserScan
 from .base import Head, Log
 from .copies import check_growth

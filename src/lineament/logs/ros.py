@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
+from ..rosmsg.messages import CLOUD, decoders
 from ..scan import LaserScan
 from .base import Log, ReadOptions, Topic
 from .ros_bag import Bag, Buffer, Connection
-from .ros_messages import CLOUD, decoders
 from .ros_poses import PoseFinder
 
 __all__ = ["RosLog"]

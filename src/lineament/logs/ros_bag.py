@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import NamedTuple
 
 from ..errors import LogError
+from ..rosmsg.wire import Buffer
 from .lines import reading
 
 __all__ = ["MAX_PIECE", "Bag", "Buffer", "Connection", "Fault", "Source", "decompress"]
@@ -18,7 +19,6 @@ __all__ = ["MAX_PIECE", "Bag", "Buffer", "Connection", "Fault", "Source", "decom
 #: Largest chunk, record or message that is held in memory [bytes].
 MAX_PIECE = 1 << 28
 
-Buffer = bytes | memoryview
 #: What a bag calls with each fault that it finds: it raises, or counts and returns.
 Fault = Callable[[LogError], None]
 

@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
+from ..rosmsg.wire import Wire
 from ..scan import LaserScan, Pose
 from .ros_bag import Buffer, Connection
-from .ros_wire import Wire
 
 __all__ = ["POSE_TYPES", "TRANSFORMS", "PoseFinder", "plane_pose"]
 

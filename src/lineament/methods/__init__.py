@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..block import Block
     from ..features import Features
     from ..scan import LaserScan
-    from ..tracing import Trace
+    from .trace import Trace
+    from .workspace import Block
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "get_method", "method_names"]
 

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..features import Features
 from ..scan import LaserScan
-from ..tracing import Trace, trace_of
 from .steps import estimate_noise
+from .trace import Trace, trace_of
+from .workspace import Block
 
 __all__ = ["MethodBase"]
 

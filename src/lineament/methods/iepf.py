@@ -15,12 +15,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..kernels.line_fit import TOTAL, WEIGHTED
-from ..kernels.splitting import CHORD, split
-from ..kernels.stretches import MOMENTS
+from ..kernels.rivals.splitting import CHORD, split
+from ..kernels.rivals.stretches import MOMENTS
 from .checks import check_choice, check_count, check_number
 from .lines import LineMethod
+from .workspace import Block
 
 __all__ = ["IEPF"]
 

@@ -16,12 +16,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..kernels.line_fit import WEIGHTED
-from ..kernels.line_tracking import track_lines
-from ..kernels.stretches import MOMENTS
+from ..kernels.rivals.line_tracking import track_lines
+from ..kernels.rivals.stretches import MOMENTS
 from .checks import check_count, check_number
 from .lines import LineMethod
+from .workspace import Block
 
 __all__ = ["LineTracking"]
 

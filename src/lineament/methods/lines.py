@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
-from ..kernels.settling import settle
+from ..kernels.rivals.settling import settle
 from .base import MethodBase
 from .checks import check_count, check_number
 from .pdbs import check_acute, part
 from .steps import limit_vertices, measure
+from .workspace import Block
 
 __all__ = ["LineMethod"]
 

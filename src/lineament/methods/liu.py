@@ -13,14 +13,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..kernels.bilateral import scratch_shape
 from ..kernels.layout import FILTERED, RANGE
 from ..kernels.liu import extract_rows
-from ..stages import FITS, RESPONSES
 from .base import MethodBase
 from .checks import check_choice, check_count, check_number
+from .stages import FITS, RESPONSES
 from .steps import budget_scratch
+from .workspace import Block
 
 __all__ = ["Liu"]
 

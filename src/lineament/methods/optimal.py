@@ -13,7 +13,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..features import Features
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.optimal import layout
@@ -21,12 +20,13 @@ from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
 from ..kernels.vertices import hold_together
 from ..scan import LaserScan
-from ..tracing import Trace
 from .base import MethodBase
 from .checks import check_count, check_number
 from .optimal_trace import evidence_of, trace_of
 from .pdbs import part
 from .steps import measure
+from .trace import Trace
+from .workspace import Block
 
 __all__ = ["Optimal"]
 

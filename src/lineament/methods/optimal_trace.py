@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..features import Features
 from ..kernels.layout import FILTERED
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
@@ -24,7 +23,8 @@ from ..kernels.optimal.layout import (
     Y,
 )  # fmt: skip
 from ..scan import LaserScan
-from ..tracing import CANDIDATE, Trace
+from .trace import CANDIDATE, Trace
+from .workspace import Block
 
 if TYPE_CHECKING:
     from .optimal import Optimal

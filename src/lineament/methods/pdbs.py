@@ -12,11 +12,11 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..block import Block
-from ..kernels.pdbs import BORGES_ALDON, DIETMAYER, FIXED, LEE, SANTOS, part_by_distance
+from ..kernels.rivals.pdbs import BORGES_ALDON, DIETMAYER, FIXED, LEE, SANTOS, part_by_distance
 from .base import MethodBase
 from .checks import check_choice, check_count, check_number
 from .steps import measure
+from .workspace import Block
 
 __all__ = ["PDBS", "RULES", "check_acute", "part"]
 

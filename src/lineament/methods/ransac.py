@@ -14,12 +14,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
-from ..kernels.ransac import PERIOD, find_by_consensus
-from ..kernels.stretches import MOMENTS
-from ..stages import FITS
+from ..kernels.rivals.ransac import PERIOD, find_by_consensus
+from ..kernels.rivals.stretches import MOMENTS
 from .checks import check_choice, check_count, check_number
 from .lines import LineMethod
+from .stages import FITS
+from .workspace import Block
 
 __all__ = ["Ransac"]
 

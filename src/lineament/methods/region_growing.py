@@ -12,12 +12,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
-from ..kernels.region_growing import grow_regions
-from ..kernels.stretches import MOMENTS
-from ..stages import FITS
+from ..kernels.rivals.region_growing import grow_regions
+from ..kernels.rivals.stretches import MOMENTS
 from .checks import check_choice, check_count, check_number
 from .lines import LineMethod
+from .stages import FITS
+from .workspace import Block
 
 __all__ = ["RegionGrowing"]
 

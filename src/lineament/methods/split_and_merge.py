@@ -15,12 +15,12 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..kernels.line_fit import WEIGHTED
-from ..kernels.splitting import LINE, split
-from ..kernels.stretches import MOMENTS
+from ..kernels.rivals.splitting import LINE, split
+from ..kernels.rivals.stretches import MOMENTS
 from .checks import check_count, check_number
 from .lines import LineMethod
+from .workspace import Block
 
 __all__ = ["SplitAndMerge"]
 

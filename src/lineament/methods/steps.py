@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..block import Block
 from ..kernels.budget import LINK, WORST, limit_pieces
 from ..kernels.layout import RANGE
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure as _measure
 from ..kernels.noise import estimate_noise as _estimate_noise
+from .workspace import Block
 
 __all__ = ["budget_scratch", "estimate_noise", "limit_vertices", "measure"]
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from ..atomic import written_beside
 from ..errors import LineamentError
+from ..files import written_beside
 from .writer import Writer
 
 __all__ = ["ENDINGS", "Writer", "open_writer", "written_beside"]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import naming_errors, written_beside
 from ..errors import LineamentError
+from ..files import naming_errors, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..features import Features
 
 if TYPE_CHECKING:
-    from ..tracking import Tracks
+    from ..motion import Tracks
 
 __all__ = ["ARC_POINT", "CORNER_POINT", "FEATURE_POINT", "SEGMENT_POINT", "feature_points"]
 
@@ -48,7 +48,7 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
     features : Features
         Of one scan.
     tracks : Tracks, optional
-        The numbers that its features have from frame to frame, from `lineament.tracking`.
+        The numbers that its features have from frame to frame, from `lineament.motion`.
 
     Returns
     -------

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..tracing import Trace
+    from ..methods.trace import Trace
 
 __all__ = ["plot_map", "plot_scan", "plot_trace", "scan_figure"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mcap.writer import Writer as File
 
-from .. import __version__
+from .._version import __version__
 from ..errors import LineamentError
 from ..scan import LaserScan
 from .layers import layers_of

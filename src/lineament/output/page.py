@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from ..atomic import write_text
 from ..errors import LineamentError
+from ..files import write_text
 
 __all__ = [
     "contents_part",

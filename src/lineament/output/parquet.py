@@ -15,7 +15,7 @@ __all__ = ["ParquetWriter"]
 
 
 class ParquetWriter(RowWriter):
-    """Writes the table of `lineament.tables`, with the frames and the number of scans.
+    """Writes the table of `lineament.features.tables`, with the frames and the number of scans.
 
     A log without scans gives a file without rows, with the same schema.
     """

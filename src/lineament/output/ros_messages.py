@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
+from ..rosmsg.packing import Packer
 from ..scan import LaserScan, Pose
 from .feature_points import feature_points
 from .layers import Layer
 from .markers import Array, is_drawn
-from .ros_wire import Packer
 from .scene import Message, Moment, SceneMessages, cloud_of, single
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-    from ..tracking import Tracks
+    from ..motion import Tracks
 
 __all__ = ["RosMessages"]
 

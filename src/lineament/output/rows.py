@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pyarrow as pa
 
-from ..tables import SCHEMA, features_table
+from ..features.tables import SCHEMA, features_table
 from .writer import Found, Writer
 
 __all__ = ["TOPIC", "RowWriter"]

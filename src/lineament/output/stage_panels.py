@@ -13,7 +13,7 @@ from .canvas import CORNER_COLOR, FAINT, INK, count
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..tracing import Trace
+    from ..methods.trace import Trace
 
 
 def draw_filter(axes: Axes, trace: Trace) -> None:

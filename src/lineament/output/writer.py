@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, NamedTuple, Self
 
-from ..atomic import naming_errors, written_beside
 from ..features import Features
+from ..files import naming_errors, written_beside
 from ..scan import LaserScan
 
 __all__ = ["Found", "Writer"]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..poses import Twist
+from ..motion.poses import Twist
 from ..scan import Array, LaserScan
 from .sensor import Sensor
 from .worlds import World

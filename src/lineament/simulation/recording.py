@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..logs import save_log
+from ..progress import Track, untracked
 from ..scan import LaserScan, Pose
-from ..track import Track, untracked
 from .drive import drive, drive_poses
 from .presets import SENSORS
 from .scenes import SCENES, scene

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import LineamentError
-from ..explaining import explain
+from ..explain.explain import explain
 from ..extractor import Extractor
 from ..logs import open_log
 from ..scan import LaserScan

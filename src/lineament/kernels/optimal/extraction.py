@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .. import helper, kernel
-from ..records import S_CLUSTER
+from ...features.records import S_CLUSTER
 from ..writing import write_arc, write_breaks, write_segment
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .. import helper
-from ..records import (
+from ...features.records import (
     C_BEAM, C_CONVEX, C_OPENING, C_RESPONSE, C_SEGMENTS, S_END, S_START, SHARP, SLIT,
 )  # fmt: skip
 from ..writing import grade_corner, grade_edge, write_opening, write_place

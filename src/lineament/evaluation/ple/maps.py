@@ -1,0 +1,254 @@
+"""Maps of polylines: what the public benchmark compares, from features or from points alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...extractor import Extractor
+from ...features import Features
+from ...methods import get_method
+from ...scan import Array, LaserScan
+from .scores import cast_map
+
+__all__ = ["MapMaker", "benchmark_iepf", "iepf_map", "method_map", "polylines_of", "sparing_map"]
+
+#: Makes the polylines of a scan, arrays of shape (k, 2) [m], with at most so many vertices in all.
+MapMaker = Callable[[LaserScan, int], Sequence[Array]]
+
+#: Steeper than this to the ray, a line is not followed to where the ray would meet it.
+_LEAST_COSINE = 0.1
+#: What a return that the map does not explain counts as being off, and the most that any does [m].
+_WORST = 0.3
+#: Distances closer than this are equal but for rounding [m].
+_TIE = 1e-12
+
+
+def method_map(method: str) -> MapMaker:
+    """Make maps with a method of the registry, given the number of vertices as its budget.
+
+    Parameters
+    ----------
+    method : str
+        As for `lineament.extract`; the method needs the parameter ``max_vertices``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such method, or it takes no budget.
+
+    Examples
+    --------
+    >>> bearings = np.radians(np.arange(-40, 41))
+    >>> ranges = 2.0 / (np.cos(bearings) + np.abs(np.sin(bearings)))  # a corner, straight ahead
+    >>> make = method_map("iepf")
+    >>> [len(polyline) for polyline in make(LaserScan(ranges, angles=bearings), 10)]
+    [3]
+    """
+    get_method(method, max_vertices=1)
+    extractors: dict[int, Extractor] = {}
+
+    def make(scan: LaserScan, max_vertices: int) -> list[Array]:
+        if max_vertices not in extractors:
+            extractors[max_vertices] = Extractor(method, max_vertices=max_vertices)
+        return polylines_of(extractors[max_vertices](scan), scan)
+
+    return make
+
+
+def sparing_map(method: str) -> MapMaker:
+    """Make maps with a method of the registry, of as many vertices as there is evidence for.
+
+    Of the maps with 2, 3, … vertices that of the least n ln(E/n) + v (2 ln(n/v) + 5), where v is
+    the budget, n the number of returns, and E the sum of their squared range errors: the penalty
+    of E. Lebarbier, *Detecting multiple change-points in the mean of Gaussian process by model
+    selection*, Signal Processing 85, 2005, with the noise taken from what is left of E.
+
+    Parameters
+    ----------
+    method : str
+        As for `method_map`.
+
+    Raises
+    ------
+    ValueError
+        As `method_map` does.
+
+    Examples
+    --------
+    >>> bearings = np.radians(np.arange(-40, 41))
+    >>> ranges = 2.0 / (np.cos(bearings) + np.abs(np.sin(bearings)))  # a corner, straight ahead
+    >>> ranges += np.random.default_rng(7).normal(0.0, 0.01, len(ranges))
+    >>> scan = LaserScan(ranges, angles=bearings)
+    >>> polylines = sparing_map("optimal")(scan, 10)
+    >>> [len(polyline) for polyline in polylines]
+    [3]
+    """
+    make = method_map(method)
+
+    def make_sparingly(scan: LaserScan, max_vertices: int) -> Sequence[Array]:
+        maps = [make(scan, vertices) for vertices in range(2, max_vertices + 1)]
+        penalised = [_penalised(polylines, scan, k + 2) for k, polylines in enumerate(maps)]
+        return maps[int(np.argmin(penalised))] if maps else []
+
+    return make_sparingly
+
+
+def _penalised(polylines: Sequence[Array], scan: LaserScan, vertices: int) -> float:
+    """How ill a map explains a scan, and what its vertices cost."""
+    ranges, n = scan.ranges[scan.valid], max(int(scan.valid.sum()), 1)
+    errors = np.nan_to_num(cast_map(polylines, scan.angles[scan.valid]) - ranges, nan=_WORST)
+    squares = max(float(np.sum(np.minimum(errors**2, _WORST**2))), n * _TIE**2)
+    return n * math.log(squares / n) + vertices * (2.0 * math.log(n / vertices) + 5.0)
+
+
+def polylines_of(features: Features, scan: LaserScan) -> list[Array]:
+    """Connect the segments of a scan at its corners.
+
+    Segments that a corner joins share one vertex, midway between the end of the first and the
+    start of the second: that is the corner itself where it lies on both lines. Elsewhere a segment
+    goes on to the rays of its first and last beam. A closed outline ends in its first vertex.
+
+    Parameters
+    ----------
+    features : Features
+        In the frame of the sensor.
+    scan : LaserScan
+        That they were found in.
+
+    Returns
+    -------
+    list of ndarray, shape (k, 2)
+        Polylines in beam order [m]; k - 1 segments each.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> polylines_of(ln.extract(scan, method="iepf"), scan)[0].round(2).tolist()
+    [[2.0, -0.02], [2.0, 0.02]]
+    """
+    segments, angles = features.segments, scan.angles
+    joints = {a: (b, c) for c, (a, b) in enumerate(features.corners["segments"].tolist())}
+    joints = {a: (b, c) for a, (b, c) in joints.items() if a >= 0 and b >= 0}
+    open_ones = set(range(len(segments))) - {b for b, _ in joints.values()}
+    polylines, drawn = [], set[int]()
+    # A closed outline has no segment to begin with: what no open one leads to is one.
+    for k in [*sorted(open_ones), *range(len(segments))]:
+        if k in drawn:
+            continue
+        first = segments[k]
+        vertices = [_on_ray(first, "start", angles[first["first_beam"]])] if k in open_ones else []
+        while k in joints and k not in drawn:
+            drawn.add(k)
+            after, corner = joints[k]
+            bend = angles[features.corners["beam"][corner]]
+            vertices.append(_shared_vertex(segments[k], segments[after], angles, bend))
+            k = after
+        if k in drawn:
+            vertices.insert(0, vertices[-1])
+        else:
+            drawn.add(k)
+            vertices.append(_on_ray(segments[k], "end", angles[segments[k]["last_beam"]]))
+        polylines.append(np.array(vertices))
+    return polylines
+
+
+def _shared_vertex(before: np.void, after: np.void, angles: Array, bend: float) -> Array:
+    """Where two segments meet, midway between their ends.
+
+    Nearly parallel lines may meet behind the beams of both, and the map would turn back on
+    itself: then midway between them on the ray of the bend.
+    """
+    vertex = np.asarray((before["end"] + after["start"]) / 2)
+    right, left = angles[before["first_beam"]], angles[after["last_beam"]]
+    turn = math.atan2(vertex[1], vertex[0]) - right
+    if turn % (2 * math.pi) <= (left - right) % (2 * math.pi):
+        return vertex
+    return (_on_ray(before, "end", bend) + _on_ray(after, "start", bend)) / 2
+
+
+def _on_ray(segment: np.void, end: str, bearing: float) -> Array:
+    """Where a ray meets the line of a segment; its own end where it hardly meets the line."""
+    normal = np.array([-math.sin(segment["angle"]), math.cos(segment["angle"])])
+    ray = np.array([math.cos(bearing), math.sin(bearing)])
+    cosine = normal @ ray
+    if abs(cosine) < _LEAST_COSINE:
+        return np.array(segment[end])
+    return np.asarray((normal @ segment["centroid"]) / cosine * ray)
+
+
+def iepf_map(scan: LaserScan, max_vertices: int) -> list[Array]:
+    """Map a scan by `benchmark_iepf`: one polyline through all returns, whatever the gaps.
+
+    Examples
+    --------
+    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
+    >>> [len(polyline) for polyline in iepf_map(scan, 10)]
+    [3]
+    """
+    return [benchmark_iepf(scan.points[scan.valid], max_vertices)]
+
+
+def benchmark_iepf(points: Array, max_vertices: int) -> Array:
+    """Split a polyline at the point farthest from its chord until it has so many vertices.
+
+    The iterative end-point fit as the authors of the benchmark ran it: it begins with the first
+    and the last point, and splits where the distance to the infinite line through the ends of a
+    part is the largest of all parts. Of points that tie, the first is taken.
+
+    Parameters
+    ----------
+    points : array, shape (n, 2)
+        In beam order [m].
+    max_vertices : int
+        At least 2.
+
+    Returns
+    -------
+    array, shape (k, 2)
+        Some of the points, k = min(n, `max_vertices`).
+
+    Raises
+    ------
+    ValueError
+        If the shape of `points` is another, or `max_vertices` is too small.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0.0], [1.0, 0.1], [2.0, 1.0], [3.0, 0.0]])
+    >>> benchmark_iepf(points, 3).tolist()
+    [[0.0, 0.0], [2.0, 1.0], [3.0, 0.0]]
+    """
+    points = np.asarray(points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points has shape {points.shape}, expected (n, 2)")
+    if max_vertices < 2:
+        raise ValueError(f"max_vertices is {max_vertices}, expected a whole number ≥ 2")
+    if len(points) <= 2:
+        return points
+    vertices = [0, len(points) - 1]
+    splits = [_farthest(points, *vertices)]
+    while len(vertices) < min(max_vertices, len(points)):
+        k = max(range(len(splits)), key=lambda k: splits[k][0])
+        vertices.insert(k + 1, splits[k][1])
+        splits[k : k + 1] = (_farthest(points, *vertices[j : j + 2]) for j in (k, k + 1))
+    return points[vertices]
+
+
+def _farthest(points: NDArray[np.float64], first: int, last: int) -> tuple[float, int]:
+    """Tell how far the point between two others is that is farthest from their line, and which."""
+    if last - first < 2:
+        return -1.0, first
+    chord = points[last] - points[first]
+    arms = points[first + 1 : last] - points[first]
+    length = math.hypot(*chord)
+    if length > 0.0:
+        distances = np.abs(chord[0] * arms[:, 1] - chord[1] * arms[:, 0]) / length
+    else:
+        distances = np.hypot(arms[:, 0], arms[:, 1])
+    largest = float(distances.max())
+    return largest, first + 1 + int(np.argmax(distances >= largest - _TIE))

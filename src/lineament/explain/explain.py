@@ -1,0 +1,319 @@
+"""Why a beam is part of a feature, or of none: a trace put into words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..methods.trace import Trace
+from .measurements import Line, Readings, along_beam, spans, why_invalid
+
+__all__ = ["Explanation", "explain"]
+
+#: Fewer readings than this are no line in any of the methods.
+_FEW = 4
+#: The method that finds clusters alone.
+_PARTS_ONLY = "pdbs"
+#: Angle below which neighbouring lines may be taken for one wall that bends [°].
+_SHALLOW = 20.0
+#: Beams within which an examined corner still tells something about a beam.
+_NEAR = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """What became of one beam, stage by stage.
+
+    Attributes
+    ----------
+    beam : int
+        Index of the beam.
+    outcome : str
+        "invalid", "spike", "noise" (in no cluster), "unexplained" (in a cluster, but in no
+        feature), "clustered" (the method fits nothing), "segment" or "arc".
+    summary : str
+        The answer in one sentence.
+    steps : tuple of (str, str)
+        Stage and what was found there, in the order of the stages.
+    """
+
+    beam: int
+    outcome: str
+    summary: str
+    steps: tuple[tuple[str, str], ...]
+
+
+def explain(trace: Trace, beam: int) -> Explanation:
+    """Tell what became of a beam in a run of a method, and why.
+
+    What is told is measured on the trace: its thresholds, responses and evidence are the method's
+    own; lines through readings that no feature took are fitted here, to show what they look like.
+
+    Parameters
+    ----------
+    trace : Trace
+        Of one scan, from `Extractor.trace` or `lineament.trace`.
+    beam : int
+        Index of the beam, from 0.
+
+    Raises
+    ------
+    ValueError
+        If there is no such beam.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> ranges = [2.0] * 9 + [float("nan"), 3.5, 0.0]
+    >>> trace = ln.trace(ln.LaserScan(ranges, angle_min=0.0, angle_increment=0.01))
+    >>> explain(trace, 9).summary
+    'Invalid: the range is NaN, no measurement.'
+    >>> explain(trace, 10).outcome, explain(trace, 4).outcome
+    ('noise', 'segment')
+    """
+    n = len(trace.scan)
+    if isinstance(beam, bool) or not isinstance(beam, int) or not 0 <= beam < n:
+        raise ValueError(f"beam is {beam!r}, expected a whole number from 0 to {n - 1}")
+    return _Question(trace, beam).answer()
+
+
+class _Question:
+    """One beam of one trace; each method below answers for a stage."""
+
+    def __init__(self, trace: Trace, beam: int) -> None:
+        self.trace, self.beam, self.scan = trace, beam, trace.scan
+        self.segments, self.arcs = trace.features.segments, trace.features.arcs
+        self.readings = Readings(trace)
+        self.steps: list[tuple[str, str]] = []
+
+    def answer(self) -> Explanation:
+        scan, i = self.scan, self.beam
+        bearing = math.degrees(scan.angles[i])
+        invalid = why_invalid(scan, i)
+        if invalid:
+            self._note("reading", f"beam {i} at {bearing:.2f}°: {invalid}")
+            return self._done("invalid", f"Invalid: {invalid}.")
+        text = f"beam {i}: {scan.ranges[i]:.3f} m at {bearing:.2f}°"
+        self._note("reading", f"{text}, noise {_length(self._sigma(i))} (1 σ)")
+        if not math.isfinite(self.trace.filtered[i]):
+            return self._done(*self._tell_left_out())
+        moved = self.trace.filtered[i] - scan.ranges[i]
+        if moved:
+            self._note("filter", f"moved by {_signed(moved)} along its beam for the detection")
+        if self.trace.clusters[i] < 0:
+            return self._done("noise", self._tell_noise())
+        self._note("cluster", f"cluster {self.trace.clusters[i]}; {self._tell_sides()}")
+        self._tell_candidates()
+        return self._done(*self._tell_feature())
+
+    def _note(self, stage: str, text: str) -> None:
+        self.steps.append((stage, text))
+
+    def _done(self, outcome: str, summary: str) -> Explanation:
+        return Explanation(self.beam, outcome, summary, tuple(self.steps))
+
+    def _sigma(self, i: int) -> float:
+        noise = self.trace.features.noise
+        return math.sqrt(noise.range_variance(float(self.scan.ranges[i]))) if noise else math.nan
+
+    # Before the clusters.
+
+    def _tell_left_out(self) -> tuple[str, str]:
+        i, ranges = self.beam, self.scan.ranges
+        sides = [i - 1, i + 1]
+        if not 0 < i < len(self.scan) - 1 or not self.scan.valid[sides].all():
+            return "invalid", "Left out: no scanner sees that near or far."
+        off = float(ranges[i] - ranges[sides].mean())
+        text = f"off the mean of its neighbours by {_signed(off)}, while these agree"
+        self._note("filter", text)
+        return "spike", "A spike: a lone reading before or behind a surface that goes on."
+
+    def _tell_noise(self) -> str:
+        """Tell of a valid reading in no cluster what holds it to its neighbours, and what not."""
+        self._note("cluster", f"none; {self._tell_sides()}")
+        count = 1 + self._count_held(-1) + self._count_held(1)
+        if count == 1:
+            return "Noise: it stands alone, apart from the readings on either side."
+        return f"Noise: {count} readings hold together here, too few for a cluster."
+
+    def _count_held(self, way: int) -> int:
+        """Count the neighbours on one side, up to a spacing above its threshold."""
+        here = self.beam
+        for count in range(len(self.readings)):
+            there = self.readings.neighbour(here, way)
+            if there is None or not self._holds(_later(here, there, way)):
+                return count
+            here = there
+        return len(self.readings) - 1
+
+    def _holds(self, i: int) -> bool:
+        """Whether a reading was near enough to the one before it."""
+        t = self.trace
+        limits = (t.distance_threshold[i], t.density_threshold[i])
+        return any(bool(t.spacing[i] <= limit) for limit in limits)
+
+    def _tell_sides(self) -> str:
+        return ", ".join(self._tell_side(way) for way in (-1, 1))
+
+    def _tell_side(self, way: int) -> str:
+        """Tell how far the neighbour is, and whether it is in the same cluster."""
+        t, word = self.trace, "before" if way < 0 else "after"
+        other = self.readings.neighbour(self.beam, way)
+        if other is None:
+            return f"the scan ends {word}"
+        i = _later(self.beam, other, way)
+        limit = np.fmax(t.distance_threshold[i], t.density_threshold[i])
+        apart = f"{_length(t.spacing[i])} to beam {other} {word}"
+        if math.isnan(limit):
+            return f"{apart}, over too many missing beams"
+        if not t.spacing[i] <= limit:
+            return f"{apart}, more than the {_length(limit)} that hold together"
+        if t.clusters[other] != t.clusters[self.beam]:
+            why = ": the lines on the two sides do not meet" if t.evidence else ""
+            return f"{apart}, near enough, yet another cluster begins{why}"
+        return f"{apart}, of {_length(limit)} allowed"
+
+    # The cut.
+
+    def _tell_candidates(self) -> None:
+        """Tell the corners that were examined here, and whether they won."""
+        t = self.trace
+        if not len(t.candidates):
+            return
+        away = np.abs(t.candidates["beam"] - self.beam)
+        inside = t.candidates["cluster"] == t.clusters[self.beam]
+        order = np.argsort(away, kind="stable")
+        near = [k for k in order if away[k] <= _NEAR][:2] or [k for k in order if inside[k]][:1]
+        if not near:
+            self._note("cut", "no corner was examined in this cluster")
+        for k in near:
+            beam, response = int(t.candidates["beam"][k]), t.candidates["response"][k]
+            text = f"beam {beam} was examined as a corner: response {_figure(response)}"
+            self._note("cut", f"{text}, {_figure(t.threshold)} asked; {self._verdict(k)}")
+
+    def _verdict(self, k: int) -> str:
+        """Tell what became of a candidate in the end."""
+        candidate = self.trace.candidates[k]
+        beam = int(candidate["beam"])
+        if not candidate["accepted"]:
+            return "rejected"
+        if (abs(self.trace.features.corners["beam"] - beam) <= 1).any():
+            return "a corner"
+        inside = spans(self.segments, beam)
+        for end in ("first_beam", "last_beam"):
+            inside = inside & (self.segments[end] != beam)
+        if inside.any():
+            return "cut there first, then merged again"
+        return "a border, but the lines on its sides do not meet there"
+
+    # The fit.
+
+    def _tell_feature(self) -> tuple[str, str]:
+        """Tell which features a reading in a cluster is part of, or why it is of none."""
+        inside = [int(k) for k in np.flatnonzero(spans(self.segments, self.beam))]
+        for k in inside:
+            self._tell_segment(k)
+        if inside:
+            return "segment", f"Part of {' and '.join(f'segment {k}' for k in inside)}."
+        arcs = np.flatnonzero(spans(self.arcs, self.beam))
+        if len(arcs):
+            return "arc", self._tell_arc(int(arcs[0]))
+        if self.trace.method == _PARTS_ONLY:
+            return "clustered", f"In a cluster; {_PARTS_ONLY} finds no more than these."
+        return "unexplained", self._tell_unexplained()
+
+    def _tell_segment(self, k: int) -> None:
+        segment, i = self.segments[k], self.beam
+        length = math.dist(segment["start"], segment["end"])
+        off = along_beam(self.scan, i, segment)
+        sigmas = abs(off) / self._sigma(i)
+        text = f"segment {k}: {_extent(segment)}, {length:.2f} m, rms {_length(segment['rms'])}"
+        self._note("fit", f"{text}; this reading: {_signed(off)} along its beam ({sigmas:.1f} σ)")
+        evidence = self.trace.evidence.get("segments")
+        if evidence is None:
+            return
+        asked = f"{_figure(self.trace.threshold)} asked"
+        if math.isinf(evidence[k]):
+            self._note("evidence", "no neighbour that it could be one line with")
+        else:
+            text = f"χ² would rise by {_figure(evidence[k])} if it were one line with a neighbour"
+            self._note("evidence", f"{text} ({asked})")
+        self._tell_split(segment, asked)
+
+    def _tell_split(self, segment: np.void, asked: str) -> None:
+        """Tell why there is no corner here: what two lines in place of one would gain."""
+        beams = self.readings.of(segment)
+        at = beams.index(self.beam) if self.beam in beams else 0
+        if at < _FEW or len(beams) - at < _FEW:
+            return
+        whole, left, right = (
+            Line.through(self.trace, part) for part in (beams, beams[:at], beams[at:])
+        )
+        gain = whole.chi_square - left.chi_square - right.chi_square
+        text = f"cut in two here, χ² would fall by {_figure(gain)} ({asked} for a corner)"
+        if gain > self.trace.threshold:
+            turn = left.turn(right)
+            text += f"; yet it was not cut, and the two lines turn by {turn:.1f}°"
+            text += ": one wall that bends" if turn < _SHALLOW else ""
+        self._note("evidence", text)
+
+    def _tell_arc(self, k: int) -> str:
+        arc, i = self.arcs[k], self.beam
+        off = float(np.hypot(*(self.scan.points[i] - arc["center"])) - arc["radius"])
+        text = (
+            f"arc {k}: {_extent(arc)}, radius {_length(arc['radius'])}, rms {_length(arc['rms'])}"
+        )
+        self._note("fit", f"{text}; this reading: {_signed(off)} off the circle")
+        evidence = self.trace.evidence.get("arcs")
+        if evidence is not None:
+            text = f"lines in its place would cost {_figure(evidence[k])} more in χ²"
+            self._note("evidence", text)
+        return f"Part of arc {k}."
+
+    def _tell_unexplained(self) -> str:
+        """Tell what readings in no feature look like, and how far they are off the next lines."""
+        run = self.readings.unexplained(self.beam)
+        for k in (run.before, run.after):
+            if k >= 0:
+                off = along_beam(self.scan, self.beam, self.segments[k])
+                sigmas = abs(off) / self._sigma(self.beam)
+                text = f"off the line of segment {k} by {_signed(off)} ({sigmas:.1f} σ)"
+                self._note("neighbour", text)
+        count = len(run.beams)
+        where = f"{count} reading{'s' * (count > 1)} here in no line"
+        if count < _FEW:
+            return f"In no feature: {where}, too few for one of their own."
+        line = Line.through(self.trace, run.beams)
+        freedom = max(count - 2, 1)
+        looks = (
+            f"a line through them is off by {_length(line.rms)} rms over {_length(line.length)}, "
+            f"χ² {_figure(line.chi_square)} for {freedom} degrees of freedom"
+        )
+        self._note("fit", f"beams {run.beams[0]} to {run.beams[-1]}: {looks}")
+        if line.chi_square > freedom + 3 * math.sqrt(2 * freedom):
+            return f"In no feature: {where}, too crooked for a line of their own."
+        return f"In no feature: {where}; one would fit them, but {self.trace.method} gave none."
+
+
+def _later(i: int, j: int, way: int) -> int:
+    """Give the later of two neighbours, whose spacing is that between them."""
+    return i if way < 0 else j
+
+
+def _extent(feature: np.void) -> str:
+    first, last, count = (feature[name] for name in ("first_beam", "last_beam", "n_points"))
+    return f"beams {first} to {last}, {count} readings"
+
+
+def _length(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm" if abs(metres) < 1 else f"{metres:.2f} m"
+
+
+def _figure(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 10 else f"{value:.2g}"
+
+
+def _signed(metres: float) -> str:
+    return ("+" if metres >= 0 else "−") + _length(abs(metres))

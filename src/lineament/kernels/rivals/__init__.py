@@ -1,0 +1,1 @@
+"""Kernels of the methods that `optimal` and `liu` are compared with."""

@@ -1,0 +1,360 @@
+"""The stages of the methods as functions of their own: filter, cluster, cut, fit.
+
+Each checks what it is given and calls one kernel. The methods call the same kernels, without the
+detour over Python.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..features import noise_of, noise_row
+from ..kernels.bilateral import filter_ranges, scratch_shape
+from ..kernels.clustering import cluster
+from ..kernels.corner_operator import PRODUCT, RELATIVE, TANGENT, response_along
+from ..kernels.cutting import cut
+from ..kernels.layout import (
+    BEAM,
+    BEFORE,
+    CLASS_FIRST,
+    CLASS_LAST,
+    CLASSES,
+    CLOSED,
+    FILTERED,
+    FIRST,
+    LABEL,
+    LAST,
+    PIECES,
+    POINTS,
+    X,
+    Y,
+)
+from ..kernels.line_fit import TOTAL, WEIGHTED, Y_OF_X
+from ..scan import LaserScan, RangeNoise
+from . import steps
+from .checks import check_choice, check_count, check_number
+from .trace import candidate_records
+from .workspace import Block
+
+__all__ = [
+    "FITS",
+    "RESPONSES",
+    "adaptive_clusters",
+    "bilateral_filter",
+    "corner_response",
+    "estimate_noise",
+    "fit_line",
+    "primary_corners",
+]
+
+Array = NDArray[np.float64]
+
+#: Names of the readings of the corner response, and of the line fits.
+RESPONSES = {"relative": RELATIVE, "tangent": TANGENT, "product": PRODUCT}
+FITS = {"total": TOTAL, "y_of_x": Y_OF_X, "weighted": WEIGHTED}
+
+
+def bilateral_filter(
+    scan: LaserScan, *, sigma_d: float = 4.0, sigma_r: float = 0.3, half_width: int = 8
+) -> Array:
+    """Filter the ranges of a scan over index distance and range difference.
+
+    ρ̃_i = Σ_j w ρ_j / Σ_j w with w = exp(-(i - j)²/2σ_d² - (ρ_i - ρ_j)²/2σ_r²) (equations 4-9).
+    Invalid beams are left out of the sums and never filled; a full circle wraps.
+
+    Parameters
+    ----------
+    scan : LaserScan
+    sigma_d : float
+        Width along the scan [beams].
+    sigma_r : float
+        Width in range [m].
+    half_width : int
+        Beams on either side that are taken in.
+
+    Returns
+    -------
+    float64 array, shape (n,)
+        Filtered ranges [m], NaN where invalid.
+
+    Examples
+    --------
+    >>> scan = LaserScan([2.0, 2.1, 2.0, 5.0], angle_min=0.0, angle_increment=0.01)
+    >>> bilateral_filter(scan).round(3).tolist()
+    [2.033, 2.035, 2.033, 5.0]
+    """
+    check_number("sigma_d", sigma_d)
+    check_number("sigma_r", sigma_r)
+    check_count("half_width", half_width, least=0)
+    block = _block(scan)
+    scratch = np.empty(scratch_shape(len(scan), int(half_width)), np.float32)
+    filter_ranges(
+        block.floats,
+        block.range_min,
+        block.range_max,
+        float(sigma_d),
+        float(sigma_r),
+        int(half_width),
+        block.circular,
+        scratch,
+    )
+    return block.floats[FILTERED, : len(scan)]
+
+
+def estimate_noise(scan: LaserScan) -> RangeNoise | None:
+    """Estimate the range noise of a scan from the second differences of its ranges.
+
+    None where no beam is valid.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> ranges = 3.0 + rng.normal(0.0, 0.02, 3000)
+    >>> round(estimate_noise(LaserScan(ranges, 0.0, 0.001)).sigma, 2)
+    0.02
+    """
+    block = _block(scan)
+    steps.estimate_noise(block, 0)
+    return noise_of(block.noises[0])
+
+
+def adaptive_clusters(
+    scan: LaserScan,
+    ranges: ArrayLike | None = None,
+    *,
+    spacing_scale: float = 6.0,
+    noise_floor: float = 3.0,
+    density_k: float = 3.0,
+    min_points: int = 3,
+    noise: RangeNoise | None = None,
+) -> NDArray[np.int32]:
+    """Part the valid beams of a scan into classes, on distance and density.
+
+    A point joins the class before it if its spacing d is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ
+    (equation 10) plus the noise floor, or at most T_K = μ_K + k σ_K of the spacings in the class
+    (11-13). In a full circle the last class goes on in the first by the same rule.
+
+    Parameters
+    ----------
+    scan : LaserScan
+    ranges : array_like, shape (n,), optional
+        Ranges to use in place of the scan's own, such as filtered ones [m].
+    spacing_scale : float
+        λ.
+    noise_floor : float
+        Added to T_d, in units of √2 σ.
+    density_k : float
+        k.
+    min_points : int
+        Classes of fewer points are noise.
+    noise : RangeNoise, optional
+        σ of the noise floor; estimated from the scan if it is not given.
+
+    Returns
+    -------
+    int32 array, shape (n,)
+        Class of each beam, -1 for invalid beams and noise.
+
+    Examples
+    --------
+    >>> scan = LaserScan([2.0] * 4 + [3.0] * 3 + [9.0], angle_min=0.0, angle_increment=0.01)
+    >>> adaptive_clusters(scan).tolist()
+    [0, 0, 0, 0, 1, 1, 1, -1]
+    """
+    check_number("spacing_scale", spacing_scale)
+    check_number("noise_floor", noise_floor, or_equal=True)
+    check_number("density_k", density_k, or_equal=True)
+    check_count("min_points", min_points, least=1)
+    n = len(scan)
+    used = np.where(scan.valid, scan.ranges, np.nan)
+    if ranges is not None:
+        used = np.array(ranges, dtype=np.float64)
+        if used.shape != (n,):
+            raise ValueError(f"ranges has shape {used.shape}, expected ({n},), one for each beam")
+        used[~scan.valid] = np.nan
+    block = _block(scan)
+    block.floats[FILTERED, :n] = used
+    cluster(
+        *_workspace(block),
+        block.bearings,
+        block.step,
+        block.circular,
+        noise_row(noise or estimate_noise(scan)),
+        float(spacing_scale),
+        float(noise_floor),
+        float(density_k),
+        int(min_points),
+    )
+    count = block.counts[POINTS]
+    labels = np.full(n, -1, np.int32)
+    labels[block.ints[BEAM, :count]] = block.ints[LABEL, :count]
+    return labels
+
+
+def corner_response(
+    points: ArrayLike, *, support_radius: int = 6, response: str = "relative"
+) -> Array:
+    """Response of the corner detection operator along one class (equations 15-22).
+
+    Parameters
+    ----------
+    points : array_like, shape (m, 2)
+        Points of the class in beam order [m].
+    support_radius : int
+        Points on either side, truncated at the ends of the class.
+    response : {"relative", "tangent", "product"}
+        The reading: Σd to the tangent over Σ|s| [-], Σd to the tangent [m], or that times Σd to
+        the chord [m²].
+
+    Returns
+    -------
+    float64 array, shape (m,)
+
+    Examples
+    --------
+    >>> arm = np.linspace(0.2, 0.0, 7)
+    >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
+    >>> corner_response(right_angle).round(2).tolist()[4:9]
+    [0.35, 0.51, 0.71, 0.51, 0.35]
+    """
+    xy = _points(points)
+    check_count("support_radius", support_radius, least=1)
+    check_choice("response", response, RESPONSES)
+    out = np.empty(len(xy))
+    response_along(*_columns(xy), int(support_radius), RESPONSES[response], out)
+    return out
+
+
+def primary_corners(
+    points: ArrayLike,
+    *,
+    support_radius: int = 6,
+    threshold: float = 0.66,
+    response: str = "relative",
+    min_points: int = 3,
+) -> NDArray[np.void]:
+    """Find the corners of one class: the farthest point from the chord, again and again.
+
+    Steps 5-7 with equations 14-22: a candidate whose response exceeds the threshold is a corner,
+    and both sides of it are searched in turn; a branch ends at its first rejected candidate.
+
+    Parameters
+    ----------
+    points : array_like, shape (m, 2)
+        Points of the class in beam order [m].
+    support_radius, response
+        As in `corner_response`.
+    threshold : float
+        In the unit of the response.
+    min_points : int
+        No piece gets shorter.
+
+    Returns
+    -------
+    structured array of dtype `lineament.methods.trace.CANDIDATE`
+        The candidates in the order of their examination; ``beam`` counts the given points.
+
+    Examples
+    --------
+    >>> arm = np.linspace(0.2, 0.0, 7)
+    >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
+    >>> found = primary_corners(right_angle)
+    >>> found["beam"][found["accepted"]].tolist()
+    [6]
+    """
+    xy = _points(points)
+    check_count("support_radius", support_radius, least=1)
+    check_number("threshold", threshold, or_equal=True)
+    check_choice("response", response, RESPONSES)
+    check_count("min_points", min_points, least=2)
+    block = _one_class(xy, noise_row(None))
+    cut(
+        *_workspace(block),
+        int(support_radius),
+        float(threshold),
+        RESPONSES[response],
+        int(min_points),
+    )
+    return candidate_records(block, float(threshold))
+
+
+def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "total") -> np.void:
+    """Fit a line to points seen from the origin, by least squares (equations 23, 24).
+
+    Parameters
+    ----------
+    points : array_like, shape (m, 2)
+        Points in beam order, in the frame of the sensor [m]; m ≥ 2.
+    noise : RangeNoise, optional
+        Noise of the ranges, for the covariance and the weights; 1 m (unit variance) if not given.
+    fit : {"total", "y_of_x", "weighted"}
+        Orthogonal least squares, the paper's y = kx + b (x = ky + b where it is steeper than
+        45°), or maximum likelihood by Pfister's weights.
+
+    Returns
+    -------
+    record of dtype `lineament.features.SEGMENT`
+        Beams count the given points.
+
+    Examples
+    --------
+    >>> line = fit_line([(2.0, -1.0), (2.0, 0.0), (2.0, 1.0)], noise=RangeNoise(sigma=0.01))
+    >>> line["centroid"].tolist(), round(float(line["angle"]), 4)
+    ([2.0, 0.0], 1.5708)
+    """
+    xy = _points(points)
+    check_choice("fit", fit, FITS)
+    if len(xy) < 2:
+        raise ValueError(f"points has {len(xy)} points, expected at least 2")
+    if not xy.any(axis=1).all():
+        raise ValueError("points has a point at the origin, expected points that a beam can meet")
+    block = _one_class(xy, noise_row(noise or RangeNoise(sigma=1.0)))
+    block.ints[[FIRST, LAST, BEFORE], 0] = 0, len(xy) - 1, -1
+    block.counts[PIECES] = 1
+    steps.measure(block, 0, fit=FITS[fit], sharp=False)
+    line: np.void = block.written()[0][0]
+    return line
+
+
+def _block(scan: LaserScan) -> Block:
+    block = Block(scan, noise_row(None), 1)
+    block.load(scan.ranges)
+    block.take(0)
+    return block
+
+
+def _workspace(block: Block) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    return block.floats, block.ints, block.counts
+
+
+def _one_class(xy: Array, noise: Array) -> Block:
+    """Points as a scan of their own, all of one open class."""
+    m, rho = len(xy), np.hypot(*_columns(xy))
+    # The bearings do not matter but for their sines and cosines; points need not be in order.
+    block = Block(LaserScan(rho, 0.0, 1.0 / max(m, 1)), noise, 1)
+    block.load(rho)
+    block.take(0)
+    with np.errstate(invalid="ignore"):
+        block.bearings[:] = xy.T / rho
+    block.noises[0] = noise
+    block.ints[BEAM, :m], block.ints[LABEL, :m] = np.arange(m), 0
+    block.ints[[CLASS_FIRST, CLASS_LAST], 0] = 0, m - 1
+    block.floats[[X, Y], :m] = xy.T
+    block.counts[[POINTS, CLOSED, CLASSES]] = m, False, min(m, 1)
+    return block
+
+
+def _points(points: ArrayLike) -> Array:
+    xy = np.array(points, dtype=np.float64)
+    if xy.size == 0:
+        return xy.reshape(0, 2)
+    if xy.ndim != 2 or xy.shape[1] != 2:
+        raise ValueError(f"points has shape {xy.shape}, expected (m, 2)")
+    if not np.isfinite(xy).all():
+        raise ValueError("points has a value that is not finite")
+    return xy
+
+
+def _columns(xy: Array) -> tuple[Array, Array]:
+    return xy[:, 0].copy(), xy[:, 1].copy()

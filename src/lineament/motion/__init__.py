@@ -1,0 +1,53 @@
+"""How the sensor moves: poses, scans without its motion, features followed from scan to scan.
+
+>>> import lineament as ln
+>>> from lineament.motion import Tracker
+>>> tracker = Tracker()
+>>> features = ln.extract(ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01))
+>>> tracker(features).segments.tolist(), tracker(features).segments.tolist()
+([0], [0])
+
+The world is taken to stand still, and corners of kind "edge" are ignored. The velocity of the
+sensor, `Tracker.twist`, is what :func:`lineament.deskew` needs for the next scan.
+"""
+
+from typing import TYPE_CHECKING
+
+from .._lazy import lazily
+from .poses import Twist, compose, inverse, poses_along, relative, twist_between
+
+if TYPE_CHECKING:
+    from .association import Matches, associate
+    from .deskew import beam_times, deskew
+    from .estimate import Motion, estimate_motion
+    from .tracker import Tracker, Tracks
+
+_HOME = {
+    "Matches": "association",
+    "Motion": "estimate",
+    "Tracker": "tracker",
+    "Tracks": "tracker",
+    "associate": "association",
+    "beam_times": "deskew",
+    "deskew": "deskew",
+    "estimate_motion": "estimate",
+}
+
+__all__ = [
+    "Matches",
+    "Motion",
+    "Tracker",
+    "Tracks",
+    "Twist",
+    "associate",
+    "beam_times",
+    "compose",
+    "deskew",
+    "estimate_motion",
+    "inverse",
+    "poses_along",
+    "relative",
+    "twist_between",
+]
+
+__getattr__ = lazily(__name__, _HOME)

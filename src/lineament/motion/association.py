@@ -1,0 +1,203 @@
+"""Which features of a frame are those of another: pairs within gates of their covariances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..features import Features
+from ..features.records import C_COVARIANCE
+from ..kernels.tracking.assignment import PATHS
+from ..kernels.tracking.association import associate as kernel
+from ..kernels.tracking.association import move
+from ..scan import Array
+
+__all__ = ["KINDS", "Matches", "associate"]
+
+Pairs = NDArray[np.intp]
+
+#: The tables whose features are tracked.
+KINDS = ("segments", "corners", "arcs")
+#: What stands for an edge among the sides to which corners point: none is equal to another.
+_EDGE_BEFORE, _EDGE_NOW = -1, -2
+#: Words of segments, corners and arcs (see `kernels.records`).
+Words = tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """Features of two frames, and which of them are the same.
+
+    Attributes
+    ----------
+    before, now : Features
+        The features of either frame, each in the frame of its own sensor.
+    segments, corners, arcs : ndarray of int, shape (m, 2)
+        Indices into the tables of `before` and of `now`.
+    """
+
+    before: Features
+    now: Features
+    segments: Pairs
+    corners: Pairs
+    arcs: Pairs
+
+    def __len__(self) -> int:
+        return sum(len(getattr(self, kind)) for kind in KINDS)
+
+    def tables(self, kind: str) -> tuple[NDArray[np.void], NDArray[np.void]]:
+        """Paired records of one kind, before and now, row by row."""
+        before, now = getattr(self, kind).T
+        return getattr(self.before, kind)[before], getattr(self.now, kind)[now]
+
+
+def associate(
+    before: Features,
+    now: Features,
+    motion: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    covariance: ArrayLike | None = None,
+    *,
+    gate: float = 0.99,
+    roughness: float = 0.0,
+) -> Matches:
+    """Find the features that two frames share.
+
+    The later ones are moved by the expected motion into the earlier frame. A pair is possible
+    where d² = e'S⁻¹e is within the quantile `gate` of its χ² distribution, with S the sum of both
+    covariances, that of the motion, the misfits, and the roughness: for corners of the same
+    convexity, e is their distance (2 degrees); for arcs, that of their centres and radii (3); for
+    segments, the offset from the earlier line and the angle (2), if they lie side by side along
+    half of the shorter one. The pairs are one to one and at the least total cost, where to leave a
+    feature alone costs as much as the gate. Corners of kind "edge" have no pair: see `is_landmark`.
+
+    Parameters
+    ----------
+    before, now : Features
+        Features of two frames, each in the frame of its own sensor.
+    motion : (x, y, theta)
+        Expected pose of the later sensor in the frame of the earlier [m, m, rad].
+    covariance : array_like, shape (3, 3), optional
+        How well the motion is known [m, m, rad]; exactly where it is not given.
+    gate : float
+        Share of the right pairs that are within the gates, between 0 and 1.
+    roughness : float
+        How far surfaces are from straight and round [m].
+
+    Returns
+    -------
+    Matches
+
+    Raises
+    ------
+    ValueError
+        If the gate is not between 0 and 1, or the covariance has another shape.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
+    >>> features = ln.extract(scan)
+    >>> associate(features, features).segments.tolist()
+    [[0, 0]]
+    """
+    gates = chi_square(gate, 2), chi_square(gate, 3)
+    spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
+    x, y, theta = map(float, motion)
+    earlier, moved = words_of(before), words_of(now)
+    _add_misfits(moved[1], now)
+    move(*moved, x, y, theta)
+    rows, columns = max(map(len, moved)), max(map(len, earlier))
+    columns += rows + 1
+    owners = np.empty((len(KINDS), columns), np.int64)
+    kernel(
+        earlier,
+        moved,
+        (_sides(before.corners, _EDGE_BEFORE), _sides(now.corners, _EDGE_NOW)),
+        spread,
+        (x, y),
+        float(roughness),
+        gates,
+        np.empty((rows, columns)),
+        np.empty((PATHS, columns)),
+        np.empty(rows),
+        np.empty(columns, np.int64),
+        owners,
+    )
+    pairs = (_pairs(row[: len(table)]) for row, table in zip(owners, earlier, strict=True))
+    return Matches(before, now, *pairs)
+
+
+def _add_misfits(words: Array, features: Features) -> None:
+    """Add to the covariances of corners by what their walls are off straight lines, seen twice."""
+    squares = np.append(features.segments["misfit"] ** 2, 0.0)
+    both = 2.0 * squares[features.corners["segments"]].sum(axis=1)
+    words[:, C_COVARIANCE] += both
+    words[:, C_COVARIANCE + 3] += both
+
+
+def is_landmark(corners: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether each corner stays where it is: all but the edges.
+
+    An edge is where a segment ends before a jump. On a round or turned surface that is a
+    silhouette, which moves with the sensor.
+    """
+    return np.asarray(corners["kind"] != "edge")
+
+
+def _sides(corners: NDArray[np.void], edge: int) -> NDArray[np.int8]:
+    """Return 1 for convex corners, 0 for others, and `edge` for edges."""
+    sides = corners["convex"].astype(np.int8)
+    sides[~is_landmark(corners)] = edge
+    return sides
+
+
+def words_of(features: Features) -> Words:
+    """Copy the tables of tracked features as matrices of words (see `kernels.records`)."""
+    segments, corners, arcs = (
+        # By way of bytes: numpy copies records field by field, several times slower.
+        np.frombuffer(bytearray(table.tobytes())).reshape(len(table), table.itemsize // 8)
+        for table in (features.segments, features.corners, features.arcs)
+    )
+    return segments, corners, arcs
+
+
+def matrix_of(covariance: ArrayLike) -> Array:
+    """Copy a covariance of (x, y, theta); ValueError if it has another shape than (3, 3)."""
+    matrix = np.array(covariance, dtype=np.float64, order="C")
+    if matrix.shape != (3, 3):
+        raise ValueError(f"covariance is {matrix.tolist()}, expected (3, 3), of (x, y, theta)")
+    return matrix
+
+
+@lru_cache
+def chi_square(probability: float, degrees: int) -> float:
+    """Quantile of the χ² distribution of 2 or 3 degrees of freedom.
+
+    Raises
+    ------
+    ValueError
+        If `probability` is not between 0 and 1.
+    """
+    if not 0 < probability < 1:
+        raise ValueError(f"gate is {probability}, expected a share between 0 and 1")
+    if degrees == 2:
+        return -2.0 * math.log1p(-probability)
+    low, high = 0.0, 100.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        beyond = math.erfc(math.sqrt(middle / 2)) + math.sqrt(2 * middle / math.pi) * math.exp(
+            -middle / 2
+        )
+        low, high = (middle, high) if beyond > 1 - probability else (low, middle)
+    return high
+
+
+def _pairs(owners: NDArray[np.int64]) -> Pairs:
+    """List the earlier features that are seen later, and what they are then, shape (m, 2)."""
+    before = np.flatnonzero(owners >= 0)
+    pairs = np.empty((len(before), 2), np.intp)
+    pairs[:, 0], pairs[:, 1] = before, owners[before]
+    return pairs

@@ -1,0 +1,155 @@
+"""`deskew`: a scan as if all of its beams had been taken at once, from where its first one was."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array, LaserScan
+from .poses import Twist, poses_along
+
+__all__ = ["beam_times", "deskew"]
+
+#: Bearings that fall on each other are set apart by so much [rad].
+_APART = 1e-9
+#: No sensor moves so far during a sweep [m, rad].
+_FARTHEST = 1e6
+
+
+def beam_times(scan: LaserScan) -> Array | None:
+    """Time of each beam after the scan's stamp [s], shape (n,); None where it is not known.
+
+    Beams follow each other by `time_increment`. Where that is 0, the mirror goes once around in
+    `scan_time`: a beam whose bearing is ψ past the first is taken ψ/2π of it later.
+
+    Examples
+    --------
+    >>> ring = LaserScan([2.0] * 4, 0.0, math.pi / 2, scan_time=0.1)
+    >>> beam_times(ring).round(3).tolist()
+    [0.0, 0.025, 0.05, 0.075]
+    >>> beam_times(LaserScan([2.0], 0.0, 0.1)) is None
+    True
+    """
+    if scan.time_increment != 0:
+        return scan.time_increment * np.arange(len(scan), dtype=np.float64)
+    if scan.scan_time != 0:
+        return scan.scan_time * (scan.angles - scan.angle_min) / (2 * math.pi)
+    return None
+
+
+def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
+    """Undo the motion of the sensor while it swept.
+
+    The velocity is taken to be constant over the sweep. Each reading is moved to where it lies as
+    seen from the pose of the sensor at the scan's stamp, and the beams are put in the order of
+    their new bearings, which are irregular. It is then a scan whose beams are all of one time:
+    `scan_time` and `time_increment` are 0, and to deskew it again changes nothing.
+
+    A reading that has come to lie behind two neighbouring beams, farther than both by more than
+    they differ, is hidden from that pose, and becomes NaN: else near and far beams would alternate
+    along an edge. What a standing sensor would have seen and the moving one did not stays open. A
+    beam without a return keeps its range, and its place between its neighbours. Where the beams of
+    a full circle go more than once around, the last are put between the first; where a turn the
+    other way leaves a gap, there is one.
+
+    Parameters
+    ----------
+    scan : LaserScan
+    twist : (v_x, v_y, omega) or None
+        Velocity of the sensor in its own frame [m/s, m/s, rad/s], given, or from two poses
+        (:func:`~lineament.motion.poses.twist_between`), or of the last scans
+        (:attr:`lineament.motion.Tracker.twist`). None where it is not known.
+
+    Returns
+    -------
+    LaserScan
+        With as many beams; the scan itself where its times or the twist are not known, or the
+        twist is 0.
+
+    Raises
+    ------
+    ValueError
+        If the twist is not three finite numbers, or moves the sensor by a million metres or
+        radians during the sweep.
+
+    Examples
+    --------
+    A wall 2 m ahead, to which the sensor goes at 1 m/s, a beam every 0.1 s:
+
+    >>> scan = LaserScan([2.0, 1.9, 1.8], -0.001, 0.001, time_increment=0.1)
+    >>> deskew(scan, (1.0, 0.0, 0.0)).ranges.round(5).tolist()
+    [2.0, 2.0, 2.0]
+    """
+    if twist is None or not any(twist):
+        return scan
+    times = beam_times(scan)
+    if times is None or not scan.valid.any():
+        return scan
+    with np.errstate(over="ignore", invalid="ignore"):
+        poses = poses_along(twist, times)
+    if not np.abs(poses).max() < _FARTHEST:
+        raise ValueError(f"twist {twist} for {np.ptp(times):g} s leads out of any world")
+    bearings, ranges = _seen_from_the_stamp(scan, poses)
+    order = np.argsort(bearings, kind="stable")
+    ranges[_hidden(order, np.where(scan.valid, ranges, np.inf))] = np.nan
+    # What lies once around or more is put between the first beams.
+    bearings, order = _within_a_turn(bearings, order)
+    return LaserScan(
+        ranges[order],
+        angles=_increasing(bearings[order]),
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        stamp=scan.stamp,
+        frame_id=scan.frame_id,
+        intensities=None if scan.intensities is None else scan.intensities[order],
+        pose=scan.pose,
+    )
+
+
+def _seen_from_the_stamp(scan: LaserScan, poses: Array) -> tuple[Array, Array]:
+    """Bearings, near the old ones, and ranges of all beams, shape (n,)."""
+    x, y, theta = poses.T
+    valid = scan.valid
+    r = np.where(valid, scan.ranges, 1.0)
+    direction = scan.angles + theta
+    px, py = x + r * np.cos(direction), y + r * np.sin(direction)
+    shift = np.arctan2(py, px) - scan.angles
+    # Whole turns are taken off, but for those that the sensor has made.
+    shift -= 2 * math.pi * np.round((shift - theta) / (2 * math.pi))
+    beams = np.arange(len(scan))
+    shift = np.interp(beams, beams[valid], shift[valid])
+    return scan.angles + shift, np.where(valid, np.hypot(px, py), scan.ranges)
+
+
+def _hidden(order: NDArray[np.intp], ranges: Array) -> NDArray[np.bool_]:
+    """Whether each beam has come to lie behind the surface of two neighbours.
+
+    Between two beams that are at different depths there may be an edge: what is not farther than
+    both by more than that difference may be on the farther side of it.
+    """
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    cover = np.full(len(order), np.inf)
+    for i in np.flatnonzero(np.abs(np.diff(rank)) > 1):
+        first, last = sorted(rank[i : i + 2].tolist())
+        near, far = sorted(ranges[i : i + 2].tolist())
+        if far < math.inf:
+            between = cover[first + 1 : last]
+            np.minimum(between, far + (far - near), out=between)
+    return np.isfinite(ranges) & (ranges > cover[rank])
+
+
+def _within_a_turn(bearings: Array, order: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    lowest = bearings[order[0]]
+    if bearings[order[-1]] - lowest < 2 * math.pi:
+        return bearings, order
+    wrapped = lowest + np.mod(bearings - lowest, 2 * math.pi)
+    return wrapped, np.argsort(wrapped, kind="stable")
+
+
+def _increasing(bearings: Array) -> Array:
+    """Set bearings apart that are the same."""
+    apart = _APART * np.arange(len(bearings))
+    return np.asarray(np.maximum.accumulate(bearings - apart) + apart)

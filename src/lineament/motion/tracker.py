@@ -1,0 +1,258 @@
+"""`Tracker`: features that keep their numbers from frame to frame, and the motion between."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import TABLES, Features
+from ..kernels.tracking.association import move
+from ..scan import Array, Pose
+from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
+from .estimate import Motion, estimate_motion
+from .poses import Twist, inverse, poses_along, relative
+
+__all__ = ["Tracker", "Tracks"]
+
+Numbers = NDArray[np.int64]
+
+#: Deviations of the motion that odometry tells [m, rad], and their growth with way and turn.
+_ODOMETRY = (0.03, 0.01), (0.1, 0.1)
+#: The same of the motion that goes on as it was, or of none: no way is known to grow with.
+_CONTINUED = (0.1, 0.1), (0.5, 0.5)
+#: A motion that would be faster is one whose stamps are wrong [m/s, rad/s].
+FASTEST = 50.0
+#: How often pairs are looked for: with the expected motion, then with the estimated one.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracks:
+    """Who is who in a frame.
+
+    Attributes
+    ----------
+    segments, corners, arcs : ndarray of int64
+        Number of the track of each feature, parallel to the tables of the frame. A number belongs
+        to one track alone, of whatever kind, for good. Corners of kind "edge" have -1.
+    born : ndarray of int64
+        Tracks that begin with this frame.
+    ended : ndarray of int64
+        Tracks that have been missed for too long, and are given up with this frame.
+    motion : Motion or None
+        Pose of this frame's sensor in the frame before; None of the first frame.
+    """
+
+    segments: Numbers
+    corners: Numbers
+    arcs: Numbers
+    born: Numbers
+    ended: Numbers
+    motion: Motion | None
+
+
+class Tracker:
+    """Recognises features from frame to frame, and estimates the motion of the sensor.
+
+    A frame's features are paired with the last sight of all tracks (`associate`), first under the
+    expected motion, then under the one that the pairs tell (`estimate_motion`, from the tracks
+    that were seen in the very last frame). The expected motion is that of the odometry; without
+    it, the sensor goes on as it did. A feature without a pair begins a track; a track ends when it
+    is missed in more than `max_missed` frames in a row. The world is taken to stand still: what
+    moves by more than its gate from frame to frame gets a new number. Corners of kind "edge" are
+    ignored: they may be silhouettes, which move with the sensor.
+
+    Parameters
+    ----------
+    max_missed : int
+        Frames through which a track lasts without being seen.
+    gate : float
+        Share of the right pairs that are within the gates.
+    roughness : float
+        How far surfaces are from straight and round [m]: 0 in a simulation, 1 cm in offices.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of bounds.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, drive, room
+    >>> tracker, extract = Tracker(), ln.Extractor("liu:scale_free")
+    >>> for scan in drive(room(), [(-2, 0), (-1.8, 0)], SENSORS["paper"], speed=1, rate=10):
+    ...     tracks = tracker(extract(scan))
+    >>> tracks.motion.observable, round(tracks.motion.x, 2)
+    (True, 0.1)
+    """
+
+    def __init__(self, max_missed: int = 5, *, gate: float = 0.99, roughness: float = 0.01) -> None:
+        if isinstance(max_missed, bool) or not isinstance(max_missed, int) or max_missed < 0:
+            raise ValueError(f"max_missed is {max_missed!r}, expected a whole number ≥ 0")
+        if not 0 <= roughness < math.inf:
+            raise ValueError(f"roughness is {roughness}, expected a finite length ≥ 0")
+        chi_square(gate, 2)
+        self.max_missed, self.gate, self.roughness = max_missed, gate, roughness
+        #: Last sight of each track, in the frame of the last scan; those of that scan come first.
+        self._seen = _nothing()
+        self._tracks = {kind: np.empty(0, np.int64) for kind in KINDS}
+        self._missed = {kind: np.empty(0, np.int64) for kind in KINDS}
+        self._stamp: float | None = None
+        self._odometry: Pose | None = None
+        self._twists: deque[Twist] = deque(maxlen=2)
+        self._next = 0
+
+    @property
+    def twist(self) -> Twist | None:
+        """Velocity of the sensor in the last frames, as `deskew` takes it.
+
+        The mean of the last two motions: if scans are deskewed by it, the error of one motion
+        comes back in the next with the other sign. None before there were two frames with
+        increasing stamps, and after stamps by which the sensor would go at 50 m/s or more.
+        """
+        if not self._twists:
+            return None
+        (x, y, turn), (other_x, other_y, other_turn) = self._twists[0], self._twists[-1]
+        return (x + other_x) / 2, (y + other_y) / 2, (turn + other_turn) / 2
+
+    def __call__(self, features: Features, odometry: Pose | None = None) -> Tracks:
+        """Take in the next frame.
+
+        Parameters
+        ----------
+        features : Features
+            Those of the next scan, in the frame of its sensor.
+        odometry : (x, y, theta), optional
+            Pose of the sensor by odometry, in any frame that stays [m, m, rad]. Its change since
+            the last frame is what is made use of, where both have one.
+
+        Returns
+        -------
+        Tracks
+
+        Raises
+        ------
+        ValueError
+            If the odometry is not three finite numbers; the tracks are then as they were.
+        """
+        if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
+            raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
+        corners = features.corners
+        kept = is_landmark(corners)
+        if kept.all():
+            return self._take(features, odometry)
+        tracks = self._take(replace(features, corners=corners[kept]), odometry)
+        numbers = np.full(len(corners), -1, np.int64)
+        numbers[kept] = tracks.corners
+        return replace(tracks, corners=numbers)
+
+    def _take(self, features: Features, odometry: Pose | None) -> Tracks:
+        """Take in a frame without edges."""
+        motion = None
+        if self._stamp is None:
+            matches = associate(self._seen, features)
+        else:
+            duration = features.stamp - self._stamp
+            motion, matches = self._follow(features, *self._expected(odometry, duration))
+            twist = motion.twist(duration) if duration > 0 else (math.inf,) * 3
+            if all(abs(speed) <= FASTEST for speed in twist):
+                self._twists.append(twist)
+            else:
+                self._twists.clear()
+        self._stamp, self._odometry = features.stamp, odometry
+        return self._renew(features, matches, motion)
+
+    def _follow(self, features: Features, prior: Pose, spread: Array) -> tuple[Motion, Matches]:
+        """Find the tracks again, and the motion that they tell."""
+        motion, matches = Motion(*prior, spread), None
+        for _ in range(_ROUNDS):
+            found = associate(
+                self._seen,
+                features,
+                motion.pose,
+                motion.covariance,
+                gate=self.gate,
+                roughness=self.roughness,
+            )
+            if matches is not None and _are_same(matches, found):
+                break
+            matches = found
+            motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
+        assert matches is not None
+        return motion, matches
+
+    def _expected(self, odometry: Pose | None, duration: float) -> tuple[Pose, Array]:
+        """Motion since the last frame as it is expected, and its covariance."""
+        if odometry is not None and self._odometry is not None:
+            (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
+            pose = relative(self._odometry, odometry)
+        else:
+            (least_way, least_turn), (by_way, by_turn) = _CONTINUED
+            pose = (0.0, 0.0, 0.0)
+            twist = self.twist
+            if twist is not None and duration > 0:
+                x, y, theta = poses_along(twist, [duration])[0].tolist()
+                pose = (x, y, theta)
+        way = least_way + by_way * math.hypot(pose[0], pose[1])
+        turn = least_turn + by_turn * abs(pose[2])
+        return pose, np.diag((way, way, turn)) ** 2
+
+    def _fresh(self, matches: Matches) -> Matches:
+        """Keep the pairs whose track was seen in the very last frame."""
+        kept = {kind: getattr(matches, kind) for kind in KINDS}
+        fresh = {kind: pairs[self._missed[kind][pairs[:, 0]] == 0] for kind, pairs in kept.items()}
+        return Matches(matches.before, matches.now, **fresh)
+
+    def _renew(self, features: Features, matches: Matches, motion: Motion | None) -> Tracks:
+        """Give the features their numbers, and keep them with the tracks that were missed."""
+        numbers, born, ended, rest = {}, [], [], {}
+        for kind in KINDS:
+            tracks, missed = self._tracks[kind], self._missed[kind] + 1
+            before, now = getattr(matches, kind).T
+            mine = np.full(len(getattr(features, kind)), -1, np.int64)
+            mine[now] = tracks[before]
+            born.append(np.arange(self._next, self._next + len(mine) - len(now)))
+            mine[mine < 0] = born[-1]
+            self._next += len(born[-1])
+            missed[before] = 0
+            kept = (missed > 0) & (missed <= self.max_missed)
+            ended.append(tracks[missed > self.max_missed])
+            numbers[kind], rest[kind] = mine, kept
+            self._tracks[kind] = np.concatenate((mine, tracks[kept]))
+            self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
+        self._seen = _together(features, self._seen, rest, motion)
+        return Tracks(
+            **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
+        )
+
+
+def _are_same(one: Matches, other: Matches) -> bool:
+    """Whether the pairs are those of another round: then so would be all that follows."""
+    return all(np.array_equal(getattr(one, kind), getattr(other, kind)) for kind in KINDS)
+
+
+def _together(
+    features: Features, seen: Features, kept: dict[str, NDArray[np.bool_]], motion: Motion | None
+) -> Features:
+    """Features of a frame, and behind them those of the frame before that are kept."""
+    words = dict(zip(KINDS, words_of(seen), strict=True))
+    missed = [words[kind][kept[kind]] for kind in KINDS]
+    if motion is not None:
+        move(*missed, *inverse(motion.pose))
+    # By way of bytes: numpy joins records field by field, several times slower.
+    tables: dict[str, Any] = {
+        kind: np.frombuffer(getattr(features, kind).tobytes() + words.tobytes(), TABLES[kind])
+        for kind, words in zip(KINDS, missed, strict=True)
+    }
+    return replace(features, **tables)
+
+
+def _nothing() -> Features:
+    tables: dict[str, Any] = {name: np.empty(0, dtype) for name, dtype in TABLES.items()}
+    return Features(**tables, clusters=np.empty(0, np.int32))

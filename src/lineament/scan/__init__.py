@@ -1,0 +1,6 @@
+"""One sweep of a 2-D laser scanner: its beams, what is valid, its noise."""
+
+from .fields import Array, Pose
+from .laser_scan import LaserScan, RangeNoise
+
+__all__ = ["Array", "LaserScan", "Pose", "RangeNoise"]

@@ -1,0 +1,225 @@
+"""Where logs are worked on: threads, processes of which each may die alone, or Dask."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from threading import Event
+from typing import Any
+
+from ...errors import LineamentError
+from .manifest import Row
+from .parts import Report, Task, extract_part, failed
+
+__all__ = ["Processes", "Threads", "cores", "dask_executor"]
+
+#: Seconds after which a worker looks whether it is to stop, and after which it has to have ended.
+_PERIOD, _PATIENCE = 0.2, 3.0
+#: Seconds within which a Dask scheduler has to answer.
+_ANSWER = 10.0
+
+
+def cores() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Threads(ThreadPoolExecutor):
+    """Threads of this process. They share its memory, and wait for each other's Python.
+
+    Parameters
+    ----------
+    count : int, optional
+        How many; one a processor if not given.
+
+    Examples
+    --------
+    >>> with Threads(2) as executor:
+    ...     executor.submit(max, 1, 2).result()
+    2
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        super().__init__(count or cores())
+        self._stopping = Event()
+
+    def begin(self, task: Task, report: Report) -> Future[Row]:
+        """Submit a task; `report` is called from its thread."""
+        return self.submit(extract_part, task, self._stoppable(report))
+
+    def stop(self) -> None:
+        """End all work promptly, and wait for that; half files go."""
+        self._stopping.set()
+        self.shutdown(cancel_futures=True)
+
+    def _stoppable(self, report: Report) -> Report:
+        def told(scans: int, total: int) -> None:
+            if self._stopping.is_set():
+                raise KeyboardInterrupt
+            report(scans, total)
+
+        return told
+
+
+class Processes(Threads):
+    """Threads that each hand their task to a process of its own.
+
+    So it is known in which log a process has died, and the others go on. A task whose process dies
+    is tried once more.
+
+    Parameters
+    ----------
+    count : int, optional
+        How many; one a processor if not given.
+
+    Notes
+    -----
+    Processes are spawned: a script that uses them needs ``if __name__ == "__main__":``.
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        super().__init__(count)
+        self._idle: list[_Worker] = []
+
+    def begin(self, task: Task, report: Report) -> Future[Row]:
+        """Submit a task; `report` is called from its thread."""
+        return self.submit(self._hand_over, task, self._stoppable(report))
+
+    def _hand_over(self, task: Task, report: Report) -> Row:
+        deaths: list[str] = []
+        while len(deaths) < 2:
+            worker = self._free_worker()
+            try:
+                row = worker.run(task, report)
+            except (EOFError, OSError):
+                deaths.append(worker.end())
+            except BaseException:
+                worker.end()
+                raise
+            else:
+                self._idle.append(worker)
+                return row
+        told = f"{task.row.log}: its process died twice ({', '.join(deaths)})"
+        return failed(task.row, told)
+
+    def _free_worker(self) -> _Worker:
+        try:
+            return self._idle.pop()
+        except IndexError:
+            return _Worker()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes when their tasks are done."""
+        super().shutdown(wait, cancel_futures=cancel_futures)
+        while wait and self._idle:
+            self._idle.pop().end()
+
+
+class _Worker:
+    """A process that does one task after the other, and the pipe to it."""
+
+    def __init__(self) -> None:
+        context = get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        with _interrupts_held():
+            self._process.start()
+        theirs.close()
+
+    def run(self, task: Task, report: Report) -> Row:
+        """Do a task; EOFError or OSError if the process dies in it."""
+        self._pipe.send(task)
+        scans, total = 0, 0
+        while True:
+            if self._pipe.poll(_PERIOD):
+                answer = self._pipe.recv()
+                if isinstance(answer, Row):
+                    return answer
+                scans, total = answer
+            report(scans, total)
+
+    def end(self) -> str:
+        """End the process, and tell how it ended."""
+        # By a signal; if that is lost, its next report finds nobody; if it makes none, by force.
+        for end in (self._process.terminate, self._pipe.close, self._process.kill):
+            if self._process.exitcode is None:
+                end()
+                self._process.join(_PATIENCE)
+        self._pipe.close()
+        return _told(self._process.exitcode)
+
+
+def _told(status: int | None) -> str:
+    if status is None or status >= 0:
+        return f"exit status {status}"
+    with suppress(ValueError):
+        return signal.Signals(-status).name
+    return f"signal {-status}"
+
+
+def _serve(pipe: Connection) -> None:
+    """Do what comes through the pipe, until its other end is gone: with it the run is."""
+    # Ctrl-C reaches all processes of a terminal: the one that was started ends the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
+    with suppress(EOFError, OSError):
+        while True:
+            task: Task = pipe.recv()
+            pipe.send(extract_part(task, lambda scans, total: pipe.send((scans, total))))
+
+
+def _leave(number: int, _frame: Any) -> None:
+    # As an exception, so that a half file goes; a second one would come in the middle of that.
+    signal.signal(number, signal.SIG_IGN)
+    raise SystemExit
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Keep Ctrl-C from a process that starts, and does not ignore it yet."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    # Started below otherwise, which would undo the mask.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def dask_executor(address: str) -> Iterator[Executor]:
+    """Give the executor of a Dask cluster, whose workers see the same files under the same paths.
+
+    Parameters
+    ----------
+    address : str
+        Of its scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    LineamentError
+        If `distributed` is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise LineamentError(f"{address}: needs Dask: pip install lineament[dask]") from None
+    try:
+        client = Client(address, timeout=_ANSWER)
+    except (OSError, ValueError) as error:
+        raise LineamentError(f"{address}: no Dask scheduler answers: {error}") from None
+    with client:
+        # Not pure: the same log may have other content in the next run.
+        yield client.get_executor(pure=False)
