@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote
 
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 
 __all__ = ["full_path", "names_of", "part_path"]
 

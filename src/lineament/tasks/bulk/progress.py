@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 from .manifest import Row
 from .parts import log_state
 
