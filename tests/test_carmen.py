@@ -151,8 +151,8 @@ def test_no_scans(write):
 
 FAULTS = [
     ("FLASER 180 " + "1 " * 172 + "0 0 0 0 0 0 1 h 1", "says 180 ranges and has 172 of them"),
-    ("FLASER", "FLASER has 0 values, expected at least 10"),
-    ("FLASER 3 1 2", "has 3 values, expected at least 10"),
+    ("FLASER", "FLASER has 0 values, expected 10 or more"),
+    ("FLASER 3 1 2", "has 3 values, expected 10 or more"),
     ("FLASER 1.5 1 2 0 0 0 0 0 0 1 h 1", "the number of ranges is '1.5', expected a whole number"),
     ("FLASER -1 1 2 0 0 0 0 0 0 1 h 1", "the number of ranges is '-1'"),
     ("FLASER 2 1 a 0 0 0 0 0 0 1 h 1", "range 2 of 2 is 'a', expected a number"),
@@ -160,7 +160,7 @@ FAULTS = [
     (b"FLASER 2 1 \xff 0 0 0 0 0 0 1 h 1", "range 2 of 2 is "),
     ("FLASER 1 1 0 nan 0 0 0 0 1 h 1", "expected three finite numbers"),
     ("FLASER 1 1 0 0 0 0 0 0 x h 1", "FLASER stamp is 'x', expected a number"),
-    ("ROBOTLASER1 0 1", "has 2 values, expected at least 23"),
+    ("ROBOTLASER1 0 1", "has 2 values, expected 23 or more"),
     (robotlaser([1, 2], step=0), "angle_increment is 0"),
     (robotlaser([1, 2], step="inf"), "angle_increment is inf"),
     (robotlaser([1, 2]).replace(" 2 1 2", " 9 1 2"), "has 2 of them before its last 15"),

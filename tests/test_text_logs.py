@@ -101,7 +101,7 @@ def test_dpslam_fields(write):
         ("Laser 3 1 2", "Laser says 3 ranges and has 2"),
         ("Laser x 1 2", "Laser: the number of ranges is 'x'"),
         ("Laser 1 y", "range 1 of 1 is 'y'"),
-        ("Odometry 1 2", "Odometry has 2 values, expected 3"),
+        ("Odometry 1 2", "Odometry has 2 values, expected 3 or more"),
     ],
 )
 def test_faulty_dpslam_lines(write, line, problem):

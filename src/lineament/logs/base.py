@@ -22,27 +22,7 @@ ECHOES = ("first", "last", "strongest")
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How to make scans of messages that hold more than one; for ROS logs.
-
-    Parameters
-    ----------
-    echo : str
-        Which return of a beam that has several: ``first``, ``last`` or ``strongest``.
-    ring : int, optional
-        Which ring of a point cloud is the scan.
-    pose_topic : str, optional
-        Which topic gives the poses.
-
-    Raises
-    ------
-    ValueError
-        If a value is none of these.
-
-    Examples
-    --------
-    >>> ReadOptions(echo="last").ring is None
-    True
-    """
+    """How ROS messages become scans, as `open_log` takes it; ValueError if a value is wrong."""
 
     echo: str = "first"
     ring: int | None = None
@@ -62,16 +42,7 @@ class ReadOptions:
 class Topic:
     """One kind of messages in a log, of scans or of anything else.
 
-    Parameters
-    ----------
-    name : str
-        The topic.
-    type : str
-        Type of its messages; empty where the name says it all.
-    count : int
-        How many there are.
-    publishers : int
-        How many senders the log knows of.
+    `count` messages from `publishers` senders; `type` is empty where the name says it all.
     """
 
     name: str
@@ -82,16 +53,9 @@ class Topic:
 
 @dataclass(frozen=True)
 class Head:
-    """The beginning of a file, from which readers recognise their format.
+    """The beginning of a file or folder, from which readers recognise their format.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file or folder.
-    data : bytes
-        Its first bytes, decompressed where it is gzip; empty for a folder.
-    is_directory, is_gzip : bool
-        Whether it is a folder, and whether the file is compressed.
+    `data` is decompressed where the file is gzip, and empty for a folder.
     """
 
     path: Path
@@ -117,14 +81,8 @@ class Log(ABC):
 
     Attributes
     ----------
-    source : path-like
-        The file as it was given.
-    path : pathlib.Path
-        The file that is read.
-    name : str
-        What messages call it.
-    topic, keep_going, options
-        As given.
+    source, path, name
+        The file as it was given, as a ``pathlib.Path``, and as messages call it.
     skipped : int
         How many faults the last iteration skipped; 0 unless `keep_going`.
     faults : list of str

@@ -76,26 +76,10 @@ def bearing_fields(angles: NDArray[np.float64]) -> dict[str, Any]:
 def by_bearing(
     angles: NDArray[np.float64], *, degrees: bool | None = None
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Order beams by bearing; of several with one bearing, keep the first.
+    """Return the order of beams by bearing, and their bearings [rad], which increase.
 
-    Parameters
-    ----------
-    angles : ndarray, shape (n,)
-        Bearings.
-    degrees : bool, optional
-        Whether they are degrees; if None, they are where one is beyond ±2π.
-
-    Returns
-    -------
-    order : ndarray, shape (m,)
-        Indices of the beams, by bearing.
-    angles : ndarray, shape (m,)
-        Their bearings [rad], increasing.
-
-    Raises
-    ------
-    ValueError
-        If a bearing is not finite.
+    Of several with one bearing, the first is kept. Bearings are degrees where asked for or, if
+    that is None, where one is beyond ±2π; ValueError if one is not finite.
 
     Examples
     --------

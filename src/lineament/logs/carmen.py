@@ -34,11 +34,9 @@ _FIELDS = {
 class CarmenLog(LineLog):
     """A CARMEN log; front scans (FLASER, ROBOTLASER1) unless another topic is asked for.
 
-    Beams of FLASER and RLASER start at -90°, in steps of exactly 1° (180 or 181 beams), 0.5°
-    (360, 361) or π/(n-1). Their `range_max` is that of the last ``PARAM robot_front_laser_max``
-    (or ``laser_front_laser_max``, ``robot_rear_laser_max``, …) before them, else 50 m, beyond
-    which SICK scanners report that they saw nothing (51.15, 81.83, 81.91). ROBOTLASER1 has its
-    own. Poses are those of the laser as logged, stamps the robot's (``ipc_timestamp``).
+    `range_max` of FLASER and RLASER is that of the last ``PARAM`` ``…_laser_max`` before them, else
+    that from which SICK scanners report that they saw nothing (51.15, 81.83, 81.91). Poses are
+    those of the laser as logged, stamps the robot's (``ipc_timestamp``).
     """
 
     format = "carmen"
@@ -77,17 +75,7 @@ class CarmenLog(LineLog):
 def robotlaser(line: bytes, corrected: Pose | None = None) -> LaserScan:
     """Return the scan of a line ROBOTLASER1, which CARMEN logs and graphs of poses have.
 
-    Parameters
-    ----------
-    line : bytes
-        The line.
-    corrected : (x, y, theta), optional
-        Pose of the robot that replaces that of the line [m, m, rad]; the laser moves along.
-
-    Raises
-    ------
-    ValueError
-        If the counts in the line do not fit, or a word is no number.
+    A corrected pose of the robot [m, m, rad] replaces that of the line; the laser moves along.
     """
     read = _FIELDS["ROBOTLASER1"].read(line)
     ranges, remissions = read["ranges"], read["remissions"]

@@ -26,11 +26,6 @@ class CsmLog(Log):
     A reading is invalid where it is null or its ``valid`` is 0. Bearings that run clockwise are
     reversed; even steps that were rounded are made exact. The pose is the first of ``true_pose``,
     ``estimate`` and ``odometry`` that is given; ``timestamp`` is seconds and microseconds.
-
-    Raises
-    ------
-    LogError
-        If the topic is another than ``scan``, or the file does not begin with a scan.
     """
 
     format = "csm"

@@ -12,7 +12,7 @@ from .carmen import robotlaser
 from .linelog import Fields, LineLog, Parser
 
 _SCAN = "ROBOTLASER1"
-_VERTICES = {kind: Fields(kind, "_ x y theta ...") for kind in ("VERTEX2", "VERTEX_SE2")}
+_VERTICES = {kind: Fields(kind, "_ x y theta") for kind in ("VERTEX2", "VERTEX_SE2")}
 _UNKNOWN = (math.nan, math.nan, math.nan)
 #: Messages of a robot's log, of which a graph has none.
 _OTHERS = re.compile(rb"(?m)^[ \t]*(?:PARAM|ODOM|[FR]LASER)[ \t]")

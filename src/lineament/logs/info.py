@@ -30,58 +30,25 @@ _BUFFER = 1 << 16
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """What the scans of one topic are like.
-
-    Parameters
-    ----------
-    name : str
-        The topic.
-    scans : int
-        Scans read.
-    beams : (int, int)
-        Least and largest number of beams.
-    field_of_view, resolution : float
-        First to last bearing, and step between beams [rad], of the first scan with most beams.
-    full_circle : bool
-        Whether that scan goes all around.
-    start, duration : float or None
-        Earliest stamp [s], and latest minus earliest; None where stamps are missing.
-    rate : float or None
-        Scans per second, from the median of the stamp steps that go forward; None where most
-        stamps stand still, or many run backwards.
-    backwards : int
-        How many stamps are before the one that precedes them.
-    valid : float
-        Share of beams that are valid.
-    ranges : (float, float, float) or None
-        Least, median (to 1 mm) and largest valid range [m]; None where no beam is valid.
-    limits : (float, float)
-        Least `range_min` and largest `range_max` of the scans [m]; 0 and inf where unknown.
-    intensities, poses : float
-        Share of scans with intensities, and with a pose.
-    travelled : float
-        Length of the way from pose to pose [m].
-    frame_ids : tuple of str
-        Names of frames, in order of appearance, the first 16.
-    """
+    """What the scans of one topic are like; angles in radians."""
 
     name: str
     scans: int
-    beams: tuple[int, int]
-    field_of_view: float
-    resolution: float
-    full_circle: bool
-    start: float | None
-    duration: float | None
-    rate: float | None
-    backwards: int
-    valid: float
-    ranges: tuple[float, float, float] | None
-    limits: tuple[float, float]
-    intensities: float
-    poses: float
-    travelled: float
-    frame_ids: tuple[str, ...]
+    beams: tuple[int, int]  # Least and largest number.
+    field_of_view: float  # First to last bearing of the first scan with most beams.
+    resolution: float  # Step between its beams.
+    full_circle: bool  # Whether it goes all around.
+    start: float | None  # Earliest stamp [s]; None where stamps are missing.
+    duration: float | None  # Latest stamp minus earliest [s].
+    rate: float | None  # Scans per second: of the median step of stamps that go forward.
+    backwards: int  # Stamps before the one that precedes them.
+    valid: float  # Share of beams that are valid.
+    ranges: tuple[float, float, float] | None  # Least, median (to 1 mm), largest valid range [m].
+    limits: tuple[float, float]  # Least `range_min` and largest `range_max` [m].
+    intensities: float  # Share of scans with intensities.
+    poses: float  # Share of scans with a pose.
+    travelled: float  # Length of the way from pose to pose [m].
+    frame_ids: tuple[str, ...]  # In order of appearance, the first 16.
 
     def rows(self) -> list[tuple[str, str]]:
         """Names and values for a person to read, angles in degrees."""
@@ -133,10 +100,8 @@ class LogInfo:
         The topics that were read, in order of appearance, the first 32.
     contents : tuple of Topic
         All kinds of messages in the log.
-    skipped : int
-        Faults that were skipped.
-    unread : int
-        Scans of further topics.
+    skipped, unread : int
+        Number of faults that were skipped, and of scans of further topics.
     """
 
     path: str

@@ -30,20 +30,8 @@ def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogE
     goes on at the next line that begins with a brace; in a file that is broken all over, where that
     would take much longer than to read it, it ends.
 
-    Parameters
-    ----------
-    path : path-like
-        The file. Memory holds one object and one piece of it.
-
-    Yields
-    ------
-    dict or LogError
-        An object; or a fault, with the line on which what is broken begins.
-
-    Raises
-    ------
-    LogError
-        If the file cannot be opened.
+    Memory holds one object and one piece of the file. A fault has the line on which what is broken
+    begins; LogError if the file cannot be opened.
 
     Examples
     --------

@@ -22,11 +22,6 @@ class LineLog(Log):
     """A log of text lines, plain or gzip; some kinds of them hold a scan each.
 
     A format states how its lines begin and what makes scans of them (`_parser`).
-
-    Raises
-    ------
-    LogError
-        If there is no such topic, or no line with a scan at all.
     """
 
     #: What the beginning of a file in this format contains.
@@ -130,66 +125,53 @@ class LineLog(Log):
 
 
 class Fields:
-    """The words of a line by name.
+    """The words of a line by name, as a pattern gives them.
 
-    Parameters
-    ----------
-    kind : str
-        The kind of the line, its first word.
-    pattern : str
-        A name for each word behind it: ``x`` is a number, ``_`` a word that is not read,
-        ``ranges*`` a count and as many numbers, ``...`` at the end any further words.
+    In the pattern ``x`` is a number, ``_`` a word that is not read, and ``ranges*`` a count and as
+    many numbers. Words behind a pattern without such a list are not read.
 
     Examples
     --------
-    >>> line = Fields("Laser", "ranges* stamp _ ...").read(b"Laser 2 1.5 81.83 7 host and more")
+    >>> line = Fields("Laser", "ranges* stamp _").read(b"Laser 2 1.5 81.83 7 host")
     >>> line["ranges"].tolist(), line["stamp"]
     ([1.5, 81.83], 7.0)
     """
 
     def __init__(self, kind: str, pattern: str) -> None:
-        names = pattern.removesuffix("...").split()
-        self._kind, self._least = kind, len(names)
-        self._is_open = pattern.endswith("...")
-        # Pieces of the line: numbers by their places in it, how many words these are, and a list,
-        # with the number of words behind it at least.
-        self._pieces: list[tuple[list[tuple[str, int]], int, str, int]] = []
-        run: list[str] = []
-        for i, name in enumerate(names):
-            is_list = name.endswith("*")
-            if not is_list:
-                run.append(name)
-            if is_list or i == len(names) - 1:
-                scalars = [(name, at) for at, name in enumerate(run) if name != "_"]
-                list_name = name.removesuffix("*") if is_list else ""
-                self._pieces.append((scalars, len(run), list_name, len(names) - i - 1))
-                run = []
-        self._last = max((i for i, piece in enumerate(self._pieces) if piece[2]), default=-1)
+        self._kind, self._least = kind, len(pattern.split())
+        #: Numbers by their places, how many words these are, and the list behind them.
+        self._pieces: list[tuple[list[tuple[str, int]], int, str]] = []
+        for piece in re.split(r"(?<=\*)", pattern):
+            names = piece.split()
+            name = names.pop().removesuffix("*") if "*" in piece else ""
+            places = [(name, at) for at, name in enumerate(names) if name != "_"]
+            self._pieces.append((places, len(names), name))
 
     def read(self, line: bytes) -> dict[str, Any]:
         """Return numbers and arrays by name; ValueError if the line does not fit."""
         kind, words, number = self._kind, line.split(), number_parser(line)
-        has, at = len(words) - 1, 1
-        is_fixed = self._last < 0 and not self._is_open
-        if has < self._least or (is_fixed and has > self._least):
-            least = "" if is_fixed else "at least "
-            raise ValueError(f"{kind} has {has} values, expected {least}{self._least}")
+        if len(words) <= self._least:
+            raise ValueError(f"{kind} has {len(words) - 1} values, expected {self._least} or more")
         values: dict[str, Any] = {}
-        for i, (scalars, width, name, behind) in enumerate(self._pieces):
+        at, behind = 1, self._least
+        for i, (places, width, name) in enumerate(self._pieces):
             try:
-                for field, place in scalars:
+                for field, place in places:
                     values[field] = number(words[at + place])
             except ValueError:
                 raise _no_number(f"{kind} {field}", words[at + place]) from None
-            at += width
+            at, behind = at + width + 1, behind - width - 1
             if name:
-                n = _count(kind, name, words[at])
-                left = len(words) - at - 1 - behind
-                if n > left or (n < left and i == self._last and not self._is_open):
+                count = words[at - 1]
+                if not count.isdigit() or len(count) > 9:
+                    raise _no_number(f"{kind}: the number of {name}", count, "a whole number")
+                n, left = int(count), len(words) - at - behind
+                # Behind the last list are as many words as the pattern has.
+                if n > left or (n < left and i == len(self._pieces) - 2):
                     where = f" before its last {behind} values" if behind else ""
                     raise ValueError(f"{kind} says {n} {name} and has {left} of them{where}")
-                at += 1 + n
-                values[name] = numbers(name.removesuffix("s"), words[at - n : at], number)
+                values[name] = numbers(name.removesuffix("s"), words[at : at + n], number)
+                at += n
         return values
 
 
@@ -229,12 +211,6 @@ def scalar(what: str, word: bytes, number: Callable[[bytes], float] = _plain_flo
         return number(word)
     except ValueError:
         raise _no_number(what, word) from None
-
-
-def _count(kind: str, name: str, word: bytes) -> int:
-    if not word.isdigit() or len(word) > 9:
-        raise _no_number(f"{kind}: the number of {name}", word, "a whole number")
-    return int(word)
 
 
 def _no_number(what: str, word: bytes, expected: str = "a number") -> ValueError:

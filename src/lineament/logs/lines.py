@@ -39,18 +39,20 @@ def reading(path: object) -> Iterator[None]:
 def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
     """Yield the content of a file, decompressed where it is gzip, in pieces of up to 1 MiB.
 
-    What is appended while the file is read is left for the next time.
-
-    Raises
-    ------
-    LogError
-        If the file cannot be read, or its gzip data is broken or ends early: after all that
-        could be decompressed has been delivered.
+    What is appended while the file is read is left for the next time. LogError if it cannot be
+    read, or its gzip data is broken or ends early: after all that could be decompressed.
     """
-    # Only what the file does is guarded: what the consumer of a generator does is not.
+    with opened(path) as read:
+        yield from decompressed(path, read, read(_COMPRESSED))
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[Callable[[int], bytes]]:
+    """Give what reads pieces of a file, as long as it is now."""
+    # Only what the file does is guarded: what is done with its content is not.
     with reading(path):
-        opened = Path(path).open("rb")  # noqa: SIM115
-    with opened as file:
+        binary = Path(path).open("rb")  # noqa: SIM115
+    with binary as file:
         left = os.fstat(file.fileno()).st_size
 
         def read(size: int) -> bytes:
@@ -60,18 +62,17 @@ def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
             left -= len(data)
             return data
 
-        yield from decompressed(path, read)
+        yield read
 
 
-def decompressed(path: object, read: Callable[[int], bytes]) -> Iterator[bytes]:
-    """Yield what a function reads, decompressed where it is gzip; LogError as from `chunks`."""
-    data = read(_COMPRESSED)
-    if data.startswith(GZIP):
-        yield from _gunzip(path, read, data)
+def decompressed(path: object, read: Callable[[int], bytes], first: bytes) -> Iterator[bytes]:
+    """Yield a first piece and what is read behind it, decompressed; LogError as from `chunks`."""
+    if first.startswith(GZIP):
+        yield from _gunzip(path, read, first)
         return
-    while data:
-        yield data
-        data = read(_PLAIN)
+    while first:
+        yield first
+        first = read(_PLAIN)
 
 
 def _gunzip(path: object, read: Callable[[int], bytes], data: bytes) -> Iterator[bytes]:
@@ -116,13 +117,8 @@ def _up_to_fault(stream: "zlib._Decompress", data: bytes) -> bytes:
 def numbered_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, bytes]]:
     """Yield each line of a file with its number, from 1; memory holds one line and one piece.
 
-    A last line without an end is delivered, unless the stream broke within it.
-
-    Raises
-    ------
-    LogError
-        As from `chunks`, with the number of the line that was reached; and at a line of more
-        than `MAX_LINE` bytes.
+    A last line without an end is delivered, unless the stream broke within it. LogError as from
+    `chunks`, with the number of the line; and at a line of more than `MAX_LINE` bytes.
     """
     number, rest = 1, b""
     try:

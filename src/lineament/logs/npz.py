@@ -32,11 +32,6 @@ class NpzLog(Log):
     ``scan_time``, ``time_increment`` s, ``frame_id`` (one, or N of them), ``stamps`` (N,) s,
     ``poses`` (N, 3) m, m, rad (not finite where unknown), ``intensities`` (N, M). Other keys
     are left alone. Arrays stay as stored; rows become float64 as they are read.
-
-    Raises
-    ------
-    LogError
-        If the file is no such archive, is cut off, or a key is missing or has a wrong shape.
     """
 
     format = "npz"

@@ -8,17 +8,8 @@ from itertools import islice
 from pathlib import Path
 
 from ..errors import LogError
+from . import sources
 from .base import Head, Log, ReadOptions
-from .sources import (
-    ZIP,
-    fetched,
-    is_address,
-    listed,
-    member_heads,
-    read_head,
-    unzip,
-    unzipped_member,
-)
 
 #: Module and class of each reader, in the order in which they look at a file.
 READERS = (
@@ -36,7 +27,7 @@ READERS = (
     ("csv", "CsvBeamsLog"),
 )
 #: Endings that other files have too: these are logs if they look like one.
-_SHARED_ENDINGS = (".log", ".json", ".csv", ".tsv", ".dat", ".npz", ".txt")
+_SHARED_ENDINGS = (".log", ".json", ".csv", ".tsv", ".dat", ".npz", ".txt", ".zip")
 
 
 def readers() -> list[type[Log]]:
@@ -110,32 +101,32 @@ def open_log(
     """
     options = ReadOptions(echo, ring, pose_topic)
     source = _located(path)
-    head = read_head(source)
+    head = sources.read_head(source)
     reader = _recognised(head)
     if reader is None:
         source = _only_log(source, head)
-        head = read_head(source)
+        head = sources.read_head(source)
         # A damaged or unusual beginning: its ending shows which reader's error helps most.
         reader = _recognised(head) or _by_ending(str(source))
     if reader is None:
         known = " or ".join(reader.description for reader in readers())
         raise LogError(source, f"is no log that lineament knows: expected {known}")
     if head.is_gzip and reader.needs_seek:
-        source = unzip(source, keep_going=keep_going)
+        source = sources.unzip(source, keep_going=keep_going)
     return reader(source, topic, keep_going=keep_going, options=options)
 
 
 def _located(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
     """Return what can be opened as a file: the path itself, or a copy of what is behind it."""
-    if is_address(path):
-        return fetched(str(path))
+    if sources.is_address(path):
+        return sources.fetched(str(path))
     try:
         archive = next((above for above in Path(path).parents if above.is_file()), None)
     except (TypeError, ValueError, OSError):
         return path  # Reading it reports what is wrong.
     if archive is None:
         return path
-    return unzipped_member(archive, Path(path).relative_to(archive).as_posix())
+    return sources.unzipped_member(archive, Path(path).relative_to(archive).as_posix())
 
 
 def _only_log(path: str | os.PathLike[str], head: Head) -> str | os.PathLike[str]:
@@ -143,7 +134,7 @@ def _only_log(path: str | os.PathLike[str], head: Head) -> str | os.PathLike[str
     inside = _logs_in_folder(Path(path)) if head.is_directory else _logs_in_archive(path, head)
     first = list(islice(inside, 4))
     if len(first) == 1 and not head.is_directory:
-        return unzipped_member(path, first[0].removeprefix(f"{path}/"))
+        return sources.unzipped_member(path, first[0].removeprefix(f"{path}/"))
     if first or head.is_directory:
         some = f": {', '.join(first[:3])}{', …' if len(first) > 3 else ''}" if first else ""
         what = "is a directory" if head.is_directory else "holds several logs"
@@ -182,14 +173,13 @@ def find_logs(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) 
     >>> [open_log(path).path.name for path in find_logs(folder)]
     ['a.csv', 'b.csv']
     """
-    if isinstance(paths, (str, os.PathLike)):
-        paths = [paths]
+    paths = [paths] if isinstance(paths, (str, os.PathLike)) else paths
     return list(dict.fromkeys(log for path in paths for log in _expanded(path)))
 
 
 def _expanded(path: str | os.PathLike[str]) -> list[str]:
-    if is_address(path):
-        names = listed(str(path))
+    if sources.is_address(path):
+        names = sources.listed(str(path))
         logs = names if names == [path] else [name for name in names if _has_ending(name)]
     elif Path(path).is_dir():
         logs = list(_logs_in_folder(Path(path)))
@@ -197,16 +187,14 @@ def _expanded(path: str | os.PathLike[str]) -> list[str]:
         matches = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207
         logs = [log for match in matches for log in _logs_at(Path(match))]
     else:
-        return _members_or_itself(path)
+        return _logs_in_file(Path(path), is_named=True)
     if not logs:
         raise LogError(path, "holds no log")
     return logs
 
 
 def _logs_at(path: Path) -> Iterable[str]:
-    if path.is_dir():
-        return _logs_in_folder(path)
-    return _members_or_itself(path) if _is_log(path) else []
+    return _logs_in_folder(path) if path.is_dir() else _logs_in_file(path)
 
 
 def _logs_in_folder(folder: Path) -> Iterator[str]:
@@ -224,34 +212,30 @@ def _logs_in_folder(folder: Path) -> Iterator[str]:
             yield from _logs_at(path)
 
 
-def _is_log(path: Path) -> bool:
+def _logs_in_file(path: Path, *, is_named: bool = False) -> list[str]:
+    """Return the logs in an archive of several, else the file itself if it is a log or named."""
     name = path.name.lower().removesuffix(".gz")
-    if _by_ending(name) and not name.endswith(_SHARED_ENDINGS):
-        return True
+    is_log = is_named or (_has_ending(name) and not name.endswith(_SHARED_ENDINGS))
+    inside: list[str] = []
     try:
-        head = read_head(path)
-        return _recognised(head) is not None or any(_logs_in_archive(path, head))
+        head = sources.read_head(path)
+        inside = list(_logs_in_archive(path, head))
+        is_log = is_log or bool(inside) or _recognised(head) is not None
     except LogError:
         # Opening a log that is broken or must not be read reports that.
-        return path.is_file() and path.stat().st_size > 0 and _has_ending(name)
+        is_log = is_log or (path.is_file() and path.stat().st_size > 0 and _has_ending(name))
+    if len(inside) > 1:
+        return inside
+    return [str(path)] if is_log else []
 
 
 def _has_ending(name: str) -> bool:
     return _by_ending(name) is not None or name.lower().endswith(".zip")
 
 
-def _members_or_itself(path: str | os.PathLike[str]) -> list[str]:
-    """Return the logs in an archive of several, else the path itself."""
-    try:
-        inside = list(_logs_in_archive(path, read_head(path)))
-    except LogError:
-        inside = []  # Opening it reports what is wrong.
-    return inside if len(inside) > 1 else [str(path)]
-
-
 def _logs_in_archive(path: str | os.PathLike[str], head: Head) -> Iterator[str]:
     """Yield the logs in a zip archive, as paths behind that of the archive; none of other files."""
-    if head.data.startswith(ZIP) and not head.is_gzip and _recognised(head) is None:
-        for name, member in member_heads(path):
+    if head.data.startswith(sources.ZIP) and not head.is_gzip and _recognised(head) is None:
+        for name, member in sources.member_heads(path):
             if _recognised(member):
                 yield f"{path}/{name}"

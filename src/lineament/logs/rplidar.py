@@ -34,11 +34,6 @@ class RplidarLog(Log):
 
     A file ``transforms.json`` in the same folder gives poses: ``{"a": {"b": 3 × 3 matrix}}`` takes
     points of unit a to the frame of unit b. The world is the frame of the first unit.
-
-    Raises
-    ------
-    LogError
-        If there is no such unit, or the file is no such object.
     """
 
     format = "rplidar"

@@ -4,7 +4,7 @@ import gzip
 import math
 import os
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +27,13 @@ timestamp ipc_hostname logger_timestamp
 
 def save_carmen(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
     """Write scans as a CARMEN log, each as it comes; see `save_log`."""
+    i = -1
     with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as plain:
-        with ExitStack() as stack:
-            file: Any = plain
-            if Path(path).name.lower().endswith(".gz"):
-                # Without name and time: the same scans give the same file.
-                file = stack.enter_context(gzip.GzipFile("", "wb", 6, plain, mtime=0))
+        is_gzip = Path(path).name.lower().endswith(".gz")
+        # Without name and time: the same scans give the same file.
+        packed = gzip.GzipFile("", "wb", 6, plain, mtime=0) if is_gzip else nullcontext(plain)
+        with packed as file:
             file.write(_CARMEN_HEADER.encode())
-            i = -1
             for i, scan in enumerate(scans):
                 file.write(_carmen_line(i, scan).encode())
         if i < 0:

@@ -11,13 +11,13 @@ import weakref
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import IO
 
 from ..errors import LogError
 from .base import Head
-from .lines import BOM, GZIP, chunks, decompressed, reading
+from .lines import BOM, GZIP, chunks, decompressed, opened, reading
 
 #: How a zip archive begins.
 ZIP = b"PK\x03\x04"
@@ -35,13 +35,7 @@ _PIECE = 1 << 20
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
-    """Return the beginning of a file.
-
-    Raises
-    ------
-    LogError
-        If there is no such file, nothing in it, or it is a pipe or device.
-    """
+    """Return the beginning of a file; LogError if there is none, as in pipes and devices."""
     try:
         where = Path(path)
     except TypeError:
@@ -53,23 +47,15 @@ def read_head(path: str | os.PathLike[str]) -> Head:
         # Pipes and devices cannot be read twice, and may never answer.
         if not stat.S_ISREG(mode):
             raise LogError(path, "is no regular file, expected a log")
-        opened = where.open("rb")
-    with opened as file:
-        return _head_of(where, path, file.read)
+    with opened(path) as read:
+        return _head_of(where, path, read)
 
 
 def _head_of(where: Path, name: object, read: Callable[[int], bytes]) -> Head:
-    data, is_gzip = b"", False
-
-    def noting(size: int) -> bytes:
-        nonlocal is_gzip
-        with reading(name):
-            piece = read(size)
-        is_gzip = is_gzip or (not data and piece.startswith(GZIP))
-        return piece
-
+    data, first = b"", read(HEAD_SIZE)
+    is_gzip = first.startswith(GZIP)
     try:
-        for piece in decompressed(name, noting):
+        for piece in decompressed(name, read, first):
             data += piece
             if len(data) >= HEAD_SIZE:
                 break
@@ -85,19 +71,8 @@ def _head_of(where: Path, name: object, read: Callable[[int], bytes]) -> Head:
 class LocalCopy(os.PathLike[str]):
     """A temporary file under the name that a person knows it by; it goes when this object does.
 
-    Parameters
-    ----------
-    name : str
-        What errors call it: ``str`` gives this, ``os.fspath`` the path of the file.
-    pieces : iterable of bytes
-        What is written to it.
-    packed : int, optional
-        How many bytes this was before it was decompressed.
-
-    Raises
-    ------
-    LogError
-        If it grows too large, or cannot be written.
+    ``str`` gives the name, ``os.fspath`` the path. `packed` is the size before it was unpacked.
+    LogError if it grows too large, or cannot be written.
     """
 
     def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
@@ -135,19 +110,7 @@ class LocalCopy(os.PathLike[str]):
 
 
 def check_growth(name: object, size: int, packed: int) -> None:
-    """Refuse what grows too much when it is unpacked.
-
-    Parameters
-    ----------
-    name : object
-        What is unpacked, for the error.
-    size, packed : int
-        Bytes after and before.
-
-    Raises
-    ------
-    LogError
-        If it is no log but a bomb.
+    """Refuse with a LogError what is no log but a bomb, by its size after and before.
 
     Examples
     --------
@@ -174,23 +137,14 @@ def unzip(path: str | os.PathLike[str], *, keep_going: bool = False) -> LocalCop
     return LocalCopy(str(path), pieces(), packed)
 
 
-def _pieces(file: IO[bytes]) -> Iterator[bytes]:
-    while piece := file.read(_PIECE):
-        yield piece
-
-
 # Zip archives
 
 
 def member_heads(path: str | os.PathLike[str]) -> Iterator[tuple[str, Head]]:
     """Yield the name and the beginning of each file in an archive, sorted by name.
 
-    Files that systems hide there are left out, as are those that cannot be read.
-
-    Raises
-    ------
-    LogError
-        If the archive is broken or has too many files.
+    Files that systems hide there are left out, as are those that cannot be read. LogError if the
+    archive is broken or has too many files.
     """
     with _archive(path) as archive:
         names = sorted(info.filename for info in archive.infolist() if not info.is_dir())
@@ -207,18 +161,14 @@ def member_heads(path: str | os.PathLike[str]) -> Iterator[tuple[str, Head]]:
 
 def _is_shown(name: str) -> bool:
     # Names that lead out of the archive, /a and ../a, are hidden too.
-    hidden = any(not part or part.startswith((".", "__MACOSX")) for part in name.split("/"))
-    return name.isprintable() and not hidden
+    parts = name.split("/")
+    return name.isprintable() and all(
+        part and not part.startswith((".", "__MACOSX")) for part in parts
+    )
 
 
 def unzipped_member(path: str | os.PathLike[str], member: str) -> LocalCopy:
-    """Copy a member of a zip archive.
-
-    Raises
-    ------
-    LogError
-        If there is no such member, or it is broken, encrypted or too large.
-    """
+    """Copy a member of a zip archive; LogError if it is missing, broken or encrypted."""
     name = f"{path}/{member}"
     with _archive(path) as archive:
         try:
@@ -226,7 +176,7 @@ def unzipped_member(path: str | os.PathLike[str], member: str) -> LocalCopy:
         except KeyError:
             raise LogError(name, "there is no such file in the archive") from None
         with archive.open(info) as file:
-            return LocalCopy(name, _pieces(file), info.compress_size)
+            return LocalCopy(name, iter(partial(file.read, _PIECE), b""), info.compress_size)
 
 
 @contextmanager
@@ -261,7 +211,7 @@ def is_address(path: str | os.PathLike[str]) -> bool:
 def fetched(address: str) -> LocalCopy:
     """Copy what is at an address; LogError if it, fsspec or a driver of fsspec is missing."""
     with _fsspec(address) as fsspec, fsspec.open(address, "rb") as file:
-        return LocalCopy(address, _pieces(file))
+        return LocalCopy(address, iter(partial(file.read, _PIECE), b""))
 
 
 def listed(address: str) -> list[str]:
