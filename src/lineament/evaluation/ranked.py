@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..motion.poses import relative
 from ..scan import Array, LaserScan
+from ..scan.poses import relative
 from .counts import Summable, ratio
 from .matching import match
 from .repeatability import checked_poses, in_sight

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..motion.poses import relative
 from ..scan import Array, LaserScan, Pose
+from ..scan.poses import relative
 from .corners import vertices
 from .counts import Summable, ratio, rms
 from .matching import match

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..motion import Tracks
-from ..motion.poses import compose, relative
 from ..scan import Array, Pose
+from ..scan.poses import compose, relative
 from .counts import Summable, quantile, ratio, rms
 from .matching import Indices, match
 from .segments import ANGLE, line_errors

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from ..motion.poses import Twist
 from ..scan import LaserScan, Pose
+from ..scan.poses import Twist
 
 __all__ = ["Odometry", "Received", "Source", "Time"]
 

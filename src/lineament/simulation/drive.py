@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..motion.poses import Twist
 from ..scan import Array, LaserScan
+from ..scan.poses import Twist
 from .sensor import Sensor
 from .worlds import World
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.poses import Twist, poses_along
 from ..scan import Array, LaserScan, Pose, RangeNoise
+from ..scan.poses import Twist, poses_along
 from .raycast import cast_rays
 from .worlds import World
 
@@ -107,7 +107,7 @@ class Sensor:
     def sweep(self, pose: Pose, twist: Twist) -> Array:
         """Return the pose from which each beam is taken by a sensor that moves.
 
-        Its velocity is constant: see :func:`~lineament.motion.poses.poses_along`.
+        Its velocity is constant: see :func:`~lineament.scan.poses.poses_along`.
 
         Parameters
         ----------
