@@ -26,7 +26,7 @@ from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment
-from lineament.rosmsg.messages import laser_scan
+from lineament.rosmsg.scans import laser_scan
 from lineament.simulation import SENSORS, drive, room
 
 both = pytest.mark.parametrize("encoding", ["cdr", "ros1"])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..rosmsg.packing import Packer
+from ..rosmsg.wire import WireWriter as Packer
 from ..scan import LaserScan, Pose
 from .feature_points import feature_points
 from .layers import Layer
