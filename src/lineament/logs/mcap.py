@@ -1,25 +1,26 @@
 """MCAP files with messages of ROS 2 (cdr) or ROS 1, chunked or not, whole or cut off.
 
-The mcap library decodes the index. Records are read here, since it is slower, and trusts the
-lengths in damaged ones: see docs/logs.md.
+The mcap library decodes the statistics. Other records are read here, since the library is slower,
+and trusts the lengths in damaged ones: see docs/logs.md.
 """
 
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from io import BytesIO
+from typing import Any
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Footer, Statistics
+from mcap.records import Statistics
 
 from ..errors import LogError
 from ..rosmsg.wire import Buffer
 from .base import Head
 from .ros import RosLog
-from .ros_bag import Bag, Connection, Connections, RecordBag, Source, decompress
+from .ros_bag import Bag, Connection, RecordBag, RecordReader, decompress
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # Code and length of a record.
@@ -28,12 +29,11 @@ _NUMBER = struct.Struct("<H")  # Of a channel or schema.
 _MESSAGE_HEAD = 22
 _CHUNK_TIMES_SIZE, _FOOTER_SIZE = 16, 20
 # As plain numbers, which compare faster.
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = map(
-    int, (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
-)
+_SCHEMA, _CHANNEL, _MESSAGE = int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)
+_CHUNK, _STATISTICS, _FOOTER = int(Opcode.CHUNK), int(Opcode.STATISTICS), int(Opcode.FOOTER)
 _IN_CHUNKS = {_SCHEMA, _CHANNEL, _MESSAGE}
 #: Records that are read; the others are skipped.
-_READ = {*_IN_CHUNKS, _CHUNK, int(Opcode.STATISTICS)}
+_READ = {*_IN_CHUNKS, _CHUNK, _STATISTICS}
 #: No file has as many messages: statistics that say so are wrong.
 _MANY = 1 << 40
 
@@ -50,7 +50,7 @@ class McapLog(RosLog):
     endings = (".mcap",)
 
     def _open_bags(self) -> list[Bag]:
-        return [McapBag(self.source)]
+        return [RecordBag(self.source, McapReader)]
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
@@ -58,43 +58,21 @@ class McapLog(RosLog):
         return head.data.startswith(_MAGIC)
 
 
-class _Channels(Connections):
-    """Channels and schemas met so far."""
+class McapReader(RecordReader):
+    """Reads an MCAP file."""
 
-    def __init__(self, topics: Collection[str] | None) -> None:
-        super().__init__(topics)
-        self._types = {0: ""}
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._types = {0: ""}  # by schema; a channel may have none
 
-    def read(self, head: int, data: Buffer) -> tuple[Connection, Buffer] | None:
-        if head == _MESSAGE:
-            (number,) = _NUMBER.unpack_from(data)
-            connection = self.sender(number)
-            return connection and (connection, data[_MESSAGE_HEAD:])
-        # Only the names: what else these records hold may be broken.
-        if head == _SCHEMA:
-            (number,) = _NUMBER.unpack_from(data)
-            self._types[number], _ = _text(data, 2)
-        elif head == _CHANNEL:
-            number, schema = struct.unpack_from("<HH", data)
-            topic, at = _text(data, 4)
-            encoding, _ = _text(data, at)
-            if schema not in self._types:
-                raise ValueError(f"channel of schema {schema}, which is not described before it")
-            self.note(number, Connection.named(topic, self._types[schema], encoding))
-        return None
-
-
-class McapBag(RecordBag):
-    """One MCAP file."""
-
-    connections = _Channels
-
-    def _records(self, source: Source) -> Iterator[tuple[int, int, Buffer]]:
-        if source.take(len(_MAGIC), "magic") != _MAGIC:
+    def records(self) -> Iterator[tuple[int, int, bytes]]:
+        """Read all records up to the footer: their places, codes and data."""
+        if self.take(len(_MAGIC), "magic") != _MAGIC:
             raise LogError(self.path, "is no MCAP file, expected its magic at the start")
-        return _records(source)
+        return self._up_to_footer()
 
-    def _unpacked(self, head: int, data: Buffer) -> Iterator[tuple[int, Buffer]]:
+    def unpacked(self, head: int, data: Buffer) -> Iterator[tuple[int, Buffer]]:
+        """Read the records in a chunk; of another record itself."""
         if head != _CHUNK:
             yield head, data
             return
@@ -116,43 +94,62 @@ class McapBag(RecordBag):
             yield code, plain[at:end]
             at = end
 
-    def _indexed_counts(self, source: Source) -> Counter[Connection] | None:
-        channels = _Channels(None)
-        size = _HEAD.size + _FOOTER_SIZE + len(_MAGIC)
-        source.go(max(source.left - size, 0))
-        tail = source.take(size, "footer")
-        start = Footer.read(ReadDataStream(BytesIO(tail[_HEAD.size :]))).summary_start
-        if not tail.endswith(_MAGIC) or tail[0] != Opcode.FOOTER or not start:
-            return None
-        source.go(start)
-        for _, code, data in _records(source):
-            if code == Opcode.STATISTICS:
-                try:
-                    found = Statistics.read(ReadDataStream(BytesIO(data)))
-                except McapError:
-                    return None
-                counts = channels.counted(found.channel_message_counts.items())
-                return counts if counts.total() == found.message_count < _MANY else None
-            channels.read(code, data)
+    def message(self, head: int, data: Buffer) -> tuple[Connection, Buffer] | None:
+        """Take one record: note a schema or channel, return a message that is wanted."""
+        if head == _MESSAGE:
+            (number,) = _NUMBER.unpack_from(data)
+            connection = self.sender(number)
+            return connection and (connection, data[_MESSAGE_HEAD:])
+        # Only the names are read: what else these records hold may be broken.
+        if head == _SCHEMA:
+            (number,) = _NUMBER.unpack_from(data)
+            self._types[number], _ = _text(data, 2)
+        elif head == _CHANNEL:
+            number, schema = struct.unpack_from("<HH", data)
+            topic, at = _text(data, 4)
+            encoding, _ = _text(data, at)
+            if schema not in self._types:
+                raise ValueError(f"channel of schema {schema}, which is not described before it")
+            self.note(number, Connection.named(topic, self._types[schema], encoding))
         return None
 
+    def indexed_counts(self) -> Counter[Connection]:
+        """Count by the statistics, if they agree with themselves."""
+        size = _HEAD.size + _FOOTER_SIZE + len(_MAGIC)
+        self.go(max(self.left - size, 0))
+        tail = self.take(size, "footer")
+        (start,) = struct.unpack_from("<Q", tail, _HEAD.size)
+        if tail.endswith(_MAGIC) and tail[0] == _FOOTER and start:
+            self.go(start)
+            for _, code, data in self._up_to_footer():
+                if code == _STATISTICS:
+                    return self._agreed(data)
+                self.message(code, data)
+        return Counter()
 
-def _records(source: Source) -> Iterator[tuple[int, int, bytes]]:
-    """Read records, with their places and codes, up to the footer."""
-    while True:
-        at = source.at
-        if not source.left:
-            raise source.wrong("ends without a footer: it is cut off, or still recorded")
-        code, length = _HEAD.unpack(source.take(_HEAD.size, "head of a record"))
-        what = "chunk" if code == _CHUNK else f"record of code {code}"
-        if code == Opcode.FOOTER:
-            return
-        if code == 0:
-            raise source.wrong("record has the code 0, expected one of MCAP")
-        if code in _READ:
-            yield at, code, source.take(length, what)
-        else:
-            source.skip(length, what)
+    def _agreed(self, data: bytes) -> Counter[Connection]:
+        try:
+            found = Statistics.read(ReadDataStream(BytesIO(data)))
+        except McapError:
+            return Counter()
+        counts = self.counted(found.channel_message_counts.items())
+        return counts if counts.total() == found.message_count < _MANY else Counter()
+
+    def _up_to_footer(self) -> Iterator[tuple[int, int, bytes]]:
+        while True:
+            at = self.at
+            if not self.left:
+                raise self.wrong("ends without a footer: it is cut off, or still recorded")
+            code, length = _HEAD.unpack(self.take(_HEAD.size, "head of a record"))
+            what = "chunk" if code == _CHUNK else f"record of code {code}"
+            if code == _FOOTER:
+                return
+            if code == 0:
+                raise self.wrong("record has the code 0, expected one of MCAP")
+            if code in _READ:
+                yield at, code, self.take(length, what)
+            else:
+                self.skip(length, what)
 
 
 def _text(data: Buffer, at: int) -> tuple[str, int]:

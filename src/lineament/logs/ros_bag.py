@@ -21,18 +21,9 @@ Fault = Callable[[LogError], None]
 
 
 class Connection(NamedTuple):
-    """Who wrote a message: its topic, its type and how it is serialised.
+    """Who wrote a message: topic, type as ROS 1 writes it, serialisation, node ("" if not known).
 
-    Parameters
-    ----------
-    topic : str
-        Name of the topic.
-    type : str
-        Type of the messages as ROS 1 writes it, ``sensor_msgs/LaserScan``.
-    encoding : str
-        ``ros1``, ``cdr``, or another one that cannot be read here.
-    publisher : str
-        Name of the node; empty where the bag does not say.
+    The serialisation is ``ros1``, ``cdr``, or another one that cannot be read here.
     """
 
     topic: str
@@ -51,13 +42,7 @@ class Connection(NamedTuple):
 
 
 class Bag(ABC):
-    """One file of messages.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; its ``str`` is what errors call it.
-    """
+    """One file of messages; its ``str`` is what errors call it."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path
@@ -76,122 +61,16 @@ class Bag(ABC):
         """Count the messages of each connection; LogError if the bag is broken at its start."""
 
 
-class Connections(ABC):
-    """The connections of a bag met so far.
+class RecordReader(ABC):
+    """Reads a file of records once: those on `topics`, or all if None.
 
-    Parameters
-    ----------
-    topics : collection of str, optional
-        The topics that are wanted; all if None.
+    Each piece is checked against what is left of the file before it is taken. `at` is the place
+    that it has reached [bytes].
     """
 
-    def __init__(self, topics: Collection[str] | None) -> None:
-        self._topics = topics
-        self._by_number: dict[int, Connection | None] = {}
-
-    @abstractmethod
-    def read(self, head: Any, data: Buffer) -> tuple[Connection, Buffer] | None:
-        """Take one record: note a connection, return a message of a wanted topic."""
-
-    def wanted(self, connection: Connection) -> Connection | None:
-        """Return a connection if its topic is wanted."""
-        is_wanted = self._topics is None or connection.topic in self._topics
-        return connection if is_wanted else None
-
-    def note(self, number: int, connection: Connection) -> None:
-        """Remember a connection by its number."""
-        self._by_number[number] = self.wanted(connection)
-
-    def sender(self, number: int) -> Connection | None:
-        """Return the connection of a number if it is wanted; ValueError if it is not known."""
-        if number not in self._by_number:
-            raise ValueError(f"message of connection {number}, which is not described before it")
-        return self._by_number[number]
-
-    def counted(self, counts: Iterable[tuple[int, int]]) -> Counter[Connection]:
-        """Add up counts of messages, by the numbers of their connections."""
-        total: Counter[Connection] = Counter()
-        for number, count in counts:
-            connection = self.sender(number)
-            if connection is not None:
-                total[connection] += count
-        return total
-
-
-class RecordBag(Bag):
-    """A bag that is a chain of records, some of them chunks of records.
-
-    It is read from the start, record by record; its index is used for counts alone. So a bag
-    without an index, or with a wrong one, is read like any other.
-    """
-
-    #: What keeps the connections.
-    connections: type[Connections]
-
-    @abstractmethod
-    def _records(self, source: "Source") -> Iterator[tuple[int, Any, Buffer]]:
-        """Read all records: their places, heads and data."""
-
-    @abstractmethod
-    def _unpacked(self, head: Any, data: Buffer) -> Iterator[tuple[Any, Buffer]]:
-        """Read the records in a chunk; of another record itself."""
-
-    @abstractmethod
-    def _indexed_counts(self, source: "Source") -> Counter[Connection] | None:
-        """Count by the index alone; None, or any error of data, if it makes no sense."""
-
-    def messages(
-        self, topics: Collection[str] | None, fault: Fault
-    ) -> Iterator[tuple[Connection, Buffer]]:
-        """Read the messages in the order of the file; see `Bag`."""
-        connections = self.connections(topics)
-        with Source(self.path) as source:
-            try:
-                for at, head, data in self._records(source):
-                    try:
-                        for record in self._unpacked(head, data):
-                            message = connections.read(*record)
-                            if message is not None:
-                                yield message
-                    except (ValueError, struct.error) as error:
-                        # The length of the record still leads to the next one.
-                        fault(LogError(self.path, f"byte {at}: {error}"))
-            except LogError as error:
-                fault(error)
-
-    def counts(self) -> Counter[Connection]:
-        """Count the messages of each connection: by the index where there is one; see `Bag`."""
-        with Source(self.path) as source, suppress(LogError, ValueError, struct.error):
-            counts = self._indexed_counts(source)
-            if counts:
-                return counts
-        # Faults are reported when the messages are read: here they only end the count.
-        faults: list[LogError] = []
-        counted = Counter(
-            connection
-            for connection, _ in self.messages(None, lambda error: faults.append(error.fresh()))
-        )
-        if faults and not counted:
-            raise faults[0].fresh()
-        return counted
-
-
-class Source:
-    """A file that is read piece by piece, each checked against what is left before it is taken.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; its ``str`` is what errors call it.
-
-    Attributes
-    ----------
-    at : int
-        Where it stands [bytes].
-    """
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path, self.at = path, 0
+    def __init__(self, path: str | os.PathLike[str], topics: Collection[str] | None = None) -> None:
+        self.path, self.at, self._topics = path, 0, topics
+        self._connections: dict[int, Connection | None] = {}
         with reading(path):
             self._file = Path(path).open("rb")  # noqa: SIM115 (closed by __exit__)
             self._size = os.fstat(self._file.fileno()).st_size
@@ -201,6 +80,46 @@ class Source:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+    @abstractmethod
+    def records(self) -> Iterator[tuple[int, Any, Buffer]]:
+        """Read all records from the start: their places, heads and data."""
+
+    @abstractmethod
+    def unpacked(self, head: Any, data: Buffer) -> Iterator[tuple[Any, Buffer]]:
+        """Read the records in a chunk; of another record itself."""
+
+    @abstractmethod
+    def message(self, head: Any, data: Buffer) -> tuple[Connection, Buffer] | None:
+        """Take one record: note a connection, return a message that is wanted."""
+
+    @abstractmethod
+    def indexed_counts(self) -> Counter[Connection]:
+        """Count by the index alone; empty, or an error, where it is missing or makes no sense."""
+
+    def wanted(self, connection: Connection) -> Connection | None:
+        """Return a connection if its topic is wanted."""
+        is_wanted = self._topics is None or connection.topic in self._topics
+        return connection if is_wanted else None
+
+    def note(self, number: int, connection: Connection) -> None:
+        """Remember a connection by its number."""
+        self._connections[number] = self.wanted(connection)
+
+    def sender(self, number: int) -> Connection | None:
+        """Return the connection of a number if it is wanted; ValueError if it is not known."""
+        if number not in self._connections:
+            raise ValueError(f"message of connection {number}, which is not described before it")
+        return self._connections[number]
+
+    def counted(self, counts: Iterable[tuple[int, int]]) -> Counter[Connection]:
+        """Add up counts of messages, by the numbers of their connections."""
+        total: Counter[Connection] = Counter()
+        for number, count in counts:
+            connection = self.sender(number)
+            if connection is not None:
+                total[connection] += count
+        return total
 
     @property
     def left(self) -> int:
@@ -241,23 +160,58 @@ class Source:
             raise self.wrong(f"is cut off: {what} has {n} bytes, {self.left} are left")
 
 
-def decompress(codec: str, data: Buffer, size: int) -> Buffer:
-    """Decompress a chunk that says how large it becomes, and never more than that.
+class RecordBag(Bag):
+    """A bag that is a chain of records, some of them chunks of records.
 
-    Parameters
-    ----------
-    codec : str
-        ``none`` or empty, ``bz2``, ``lz4`` or ``zstd``.
-    data : bytes-like
-        The compressed chunk.
-    size : int
-        Its size once decompressed [bytes].
+    It is read from the start, record by record; its index is used for counts alone. So a bag
+    without an index, or with a wrong one, is read like any other.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], reader: type[RecordReader]) -> None:
+        super().__init__(path)
+        self._reader = reader
+
+    def messages(
+        self, topics: Collection[str] | None, fault: Fault
+    ) -> Iterator[tuple[Connection, Buffer]]:
+        """Read the messages in the order of the file; see `Bag`."""
+        with self._reader(self.path, topics) as reader:
+            try:
+                for at, head, data in reader.records():
+                    try:
+                        for record in reader.unpacked(head, data):
+                            message = reader.message(*record)
+                            if message is not None:
+                                yield message
+                    except (ValueError, struct.error) as error:
+                        # The length of the record still leads to the next one.
+                        fault(LogError(self.path, f"byte {at}: {error}"))
+            except LogError as error:
+                fault(error)
+
+    def counts(self) -> Counter[Connection]:
+        """Count the messages of each connection: by the index where there is one; see `Bag`."""
+        with self._reader(self.path) as reader, suppress(LogError, ValueError, struct.error):
+            counts = reader.indexed_counts()
+            if counts:
+                return counts
+        # Faults are reported when the messages are read: here they only end the count.
+        faults: list[LogError] = []
+        messages = self.messages(None, lambda error: faults.append(error.fresh()))
+        counted = Counter(connection for connection, _ in messages)
+        if faults and not counted:
+            raise faults[0].fresh()
+        return counted
+
+
+def decompress(codec: str, data: Buffer, size: int) -> Buffer:
+    """Decompress a chunk that says how large it becomes [bytes], and never more than that.
 
     Raises
     ------
     ValueError
-        If the codec is not known, the data is broken, or its size is another one or more than
-        `MAX_PIECE`.
+        If the codec is not none, bz2, lz4 or zstd, the data is broken, or its size is another one
+        or more than `MAX_PIECE`.
 
     Examples
     --------

@@ -8,7 +8,7 @@ from ..errors import LogError
 from ..rosmsg.wire import Buffer
 from .base import Head
 from .ros import RosLog
-from .ros_bag import Bag, Connection, Connections, RecordBag, Source, decompress
+from .ros_bag import Bag, Connection, RecordBag, RecordReader, decompress
 
 _MAGICS = (b"#ROSBAG V2.0\n", b"#ROSRECORD V1.2\n", b"#ROSRECORD V1.1\n")
 _WORD = struct.Struct("<I")
@@ -33,7 +33,7 @@ class Rosbag1Log(RosLog):
     endings = (".bag", ".bag.active", ".bag.orig.active")
 
     def _open_bags(self) -> list[Bag]:
-        return [Rosbag1(self.source)]
+        return [RecordBag(self.source, _Reader)]
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
@@ -41,10 +41,36 @@ class Rosbag1Log(RosLog):
         return head.data.startswith((b"#ROSBAG V", b"#ROSRECORD V"))
 
 
-class _Connections(Connections):
-    """Connections of a bag; version 1 has none."""
+class _Reader(RecordReader):
+    """Reads a bag; version 1 has neither chunks nor connections."""
 
-    def read(self, head: _Header, data: Buffer) -> tuple[Connection, Buffer] | None:
+    def records(self) -> Iterator[tuple[int, _Header, Buffer]]:
+        # Only the index of version 2 is made of its own records.
+        has_index = self._magic() != _MAGICS[0]
+        while self.left:
+            at = self.at
+            header, data = self._record()
+            has_index = has_index or _code(header) in (_CONNECTION, _CHUNK_INFO)
+            yield at, header, data
+        if not has_index:
+            raise self.wrong("ends without an index: it is cut off, or still recorded")
+
+    def unpacked(self, head: _Header, data: Buffer) -> Iterator[tuple[_Header, Buffer]]:
+        if _code(head) != _CHUNK:
+            yield head, data
+            return
+        size = _word(head, b"size")
+        plain = memoryview(decompress(_text(head, b"compression"), data, size))
+        at = 0
+        while at < size:
+            fields, at = _piece(plain, at)
+            message, at = _piece(plain, at)
+            inner = _fields(fields)
+            if _code(inner) not in (_MESSAGE, _CONNECTION):
+                raise ValueError(f"chunk has a record of code {_code(inner)} in it")
+            yield inner, message
+
+    def message(self, head: _Header, data: Buffer) -> tuple[Connection, Buffer] | None:
         code = _code(head)
         if code == _MESSAGE:
             if b"conn" in head:
@@ -60,86 +86,50 @@ class _Connections(Connections):
             self.note(_word(head, b"conn"), connection)
         return None
 
-
-class Rosbag1(RecordBag):
-    """One ROS 1 bag."""
-
-    connections = _Connections
-
-    def _records(self, source: Source) -> Iterator[tuple[int, _Header, Buffer]]:
-        # Only the index of version 2 is made of its own records.
-        has_index = _read_magic(source) != _MAGICS[0]
-        while source.left:
-            at = source.at
-            header, data = _record(source)
-            has_index = has_index or _code(header) in (_CONNECTION, _CHUNK_INFO)
-            yield at, header, data
-        if not has_index:
-            raise source.wrong("ends without an index: it is cut off, or still recorded")
-
-    def _unpacked(self, head: _Header, data: Buffer) -> Iterator[tuple[_Header, Buffer]]:
-        if _code(head) != _CHUNK:
-            yield head, data
-            return
-        size = _word(head, b"size")
-        plain = memoryview(decompress(_text(head, b"compression"), data, size))
-        at = 0
-        while at < size:
-            fields, at = _piece(plain, at)
-            message, at = _piece(plain, at)
-            inner = _fields(fields)
-            if _code(inner) not in (_MESSAGE, _CONNECTION):
-                raise ValueError(f"chunk has a record of code {_code(inner)} in it")
-            yield inner, message
-
-    def _indexed_counts(self, source: Source) -> Counter[Connection] | None:
-        connections = _Connections(None)
+    def indexed_counts(self) -> Counter[Connection]:
         counts: Counter[Connection] = Counter()
-        version = _read_magic(source)
-        header, _ = _record(source)
-        (start,) = struct.unpack("<Q", _field(header, b"index_pos"))
+        version = self._magic()
+        (start,) = struct.unpack("<Q", _field(self._record()[0], b"index_pos"))
         if version != _MAGICS[0] or not start:
-            return None
-        source.go(start)
-        while source.left:
-            header, data = _record(source)
+            return counts
+        self.go(start)
+        while self.left:
+            header, data = self._record()
             if _code(header) == _CONNECTION:
-                connections.read(header, data)
+                self.message(header, data)
             elif _code(header) == _CHUNK_INFO:
-                counts += connections.counted(struct.iter_unpack("<II", data))
+                counts += self.counted(struct.iter_unpack("<II", data))
         return counts
 
+    def _magic(self) -> bytes:
+        """Read the first line, which says the version."""
+        line = self.take(min(self.left, len(_MAGICS[0])), "first line")
+        if not line.endswith(b"\n"):
+            line += self.take(min(self.left, len(_MAGICS[1]) - len(line)), "first line")
+        if line not in _MAGICS:
+            known = ", ".join(magic.decode().strip() for magic in _MAGICS)
+            raise LogError(self.path, f"begins with {line!r:.40}, expected a bag: {known}")
+        return line
 
-def _read_magic(source: Source) -> bytes:
-    """Read the first line, which says the version."""
-    line = source.take(min(source.left, len(_MAGICS[0])), "first line")
-    if not line.endswith(b"\n"):
-        line += source.take(min(source.left, len(_MAGICS[1]) - len(line)), "first line")
-    if line not in _MAGICS:
-        known = ", ".join(magic.decode().strip() for magic in _MAGICS)
-        raise LogError(source.path, f"begins with {line!r:.40}, expected a bag: {known}")
-    return line
-
-
-def _record(source: Source) -> tuple[_Header, bytes]:
-    """Read one record; without its data where that is of no interest."""
-    (size,) = _WORD.unpack(source.take(4, "length of a header"))
-    try:
-        header = _fields(source.take(size, "header of a record"))
-        code = _code(header)
-    except ValueError as error:
-        raise source.wrong(str(error)) from None
-    (size,) = _WORD.unpack(source.take(4, "length of a record"))
-    what = "chunk" if code == _CHUNK else f"record of code {code}"
-    if code in _READ:
-        return header, source.take(size, what)
-    if code == _INDEX and header.get(b"ver") == _WORD.pack(1):
-        # Early recorders wrote the length that the index of version 0 would have.
-        count = header.get(b"count", b"")
-        if len(count) == _WORD.size:
-            size = 12 * _WORD.unpack(count)[0]
-    source.skip(size, what)
-    return header, b""
+    def _record(self) -> tuple[_Header, bytes]:
+        """Read one record; without its data where that is of no interest."""
+        (size,) = _WORD.unpack(self.take(4, "length of a header"))
+        try:
+            header = _fields(self.take(size, "header of a record"))
+            code = _code(header)
+        except ValueError as error:
+            raise self.wrong(str(error)) from None
+        (size,) = _WORD.unpack(self.take(4, "length of a record"))
+        what = "chunk" if code == _CHUNK else f"record of code {code}"
+        if code in _READ:
+            return header, self.take(size, what)
+        if code == _INDEX and header.get(b"ver") == _WORD.pack(1):
+            # Early recorders wrote the length that the index of version 0 would have.
+            count = header.get(b"count", b"")
+            if len(count) == _WORD.size:
+                size = 12 * _WORD.unpack(count)[0]
+        self.skip(size, what)
+        return header, b""
 
 
 def _fields(data: Buffer) -> _Header:
@@ -170,8 +160,7 @@ def _code(header: _Header) -> int:
 
 
 def _word(header: _Header, name: bytes) -> int:
-    (word,) = _WORD.unpack(_field(header, name, 4))
-    return int(word)
+    return int.from_bytes(_field(header, name, 4), "little")
 
 
 def _text(header: _Header, name: bytes) -> str:

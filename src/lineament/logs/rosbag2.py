@@ -17,9 +17,9 @@ from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Head
 from .lines import reading
-from .mcap import McapBag
+from .mcap import McapReader
 from .ros import RosLog
-from .ros_bag import MAX_PIECE, Bag, Connection, Fault, decompress
+from .ros_bag import MAX_PIECE, Bag, Connection, Fault, RecordBag, decompress
 
 _MAGIC = b"SQLite format 3\0"
 _METADATA = "metadata.yaml"
@@ -119,7 +119,7 @@ def _holds_one_bag(folder: Path) -> bool:
 def _bag(part: Path) -> Bag:
     if part.suffix == ".zstd":
         raise LogError(part, "is compressed as a whole: decompress it first (zstd -d)")
-    return McapBag(part) if part.suffix == ".mcap" else Sqlite3Bag(part)
+    return RecordBag(part, McapReader) if part.suffix == ".mcap" else Sqlite3Bag(part)
 
 
 class Sqlite3Bag(Bag):
@@ -173,13 +173,8 @@ class Sqlite3Bag(Bag):
                 for name, column in database.execute(_COMPUTED):
                     problem = f"column {column} of its table {name} is computed"
                     raise LogError(self.path, f"is no ROS 2 bag: {problem}")
-                yield (
-                    database,
-                    {
-                        number: Connection.named(str(topic), str(kind), str(encoding))
-                        for number, topic, kind, encoding in database.execute(_TOPICS)
-                    },
-                )
+                topics = database.execute(_TOPICS)
+                yield database, {n: Connection.named(*map(str, names)) for n, *names in topics}
         except _BROKEN as error:
             problem = f"cannot be read as a ROS 2 bag (sqlite3): {error}"
             raise LogError(self.path, problem) from None
