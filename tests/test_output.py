@@ -242,13 +242,6 @@ def test_topic_must_be_one_of_those_of_the_log(target):
     assert not target.exists()
 
 
-def test_package_that_is_missing_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    monkeypatch.delitem(sys.modules, "lineament.output.rrd", raising=False)
-    with pytest.raises(LineamentError, match=r"a\.rrd: files .* need the package rerun"):
-        open_writer(tmp_path / "a.rrd")
-
-
 def test_targets_that_cannot_be(target):
     with pytest.raises(LineamentError, match="does not exist") as caught:
         write(target.parent / "nowhere" / target.name, [])

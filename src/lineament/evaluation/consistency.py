@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
 from .counts import Summable, quantile, ratio
 
@@ -148,6 +149,7 @@ def tolerance(variance: Array) -> Array:
 
 def _chi_square(probability: float, degrees: int) -> float:
     """Quantile of the chi-square distribution, that of a gamma distribution of half as many."""
-    from scipy.special import gammaincinv
+    with needed_by("evaluation"):
+        from scipy.special import gammaincinv
 
     return 2.0 * float(gammaincinv(degrees / 2, probability))

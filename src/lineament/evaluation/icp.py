@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from ..errors import needed_by
 from ..scan import Array, LaserScan, Pose
 
 __all__ = ["icp"]
@@ -50,7 +51,8 @@ def icp(before: LaserScan, now: LaserScan, start: Pose = (0.0, 0.0, 0.0)) -> Pos
     >>> [abs(round(value, 2)) for value in icp(*scans)]
     [0.1, 0.0, 0.05]
     """
-    from scipy.spatial import cKDTree
+    with needed_by("evaluation"):
+        from scipy.spatial import cKDTree
 
     anchors, normals = _lines(before)
     points = now.points[now.valid]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
 
 __all__ = ["match"]
@@ -52,7 +53,8 @@ def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     most = excess[within].max()
     if not np.isfinite(most):
         raise ValueError(f"cost of an allowed pair is {most} above the least, expected finite")
-    from scipy.optimize import linear_sum_assignment
+    with needed_by("evaluation"):
+        from scipy.optimize import linear_sum_assignment
 
     # All pairs that there can be cost less than a single one that is not allowed.
     barred = min(within.shape) * most + 1.0

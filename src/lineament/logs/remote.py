@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
 
-from ..errors import LogError
+from ..errors import LogError, needs
 from .copies import LocalCopy, pieces
 
 __all__ = ["fetched", "is_address", "listed"]
@@ -68,7 +68,7 @@ def _fsspec(address: str) -> Iterator[ModuleType]:
         raise
     except ImportError as error:
         if error.name == "fsspec":
-            raise LogError(address, "needs fsspec: pip install lineament[remote]") from None
+            raise LogError(address, needs("fsspec")) from None
         raise LogError(address, f"needs a driver of fsspec: {error}") from None
     except FileNotFoundError:
         raise LogError(address, "there is no such file, expected a log") from None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from ..errors import LineamentError
+from ..errors import LineamentError, needed_by
 from ..files import written_beside
 from .writer import Writer
 
@@ -74,11 +74,6 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
 
 def _make(path: str | os.PathLike[str], topics: Sequence[str], ending: str) -> Writer:
     module, name = _WRITERS[ending]
-    try:
+    with needed_by(f"{path}:"):
         writer: Writer = getattr(import_module(f".{module}", __name__), name)(path, topics)
-    except ModuleNotFoundError as error:
-        raise LineamentError(
-            f"{path}: files that end in {ending} need the package {error.name}, "
-            "which is not installed"
-        ) from None
     return writer

@@ -5,17 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import LineamentError
+from ...errors import needed_by
 from ...scan import Array, LaserScan
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 __all__ = ["MapScore", "cast_map", "score_map"]
 
@@ -150,7 +145,8 @@ def _share(flags: NDArray[np.bool_]) -> float:
 
 def _areas(polylines: Sequence[Array], outline: Array) -> tuple[float, float]:
     """Area error and intersection over union of a map and the true outline."""
-    shapely = _shapely()
+    with needed_by("areas"):
+        import shapely
     true = shapely.make_valid(shapely.Polygon(outline))
     vertices = np.concatenate([np.empty((0, 2)), *polylines])
     if len(vertices) < 3:
@@ -159,12 +155,3 @@ def _areas(polylines: Sequence[Array], outline: Array) -> tuple[float, float]:
     found = shapely.make_valid(shapely.Polygon(vertices[np.argsort(bearings, kind="stable")]))
     union, common = true.union(found).area, true.intersection(found).area
     return (union - common) / true.area, common / union
-
-
-def _shapely() -> ModuleType:
-    try:
-        return import_module("shapely")
-    except ImportError:
-        raise LineamentError(
-            "areas need shapely, which is not installed: pip install 'lineament[bench]'"
-        ) from None
