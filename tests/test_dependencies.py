@@ -69,7 +69,8 @@ assert run(["info", log, "-q"]) == 0
 assert run(["plot", log, "-o", "a.png"]) == 0
 assert run(["plot", log, "-o", "b.png", "--trace", "-m", "liu"]) == 0
 assert run(["demo", log, "-o", "demo", "-q"]) == 0
-import lineament.view, lineament.live
+assert run(["live", "--from", log, "--ros", "0", "--rate", "0", "-q"]) == 0
+import lineament.view
 assert run(["extract", log, "-o", "a.dxf", "-q"]) == 1
 assert run(["reproduce", "-o", "report", "-q"]) == 1
 """

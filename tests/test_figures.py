@@ -19,7 +19,7 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
 from lineament.methods.trace import CANDIDATE, Trace
-from lineament.output import canvas, figures, labels
+from lineament.output import canvas, drawing, figures
 
 CORNER_RGB = np.array([0xD1, 0x24, 0x2F]) / 255
 
@@ -154,7 +154,7 @@ def test_many_corners_have_no_labels(tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr(canvas, "save", lambda figure, _: written.append(figure))
     scan, features = room()
-    features.corners = np.repeat(features.corners, labels.MAX_LABELS + 1)
+    features.corners = np.repeat(features.corners, drawing.MAX_LABELS + 1)
     figures.plot_scan(scan, {"a": features}, tmp_path / "a.png")
     assert len(written[0].axes[0].texts) == 1
 
