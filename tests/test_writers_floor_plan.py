@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lineament import LaserScan
-from lineament.output.averages import Averages
-from lineament.output.floor_plan import FloorPlan
+from lineament.output.floor_plan import Averages, FloorPlan
 from lineament.output.markers import Markers, ellipses_of, markers_of
 
 SURE = (0.002, 0.002)
@@ -138,8 +137,7 @@ def _distance(points, a, b):
 
 
 def test_walls_are_bounded_in_number(monkeypatch):
-    monkeypatch.setattr("lineament.output.floor_plan.MOST_WALLS", 40)
-    monkeypatch.setattr("lineament.output.averages.MOST", 40)
+    monkeypatch.setattr("lineament.output.floor_plan.MOST", 40)
     plan = FloorPlan()
     kept = [line((0, 0), (5, 0))]
     for y in range(1, 300):
