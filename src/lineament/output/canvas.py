@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import LineamentError
-from ..files import naming_errors, written_beside
+from ..files import ending_of, naming_errors, written_beside
 from ..scan import Array
 
 if TYPE_CHECKING:
@@ -45,11 +43,7 @@ DPI = 150
 
 def check_ending(path: str | os.PathLike[str]) -> str:
     """Return the ending of a picture file; a LineamentError if it is not known."""
-    ending = Path(path).suffix.lower()
-    if ending not in _METADATA:
-        problem = f"the ending {ending!r} is not known" if ending else "the name has no ending"
-        raise LineamentError(f"{path}: {problem}, expected one of {', '.join(PICTURE_ENDINGS)}")
-    return ending
+    return ending_of(path, PICTURE_ENDINGS)
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -161,11 +155,6 @@ def add_legend(figure: Figure) -> None:
         fontsize=9,
         frameon=False,
     )
-
-
-def colors_of(labels: NDArray[np.int32]) -> NDArray[np.str_]:
-    """Return the colour of each beam by its cluster."""
-    return PALETTE[np.asarray(labels) % len(PALETTE)]
 
 
 def count(number: int, one: str) -> str:

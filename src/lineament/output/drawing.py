@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import Array, LaserScan
-from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, colors_of, style
+from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, PALETTE, style
 from .markers import arc_span, ellipses_of
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def draw_beams(axes: Axes, scan: LaserScan, clusters: NDArray[np.int32]) -> Arra
     known, noise = scan.valid & (clusters >= 0), scan.valid & (clusters < 0)
     rim = _draw_rim(axes, scan)
     x, y = scan.points[known].T
-    axes.scatter(x, y, s=13, c=colors_of(clusters[known]), linewidths=0, zorder=3)
+    axes.scatter(x, y, s=13, c=PALETTE[clusters[known] % len(PALETTE)], linewidths=0, zorder=3)
     _draw_points(axes, scan.points[noise], "noise", marker="x", ms=3.8, c="#868e96", mew=0.8)
     draw_sensor(axes)
     return np.vstack([scan.points[scan.valid], rim, np.zeros((1, 2))])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,21 +31,12 @@ _PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch
 def plot_scan(
     scan: LaserScan, features_by_method: Mapping[str, Features], path: str | os.PathLike[str]
 ) -> None:
-    """Draw what some methods found in one scan into a file: see `scan_figure`.
-
-    Parameters
-    ----------
-    scan, features_by_method
-        As of `scan_figure`.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+    """Write the picture that `scan_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file.
 
     Raises
     ------
     LineamentError
         If the ending is not known or the file cannot be written.
-    ValueError
-        As `scan_figure`.
     """
     canvas.check_ending(path)
     canvas.save(scan_figure(scan, features_by_method), path)
@@ -97,7 +89,7 @@ def scan_figure(
         axes.remove()
     for k, (method, features) in enumerate(features_by_method.items()):
         shown = drawing.draw_beams(panels[k], scan, features.clusters)
-        canvas.style_plane(panels[k], method, _counts(features), shown)
+        canvas.style_plane(panels[k], method, _about(features), shown)
         drawing.draw_features(panels[k], features, scan, _extent(panels[k]))
         if errors_by_method is not None:
             drawing.draw_errors(strips[k], scan, errors_by_method[method])
@@ -115,22 +107,15 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
 
     Of a method that examines no candidates, the corners and edges that it found are drawn.
 
-    Parameters
-    ----------
-    trace : Trace
-        Every intermediate of the run.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
-
     Raises
     ------
     LineamentError
-        If the ending is not known or the file cannot be written.
+        If the ending of the path is not ``.png``, ``.svg`` or ``.pdf``, or it cannot be written.
     ValueError
         If the clusters do not have the scan's number of beams.
     """
     canvas.check_ending(path)
-    scan, candidates = trace.scan, trace.candidates
+    scan = trace.scan
     _check_beams(scan, trace.clusters, trace.method)
     height = _height(scan, 6.2)
     figure = canvas.new_figure(13, 4.0 + height + 1.0)
@@ -152,7 +137,7 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
             )
     canvas.settle(figure)
     points = scan.points[scan.valid]
-    drawing.label_points(panels[1, 1], positions, candidates["response"], points)
+    drawing.label_points(panels[1, 1], positions, trace.candidates["response"], points)
     canvas.save(figure, path)
 
 
@@ -215,7 +200,7 @@ def _draw_candidates(axes: Axes, trace: Trace, shown: Array) -> Array:
         f"{count(len(candidates), 'candidate')} · {int(accepted.sum())} accepted · "
         f"threshold {trace.threshold:.4g} · {count(len(trace.features.segments), 'segment')}"
         if len(candidates)
-        else _counts(trace.features)
+        else _about(trace.features)
     )
     canvas.style_plane(axes, "d  Corners", about, shown)
     if not len(candidates):  # a method that examines none
@@ -255,37 +240,32 @@ def plot_map(
     LineamentError
         If the ending is not known or the file cannot be written.
     """
-    from matplotlib.collections import EllipseCollection, LineCollection
+    from matplotlib.collections import LineCollection
 
     canvas.check_ending(path)
     way, found = _in_the_world(posed)
     shown = np.vstack([found.segments.reshape(-1, 2), found.corners, found.edges, way])
     figure = canvas.new_figure(9, canvas.plane_height(shown, 9) + 1.3)
     axes = figure.subplots()
-    numbers = {"scan": way, "segment": found.segments, "corner": found.corners}
-    numbers |= {"edge": found.edges} if len(found.edges) else {}
-    numbers["arc"] = found.arcs
-    about = " · ".join(count(len(rows), name) for name, rows in numbers.items())
-    canvas.style_plane(axes, title, about, shown)
+    numbers = {"scans": len(way)} | {
+        name: len(getattr(found, name)) for name in ("segments", "corners", "edges", "arcs")
+    }
+    canvas.style_plane(axes, title, _counts(numbers), shown)
     # Walls that were seen often come out dark, what was seen once stays faint; not so the legend.
     alpha = float(np.clip(60 / max(len(way), 1), 0.08, 0.9))
-    lines = LineCollection(list(found.segments), colors=INK, linewidths=0.9, alpha=alpha)
-    axes.add_collection(lines)
-    axes.plot([], [], color=INK, linewidth=1.2, label="segments")
+    for name, strips, color, width in (
+        ("segments", list(found.segments), INK, 0.9),
+        ("arcs", found.arc_strips(), ARC_COLOR, 0.7),
+    ):
+        if len(strips) or name == "segments":
+            lines = LineCollection(strips, colors=color, linewidths=width, alpha=alpha)
+            axes.add_collection(lines)
+            axes.plot([], [], color=color, linewidth=1.2, label=name)
     for name, color in (("edges", EDGE_COLOR), ("corners", CORNER_COLOR)):
         points = getattr(found, name)
         axes.plot(*points.T, "o", color=color, ms=2.2, mew=0, alpha=max(alpha, 0.2), zorder=3)
         if len(points) or name == "corners":
             axes.plot([], [], "o", color=color, markersize=4, label=name)
-    if len(found.arcs):
-        size = 2 * found.arcs[:, 2]
-        circles = EllipseCollection(
-            size, size, 0 * size, units="xy", offsets=found.arcs[:, :2],
-            offset_transform=axes.transData, facecolors="none", edgecolors=ARC_COLOR,
-            linewidths=0.7, alpha=alpha,
-        )  # fmt: skip
-        axes.add_collection(circles)
-        axes.plot([], [], color=ARC_COLOR, linewidth=1.2, label="arcs")
     axes.plot(*way.T, color=WAY_COLOR, linewidth=1.3, label="path of the sensor", zorder=4)
     if len(way):
         axes.plot(*way[0], "o", color=WAY_COLOR, ms=6, mec="white", label="start", zorder=5)
@@ -293,7 +273,7 @@ def plot_map(
     canvas.save(figure, path)
 
 
-_NOTHING = Markers(np.zeros((0, 2, 2)), *(np.zeros((0, k)) for k in (2, 2, 5, 5)))
+_NOTHING = tuple(np.zeros((0, *shape)) for shape in ((2, 2), (2,), (2,), (5,), (5,)))
 
 
 def _in_the_world(posed: Iterable[tuple[Pose, Features]]) -> tuple[Array, Markers]:
@@ -302,12 +282,8 @@ def _in_the_world(posed: Iterable[tuple[Pose, Features]]) -> tuple[Array, Marker
     for pose, features in posed:
         way.append(pose[:2])
         with np.errstate(invalid="ignore"):  # what is not finite is not drawn
-            found.append(markers_of(features.transform(*pose)))
-    joined = {
-        name: np.concatenate([getattr(markers, name) for markers in found])
-        for name in Markers.__dataclass_fields__
-    }
-    return np.reshape(way, (-1, 2)), Markers(**joined)
+            found.append(astuple(markers_of(features.transform(*pose))))
+    return np.reshape(way, (-1, 2)), Markers(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def _check_beams(scan: LaserScan, clusters: NDArray[np.int32], method: str) -> None:
@@ -328,9 +304,11 @@ def _n_clusters(clusters: NDArray[np.int32]) -> int:
     return len(np.unique(clusters[clusters >= 0]))
 
 
-def _counts(features: Features) -> str:
-    """Write how many features of each kind there are."""
-    counts = features.counts() | {"clusters": _n_clusters(features.clusters)}
-    if not counts["edges"]:
-        del counts["edges"]
-    return " · ".join(count(number, name[:-1]) for name, number in counts.items())
+def _about(features: Features) -> str:
+    return _counts(features.counts() | {"clusters": _n_clusters(features.clusters)})
+
+
+def _counts(counts: dict[str, int]) -> str:
+    """Write how many things of each kind there are; edges only if there are some."""
+    kept = {name: number for name, number in counts.items() if number or name != "edges"}
+    return " · ".join(count(number, name[:-1]) for name, number in kept.items())
