@@ -75,12 +75,12 @@ def reproduce(
     """Make the paper's experiments again: a page and all figures as JSON."""
     from ..reproduce import Setting, experiment_names
     from ..reproduce.report import reproduce
-    from .progress import telling
+    from .progress import status
 
     with wrong_usage():
         chosen = experiment_names(names)
-    with telling(quiet) as tell:
-        page = reproduce(output, chosen, Setting(frames, seed, data), tell)
+    with status(quiet) as show:
+        page = reproduce(output, chosen, Setting(frames, seed, data), show)
     if not quiet:
         click.echo(str(page))
 
