@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import helper, inlined
 from ...features import records as to
-from ..writing import grade_corner, grade_edge, write_opening, write_place
+from ..writing import grade_corner, grade_edge, write_end, write_opening, write_place
 from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
@@ -144,8 +144,8 @@ def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
     ints[row, to.C_SEGMENTS + 1] = b - tables.offsets[scan, 0]
     grade_corner(corners, ints, row, kind, spans[at.COUNT, k], spans[at.COUNT, m])
     if kind == to.SHARP:
-        segments[a, to.S_END], segments[a, to.S_END + 1] = x, y
-        segments[b, to.S_START], segments[b, to.S_START + 1] = x, y
+        write_end(segments, a, to.S_END, x, y)
+        write_end(segments, b, to.S_START, x, y)
     spans[at.END, k] = spans[at.START, m] = 1
     tables.offsets[scan + 1, 1] += 1
 
@@ -187,13 +187,9 @@ def _add_edge(work, tables, scan, k, way):
     lengthwise += (noise[0] + noise[1] * rho[i] * rho[i]) * sine * sine
     if across + lengthwise > MOST_DEVIATION * MOST_DEVIATION:
         return
-    corners, ints, row = (
-        tables.corners,
-        tables.corners.view(np.int32),
-        tables.offsets[scan.row + 1, 1],
-    )
-    segment, end = spans[at.SEGMENT, k], to.S_END if way > 0 else to.S_START
-    tables.segments[segment, end], tables.segments[segment, end + 1] = px, py
+    corners, ints = tables.corners, tables.corners.view(np.int32)
+    segment, row = spans[at.SEGMENT, k], tables.offsets[scan.row + 1, 1]
+    write_end(tables.segments, segment, to.S_END if way > 0 else to.S_START, px, py)
     write_place(corners, row, px, py, lengthwise, ux, uy, across, -uy, ux)
     corners[row, to.C_OPENING], corners[row, to.C_RESPONSE] = 0.0, 0.0
     ints[row, to.C_CONVEX], ints[row, to.C_BEAM] = 1, beam[i]
