@@ -13,6 +13,7 @@ from .layout import (
     STACK_FIRST, STACK_LAST, U_AFTER, U_BEFORE, X, Y,
 )  # fmt: skip
 from ..features.records import C_POSITION, S_ANGLE, S_CENTROID, S_END, S_START
+from .writing import write_end
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
 #: its ray; or they are free to meet beside it, and its reading is on neither as long as it is open
@@ -215,8 +216,8 @@ def hold_together(floats, ints, counts, row, segments, corners, offsets):
         c, s = math.cos(angle), math.sin(angle)
         cx, cy = segments[segment, S_CENTROID], segments[segment, S_CENTROID + 1]
         along = c * (cx - x1) + s * (cy - y1)
-        segments[segment, S_START], segments[segment, S_START + 1] = x1, y1
-        segments[segment, S_END], segments[segment, S_END + 1] = x2, y2
+        write_end(segments, segment, S_START, x1, y1)
+        write_end(segments, segment, S_END, x2, y2)
         segments[segment, S_CENTROID] = x1 + along * c
         segments[segment, S_CENTROID + 1] = y1 + along * s
         segments[segment, S_ANGLE] = angle
