@@ -21,9 +21,7 @@ def scratch_shape(beams: int, half_width: int) -> tuple[int, int]:
 
 
 @kernel
-def filter_ranges(
-    floats, ints, range_min, range_max, sigma_d, sigma_r, half_width, circular, scratch
-):
+def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, circular, scratch):
     """Filter the ranges of a scan over index distance and range difference.
 
     ρ̃_i = ρ_i + Σ_j w (ρ_j - ρ_i) / Σ_j w, which is Σ_j w ρ_j / Σ_j w and keeps its digits: the
@@ -32,15 +30,15 @@ def filter_ranges(
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. RANGE is read, FILTERED written: NaN where not usable.
+    floats : float64 array
+        Of the workspace, see `layout`. RANGE is read, FILTERED written: NaN where not usable.
     range_min, range_max, sigma_d, sigma_r : float
     half_width : int
     circular : bool
         Whether the window goes over the seam; else it ends at the ends of the scan.
     scratch : float32 array, see `scratch_shape`
     """
-    n, h, beams = floats.shape[1] - at.EXTRA, half_width, at.named(floats, ints).beams
+    n, h, beams = floats.shape[1] - at.EXTRA, half_width, at.beams_of(floats)
     least, away = max(range_min, LEAST_RANGE), F(-1e4 * sigma_r)
     ranges, filtered = beams[at.RANGE], beams[at.FILTERED]
     _pad(ranges, n, least, min(range_max, FARTHEST), h, circular, away, scratch[0])

@@ -37,7 +37,7 @@ def limit_pieces(floats, ints, bearings, max_vertices, link, worst, costs, follo
     bearings : float64 array, shape (2, n)
         Cosines and sines.
     max_vertices : int
-        The budget; 0 sets none.
+        The budget, at least 1.
     link : float
         How far apart two pieces that no corner joins may be to become one [m], if no beam between
         them is missing.
@@ -49,7 +49,7 @@ def limit_pieces(floats, ints, bearings, max_vertices, link, worst, costs, follo
     """
     work = at.named(floats, ints)
     pieces = work.counts[at.PIECES]
-    if max_vertices == 0 or _count_vertices(work.pieces[at.BEFORE], pieces) <= max_vertices:
+    if _count_vertices(work.pieces[at.BEFORE], pieces) <= max_vertices:
         return
     kept, best = costs[0], costs[1]
     for v in range(max_vertices + 1):

@@ -30,7 +30,8 @@ def cut(floats, ints, radius, threshold, kind, min_points):
         No piece gets shorter.
     """
     work = at.named(floats, ints)
-    x, y, counts = work.points[at.X], work.points[at.Y], work.counts
+    points, counts = work.points, work.counts
+    x, y = points[at.X], points[at.Y]
     count, closed, found = counts[at.POINTS], counts[at.CLOSED] != 0, np.int64(0)
     if closed and counts[at.CLUSTERS] > 0:
         # The point at which a closed cluster was opened is examined first.
@@ -41,7 +42,7 @@ def cut(floats, ints, radius, threshold, kind, min_points):
         first, last = work.clusters[at.FIRST, c], work.clusters[at.LAST, c]
         depth = add_side(work.waiting, 0, first, last)
         while depth > 0:
-            depth, a, b, i, distance = next_candidate(work, depth, min_points)
+            depth, a, b, i, distance = next_candidate(points, work.waiting, depth, min_points)
             if i < 0:
                 continue
             response = corner_response(x, y, i, first, last, radius, kind, closed)
@@ -53,7 +54,7 @@ def cut(floats, ints, radius, threshold, kind, min_points):
 
 
 @helper
-def next_candidate(work, depth, min_points):
+def next_candidate(points, waiting, depth, min_points):
     """Take the last piece that waits: its farthest point from its chord is a candidate.
 
     Returns
@@ -61,8 +62,7 @@ def next_candidate(work, depth, min_points):
     depth, first, last, point, distance
         Pieces that still wait; the ends of this one; the candidate, or -1, and its distance.
     """
-    first, last = work.waiting[at.FIRST, depth - 1], work.waiting[at.LAST, depth - 1]
-    points = work.points
+    first, last = waiting[at.FIRST, depth - 1], waiting[at.LAST, depth - 1]
     point, distance = farthest_from_chord(
         points[at.X], points[at.Y], first, last, min_points - 1, points[at.SPARE]
     )

@@ -48,41 +48,68 @@ EXTRA = 5
 
 
 class Workspace(NamedTuple):
-    """Arrays of one scan. All have `EXTRA` columns more than beams, but `moments` has rows."""
+    """Arrays of one scan, with `EXTRA` columns more than beams."""
 
     beams: NDArray[np.float64]
     points: NDArray[np.float64]
-    moments: NDArray[np.float64]
     candidates: NDArray[np.float64]
     response: NDArray[np.float64]  # by piece: of the corner at its first point
-    rays: NDArray[np.float64]
     marks: NDArray[np.int64]
     clusters: NDArray[np.int64]
     pieces: NDArray[np.int64]
     waiting: NDArray[np.int64]  # by piece that is to be searched
-    vertices: NDArray[np.int64]
     counts: NDArray[np.int64]
-
-
-@register_jitable  # type: ignore[misc]  # without types
-def named(floats: NDArray[np.float64], ints: NDArray[np.int64]) -> Workspace:
-    """Name the parts of a workspace, which are views; see `workspace`."""
-    return Workspace(
-        floats[0:2],
-        floats[2:14],
-        floats[14:21].reshape(-1, MOMENTS),
-        floats[21:24],
-        floats[24],
-        floats[25:30],
-        ints[0:4],
-        ints[4:6],
-        ints[6:9],
-        ints[9:11],
-        ints[11:13],
-        ints[13],
-    )
 
 
 def workspace(beams: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Make the floats and the whole numbers of a workspace for scans of so many beams."""
     return np.zeros((30, beams + EXTRA)), np.zeros((14, beams + EXTRA), np.int64)
+
+
+_inlined = register_jitable
+
+
+@_inlined  # type: ignore[misc]  # without types
+def named(floats: NDArray[np.float64], ints: NDArray[np.int64]) -> Workspace:
+    """Name the parts of a workspace, which are views."""
+    return Workspace(
+        floats[0:2],
+        floats[2:14],
+        floats[14:17],
+        floats[17],
+        ints[0:4],
+        ints[4:6],
+        ints[6:9],
+        ints[9:11],
+        ints[11],
+    )
+
+
+@_inlined  # type: ignore[misc]
+def beams_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `beams` alone: a view costs 5 ns."""
+    return floats[0:2]
+
+
+@_inlined  # type: ignore[misc]
+def points_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `points` alone."""
+    return floats[2:14]
+
+
+@_inlined  # type: ignore[misc]
+def moments_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `moments`, a row for each point, of the methods that fit lines by running sums."""
+    return floats[18:25].reshape(-1, MOMENTS)
+
+
+@_inlined  # type: ignore[misc]
+def rays_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `rays`, of maps."""
+    return floats[25:30]
+
+
+@_inlined  # type: ignore[misc]
+def vertices_of(ints: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return `vertices`, of maps."""
+    return ints[12:14]

@@ -61,7 +61,7 @@ def extract_rows(
     tables : tuple
         See `measuring.measure`.
     """
-    p, line = Parameters(*parameters), at.named(floats, ints).beams[at.RANGE]
+    p, line = Parameters(*parameters), at.beams_of(floats)[at.RANGE]
     range_min, range_max, step, circular = sensor
     filter_scratch, costs, follow = scratch
     options = p.measure, p.fit, p.corner, p.corner_trim, 0.5 * p.support_radius, p.spacing_scale
@@ -69,9 +69,9 @@ def extract_rows(
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]
         noise = noises[row]
-        estimate_noise(floats, ints, range_min, range_max, given_noise, noise)
+        estimate_noise(floats, range_min, range_max, given_noise, noise)
         filter_ranges(
-            floats, ints, range_min, range_max, p.sigma_d, p.sigma_r, p.half_width, circular,
+            floats, range_min, range_max, p.sigma_d, p.sigma_r, p.half_width, circular,
             filter_scratch,
         )  # fmt: skip
         cluster(
@@ -79,5 +79,6 @@ def extract_rows(
             p.density_k, p.min_points,
         )  # fmt: skip
         cut(floats, ints, p.support_radius, p.threshold, p.response, p.min_points)
-        limit_pieces(floats, ints, bearings, p.max_vertices, LINK, WORST, costs, follow)
+        if p.max_vertices > 0:
+            limit_pieces(floats, ints, bearings, p.max_vertices, LINK, WORST, costs, follow)
         measure(floats, ints, row, bearings, circular, noise, options, tables)

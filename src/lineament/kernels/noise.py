@@ -19,13 +19,13 @@ _BITS_OF_INFINITY = 0x7FF0000000000000
 
 
 @kernel
-def estimate_noise(floats, ints, range_min, range_max, given, noise):
+def estimate_noise(floats, range_min, range_max, given, noise):
     """Write the noise of a scan: as `given`, or, where that is NaN, estimated.
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. RANGE is read.
+    floats : float64 array
+        Of the workspace, see `layout`. RANGE is read.
     range_min, range_max : float
     given : float64 array, shape (4,)
         (sigma, proportional, bearing, quantum).
@@ -35,8 +35,9 @@ def estimate_noise(floats, ints, range_min, range_max, given, noise):
     for part in range(4):
         noise[part] = given[part]
     if math.isnan(given[0]):
-        work, n = at.named(floats, ints), floats.shape[1] - at.EXTRA
-        sigma = range_sigma(work.beams[at.RANGE], n, range_min, range_max, work.points[at.SPARE])
+        ranges, scratch = at.beams_of(floats)[at.RANGE], at.points_of(floats)[at.SPARE]
+        n = floats.shape[1] - at.EXTRA
+        sigma = range_sigma(ranges, n, range_min, range_max, scratch)
         noise[0] = sigma
         for part in range(1, 4):
             noise[part] = 0.0 * sigma

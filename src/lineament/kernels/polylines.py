@@ -60,8 +60,9 @@ def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, cost
         for v in range(budget + 1):
             closed[i + 1, v] = min(closed[i, v] + worst * worst, least[i, v])
         _extend(work, bearings, i, budget, max_missing, link, worst, costs, follow)
-    count = _list_vertices(work.vertices, points, budget, worst * worst, costs, follow)
-    place_vertices(work, bearings, count)
+    vertices = at.vertices_of(ints)
+    count = _list_vertices(vertices, points, budget, worst * worst, costs, follow)
+    place_vertices(work, vertices, at.rays_of(floats), bearings, count)
 
 
 @helper

@@ -20,15 +20,15 @@ _ENOUGH = 3
 
 
 @helper
-def place_vertices(work, bearings, count):
+def place_vertices(work, vertices, rays, bearings, count):
     """Place the vertices listed (BEGIN or HELD); the lines between them become the pieces.
 
     X and Y of their points become those of the vertices.
     """
-    counts, vertices = work.counts, work.vertices
+    counts = work.counts
     ring = counts[at.CLOSED] != 0 and _closes(vertices, counts[at.POINTS], count)
-    _settle(work, bearings, count, ring)
-    _move_points(work, bearings, count, ring)
+    _settle(work, vertices, rays, bearings, count, ring)
+    _move_points(work, vertices, rays, bearings, count, ring)
     counts[at.PIECES] = _list_pieces(vertices, work.pieces, work.response, count, ring)
 
 
@@ -57,15 +57,15 @@ def _list_pieces(vertices, pieces, response, count, ring):
 
 
 @helper
-def _settle(work, bearings, count, ring):
+def _settle(work, vertices, rays, bearings, count, ring):
     """Find the lines: held together at first, then free where they meet beside a measurement.
 
     The two ends of a ring are one vertex, and free from the start.
     """
-    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
+    point, kind = vertices[at.AT], vertices[at.KIND]
     end = count if ring else count - 1
     for step in range(4):
-        _solve(work, bearings, count, step > 0)
+        _solve(work, vertices, rays, bearings, count, step > 0)
         for k in range(1, end if step < 3 else 1):
             m = _leaves(k, count)
             if kind[k] == BEGIN or kind[m + 1] == BEGIN:
@@ -73,7 +73,7 @@ def _settle(work, bearings, count, ring):
             if step == 0 and min(point[k] - point[k - 1], point[m + 1] - point[m]) > _ENOUGH:
                 kind[k] = _OPEN
             elif kind[k] != HELD:
-                tangent, _ = _meeting(work, bearings, k, m)
+                tangent, _ = _meeting(work.marks[at.BEAM], vertices, rays, bearings, k, m)
                 kind[k] = _BEFORE if tangent > 0.0 else HELD if math.isnan(tangent) else _AFTER
         if ring:
             kind[0] = kind[count - 1] if kind[count - 1] > HELD else BEGIN
@@ -86,10 +86,10 @@ def _leaves(k, count):
 
 
 @helper
-def _move_points(work, bearings, count, ring):
+def _move_points(work, vertices, rays, bearings, count, ring):
     """Move the points of the vertices to where their lines meet, or end."""
-    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
-    before, after = work.rays[at.U_BEFORE], work.rays[at.U_AFTER]
+    point, kind = vertices[at.AT], vertices[at.KIND]
+    before, after = rays[at.U_BEFORE], rays[at.U_AFTER]
     x, y = work.points[at.X], work.points[at.Y]
     for k in range(count):
         i, b, tangent = point[k], work.marks[at.BEAM, point[k]], 0.0
@@ -100,7 +100,7 @@ def _move_points(work, bearings, count, ring):
         elif kind[m + 1] == BEGIN or (m != k and not ring):
             u = before[k]
         else:
-            tangent, u = _meeting(work, bearings, k, m)
+            tangent, u = _meeting(work.marks[at.BEAM], vertices, rays, bearings, k, m)
             if kind[k] == HELD or math.isnan(tangent):
                 tangent, u = 0.0, 0.5 * (before[k] + after[m])
         if not u > 0.0:
@@ -119,14 +119,14 @@ def _turn(bearings, b, to):
 
 
 @helper
-def _meeting(work, bearings, k, m):
+def _meeting(beam, vertices, rays, bearings, k, m):
     """Where the lines that come to vertex k and leave m, on the same ray, meet.
 
     Tangent of the angle from that ray, and 1/ρ times its cosine; NaN if they do not meet between
     the measurements next to it.
     """
-    point, beam = work.vertices[at.AT], work.marks[at.BEAM]
-    before, after = work.rays[at.U_BEFORE], work.rays[at.U_AFTER]
+    point = vertices[at.AT]
+    before, after = rays[at.U_BEFORE], rays[at.U_AFTER]
     b = beam[point[k]]
     c, s = _turn(bearings, b, beam[point[k - 1]])
     slope = (after[k - 1] - before[k] * c) / s
@@ -143,20 +143,20 @@ def _meeting(work, bearings, k, m):
 
 
 @helper
-def _solve(work, bearings, count, again):
+def _solve(work, vertices, rays, bearings, count, again):
     """Inverse range of the line before each vertex (U_BEFORE) and of that after it (U_AFTER).
 
     Of least squared range errors; with weights from the lines that are there, if `again`.
     """
-    kind, before, after = work.vertices[at.KIND], work.rays[at.U_BEFORE], work.rays[at.U_AFTER]
-    pivot, right, cross = work.rays[at.PIVOT], work.rays[at.RIGHT], work.rays[at.CROSS]
+    kind, before, after = vertices[at.KIND], rays[at.U_BEFORE], rays[at.U_AFTER]
+    pivot, right, cross = rays[at.PIVOT], rays[at.RIGHT], rays[at.CROSS]
     d, h = 0.0, 0.0
     for k in range(count):
         if kind[k] == BEGIN or kind[k] > HELD:
             d, h = 0.0, 0.0
         if k + 1 == count or kind[k + 1] == BEGIN:
             continue
-        aa, ab, bb, ua, ub = _normal_equations(work, bearings, k, again)
+        aa, ab, bb, ua, ub = _normal_equations(work, vertices, rays, bearings, k, again)
         pivot[k], right[k], cross[k] = d + aa, h + ua, ab
         d, h = bb - ab * ab / pivot[k], ub - ab * right[k] / pivot[k]
         if k + 2 == count or kind[k + 2] == BEGIN or kind[k + 1] > HELD:
@@ -170,13 +170,13 @@ def _solve(work, bearings, count, again):
 
 
 @helper
-def _normal_equations(work, bearings, k, again):
+def _normal_equations(work, vertices, rays, bearings, k, again):
     """Sum up the normal equations of the line from a vertex to the next, in their inverse ranges.
 
     A measurement at a vertex counts once: for the line before it, if both are held together.
     """
-    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
-    beam, rho, rays = work.marks[at.BEAM], work.points[at.RHO], work.rays
+    point, kind = vertices[at.AT], vertices[at.KIND]
+    beam, rho = work.marks[at.BEAM], work.points[at.RHO]
     origin, end = beam[point[k]], beam[point[k + 1]]
     _, whole = _turn(bearings, origin, end)
     aa, ab, bb, ua, ub = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -9,6 +9,7 @@ data for indoor mobile robotics*, Autonomous Robots 23, 2007.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from ..kernels.line_fit import FITS
 from ..kernels.rivals.hough import Parameters, find_by_votes
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["Hough"]
@@ -26,7 +27,8 @@ __all__ = ["Hough"]
 _numbers = attrgetter(*Parameters._fields)
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Hough(LineMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
 

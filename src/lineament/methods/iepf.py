@@ -9,19 +9,21 @@ data*, RoMoCo 2017.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..kernels.line_fit import TOTAL, WEIGHTED
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["IEPF"]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class IEPF(LineMethod):
     """Iterative end point fit.
 

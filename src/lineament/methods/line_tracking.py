@@ -10,18 +10,20 @@ primitives produced by a 2D range finder*, ICRA 1996.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.rivals.line_tracking import track_lines
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["LineTracking"]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LineTracking(LineMethod):
     """Line tracking.
 

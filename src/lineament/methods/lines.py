@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from ..kernels.rivals.settling import settle
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .steps import limit_vertices, measure, part
 from .workspace import Block
 
 __all__ = ["LineMethod"]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LineMethod(MethodBase):
     """A method that parts a scan at its breakpoints, finds lines, and settles their borders."""
 

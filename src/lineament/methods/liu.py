@@ -7,7 +7,7 @@ where the paper is open.
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..kernels.layout import FILTERED, RANGE
 from ..kernels.line_fit import FITS
 from ..kernels.liu import Parameters, extract_rows
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .steps import budget_scratch
 from .workspace import Block
 
@@ -31,7 +31,8 @@ class _Own(NamedTuple):
     scratch: tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64]]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Liu(MethodBase):
     """The method of Liu et al. 2023, and its parameters; defaults are the paper's numbers.
 

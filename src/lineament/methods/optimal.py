@@ -7,6 +7,7 @@ Where Liu et al. 2023 cluster, cut and fit by thresholds, one energy decides her
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..kernels.vertices import hold_together
 from ..scan import LaserScan
 from .base import MethodBase
 from .optimal_trace import evidence_of, trace_of
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .steps import measure, part
 from .trace import Trace
 from .workspace import Block
@@ -49,7 +50,8 @@ class Workspace(NamedTuple):
     follow: NDArray[np.int64]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Optimal(MethodBase):
     """Lines, corners and arcs: the partition of a scan that has the least energy.
 

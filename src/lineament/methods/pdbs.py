@@ -9,11 +9,12 @@ Intelligent and Robotic Systems 40, 2004.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..kernels.rivals.pdbs import BORGES_ALDON, DIETMAYER, FIXED, LEE, SANTOS
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .steps import measure, part
 from .workspace import Block
 
@@ -29,7 +30,8 @@ RULES = {
 }
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PDBS(MethodBase):
     """Clusters of neighbouring points, and the breakpoints between them.
 

@@ -8,13 +8,14 @@ Autonomous Robots 23, 2007.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
 from ..kernels.line_fit import FITS
 from ..kernels.rivals.ransac import PERIOD, Parameters, find_by_consensus
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["Ransac"]
@@ -22,7 +23,8 @@ __all__ = ["Ransac"]
 _numbers = attrgetter(*Parameters._fields)
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ransac(LineMethod):
     """Random sample consensus within the clusters of a scan.
 

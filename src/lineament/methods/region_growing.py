@@ -6,13 +6,14 @@ seeded region growing*, International Journal of Advanced Robotic Systems 15(1),
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
 from ..kernels.line_fit import FITS
 from ..kernels.rivals.region_growing import Parameters, grow_regions
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["RegionGrowing"]
@@ -20,7 +21,8 @@ __all__ = ["RegionGrowing"]
 _numbers = attrgetter(*Parameters._fields)
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RegionGrowing(LineMethod):
     """The method of Gao et al. 2018, its thresholds scaled by the noise.
 

@@ -9,19 +9,21 @@ ICRA 2003.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import LineMethod
-from .parameters import method, parameter
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["SplitAndMerge"]
 
 
-@method
+@documented
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SplitAndMerge(LineMethod):
     """Split-and-merge.
 

@@ -68,11 +68,12 @@ def bilateral_filter(
     _check(sigma_d=sigma_d, sigma_r=sigma_r, half_width=half_width)
     block = _block(scan)
     filter_ranges(
-        block.floats, block.ints, block.range_min, block.range_max, float(sigma_d), float(sigma_r),
+        block.floats, block.range_min, block.range_max, float(sigma_d), float(sigma_r),
         int(half_width), block.circular,
         np.empty(scratch_shape(len(scan), int(half_width)), np.float32),
     )  # fmt: skip
-    return block.work.beams[at.FILTERED, : len(scan)]
+    filtered: Array = block.work.beams[at.FILTERED, : len(scan)]
+    return filtered
 
 
 def estimate_noise(scan: LaserScan) -> RangeNoise | None:

@@ -18,9 +18,7 @@ __all__ = ["budget_scratch", "estimate_noise", "limit_vertices", "measure", "par
 
 def estimate_noise(block: Block, row: int) -> None:
     """Fill the noise of the scan in a block's workspace: that given, or estimated from it."""
-    _estimate_noise(
-        block.floats, block.ints, block.range_min, block.range_max, block.noise, block.noises[row]
-    )
+    _estimate_noise(block.floats, block.range_min, block.range_max, block.noise, block.noises[row])
 
 
 def part(

@@ -34,17 +34,17 @@ def grow_regions(floats, ints, noise, parameters):
     parameters : tuple
         See `Parameters`.
     """
-    work, p = at.named(floats, ints), Parameters(*parameters)
-    prepare(work, noise, p.epsilon, p.sigmas)
+    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
+    prepare(work, moments, noise, p.epsilon, p.sigmas)
     work.counts[at.PIECES] = 0
     for c in range(work.counts[at.CLUSTERS]):
-        _grow_in_cluster(work, work.clusters[at.FIRST, c], work.clusters[at.LAST, c], p)
+        _grow_in_cluster(work, moments, work.clusters[at.FIRST, c], work.clusters[at.LAST, c], p)
 
 
 @helper
-def _grow_in_cluster(work, start, stop, p):
+def _grow_in_cluster(work, moments, start, stop, p):
     """Find the regions of one cluster, from `start` to `stop`."""
-    points, moments, pieces, counts = work.points, work.moments, work.pieces, work.counts
+    points, pieces, counts = work.points, work.pieces, work.counts
     i, floor, delta = start, start, p.delta
     while i + p.s_num - 1 <= stop:
         a, b = i, i + p.s_num - 1

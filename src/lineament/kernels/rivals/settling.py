@@ -46,26 +46,26 @@ def settle(floats, ints, noise, epsilon, reach):
     reach : float
         How many spacings the lines' intersection may lie from the ends of both pieces.
     """
-    work = at.named(floats, ints)
+    work, moments = at.named(floats, ints), at.moments_of(floats)
     pieces, counts = work.pieces, work.counts
-    fill_moments(work)
-    _merge(work, noise, epsilon)
+    fill_moments(work, moments)
+    _merge(work, moments, noise, epsilon)
     for _ in range(2):
         for k in range(1, counts[at.PIECES]):
             if _are_neighbours(work, k):
-                _cut(work.points, work.moments, pieces, k)
-    _merge(work, noise, epsilon)
+                _cut(work.points, moments, pieces, k)
+    _merge(work, moments, noise, epsilon)
     n, count = counts[at.PIECES], counts[at.POINTS]
     is_ring = counts[at.CLOSED] != 0 and n > 1
     for _ in range(2 if is_ring else 0):
-        _leave_opening(work.points, work.moments, pieces, n)
+        _leave_opening(work.points, moments, pieces, n)
     for k in range(n):
         pieces[at.BEFORE, k], work.response[k] = -1, math.nan
         if k > 0 and _are_neighbours(work, k):
-            _join(work, k - 1, k, reach)
+            _join(work, moments, k - 1, k, reach)
     # A closed cluster may have a corner where it was opened; its last point is its first again.
     if is_ring and pieces[at.FIRST, 0] + count - 1 - pieces[at.LAST, n - 1] <= _BETWEEN + 1:
-        _join(work, n - 1, np.int64(0), reach)
+        _join(work, moments, n - 1, np.int64(0), reach)
 
 
 @helper
@@ -76,9 +76,9 @@ def _are_neighbours(work, k):
 
 
 @helper
-def _merge(work, noise, epsilon):
+def _merge(work, moments, noise, epsilon):
     """Merge neighbours that one line fits."""
-    points, moments = work.points, work.moments
+    points = work.points
     first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
     kept = np.int64(0)
     for k in range(work.counts[at.PIECES]):
@@ -140,9 +140,9 @@ def _leave_opening(points, moments, pieces, n):
 
 
 @helper
-def _join(work, before, after, reach):
+def _join(work, moments, before, after, reach):
     """Join two pieces at a corner if their lines meet near their ends."""
-    points, moments, pieces = work.points, work.moments, work.pieces
+    points, pieces = work.points, work.pieces
     x, y, b, c = points[at.X], points[at.Y], pieces[at.LAST, before], pieces[at.FIRST, after]
     n1x, n1y, d1, _ = stretch_line(points, moments, pieces[at.FIRST, before], b)
     n2x, n2y, d2, _ = stretch_line(points, moments, c, pieces[at.LAST, after])

@@ -50,7 +50,7 @@ def split(floats, ints, noise, by_line, threshold, proportion, noise_factor, min
     for c in range(counts[at.CLUSTERS]):
         depth = add_side(work.waiting, 0, work.clusters[at.FIRST, c], work.clusters[at.LAST, c])
         while depth > 0:
-            depth, a, b, i, distance = next_candidate(work, depth, min_points)
+            depth, a, b, i, distance = next_candidate(points, work.waiting, depth, min_points)
             if i < 0:
                 continue
             excess = _off_line(points, a, b, noise) if by_line else distance / tolerance[i]

@@ -14,13 +14,13 @@ from ..line_fit import range_variance
 
 
 @helper
-def fill_moments(work):
+def fill_moments(work, moments):
     """Sum x, y, xx, xy, yy over the points of a cluster before each of its points.
 
     About the first point of the cluster, not the far origin, so that they keep their digits; the
     last two columns are that point.
     """
-    x, y, label, moments = work.points[at.X], work.points[at.Y], work.marks[at.LABEL], work.moments
+    x, y, label = work.points[at.X], work.points[at.Y], work.marks[at.LABEL]
     x0, y0 = 0.0, 0.0
     sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(work.counts[at.POINTS]):
@@ -39,14 +39,14 @@ def fill_moments(work):
 
 
 @helper
-def prepare(work, noise, epsilon, sigmas):
+def prepare(work, moments, noise, epsilon, sigmas):
     """Fill the moments, and how far each point may lie from its line: ``slack + slope |d|``.
 
     The noise of a range moves a point by σ_r cos ψ = σ_r |d|/ρ off a line at distance d; `sigmas`
     times that, as much of the bearing's, and the misfit `epsilon` [m] are allowed. All points are
     free.
     """
-    fill_moments(work)
+    fill_moments(work, moments)
     rho, slack, slope = work.points[at.RHO], work.points[at.SLACK], work.points[at.SLOPE]
     for i in range(work.counts[at.POINTS]):
         slack[i] = epsilon + sigmas * noise[2] * rho[i]
@@ -145,12 +145,12 @@ def longest_run(points, free, first, last, line, margin, max_misses):
 
 
 @helper
-def refined_run(work, first, last, line, margin, max_misses, passes):
+def refined_run(work, moments, first, last, line, margin, max_misses, passes):
     """Find the longest run near a line; fit a line to it, and find that line's, again and again.
 
     `margin` is for the first line only, which may be a coarse one. Returns as `longest_run`.
     """
-    points, moments, free = work.points, work.moments, work.marks[at.FREE]
+    points, free = work.points, work.marks[at.FREE]
     near, a, b = longest_run(points, free, first, last, line, margin, max_misses)
     for _ in range(passes):
         if near < 3:
