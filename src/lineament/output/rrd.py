@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .layers import Layer, layers_of
 from .markers import markers_of
+from .scene import Layer, layers_of
 from .writer import Found, Writer
 
 __all__ = ["RerunWriter"]
