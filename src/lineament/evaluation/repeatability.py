@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..motion.poses import relative
 from ..scan import Array, LaserScan, Pose
+from ..scan.poses import relative
 from .beams import nearest_beams, with_neighbours
 from .counts import Summable, ratio, rms
 from .kinds import ANGLE, vertices

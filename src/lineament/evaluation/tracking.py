@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..motion import Tracks
-from ..motion.poses import compose, relative
 from ..scan import Array, Pose
+from ..scan.poses import compose, relative
 from .counts import Summable, quantile, ratio, rms
 from .kinds import ANGLE, line_errors
 from .matching import Indices, match, match_points

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.poses import Twist, poses_along
 from ..scan import Array, LaserScan, Pose, RangeNoise
+from ..scan.poses import Twist, poses_along
 from .raycast import cast_rays
 from .worlds import World
 
