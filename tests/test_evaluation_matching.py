@@ -19,8 +19,9 @@ from lineament.evaluation.beams import (
     with_neighbours,
 )
 from lineament.evaluation.consistency import largest_variance, tolerance, usable_covariances
-from lineament.evaluation.counts import optional
+from lineament.evaluation.icp import icp
 from lineament.evaluation.matching import distances_from_segments
+from lineament.evaluation.ple import score_map
 
 
 def best_by_trying_all(cost, allowed):
@@ -64,14 +65,21 @@ def test_match_refuses():
         match(np.array([[np.nan]]), np.array([[True]]))
 
 
-def test_without_scipy_one_line_names_the_extra(monkeypatch):
-    wall = features(segments=[segment((2, -1), (2, 1), 10, 49)])
-    for module in ("scipy", "scipy.optimize", "scipy.special"):
+@pytest.mark.parametrize(
+    ("package", "compute"),
+    [
+        ("scipy", lambda scan, wall: evaluate(wall, wall)),
+        ("scipy", lambda scan, wall: evaluate(features(), features()).summary()),
+        ("scipy", lambda scan, wall: icp(scan, scan)),
+        ("shapely", lambda scan, wall: score_map([], scan, np.ones((3, 2)))),
+    ],
+)
+def test_without_an_optional_package_one_line_names_the_extra(package, compute, monkeypatch):
+    for module in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(LineamentError, match=r"^evaluation needs scipy: pip install 'lineament\["):
-        evaluate(wall, wall)
-    with pytest.raises(LineamentError, match=r"needs no_such: pip install 'lineament\[extra\]'$"):
-        optional("no_such.module", "extra")
+    wall = features(segments=[segment((2, -1), (2, 1), 10, 49)])
+    with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[evaluation\]'$"):
+        compute(LaserScan([2.0] * 9, 0.0, 0.01), wall)
 
 
 def test_counts_by_hand():
