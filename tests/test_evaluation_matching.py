@@ -23,6 +23,9 @@ from lineament.evaluation.icp import icp
 from lineament.evaluation.matching import distances_from_segments
 from lineament.evaluation.ple import score_map
 
+SCAN = LaserScan([2.0] * 9, 0.0, 0.01)
+WALL = features(segments=[segment((2, -1), (2, 1), 10, 49)])
+
 
 def best_by_trying_all(cost, allowed):
     """(number of pairs, cost) of the best matching, by every order of the columns."""
@@ -68,18 +71,17 @@ def test_match_refuses():
 @pytest.mark.parametrize(
     ("package", "compute"),
     [
-        ("scipy", lambda scan, wall: evaluate(wall, wall)),
-        ("scipy", lambda scan, wall: evaluate(features(), features()).summary()),
-        ("scipy", lambda scan, wall: icp(scan, scan)),
-        ("shapely", lambda scan, wall: score_map([], scan, np.ones((3, 2)))),
+        ("scipy", lambda: evaluate(WALL, WALL)),
+        ("scipy", lambda: evaluate(features(), features()).summary()),
+        ("scipy", lambda: icp(SCAN, SCAN)),
+        ("shapely", lambda: score_map([], SCAN, np.ones((3, 2)))),
     ],
 )
 def test_without_an_optional_package_one_line_names_the_extra(package, compute, monkeypatch):
     for module in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
         monkeypatch.setitem(sys.modules, module, None)
-    wall = features(segments=[segment((2, -1), (2, 1), 10, 49)])
     with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[evaluation\]'$"):
-        compute(LaserScan([2.0] * 9, 0.0, 0.01), wall)
+        compute()
 
 
 def test_counts_by_hand():
