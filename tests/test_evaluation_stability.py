@@ -1,4 +1,4 @@
-"""Features found again: in turned views, and from other places."""
+"""Features found again from other places."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from handmade import corner, features, segment
 import lineament as ln
 from lineament.evaluation import Repeatability, repeatability
 from lineament.evaluation.repeatability import in_sight
-from lineament.reproduce.stability import Stability, rotation_stability
 from lineament.simulation import SENSORS, Sensor, World, room
 
 PAPER = SENSORS["paper"]
@@ -19,62 +18,6 @@ PAPER = SENSORS["paper"]
 
 def corners_at(*positions):
     return features(corners=[corner(*p) for p in positions])
-
-
-class Recorded:
-    """An extractor that gives what it was told to, one after the other, and keeps the scans."""
-
-    def __init__(self, *results):
-        self.results, self.scans = list(results), []
-
-    def __call__(self, scan):
-        self.scans.append(scan)
-        return self.results.pop(0)
-
-
-def test_stability_by_hand():
-    turn = 0.002
-    reference = corners_at((1, 0), (2, 0), (3, 0), (0, 4))
-    turned = corners_at((1, 0.03), (2.04, 0), (7, 7)).transform(0, 0, -turn)
-    extract = Recorded(reference, turned, reference, corners_at())
-    stability = rotation_stability(extract, room(), (0, 0, 0.5), PAPER, [turn], [1, 2])
-    assert [scan.pose[2] for scan in extract.scans] == [0.5, 0.5 + turn] * 2
-    assert (stability.reference, stability.turned, stability.repeated) == (8, 3, 2)
-    assert stability.average_repetition == pytest.approx((2 / 8 + 2 / 3) / 2)
-    assert stability.localisation_error == pytest.approx(math.sqrt((0.03**2 + 0.04**2) / 2))
-
-
-def test_stability_has_fresh_noise_and_can_be_made_again():
-    def scans_of(seeds):
-        extract = Recorded(*[corners_at()] * 6)
-        rotation_stability(extract, room(), (0, 0, 0), PAPER, [0.0, 0.0], seeds)
-        return [scan.ranges.tolist() for scan in extract.scans]
-
-    scans = scans_of([3, 4])
-    assert scans == scans_of([3, 4])
-    assert len(set(map(tuple, scans))) == 6
-
-
-def test_stability_of_nothing():
-    assert math.isnan(Stability().average_repetition)
-    assert Stability(3, 0).average_repetition == 0
-    assert rotation_stability(ln.extract, room(), (0, 0, 0), PAPER, [], [1]).reference == 0
-    with pytest.raises(ValueError, match="gate is 0, expected a distance > 0"):
-        rotation_stability(ln.extract, room(), (0, 0, 0), PAPER, [0.0], [1], gate=0)
-
-
-@pytest.mark.slow
-def test_stability_falls_with_noise():
-    turns = np.radians(np.arange(1, 6) / 18)
-    found = []
-    for sigma in (0.003, 0.08):
-        sensor = Sensor(
-            "s", 481, PAPER.angle_min, PAPER.angle_increment, noise=ln.RangeNoise(sigma)
-        )
-        extract = ln.Extractor("liu:scale_free")
-        found.append(rotation_stability(extract, room(), (0, 0, 0), sensor, turns, range(3)))
-    assert found[0].average_repetition > found[1].average_repetition
-    assert found[0].localisation_error < found[1].localisation_error
 
 
 # A wall x = 3 and a pillar before its upper half, as the first scanner sees it.

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,18 +10,12 @@ from handmade import corner, features, segment
 import lineament as ln
 from lineament.evaluation.icp import icp
 from lineament.evaluation.tracking import MotionErrors, motion_errors, track_scores
-from lineament.logs import save_npz
-from lineament.motion import Tracker, Tracks
-from lineament.reproduce import Setting, tracking
+from lineament.motion import Tracks
 from lineament.scan import RangeNoise
 from lineament.scan.poses import compose, inverse, relative
-from lineament.simulation import SENSORS, drive, room
+from lineament.simulation import SENSORS, room
 
 NONE = np.empty(0, np.int64)
-
-
-def silent(_):
-    pass
 
 
 def tracks_of(segments, corners=(), born=()):
@@ -94,47 +87,3 @@ def test_icp_without_points_stays_where_it_began():
     far = ln.LaserScan([9.0] * 9, 0.0, 0.01)
     for before, now in ((empty, scan), (scan, empty), (scan, far)):
         assert icp(before, now, (1.0, 2.0, 0.5)) == (1.0, 2.0, 0.5)
-
-
-def test_the_stand_in_for_odometry_has_the_errors_that_are_told():
-    poses = [(0.5 * i, 0.0, 0.0) for i in range(2000)]
-    way = tracking.stand_in_odometry(poses, seed=1)
-    steps = np.array([relative(a, b) for a, b in pairwise(way)])
-    np.testing.assert_allclose(steps.mean(axis=0), (0.5, 0.0, 0.0), atol=0.006)
-    np.testing.assert_allclose(steps.std(axis=0), (0.07, 0.07, 0.01), rtol=0.06)
-    assert way == tracking.stand_in_odometry(poses, seed=1)
-
-
-@pytest.mark.slow
-def test_the_experiment_on_a_small_log(tmp_path, monkeypatch):
-    folder = tmp_path / "truth"
-    folder.mkdir()
-    scans = list(drive(room(), [(-2, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10))
-    save_npz(folder / "small.npz", scans)
-    monkeypatch.setattr(tracking, "LOGS", {"small": ("truth/small.npz", 0.5), "none": ("no", 0.0)})
-    monkeypatch.setattr(tracking, "SCANS_A_FRAME", 12)
-    findings = tracking.run(Setting(frames=1, data=tmp_path), silent)
-    numbers = findings.numbers["small"]
-    assert numbers["frames"] == 12
-    assert list(findings.numbers) == ["small"]
-    for name in ("features", "ICP", "features, no odometry"):
-        assert numbers["motion"][name]["step"]["way_median"] < 0.01
-    assert numbers["tracks"]["features"]["segments"]["kept"] > 0.95
-    assert [len(table.rows) for table in findings.tables] == [5, 4]
-
-
-def test_without_recordings_it_says_so():
-    findings = tracking.run(Setting(frames=1), silent)
-    assert findings.text == ("The recordings are not there: nothing was measured.",)
-
-
-@pytest.mark.slow
-def test_a_recorded_arena_is_followed(data_dir):
-    file, skipped = tracking.LOGS["arena, moving"]
-    recording = tracking.load_recording(data_dir / file, 40, skipped)
-    extract, tracker = ln.Extractor(), Tracker()
-    frames = [extract(scan) for scan in recording.scans]
-    tracks = [tracker(found) for found in frames]
-    errors = motion_errors([t.motion.pose for t in tracks[1:]], recording.poses)
-    assert np.median(errors.ways) < 0.01
-    assert track_scores(frames, tracks, recording.poses)["segments"].summary()["kept"] > 0.85
