@@ -70,6 +70,8 @@ PILASTER = [(2, -1), (2, LOW), (1.95, LOW), (1.95, HIGH), (2, HIGH), (2, 1)]
 
 #: Where the beam at 29.5° meets the line x + y = √8.
 X = math.sqrt(8) / (1 + tan(29.5))
+#: Where the beam at 24.5° meets the line x - y = √2.
+Z = math.sqrt(2) / (1 - tan(24.5))
 
 #: World, pose, sensor; walls, corners and breakpoints that are true.
 CASES = {
@@ -86,6 +88,24 @@ CASES = {
         lines([(2, -2), (2, 2), (-2, 2)]), TURNED, fan(30),
         [(X, -X * tan(29.5), math.sqrt(8), 0, 0, 29), (math.sqrt(8), 0, X, X * tan(29.5), 30, 59)],
         [(math.sqrt(8), 0, RIGHT, False, 0, 1)], scan_ends(0, 59),
+    ),
+    "a convex corner": (
+        lines(box(1, 1, 3, 3)), TURNED, fan(25),
+        [(Z, -Z * tan(24.5), math.sqrt(2), 0, 0, 24), (math.sqrt(2), 0, Z, Z * tan(24.5), 25, 49)],
+        [(math.sqrt(2), 0, RIGHT, True, 0, 1)], scan_ends(0, 49),
+    ),
+    # The side from (2, 0) towards the scanner is met at 0.5° and ends at 0.9°.
+    "a corner with a side of one beam": (
+        lines([(2, -1), (2, 0), (1.9, 0.03)]), ORIGIN, fan(10), [(2, -2 * tan(9.5), 2, 0, 0, 9)],
+        [(2, 0, math.pi - math.atan2(0.1, 0.03), False, 0, -1)], scan_ends(0, 10),
+    ),
+    # Its corners are at 18.4°, 153.4°, 206.6° and 341.6°; the wall x = 3 is over the seam.
+    "a wall over the seam is in one piece": (
+        lines(box(-2, -1, 3, 1)), ORIGIN, ring(first=0.0),
+        [(3, -1, 3, 1, 342, 18), (3, 1, -2, 1, 19, 153), (-2, 1, -2, -1, 154, 206),
+         (-2, -1, 3, -1, 207, 341)],
+        [(3, 1, RIGHT, False, 0, 1), (-2, 1, RIGHT, False, 1, 2), (-2, -1, RIGHT, False, 2, 3),
+         (3, -1, RIGHT, False, 3, 0)], [],
     ),
     "a box whose other sides are hidden": (
         lines(box(2, -0.5, 3, 0.5)), ORIGIN, fan(40),
@@ -172,36 +192,17 @@ def test_by_hand(name):
     assert (features.corners["kind"] == "corner").all()
     assert (features.corners["quality"] == 1).all()
     assert len(features.arcs) == 0
-    # Each segment has the bound of its beams, which is all that is not geometry.
+    bounds = []
     for segment in features.segments:
         bearings = sensor.angles[beams_of(segment, sensor.n_beams)]
-        bound = line_bound(bearings, segment["start"], segment["angle"], sensor.noise)
-        np.testing.assert_allclose(segment["covariance"], bound.covariance, rtol=1e-6)
-        np.testing.assert_allclose(segment["centroid"], bound.centroid, atol=1e-9)
+        bounds.append(line_bound(bearings, segment["start"], segment["angle"], sensor.noise))
+        np.testing.assert_allclose(segment["covariance"], bounds[-1].covariance, rtol=1e-6)
+        np.testing.assert_allclose(segment["centroid"], bounds[-1].centroid, atol=1e-9)
         assert (segment["rms"], segment["misfit"]) == (0, 0)
-
-
-def test_corners_have_the_bound_of_both_sides():
-    sensor = fan(25)
-    for world, convex in ((lines([(2, -2), (2, 2), (-2, 2)]), 0), (lines(box(1, 1, 3, 3)), 1)):
-        features = truth(world, TURNED, sensor)
-        (corner,) = features.corners
-        at, halves = corner["position"], np.split(sensor.angles, 2)
-        angles = features.segments["angle"]
-        sides = [line_bound(b, at, a, NOISE) for b, a in zip(halves, angles, strict=True)]
-        np.testing.assert_allclose(corner["covariance"], corner_bound(*sides), atol=1e-12)
-        assert (corner["convex"], corner["opening"]) == (convex, pytest.approx(RIGHT))
-        assert corner["beam"] in (24, 25)
-        assert (features.clusters == 0).all()
-
-
-def test_a_corner_with_a_side_of_one_beam_has_no_bound():
-    # The side from (2, 0) towards the scanner is met at 0.5° and ends at 0.9°.
-    features = truth(lines([(2, -1), (2, 0), (1.9, 0.03)]), ORIGIN, fan(10))
-    (corner,) = features.corners
-    assert corner["segments"].tolist() == [0, -1]
-    for found in (features, features.transform(1, 2, 3)):
-        assert np.isnan(found.corners["covariance"]).all()
+    for corner in features.corners:
+        sides = [bounds[k] for k in corner["segments"] if k >= 0]
+        expected = corner_bound(*sides) if len(sides) == 2 else np.full((2, 2), np.nan)
+        np.testing.assert_allclose(corner["covariance"], expected, rtol=1e-6, atol=1e-12)
 
 
 def test_beams_through_the_vertices_of_a_room():
@@ -209,19 +210,6 @@ def test_beams_through_the_vertices_of_a_room():
     assert counts(features) == (4, 4, 0, 0)
     assert features.segments["n_points"].sum() == 16
     np.testing.assert_allclose(features.corners["opening"], RIGHT)
-
-
-@pytest.mark.parametrize("first", [-math.pi, 0.0, 1.0])
-def test_a_wall_over_the_seam_is_in_one_piece(first):
-    features = truth(lines(box(-2, -1, 3, 1)), ORIGIN, ring(first=first))
-    assert counts(features) == (4, 4, 0, 0)
-    assert features.segments["n_points"].sum() == 360
-    assert (features.segments["first_beam"] > features.segments["last_beam"]).sum() == 1
-    assert features.corners["segments"].tolist() == [[0, 1], [1, 2], [2, 3], [3, 0]]
-    for corner in features.corners:
-        before, after = features.segments[corner["segments"]]
-        np.testing.assert_allclose((before["end"], after["start"]), [corner["position"]] * 2)
-    assert (features.clusters == 0).all()
 
 
 def test_a_column_in_front_of_a_wall():
@@ -241,19 +229,18 @@ def test_a_column_in_front_of_a_wall():
     assert math.dist(features.breakpoints["position"][0], (2, 0)) == pytest.approx(0.3)
 
 
-def test_a_column_of_two_beams_has_no_bound():
-    features = truth(World([], [[3, 0, 0.04]]), ORIGIN, fan(10))
-    assert features.arcs["n_points"].tolist() == [2]
-    assert np.isnan(features.arcs["covariance"]).all()
-    assert (features.clusters == -1).all()
-    assert len(features.breakpoints) == 0
-
-
-def test_a_round_room_is_one_arc_around():
-    features = truth(World([], [[0.3, 0.2, 2]]), ORIGIN, ring(90))
+@pytest.mark.parametrize(
+    ("circle", "sensor", "n_points", "known", "label"),
+    [((3, 0, 0.04), fan(10), 2, False, -1), ((0.3, 0.2, 2), ring(90), 90, True, 0)],
+)
+def test_a_column_of_two_beams_has_no_bound_and_a_round_room_no_end(
+    circle, sensor, n_points, known, label
+):
+    features = truth(World([], [circle]), ORIGIN, sensor)
     assert counts(features) == (0, 0, 1, 0)
-    assert features.arcs["n_points"].tolist() == [90]
-    assert (features.clusters == 0).all()
+    assert features.arcs["n_points"].tolist() == [n_points]
+    assert np.isfinite(features.arcs["covariance"]).all() == known
+    assert (features.clusters == label).all()
 
 
 # In every scene
