@@ -98,6 +98,22 @@ def test_time(summary, stamps, time):
     assert rows_of(summary(LaserScan([1.0], 0, 1, stamp=t) for t in stamps))["time"] == time
 
 
+@pytest.mark.parametrize(
+    ("ranges", "median"), [([7], 7), ([1, 3, 20], 3), ([1, 2, 10, 20], 6), ([1e3, 2e3, 3e3], 1e3)]
+)
+def test_median(summary, ranges, median):
+    (topic,) = summary([LaserScan(ranges, 0.0, 0.1)]).topics
+    assert topic.ranges == (ranges[0], median, ranges[-1])
+
+
+def test_geometry_is_that_of_the_first_scan_with_most_beams(write):
+    steps = (("0.1", 2), ("0.2", 3), ("0.3", 3), ("0.4", 1))
+    text = "".join(robotlaser([1] * n, step=step) for step, n in steps)
+    (topic,) = summarize(open_log(write(text))).topics
+    assert (topic.beams, topic.resolution) == ((1, 3), 0.2)
+    assert topic.field_of_view == pytest.approx(0.4)
+
+
 def test_frames(summary):
     scans = [LaserScan([1.0], 0, 1, frame_id=name) for name in ("front", "", "rear", "front")]
     assert rows_of(summary(scans))["frames"] == (

@@ -56,6 +56,7 @@ def test_folders_and_patterns(fleet, monkeypatch):
     assert find_logs(f"{fleet}/**/*.log*") == [everything[i] for i in (0, 2, 4)]
     monkeypatch.chdir(fleet)
     assert find_logs("day2/*") == [str(Path("day2/a.csv")), str(Path("day2/b.log"))]
+    assert find_logs("./day2/b.log") == ["./day2/b.log"]
 
 
 def test_what_is_named_is_taken(fleet):
