@@ -30,7 +30,7 @@ def rows_of(found):
 
 
 def test_against_all_at_once(summary, monkeypatch):
-    monkeypatch.setattr(info, "_BUFFER", 100)
+    monkeypatch.setattr(info, "_STEPS", 100)
     rng = np.random.default_rng(2)
     stamps = 100 + np.cumsum(rng.uniform(0.05, 0.15, 300))
     ranges = rng.uniform(0, 40, (300, 7))

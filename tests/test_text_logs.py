@@ -173,15 +173,16 @@ def test_ranges_are_read_to_the_last_bit(write, ranges):
 
 def test_a_vertex_corrects_the_scan_behind_it(write):
     text = (
-        "VERTEX_SE2 0 10 20 1.5707963267948966\n"
+        "VERTEX_SE2 0 10 20 1\n"
         + robotlaser(laser=(1.5, 1.2, 0.25), robot=(1, 1, 0), stamp=5)
         + "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nVERTEX_SE2 1 7 8 0\n"
         + robotlaser(laser=(3, 3, 1), robot=(3, 3, 1), stamp=6)
         + robotlaser(laser=(4, 3, 1), robot=(3, 3, 0), stamp=7)
     )
     scans = list(open_log(write(text)))
-    # The laser is 0.5 m ahead and 0.2 m left of the robot, which was turned to look along y.
-    assert scans[0].pose == pytest.approx((9.8, 20.5, math.pi / 2 + 0.25))
+    # The laser is 0.5 m ahead and 0.2 m left of the robot, which was turned by 1 rad.
+    place = 10 + 20j + (0.5 + 0.2j) * np.exp(1j)
+    assert scans[0].pose == pytest.approx((place.real, place.imag, 1.25))
     # Both scans hang on the second vertex.
     assert [scan.pose for scan in scans[1:]] == [pytest.approx((7, 8, 0)), pytest.approx((8, 8, 1))]
     assert [scan.stamp for scan in scans] == [5, 6, 7]
