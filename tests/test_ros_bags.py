@@ -216,11 +216,11 @@ def test_metadata_of_blanks_take_no_time(tmp_path, text):
 
 def test_which_folders_are_bags(tmp_path):
     folder = split_bag(tmp_path)
-    assert Rosbag2Log.recognises(Head.read(folder))
+    assert Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
     (folder / "notes.txt").write_text("what is this?")
-    assert not Rosbag2Log.recognises(Head.read(folder))
+    assert not Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
     metadata(folder)
-    assert Rosbag2Log.recognises(Head.read(folder))
+    assert Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
     metadata(tmp_path)
     with pytest.raises(LogError, match=r"holds no part of a ROS 2 bag, expected \.db3 or \.mcap"):
         open_log(tmp_path)
