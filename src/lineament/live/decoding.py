@@ -14,18 +14,8 @@ def received_scan(
 ) -> Received:
     r"""Return what a source gives of a serialised scan that has just arrived.
 
-    Parameters
-    ----------
-    publisher : str
-        Who sent it.
-    data : bytes-like
-        The message; `Received.read` decodes it.
-    encoding : {"ros1", "cdr"}
-        How it is serialised.
-    kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
-        Its type.
-    echo : {"first", "last", "strongest"}
-        Which echo of the latter.
+    Its type is ``sensor_msgs/LaserScan`` or ``sensor_msgs/MultiEchoLaserScan``, of which `echo` is
+    the echo to take.
 
     Raises
     ------
