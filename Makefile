@@ -4,7 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint types tests coverage wheel bench lines browser clean
+.PHONY: demo test test-all lint house types tests coverage wheel bench mutants lines browser clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -23,6 +23,12 @@ test-all: coverage
 lint: .venv/ready
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/lint-imports --no-cache
+	$(BIN)/python benchmarks/house.py --check
+
+# The picture of the house in CONTRIBUTING, from the real imports.
+house: .venv/ready
+	$(BIN)/python benchmarks/house.py
 
 types: .venv/ready
 	$(BIN)/mypy
@@ -34,7 +40,7 @@ browser:
 	else echo "no chromium: the tests of the page will be skipped"; fi
 
 tests: .venv/ready browser
-	$(BIN)/python -m pytest --durations=5
+	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
 
 coverage: .venv/ready
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m 'not slow'
@@ -49,6 +55,10 @@ wheel: .venv/ready
 	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
 	build/empty/bin/python benchmarks/installed.py
 	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
+
+# Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
+mutants: .venv/ready
+	$(BIN)/python benchmarks/mutants.py --count 300 --seed 1
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py

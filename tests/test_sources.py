@@ -10,7 +10,9 @@ import pytest
 from text_logs import BEAMS, FLASER, zipped
 
 from lineament import LogError
-from lineament.logs import copies, find_logs, open_log, remote
+from lineament.logs import find_logs, open_log
+from lineament.logs import sources as copies
+from lineament.logs import sources as remote
 
 # Folders and patterns
 

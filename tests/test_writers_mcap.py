@@ -16,8 +16,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lineament import LaserScan, LineamentError
 from lineament.output import open_writer
-from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
+from lineament.output.scene import layers_of
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)

@@ -7,8 +7,7 @@ from typing import Any
 
 import click
 
-from .method_options import NOISE, SET, make_extractor
-from .options import LOG, reading
+from .options import LOG, NOISE, SET, make_extractor, reading
 
 __all__ = ["view"]
 

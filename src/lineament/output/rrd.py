@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .layers import layers_of
 from .markers import markers_of
+from .scene import layers_of
 from .writer import Found, Writer
 
 __all__ = ["RerunWriter"]
