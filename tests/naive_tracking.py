@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
 from lineament.motion import Matches, Motion, Tracker, Tracks
-from lineament.motion.poses import inverse
+from lineament.scan.poses import inverse
 
 KINDS = ("segments", "corners", "arcs")
 PLACE = {"segments": "centroid", "corners": "position", "arcs": "center"}

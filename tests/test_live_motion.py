@@ -6,7 +6,7 @@ import pytest
 import lineament as ln
 from lineament.live import LiveConfig, Odometry, Pipeline
 from lineament.live.motion import OdometryMotion, PoseMotion, twist_of_laser
-from lineament.motion.poses import compose, poses_along, twist_between
+from lineament.scan.poses import compose, poses_along, twist_between
 from lineament.simulation import SENSORS, drive, room
 
 

@@ -12,7 +12,7 @@ from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, Repla
 from lineament.live.counters import Counters
 from lineament.live.pipeline import MOST_BEAMS, time_of
 from lineament.logs import save_npz
-from lineament.rosmsg.messages import laser_scan
+from lineament.rosmsg.scans import laser_scan
 
 
 class Given:

@@ -15,10 +15,9 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.live.received import Received
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
-from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
-from lineament.output.scene import Message, Moment
+from lineament.output.scene import Message, Moment, layers_of
 
 # rospy leaves sockets open, calls what is deprecated, and takes any exception for a dead master.
 pytestmark = [

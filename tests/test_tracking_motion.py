@@ -13,7 +13,7 @@ from lineament.kernels import kernel
 from lineament.kernels.tracking.symmetric import diagonalise, invert
 from lineament.motion import Matches, associate, estimate_motion
 from lineament.motion.association import KINDS
-from lineament.motion.poses import compose, inverse
+from lineament.scan.poses import compose, inverse
 from lineament.simulation import SENSORS, World, scene
 
 APART = (segment((2, -1), (2, 1), 10, 30), segment((2, 3), (-1, 3), 31, 60))

@@ -100,7 +100,7 @@ def ple(
     data: Path, methods: tuple[str, ...], sparing: bool, output: Path | None, quiet: bool
 ) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
-    from ..evaluation.ple.benchmark import load_benchmark, method_map, run_benchmark, sparing_map
+    from ..evaluation.ple import load_benchmark, method_map, run_benchmark, sparing_map
     from ..files import write_text
     from ..reproduce.report import benchmark_tables
     from .progress import tracker

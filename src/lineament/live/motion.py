@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from ..motion import Tracker
-from ..motion.poses import Twist, twist_between
 from ..scan import LaserScan, Pose
+from ..scan.poses import Twist, twist_between
 from .received import Odometry
 
 __all__ = ["OdometryMotion", "PoseMotion", "ScanMotion", "StandingMotion", "twist_of_laser"]

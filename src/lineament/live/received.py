@@ -5,35 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from ..motion.poses import Twist
-from ..scan import LaserScan, Pose
+from ..rosmsg.poses import Odometry
+from ..scan import LaserScan
 
 __all__ = ["Odometry", "Received", "Source", "Time"]
 
 #: Seconds and nanoseconds of a stamp, exactly as a message has them.
 Time = tuple[int, int]
-
-
-class Odometry(NamedTuple):
-    """A ``nav_msgs/Odometry``.
-
-    Attributes
-    ----------
-    stamp : float
-        Its time [s].
-    twist : (v_x, v_y, omega)
-        Velocity in the frame of what moves [m/s, m/s, rad/s].
-    pose : (x, y, theta)
-        Pose of what moves [m, m, rad].
-    frame, child_frame : str
-        Names of the frames of the pose and of what moves.
-    """
-
-    stamp: float
-    twist: Twist
-    pose: Pose
-    frame: str
-    child_frame: str
 
 
 class Received(NamedTuple):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from ..output.layers import layers_of
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
 from ..scan import LaserScan
 from .counters import Report
 from .pipeline import Frame

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from ..kernels.tracking.motion import NOT_POSITIVE, NOT_THERE
 from ..kernels.tracking.motion import estimate_motion as kernel
 from ..scan import Array, Pose
+from ..scan.poses import Twist, twist_between
 from .association import KINDS, Matches, chi_square, matrix_of, words_of
-from .poses import Twist, twist_between
 
 __all__ = ["Motion", "estimate_motion"]
 

@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from ...files import naming_errors, write_text
 from ...logs.lines import reading
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 
 #: File name in the folder: Arrow, Hive and Spark skip what begins with "_".
 MANIFEST = "_manifest.jsonl"

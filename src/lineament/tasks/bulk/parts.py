@@ -13,7 +13,7 @@ from typing import Any
 from ...errors import LineamentError
 from ...extractor import Extractor
 from ...files import made_folder
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 from ...methods import Method
 from ...scan import RangeNoise
 from ..extract import extract_log

@@ -20,7 +20,7 @@ from ...features import COUNTED
 from ...files import made_folder
 from ...logs import find_logs, open_log
 from ...logs.base import ReadOptions
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 from ...output import open_writer
 from .manifest import Manifest, Row, full_path, names_of, part_path
 from .parts import Task, extract_part, failed, log_state
