@@ -242,7 +242,8 @@ def test_missing_package_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "foxglove", None)
     monkeypatch.delitem(sys.modules, "lineament.output.foxglove", raising=False)
     with pytest.raises(
-        LineamentError, match=r"end in \.mcap need the package foxglove, which is not"
+        LineamentError,
+        match=r"\.mcap: needs foxglove, .*: pip install 'lineament\[foxglove\]'",
     ):
         open_writer(tmp_path / "a.mcap")
     open_writer(tmp_path / "a.ros2.mcap")  # does without

@@ -7,8 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
-from .counts import Summable, optional, quantile, ratio
+from .counts import Summable, quantile, ratio
 
 #: A covariance whose eigenvalues have a smaller ratio than this has lost all its digits.
 _LEAST_EIGENVALUE = 1e-14
@@ -137,5 +138,7 @@ def tolerance(variance: Array) -> Array:
 
 def _chi_square(probability: float, degrees: int) -> float:
     """Quantile of the chi-square distribution, that of a gamma distribution of half as many."""
-    special = optional("scipy.special", "evaluation")
-    return 2.0 * float(special.gammaincinv(degrees / 2, probability))
+    with needed_by("evaluation"):
+        from scipy.special import gammaincinv
+
+    return 2.0 * float(gammaincinv(degrees / 2, probability))

@@ -3,13 +3,10 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from importlib import import_module
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ..errors import LineamentError
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,14 +137,3 @@ def plain(value: object) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def optional(module: str, extra: str) -> Any:
-    """Import a module of an optional dependency; LineamentError names its extra if missing."""
-    try:
-        return import_module(module)
-    except ImportError:
-        package = module.partition(".")[0]
-        raise LineamentError(
-            f"evaluation needs {package}: pip install 'lineament[{extra}]'"
-        ) from None

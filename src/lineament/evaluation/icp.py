@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
+from ..errors import needed_by
 from ..scan import Array, LaserScan, Pose
-from .counts import optional
 
 #: Farthest pair of points in the first round, and in the last ones [m]; halved from round to round.
 _FARTHEST, _NEAREST = 0.5, 0.1
@@ -44,11 +44,14 @@ def icp(before: LaserScan, now: LaserScan, start: Pose = (0.0, 0.0, 0.0)) -> Pos
     >>> [abs(round(value, 2)) for value in icp(before, now)]
     [0.1, 0.0, 0.05]
     """
+    with needed_by("evaluation"):
+        from scipy.spatial import cKDTree
+
     anchors, normals = _lines(before)
     points = now.points[now.valid]
     if len(anchors) < 3 or len(points) < 3:
         return start
-    tree = optional("scipy.spatial", "evaluation").cKDTree(anchors)
+    tree = cKDTree(anchors)
     motion, limit = np.array(start, dtype=np.float64), _FARTHEST
     for _ in range(_ROUNDS):
         c, s = math.cos(motion[2]), math.sin(motion[2])

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
-from .counts import optional
 
 Indices = NDArray[np.intp]
 
@@ -51,10 +51,12 @@ def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     most = excess[within].max()
     if not np.isfinite(most):
         raise ValueError(f"cost of an allowed pair is {most} above the least, expected finite")
+    with needed_by("evaluation"):
+        from scipy.optimize import linear_sum_assignment
+
     # All pairs that there can be cost less than a single one that is not allowed.
     barred = min(within.shape) * most + 1.0
-    assign = optional("scipy.optimize", "evaluation").linear_sum_assignment
-    r, c = assign(np.where(within, excess, barred))
+    r, c = linear_sum_assignment(np.where(within, excess, barred))
     kept = within[r, c]
     return rows[r[kept]], columns[c[kept]]
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..features import records as col
 from . import helper, kernel
 from . import layout as at
+from .writing import write_end
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
 #: its ray; or they are free to meet beside it, and its reading is on neither as long as it is open
@@ -213,8 +214,8 @@ def hold_together(floats, ints, row, segments, corners, offsets):
         c, s = math.cos(angle), math.sin(angle)
         cx, cy = segments[segment, col.S_CENTROID], segments[segment, col.S_CENTROID + 1]
         along = c * (cx - x1) + s * (cy - y1)
-        segments[segment, col.S_START], segments[segment, col.S_START + 1] = x1, y1
-        segments[segment, col.S_END], segments[segment, col.S_END + 1] = x2, y2
+        write_end(segments, segment, col.S_START, x1, y1)
+        write_end(segments, segment, col.S_END, x2, y2)
         segments[segment, col.S_CENTROID] = x1 + along * c
         segments[segment, col.S_CENTROID + 1] = y1 + along * s
         segments[segment, col.S_ANGLE] = angle

@@ -6,11 +6,10 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 
-from ..errors import LineamentError
+from ..errors import needed_by
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
 from ..scan import LaserScan
@@ -126,7 +125,8 @@ def _replay(config: LiveConfig, log: str) -> ReplaySource:
 def _over_dds(
     config: LiveConfig, stack: ExitStack, *, listens: bool
 ) -> tuple[Source | None, Publisher]:
-    dds = _imported("dds", "cyclonedds", "live")
+    with needed_by("live"):
+        dds = import_module(".dds", __package__)
     participant = dds.Participant(config.domain, localhost=config.localhost)
     stack.callback(participant.close)
     publisher = dds.DdsPublisher(participant, config.depth)
@@ -166,17 +166,9 @@ def _over_ros1(
 def _foxglove(
     config: LiveConfig, port: int, stack: ExitStack, tell: Callable[[str], None]
 ) -> FoxgloveSink:
-    foxglove = _imported("foxglove", "foxglove", "foxglove")
+    with needed_by("live"):
+        foxglove = import_module(".foxglove", __package__)
     server = foxglove.FoxgloveServer(config.host, port, config.name)
     stack.callback(server.close)
     tell(f"Foxglove: open a connection to {server.address}")
     return FoxgloveSink(server, foxglove.FoxgloveMessages(), config.scan_topic)
-
-
-def _imported(module: str, package: str, extra: str) -> ModuleType:
-    try:
-        return import_module(f".{module}", __package__)
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != package:
-            raise
-        raise LineamentError(f"live needs {package}: pip install 'lineament[{extra}]'") from None

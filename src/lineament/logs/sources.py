@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from ..errors import LogError
+from ..errors import LogError, needs
 from .base import Head
 from .lines import BOM, GZIP, chunks, decompressed, opened, reading
 
@@ -241,7 +241,7 @@ def _fsspec(address: str) -> Iterator[ModuleType]:
         raise
     except ImportError as error:
         if error.name == "fsspec":
-            raise LogError(address, "needs fsspec: pip install lineament[remote]") from None
+            raise LogError(address, needs("fsspec")) from None
         raise LogError(address, f"needs a driver of fsspec: {error}") from None
     except FileNotFoundError:
         raise LogError(address, "there is no such file, expected a log") from None

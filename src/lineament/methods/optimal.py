@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +38,9 @@ _GRAZING = math.radians(4.0)
 
 
 class Workspace(NamedTuple):
-    """Arrays of one scan, see `kernels.optimal.layout`; the last two are those of maps."""
+    """Arrays of one scan: as in `kernels.optimal.layout.Work`, and those of maps."""
 
-    points: NDArray[np.float64]
-    beams: NDArray[np.int64]
-    spans: NDArray[np.int64]
-    pieces: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    noise: NDArray[np.float64]
+    arrays: tuple[NDArray[Any], ...]
     costs: NDArray[np.float64]
     follow: NDArray[np.int64]
 
@@ -102,12 +97,14 @@ class Optimal(MethodBase):
         """Make the workspace of a scan."""
         n, vertices = beams + 2, min(self.max_vertices, beams + 1) + 1
         return Workspace(
-            np.zeros((layout.POINTS, n)),
-            np.zeros((layout.BEAMS, n), np.int64),
-            np.zeros((layout.SPANS, n), np.int64),
-            np.zeros((n, layout.PIECES)),
-            np.zeros((n, layout.SUMS)),
-            np.zeros(3),
+            (
+                np.zeros((layout.POINTS, n)),
+                np.zeros((layout.BEAMS, n), np.int64),
+                np.zeros((layout.SPANS, n), np.int64),
+                np.zeros((n, layout.PIECES)),
+                np.zeros((n, layout.SUMS)),
+                np.zeros(3),
+            ),
             np.empty((PLANES, n, vertices)),
             np.empty((n, vertices), np.int64),
         )
@@ -118,29 +115,23 @@ class Optimal(MethodBase):
             MethodBase.run(self, block)
             return
         own: Workspace = block.own
+        # Plain tuples: named ones take numba a microsecond to recognise.
         extract_rows(
             block.ranges,
             block.rows,
-            block.range_min,
-            block.range_max,
             block.bearings,
-            block.circular,
             block.noise,
-            self.evidence,
-            self.max_missing,
-            own.points,
-            own.beams,
-            own.spans,
-            own.pieces,
-            own.sums,
-            own.noise,
+            (block.range_min, block.range_max, block.circular, self.evidence, self.max_missing),
+            own.arrays,
+            (
+                block.segments,
+                block.corners,
+                block.arcs,
+                block.breakpoints,
+                block.clusters,
+                block.offsets,
+            ),
             block.noises,
-            block.segments,
-            block.corners,
-            block.arcs,
-            block.breakpoints,
-            block.clusters,
-            block.offsets,
             block.counts,
         )
 

@@ -65,10 +65,12 @@ def run_demo(
         ("beams invalid", f"{100 * summary.invalid:.1f} %"),
         ("speed", f"{summary.scans / summary.seconds:.0f} scans/s, from file to table"),
     ]
-    from ..output.page import write_page
+    from ..output.page import image_part, list_part, text_parts, write_parts
 
     page = target / "index.html"
-    write_page(page, "lineament: lines and corners of a drive", facts, figures, [_NOTE])
+    images = [image_part(caption, image.read_bytes()) for caption, image in figures]
+    parts = [list_part(facts), *images, *text_parts([_NOTE])]
+    write_parts(page, "lineament: lines and corners of a drive", parts)
     return [*facts, ("page", str(page))]
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import needed_by
 from ...scan import Array, LaserScan
-from ..counts import optional, rms
+from ..counts import rms
 
 #: By how much a ray may pass the end of a segment and still meet it [rad].
 _MARGIN = 1e-3
@@ -103,7 +104,8 @@ def _share(flags: NDArray[np.bool_]) -> float:
 
 def _areas(polylines: Sequence[Array], outline: Array) -> tuple[float, float]:
     """Area error and intersection over union of a map and the true outline."""
-    shapely = optional("shapely", "bench")
+    with needed_by("areas"):
+        import shapely
     true = shapely.make_valid(shapely.Polygon(outline))
     vertices = np.concatenate([np.empty((0, 2)), *polylines])
     if len(vertices) < 3:

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 from threading import Event
 from typing import Any
 
-from ...errors import LineamentError
+from ...errors import LineamentError, needed_by
 from .manifest import Row
 from .parts import Report, Task, extract_part, failed
 
@@ -188,10 +188,8 @@ def dask_executor(address: str) -> Iterator[Executor]:
     LineamentError
         If `distributed` is not installed, or no scheduler answers.
     """
-    try:
+    with needed_by(f"{address}:"):
         from distributed import Client
-    except ModuleNotFoundError:
-        raise LineamentError(f"{address}: needs Dask: pip install lineament[dask]") from None
     try:
         client = Client(address, timeout=_ANSWER)
     except (OSError, ValueError) as error:
