@@ -10,10 +10,8 @@ from worlds import (
     BOX,
     NOISE,
     STEP,
-    degenerate_scans,
     fan,
     full_circle,
-    random_scan,
     room,
     scan_of,
     vertex,
@@ -21,8 +19,13 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan
+from lineament.methods import get_method
 
 NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing"]
+#: Also the methods that have another way to part and to join.
+and_others = pytest.mark.parametrize(
+    "extractor", [*NAMES, "liu", "liu:paper", "optimal"], indirect=True
+)
 BOX_CORNERS = [(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)]
 
 
@@ -35,40 +38,17 @@ def noisy(ranges, seed=0):
     return ranges + NOISE.sigma * np.random.default_rng(seed).normal(size=len(ranges))
 
 
-def test_features_of_any_scan_are_sound(extractor):
-    for scan in [*degenerate_scans().values(), *map(random_scan, range(20))]:
-        for given in (extractor, Extractor(extractor.method)):
-            assert_sound(scan, given(scan))
-
-
-def assert_sound(scan, features):
-    segments, corners = features.segments, features.corners
-    for table in (segments, corners):
-        for name in set(table.dtype.names) - {"kind"}:
-            assert np.isfinite(table[name]).all(), name
-        assert (np.linalg.eigvalsh(table["covariance"]) > 0).all()
-    assert (corners["kind"] == "corner").all()
-    valid = np.flatnonzero(scan.valid)
-    for line in segments:
-        first, last = int(line["first_beam"]), int(line["last_beam"])
-        beams = valid[(valid - first) % len(scan) <= (last - first) % len(scan)]
-        # On a ring, the measurement at which it was opened belongs to its first and its last line.
-        assert line["n_points"] in (len(beams), 1 + len(scan) * (first == last))
-        assert set(features.clusters[beams]) == {line["cluster"]}
-    for corner in corners:
-        before, after = corner["segments"]
-        assert segments["cluster"][before] == segments["cluster"][after]
-        assert corner["beam"] == segments["first_beam"][after]
-    assert (features.clusters[~scan.valid] == -1).all()
-
-
+@and_others
 @pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
 def test_wall_has_its_ends_along_an_axis_too(extractor, normal):
     angles = math.radians(normal) + fan(30)
     scan = scan_of(wall(angles, 2.0, normal), angles)
     (line,) = extractor(scan).segments
-    np.testing.assert_allclose(line["start"], scan.points[0], atol=1e-9)
-    np.testing.assert_allclose(line["end"], scan.points[-1], atol=1e-9)
+    # On filtered ranges, whose ends are drawn inwards, a wall is not quite straight.
+    atol = 0.02 if extractor.method == get_method("liu:paper") else 1e-9
+    np.testing.assert_allclose(line["start"], scan.points[0], atol=atol)
+    np.testing.assert_allclose(line["end"], scan.points[-1], atol=atol)
+    assert np.isfinite(line["covariance"]).all()
     assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
     assert line["n_points"] == len(angles)
 
@@ -130,6 +110,7 @@ def test_a_segment_goes_over_as_many_missing_beams_as_it_may(extractor, missing,
     assert segments["n_points"].sum() == len(angles) - missing
 
 
+@and_others
 @pytest.mark.parametrize(("behind", "lines"), [(np.nan, 2), (np.inf, 2), (5.0, 3)])
 def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor, behind, lines):
     angles = fan(40)
@@ -137,7 +118,7 @@ def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor, behind, li
     ranges = noisy(np.where(door, wall(angles, behind, 0.0), wall(angles, 2.0, 0.0)))
     features = extractor(scan_of(ranges, angles))
     assert len(features.segments) == lines
-    assert len(features.corners) == 0
+    assert (features.corners["kind"] == "edge").all()  # Of `optimal`, beside the jump.
     for line in features.segments:
         assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
 
@@ -171,6 +152,7 @@ def test_room_all_around_has_four_walls_and_four_corners(extractor, turn, n):
         assert before["end"].tolist() == after["start"].tolist() == corner["position"].tolist()
 
 
+@and_others
 def test_wall_over_the_seam_is_one(extractor):
     angles = full_circle()
     ranges = np.where(abs(angles) > 2.6, wall(angles, 2.0, 180.0), np.inf)
