@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from foxglove_client import FoxgloveClient
 from protobuf import decode, messages_of
-from websocket import FoxgloveClient
 
 import lineament as ln
 from lineament import LineamentError
