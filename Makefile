@@ -4,7 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint types tests coverage wheel bench lines browser ros1 clean
+.PHONY: demo test test-all lint house types tests coverage wheel bench mutants lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -23,6 +23,12 @@ test-all: coverage
 lint: .venv/ready
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/lint-imports --no-cache
+	$(BIN)/python benchmarks/house.py --check
+
+# The picture of the house in CONTRIBUTING, from the real imports.
+house: .venv/ready
+	$(BIN)/python benchmarks/house.py
 
 types: .venv/ready
 	$(BIN)/mypy
@@ -40,7 +46,7 @@ ros1:
 	apt-get install -y -qq --no-install-recommends $(ROS1:%=python3-%) >/dev/null; } || echo "no ROS 1: its tests will be skipped"
 
 tests: .venv/ready browser ros1
-	$(BIN)/python -m pytest --durations=5
+	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
 
 coverage: .venv/ready
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m 'not slow'
@@ -54,6 +60,10 @@ wheel: .venv/ready
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
 	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
 	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
+
+# Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
+mutants: .venv/ready
+	$(BIN)/python benchmarks/mutants.py --count 300 --seed 1
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py

@@ -11,7 +11,7 @@ import numpy as np
 
 from lineament import Extractor, LaserScan, LogError
 from lineament.evaluation import (
-    CornerScores,
+    FeatureScores,
     FreeSpaceScores,
     NormalisedErrors,
     RankedRepeats,
@@ -113,7 +113,7 @@ def figures(parts: Parts) -> dict[str, float]:
     """Figures of all that was measured, by column."""
     sums = [Scores.total(scores) for scores in parts["simulated"].values()]
     columns = {
-        "corner F1": [s.corners.counts[0.10].f1 for s in sums],
+        "corner F1": [s.corners.counts.f1 for s in sums],
         "segment F1": [s.segments.counts.f1 for s in sums],
         "partition F1": [s.partition.regions.f1 for s in sums],
         "arc F1": [s.arcs.counts.f1 for s in sums],
@@ -123,11 +123,12 @@ def figures(parts: Parts) -> dict[str, float]:
     if not parts["free"]:
         return all_of
     free = FreeSpaceScores.total(s for scores in parts["free"].values() for s in scores)
-    all_of |= {"phantom in 100 m": free.phantom_share, "covered": free.covered_share}
+    shares = free.summary()
+    all_of |= {"phantom in 100 m": shares["phantom_in_100m"], "covered": shares["covered"]}
     for name, scores in parts["arena"].items():
-        corners = CornerScores.total(scores)
-        all_of[f"{name}: recall"] = corners.counts[0.10].recall
-        all_of[f"{name}: error [mm]"] = 1e3 * float(np.median(corners.distances))
+        corners = FeatureScores.total(scores)
+        all_of[f"{name}: recall"] = corners.counts.recall
+        all_of[f"{name}: error [mm]"] = 1e3 * float(np.median(corners.errors["position"]))
     all_of["repeated at .8"] = sum(
         RankedRepeats.total(scores).count_at(0.8) for scores in parts["repeats"].values()
     )

@@ -16,9 +16,9 @@ from random import Random
 import atheris
 
 with atheris.instrument_imports(include=["lineament.logs"]):
-    import lineament.logs
+    import lineament.logs.opening
 
-    lineament.logs.readers()
+    lineament.logs.opening.readers()
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from fuzzing import OPTIONS, check, check_nothing_left, corpus, scratch

@@ -9,7 +9,7 @@ from naive_association import associate
 from naive_motion import estimate_motion
 
 from lineament.motion import Motion, Tracker, Tracks
-from lineament.motion.poses import inverse
+from lineament.scan.poses import inverse
 
 KINDS = ("segments", "corners", "arcs")
 

@@ -15,7 +15,9 @@ import pytest
 from text_logs import BEAMS, FLASER, zipped
 
 from lineament import LaserScan, LogError
-from lineament.logs import archives, copies, find_logs, open_log, save_npz
+from lineament.logs import find_logs, open_log, save_npz
+from lineament.logs import sources as archives
+from lineament.logs import sources as copies
 
 
 def npz_bytes(tmp_path):
@@ -67,7 +69,7 @@ def test_npz_logs_in_gzip_and_zip(tmp_path, temporary):
 
 def test_errors_name_the_member(tmp_path):
     path = tmp_path / "a.zip"
-    path.write_bytes(zipped(**{"b.log": FLASER + b"FLASER 9\n"}))
+    path.write_bytes(zipped(**{"b.log": FLASER + b"FLASER 9 0 0 0 0 0 0 0 0 0\n"}))
     with pytest.raises(LogError, match=r"a\.zip/b\.log:2: FLASER says 9"):
         list(open_log(path))
     log = open_log(path, keep_going=True)

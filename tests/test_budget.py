@@ -10,7 +10,7 @@ import pytest
 from worlds import random_scan
 
 import lineament as ln
-from lineament.evaluation.ple.benchmark import polylines_of
+from lineament.evaluation.ple import polylines_of
 from lineament.kernels.budget import LINK, WORST, limit_pieces
 from lineament.kernels.layout import (
     BEAM,

@@ -40,8 +40,8 @@ def test_a_data_set_is_one_table_of_all_logs(logs, tmp_path):
 
 def test_the_manifest_tells_what_became_of_each_log(logs, tmp_path):
     logs[1].write_bytes(logs[1].read_bytes()[:200])
-    told = []
-    bulk = extract_logs([*logs, "/none.bag"], tmp_path / "out", IEPF, tell=told.append)
+    shown = []
+    bulk = extract_logs([*logs, "/none.bag"], tmp_path / "out", IEPF, show=shown.append)
     assert (bulk.failed, bulk.scans) == (2, 8)
     assert "2 done, 2 failed, 0 whole before" in str(bulk)
     rows = rows_of(tmp_path / "out")
@@ -62,7 +62,7 @@ def test_the_manifest_tells_what_became_of_each_log(logs, tmp_path):
     assert rows["b.npz"]["error"].startswith(f"{logs[1]}: ")
     assert rows["none.bag"]["error"] == "/none.bag: there is no such file, expected a log"
     assert not (tmp_path / "out" / "log=b.npz").exists()
-    assert told[-1].startswith("4/4 logs, 2 failed, ")
+    assert shown[-1].startswith("4/4 logs, 2 failed, ")
 
 
 def test_neither_executor_nor_order_changes_the_table(logs, tmp_path):
@@ -196,7 +196,7 @@ def test_an_interrupted_run_leaves_whole_files_and_tells_what_is_missing(logs, t
             raise KeyboardInterrupt
 
     with Threads(1) as one, pytest.raises(KeyboardInterrupt):
-        extract_logs(logs, out, IEPF, executor=one, tell=interrupt)
+        extract_logs(logs, out, IEPF, executor=one, show=interrupt)
     assert halves(out) == []
     told = outcomes(out)
     assert len(told) == 3

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lineament.tasks.bulk import MANIFEST, Manifest, Row
-from lineament.tasks.bulk.naming import names_of, part_path
+from lineament.tasks.bulk.manifest import names_of, part_path
 from lineament.tasks.bulk.parts import log_state
-from lineament.tasks.bulk.progress import Progress
+from lineament.tasks.bulk.run import _Progress
 
 PATHS = st.lists(st.lists(st.sampled_from("aAbé=%"), min_size=1, max_size=4), max_size=9)
 
@@ -75,10 +75,10 @@ def test_the_state_of_what_is_at_an_address_is_known(tmp_path):
 
 def test_progress_tells_a_throughput_and_the_time_left(monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("lineament.tasks.bulk.progress.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("lineament.tasks.bulk.run.time.monotonic", lambda: clock[0])
     sizes = {"a": (3000, "1"), "b": (1000, "1"), "c": (None, "")}
-    monkeypatch.setattr("lineament.tasks.bulk.progress.log_state", sizes.__getitem__)
-    progress = Progress(["a", "b", "c"])
+    monkeypatch.setattr("lineament.tasks.bulk.run.log_state", sizes.__getitem__)
+    progress = _Progress(["a", "b", "c"])
     assert str(progress) == "0/3 logs, 0 scans/s"
     clock[0] += 10.0
     progress.report("a", 500, 1000)  # half of three of six parts

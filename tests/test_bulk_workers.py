@@ -81,7 +81,7 @@ def test_a_dask_cluster_that_does_not_answer_is_named(monkeypatch):
             pass
     monkeypatch.setitem(sys.modules, "distributed", None)
     with (
-        pytest.raises(ln.LineamentError, match=r"needs Dask: pip install lineament\[dask\]"),
+        pytest.raises(ln.LineamentError, match=r"needs distributed, .*'lineament\[dask\]'"),
         dask_executor("tcp://127.0.0.1:9"),
     ):
         pass

@@ -1,5 +1,6 @@
 """The real commands, over a matrix of inputs: what they write, say and return."""
 
+import ast
 import gzip
 import json
 import os
@@ -8,13 +9,18 @@ import subprocess
 import sys
 import time
 
+import click
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from bulk_logs import corner_log
+from text_logs import FLASER, zipped
 
 import lineament as ln
 from lineament.cli import run
+from lineament.cli.options import LOG_PATH, reading
 from lineament.logs import save_npz
+from lineament.logs.base import ECHOES, ReadOptions
 
 
 def wall_scans(count, beams=61):
@@ -360,3 +366,105 @@ def test_progress_bar_on_a_real_terminal(npz):
     os.close(main)
     assert "wall.npz" in shown
     assert "7/7" in shown
+
+
+@pytest.fixture
+def two_logs(tmp_path):
+    return [str(corner_log(tmp_path / f"{name}.npz", 4 + k)) for k, name in enumerate("ab")]
+
+
+def test_several_logs_go_into_a_folder(two_logs, tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ["extract", *two_logs, "-o", f"{out}/", "--threads", "1"]
+    assert run(arguments) == 0
+    said = capsys.readouterr().out
+    assert f"2 logs -> {out}/\n  2 done, 0 failed, 0 whole before\n  9 scans, " in said
+    parts = sorted(str(path.relative_to(out)) for path in out.rglob("*.parquet"))
+    assert parts == ["log=a.npz/part-0.parquet", "log=b.npz/part-0.parquet"]
+    # Without --resume all is done again; a folder that is there needs no slash.
+    assert run([*arguments[:4], str(out), "--threads", "2"]) == 0
+    assert "2 done" in capsys.readouterr().out
+    assert run([*arguments, "--resume"]) == 0
+    assert "0 done, 0 failed, 2 whole before" in capsys.readouterr().out
+
+
+def test_logs_that_fail_are_counted_in_one_line(two_logs, tmp_path, capfd):
+    out = tmp_path / "out"
+    given = [two_logs[0], "/none.bag", "/none.npz"]
+    assert run(["extract", *given, "-q", "-o", f"{out}/", "--processes", "1"]) == 1
+    output, errors = capfd.readouterr()
+    assert output == ""
+    assert errors == f"lineament: 2 of 3 logs failed, see {out}/_manifest.jsonl\n"
+    assert (out / "log=a.npz" / "part-0.parquet").exists()
+
+
+def test_a_folder_of_other_files_than_tables(two_logs, tmp_path):
+    arguments = ["extract", two_logs[0], "-q", "-o", f"{tmp_path}/out/", "--threads", "1"]
+    assert run([*arguments, "--format", "jsonl"]) == 0
+    assert [path.name for path in (tmp_path / "out").rglob("part*")] == ["part-0.jsonl"]
+    assert run([*arguments, "--format", "xls"]) == 1
+
+
+def test_nothing_is_appended_to_a_file(two_logs, tmp_path, capsys):
+    target = tmp_path / "features.parquet"
+    assert run(["extract", two_logs[0], "--append", "-o", str(target)]) == 2
+    assert "--append: a file is written whole" in capsys.readouterr().err
+    assert not target.exists()
+
+
+@click.command()
+@reading
+def show(reading):
+    click.echo(reading)
+
+
+def test_options_become_what_open_log_takes(capsys):
+    show.main([], standalone_mode=False)
+    given = ["--topic", "/scan", "--echo", "last", "--ring", "3", "--poses", "/odom"]
+    show.main([*given, "--keep-going"], standalone_mode=False)
+    plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
+    assert plain == {"topic": None, "keep_going": False, **vars(ReadOptions())}
+    assert list(all_given.values()) == ["/scan", True, "last", 3, "/odom"]
+    for option in show.params:
+        if option.name == "echo":
+            assert tuple(option.type.choices) == ECHOES
+
+
+@pytest.mark.parametrize("wrong", [["--echo", "second"], ["--ring", "-1"], ["--ring", "x"]])
+def test_wrong_options(wrong, tmp_path, capsys):
+    assert run(["info", str(tmp_path / "a.log"), *wrong]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"echo": "second"}, "echo is 'second', expected first or last or strongest"),
+        ({"ring": -1}, "ring is -1, expected a whole number"),
+        ({"ring": True}, "ring is True"),
+        ({"pose_topic": ""}, "pose_topic is ''"),
+    ],
+)
+def test_options_are_checked(options, problem):
+    with pytest.raises(ValueError, match=problem):
+        ReadOptions(**options)
+
+
+def test_paths_and_addresses():
+    assert LOG_PATH.convert("s3://bucket/a.log", None, None) == "s3://bucket/a.log"
+    assert LOG_PATH.convert("a.log", None, None).name == "a.log"
+
+
+def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys):
+    fsspec = pytest.importorskip("fsspec")
+    (tmp_path / "a.zip").write_bytes(zipped(**{"x.log": FLASER, "y.log": FLASER}))
+    fsspec.filesystem("memory").pipe("/cli/a.log", FLASER)
+    for log in (f"{tmp_path}/a.zip/y.log", "memory://cli/a.log"):
+        assert run(["info", log]) == 0
+        out = capsys.readouterr().out
+        assert out.startswith(f"log      {log} (carmen: FLASER)\n")
+        assert "ranges   1.50 to 2.50 m, median 2.00 m, 66.7 % valid" in out
+    assert run(["info", str(tmp_path / "a.zip")]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"holds several logs, expected a log file: {tmp_path}/a.zip/x.log" in error

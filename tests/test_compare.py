@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lineament as ln
-from lineament import LineamentError
-from lineament.logs import LogError, save_npz
+from lineament import LineamentError, LogError
+from lineament.logs import save_npz
 from lineament.reproduce.compare import compare_log, compare_scan, write_comparison
 from lineament.reproduce.contenders import region_lines
 from lineament.simulation import SENSORS, room

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from naive_world import distance_to_walls, ring_sensor
 
 import lineament as ln
-from lineament.evaluation import CornerScores, corner_scores
+from lineament.evaluation import FeatureScores, corner_scores
 from lineament.evaluation.counts import rms
 from lineament.motion.deskew import beam_times
 from lineament.scan import RangeNoise
@@ -127,7 +127,7 @@ def test_a_twist_must_be_finite():
 @pytest.mark.slow
 def test_corners_are_as_good_as_those_of_a_standing_sensor():
     sensor, extract, twist = replace(SENSORS["utm30lx"], rate=10.0), ln.Extractor(), (1.0, 0.0, 1.5)
-    standing, deskewed = CornerScores(), CornerScores()
+    standing = deskewed = FeatureScores.none("corners")
     for seed in range(10_000, 10_030):
         world, pose = scene("room", seed)
         true = truth(world, pose, sensor)
@@ -137,6 +137,6 @@ def test_corners_are_as_good_as_those_of_a_standing_sensor():
         )
         standing += corner_scores(extract(still), true)
         deskewed += corner_scores(extract(ln.deskew(moving, twist)), true)
-    assert rms(deskewed.distances) <= 1.3 * rms(standing.distances)
+    assert rms(deskewed.errors["position"]) <= 1.3 * rms(standing.errors["position"])
     assert deskewed.summary()["recall_0.10"] > 0.97
     assert deskewed.summary()["precision_0.10"] > 0.97

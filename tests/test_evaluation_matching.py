@@ -1,24 +1,26 @@
-"""What all metrics stand on: assignment, counts, sums, errors in units of a covariance, masks."""
-
-from __future__ import annotations
+"""What all metrics stand on: assignment, counts, sums, errors by a covariance, beams, scipy."""
 
 import itertools
 import math
+import sys
 
 import numpy as np
 import pytest
 from handmade import features, segment
 
-from lineament.evaluation import Counts, NormalisedErrors, match
+from lineament import LaserScan
+from lineament.errors import LineamentError
+from lineament.evaluation import Counts, NormalisedErrors, evaluate, match
 from lineament.evaluation.beams import (
     beam_masks,
-    beam_spans,
-    marked_beams,
     on_small_surfaces,
     overlap_ratios,
     shared_beams,
+    with_neighbours,
 )
 from lineament.evaluation.consistency import largest_variance, tolerance, usable_covariances
+from lineament.evaluation.counts import optional
+from lineament.evaluation.matching import distances_from_segments
 
 
 def best_by_trying_all(cost, allowed):
@@ -49,7 +51,7 @@ def test_match_is_the_best_of_all(seed):
     assert cost[rows, columns].sum() == pytest.approx(least)
 
 
-def test_match_looks_at_no_cost_outside_the_gate():
+def test_match_ignores_costs_outside_the_gate():
     cost = np.array([[np.nan, 1.0], [np.inf, np.nan]])
     rows, columns = match(cost, np.isfinite(cost))
     assert (rows.tolist(), columns.tolist()) == ([0], [1])
@@ -62,12 +64,22 @@ def test_match_refuses():
         match(np.array([[np.nan]]), np.array([[True]]))
 
 
+def test_without_scipy_one_line_names_the_extra(monkeypatch):
+    wall = features(segments=[segment((2, -1), (2, 1), 10, 49)])
+    for module in ("scipy", "scipy.optimize", "scipy.special"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(LineamentError, match=r"^evaluation needs scipy: pip install 'lineament\["):
+        evaluate(wall, wall)
+    with pytest.raises(LineamentError, match=r"needs no_such: pip install 'lineament\[extra\]'$"):
+        optional("no_such.module", "extra")
+
+
 def test_counts_by_hand():
     # Four found: 0 and 2 are right, 1 is excused, 3 is wrong. That 2 is excused too is no matter.
     excused, demanded = np.array([0, 1, 1, 0], bool), np.array([1, 1, 1, 0], bool)
     counts = Counts.of(np.array([0, 2]), excused, demanded)
     assert counts == Counts(correct=2, found=3, true=3)
-    assert counts.precision == counts.recall == counts.f1 == 2 / 3
+    assert Counts(2, 4, 3).summary("_x") == {"precision_x": 1 / 2, "recall_x": 2 / 3, "f1_x": 4 / 7}
 
 
 @pytest.mark.parametrize(
@@ -79,8 +91,7 @@ def test_counts_by_hand():
     ],
 )
 def test_counts_of_nothing(counts, precision, recall, f1):
-    found = (counts.precision, counts.recall, counts.f1)
-    np.testing.assert_equal(found, (precision, recall, f1))
+    np.testing.assert_equal((counts.precision, counts.recall, counts.f1), (precision, recall, f1))
 
 
 def test_sums():
@@ -102,14 +113,15 @@ def test_errors_by_hand():
     # The median of chi-square with two degrees of freedom is 2 ln 2.
     assert normalised.median_ratio == pytest.approx(15 / (2 * math.log(2)))
     both = normalised + normalised
-    assert both.whitened.shape == (4, 2)
-    assert both.mean_ratio == normalised.mean_ratio
+    assert (both.whitened.shape, both.mean_ratio) == ((4, 2), normalised.mean_ratio)
 
 
-def test_interval_is_that_of_the_tables():
-    """χ² with 10 degrees of freedom: 3.247 and 20.483."""
+def test_quantiles_are_those_of_the_tables():
+    """χ² with 10 degrees of freedom: 3.247 and 20.483; 95 % of two are below -2 ln 0.05 = 5.99."""
     low, high = NormalisedErrors(np.zeros((5, 2))).interval
     assert (10 * low, 10 * high) == (pytest.approx(3.247, abs=1e-3), pytest.approx(20.483, 1e-4))
+    errors = np.sqrt([[5.98, 0.0], [0.0, 6.0], [3.0, 2.9], [3.0, 3.1]])
+    assert NormalisedErrors(errors).share_within(0.95) == 0.5
 
 
 @pytest.mark.parametrize("k", [1, 2, 3])
@@ -131,6 +143,7 @@ def test_errors_with_their_own_covariance_are_consistent(k):
 def test_errors_without_a_usable_covariance_are_counted():
     covariances = np.array([np.eye(2), np.zeros((2, 2)), -np.eye(2), np.ones((2, 2))])
     covariances = np.vstack((covariances, np.full((1, 2, 2), np.nan), [np.eye(2)]))
+    assert usable_covariances(covariances).tolist() == [True, *[False] * 4, True]
     errors = np.ones((6, 2))
     errors[5, 0] = np.inf
     normalised = NormalisedErrors.of(errors, covariances)
@@ -139,11 +152,21 @@ def test_errors_without_a_usable_covariance_are_counted():
 
 
 def test_errors_of_nothing():
-    none = NormalisedErrors.none(3)
-    assert math.isnan(none.mean_ratio)
-    assert math.isnan(none.over_bound_median)
-    assert all(map(math.isnan, none.interval))
-    assert len(NormalisedErrors.of(np.empty((0, 3)), np.empty((0, 3, 3))).whitened) == 0
+    for none in (
+        NormalisedErrors.none(3),
+        NormalisedErrors.of(np.ones((0, 3)), np.ones((0, 3, 3))),
+    ):
+        figures = (none.mean_ratio, none.over_bound_median, *none.interval, none.share_within(0.5))
+        assert all(map(math.isnan, figures))
+        assert none.whitened.shape == (0, 3)
+
+
+def test_largest_variance_and_tolerance():
+    turned = np.array([[2.0, 1.0], [1.0, 2.0]])  # eigenvalues 1 and 3
+    indefinite = np.array([[1.0, 2.0], [2.0, 1.0]])
+    covariances = np.stack([turned, indefinite, np.full((2, 2), np.inf)])
+    assert largest_variance(covariances) == pytest.approx([3.0, 0.0, 0.0])
+    assert tolerance(np.array([0.04, np.nan])).tolist() == pytest.approx([0.6, 0.0])
 
 
 def walk(first, last, n):
@@ -155,40 +178,33 @@ def walk(first, last, n):
 
 
 @pytest.mark.parametrize("n", [1, 2, 17])
-def test_spans_are_sets_of_beams(n):
-    rng = np.random.default_rng(0)
-    first, last = rng.integers(0, n, (2, 40))
+def test_masks_are_sets_of_beams(n):
+    first, last = np.random.default_rng(0).integers(0, n, (2, 40))
     sets = [walk(*ends, n) for ends in zip(first, last, strict=True)]
-    spans = beam_spans(first, last, n)
-    assert [set(np.flatnonzero(mask)) for mask in beam_masks(spans, n)] == sets
-    assert shared_beams(spans, spans, n).tolist() == [[len(a & b) for b in sets] for a in sets]
+    masks = beam_masks(first, last, n)
+    assert [set(np.flatnonzero(mask)) for mask in masks] == sets
+    assert shared_beams(masks, masks).tolist() == [[len(a & b) for b in sets] for a in sets]
     expected = [[len(a & b) / len(a | b) for b in sets] for a in sets]
-    np.testing.assert_allclose(overlap_ratios(spans, spans, n), expected)
-    marks = rng.random(n) < 0.5
-    marked = set(np.flatnonzero(marks))
-    assert marked_beams(spans, marks).tolist() == [len(beams & marked) for beams in sets]
+    np.testing.assert_allclose(overlap_ratios(masks, masks), expected)
 
 
 def test_small_surfaces_by_hand():
     small = segment((1, 0), (1, 1), 10, 14)
     large = segment((1, 0), (1, 1), 15, 20)
     truth = features(30, segments=[small, large])
-    spans = beam_spans(np.array([10, 10, 10, 5]), np.array([14, 19, 20, 10]), 30)
+    masks = beam_masks(np.array([10, 10, 10, 5]), np.array([14, 19, 20, 10]), 30)
     # 5 of 5, 5 of 10, 5 of 11, 1 of 6.
-    assert on_small_surfaces(spans, truth).tolist() == [True, True, False, False]
+    assert on_small_surfaces(masks, truth).tolist() == [True, True, False, False]
 
 
-def test_share_in_an_ellipse():
-    """95 % of χ² with two degrees of freedom are below -2 ln 0.05 = 5.99."""
-    errors = np.sqrt([[5.98, 0.0], [0.0, 6.0], [3.0, 2.9], [3.0, 3.1]])
-    assert NormalisedErrors(errors).share_within(0.95) == 0.5
-    assert math.isnan(NormalisedErrors.none(2).share_within(0.95))
+def test_neighbours_of_the_first_and_the_last_beam():
+    fan, ring = LaserScan([1.0] * 3, 0.0, 0.1), LaserScan([1.0] * 3, 0.0, 2 * math.pi / 3)
+    assert with_neighbours(fan).tolist() == [[0, 0, 1], [0, 1, 2], [1, 2, 2]]
+    assert with_neighbours(ring).tolist() == [[2, 0, 1], [0, 1, 2], [1, 2, 0]]
 
 
-def test_largest_variance_and_tolerance():
-    turned = np.array([[2.0, 1.0], [1.0, 2.0]])  # eigenvalues 1 and 3
-    indefinite = np.array([[1.0, 2.0], [2.0, 1.0]])
-    covariances = np.stack([turned, indefinite, np.full((2, 2), np.inf)])
-    assert usable_covariances(covariances).tolist() == [True, False, False]
-    assert largest_variance(covariances) == pytest.approx([3.0, 0.0, 0.0])
-    assert tolerance(np.array([0.04, np.nan])).tolist() == pytest.approx([0.6, 0.0])
+def test_distances_from_segments_by_hand():
+    walls = np.array([segment((0, 0), (4, 0), 0, 1), segment((1, 1), (1, 1), 0, 1)])
+    points = np.array([(2.0, 3.0), (7.0, 4.0), (-3.0, 0.0)])
+    found = distances_from_segments(points, walls[:, np.newaxis])
+    np.testing.assert_allclose(found, [(3, 5, 3), np.hypot(*(points - 1).T)])

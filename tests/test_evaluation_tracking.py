@@ -13,9 +13,9 @@ from lineament.evaluation.icp import icp
 from lineament.evaluation.tracking import MotionErrors, motion_errors, track_scores
 from lineament.logs import save_npz
 from lineament.motion import Tracker, Tracks
-from lineament.motion.poses import compose, inverse, relative
 from lineament.reproduce import Setting, tracking
 from lineament.scan import RangeNoise
+from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, drive, room
 
 NONE = np.empty(0, np.int64)

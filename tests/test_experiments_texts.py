@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lineament import LaserScan
-from lineament.evaluation import ArcScores, CornerScores, Counts, Scores, SimilarityScores
+from lineament.evaluation import Counts, FeatureScores, Scores, SimilarityScores
 from lineament.evaluation.consistency import NormalisedErrors
 from lineament.output import canvas, drawing
 from lineament.reproduce import all_methods, layered, similarity, two_corners
@@ -26,7 +28,9 @@ def test_claim_of_figure_12_holds_or_does_not(largest, told):
 def test_mean_nees_is_told_with_its_interval():
     """Two corners, each off by one σ along x: the mean NEES of four components is a half."""
     off = NormalisedErrors(np.array([[1.0, 0.0], [1.0, 0.0]]))
-    scored = all_methods._Result(Scores(1, CornerScores(consistency=off)), 1e-5)
+    scored = all_methods._Result(
+        Scores(1, replace(FeatureScores.none("corners"), consistency=off)), 1e-5
+    )
     told = all_methods._consistency({"lms181": {"liu": scored, "pdbs": scored}})
     # Quantiles of chi-square with 4 degrees of freedom, 0.484 and 11.143, over 4.
     assert "For corners this is 0.12 to 2.79 where most are right, 0.12 to 2.79 where" in told
@@ -36,7 +40,9 @@ def test_mean_nees_is_told_with_its_interval():
 
 def test_methods_with_arcs_are_named():
     nothing = all_methods._Result(Scores(), 1e-5)
-    two = all_methods._Result(Scores(1, arcs=ArcScores(Counts(1, 2, 2))), 1e-5)
+    two = all_methods._Result(
+        Scores(1, arcs=replace(FeatureScores.none("arcs"), by_gate={0.1: Counts(1, 2, 2)})), 1e-5
+    )
     sensors = {"lms181": {"liu": nothing, "optimal": nothing}}
     assert all_methods._arcs(sensors).startswith("Arcs are found by none of the methods.")
     sensors["ld19"] = {"liu": nothing, "optimal": two}

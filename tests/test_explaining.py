@@ -7,7 +7,7 @@ import pytest
 from worlds import degenerate_scans, random_scan
 
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.explain.explain import explain
+from lineament.explain import explain
 from lineament.methods import METHODS
 from lineament.simulation import SENSORS, scene
 
@@ -22,7 +22,7 @@ def wall(n=61, distance=2.0):
     return distance / np.cos(bearings), bearings
 
 
-def told(scan, beam, method="optimal", **parameters):
+def explained(scan, beam, method="optimal", **parameters):
     trace = Extractor(method, noise=NOISE, **parameters).trace(scan)
     explanation = explain(trace, beam)
     return explanation, " | ".join(f"{stage}: {text}" for stage, text in explanation.steps)
@@ -43,16 +43,16 @@ def test_each_kind_of_invalid_beam_is_named(value, words):
     ranges, bearings = wall()
     ranges[7] = value
     scan = LaserScan(ranges, angles=bearings, range_min=0.1, range_max=30.0)
-    explanation, _ = told(scan, 7)
+    explanation, _ = explained(scan, 7)
     assert explanation.outcome == "invalid"
     assert words in explanation.summary
 
 
 def test_a_reading_on_a_wall_names_its_segment_and_the_evidence():
     ranges, bearings = wall()
-    explanation, text = told(LaserScan(ranges, angles=bearings), 30)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 30)
     assert (explanation.outcome, explanation.summary) == ("segment", "Part of segment 0.")
-    assert "beams 0 to 60, 61 readings, 2.19 m" in text
+    assert "beams 0 to 60, 61 measurements, 2.19 m" in text
     assert "+0.0 mm along its beam (0.0 σ)" in text or "−0.0 mm along its beam (0.0 σ)" in text
     assert "no neighbour that it could be one line with" in text
     assert "cut in two here, χ² would fall by" in text
@@ -61,7 +61,7 @@ def test_a_reading_on_a_wall_names_its_segment_and_the_evidence():
 def test_a_spike_is_told_with_how_far_it_is_off():
     ranges, bearings = wall()
     ranges[30] += 1.0
-    explanation, text = told(LaserScan(ranges, angles=bearings), 30)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 30)
     assert explanation.outcome == "spike"
     assert "off the mean of its neighbours by +1.00 m" in text or "by +999" in text
 
@@ -70,16 +70,16 @@ def test_two_readings_before_two_walls_are_too_few_for_a_cluster():
     ranges, bearings = wall()
     ranges[32:] *= 2.0
     ranges[30:32] = 0.7
-    explanation, text = told(LaserScan(ranges, angles=bearings), 30)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 30)
     assert explanation.outcome == "noise"
-    assert explanation.summary == "Noise: 2 readings hold together here, too few for a cluster."
+    assert explanation.summary == "Noise: 2 measurements hold together here, too few for a cluster."
     assert "to beam 29 before, more than the" in text
 
 
-def test_missing_beams_part_and_the_end_of_the_scan_is_told():
+def test_missing_beams_part_and_the_end_of_the_scan_is_explained():
     ranges, bearings = wall()
     ranges[1:10] = NAN
-    explanation, text = told(LaserScan(ranges, angles=bearings), 0)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 0)
     assert explanation.outcome == "noise"
     assert "the scan ends before" in text
     assert "to beam 10 after, over too many missing beams" in text
@@ -88,7 +88,7 @@ def test_missing_beams_part_and_the_end_of_the_scan_is_told():
 def test_clutter_between_walls_is_too_crooked():
     ranges, bearings = wall(121)
     ranges[50:58] -= [0.4, 0.6, 0.2, 0.5, 0.7, 0.3, 0.6, 0.25]
-    explanation, text = told(LaserScan(ranges, angles=bearings), 53)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 53)
     assert explanation.outcome == "unexplained"
     assert "too crooked" in explanation.summary
     assert "a line through them is off by" in text
@@ -97,14 +97,14 @@ def test_clutter_between_walls_is_too_crooked():
 def test_the_verdict_on_a_corner():
     bearings = np.radians(np.arange(-40, 41))
     ranges = 2.0 / (np.cos(bearings) + abs(np.sin(bearings)))
-    _, text = told(LaserScan(ranges, angles=bearings), 41, "iepf")
+    _, text = explained(LaserScan(ranges, angles=bearings), 41, "iepf")
     assert "was examined as a corner" in text
     assert "asked; a corner" in text
     # Metres against metres: near walls have no corner by the paper's numbers.
-    _, text = told(LaserScan(0.5 * ranges, angles=bearings), 40, "liu")
+    _, text = explained(LaserScan(0.5 * ranges, angles=bearings), 40, "liu")
     assert "0.66 asked; rejected" in text
     # All partitions are compared: no corner was examined for itself.
-    _, text = told(LaserScan(ranges, angles=bearings), 41)
+    _, text = explained(LaserScan(ranges, angles=bearings), 41)
     assert "examined" not in text
     assert "if it were one line with a neighbour (12 asked)" in text
 
@@ -112,7 +112,7 @@ def test_the_verdict_on_a_corner():
 def test_a_reading_on_a_column_is_part_of_an_arc():
     bearings = np.linspace(-0.14, 0.14, 41)
     ranges = 2 * np.cos(bearings) - np.sqrt(0.3**2 - (2 * np.sin(bearings)) ** 2)
-    explanation, text = told(LaserScan(ranges, angles=bearings), 20)
+    explanation, text = explained(LaserScan(ranges, angles=bearings), 20)
     assert (explanation.outcome, explanation.summary) == ("arc", "Part of arc 0.")
     assert "radius 300.0 mm" in text
     assert "lines in its place would cost" in text
@@ -120,15 +120,15 @@ def test_a_reading_on_a_column_is_part_of_an_arc():
 
 def test_pdbs_finds_clusters_alone():
     ranges, bearings = wall()
-    assert told(LaserScan(ranges, angles=bearings), 5, "pdbs")[0].outcome == "clustered"
+    assert explained(LaserScan(ranges, angles=bearings), 5, "pdbs")[0].outcome == "clustered"
 
 
 def test_a_ring_ends_nowhere():
     scan = LaserScan(np.full(720, 1.0), 0.0, np.radians(0.5))
     for beam in (0, 360, 719):
-        explanation, text = told(scan, beam, "liu")
+        explanation, text = explained(scan, beam, "liu")
         assert explanation.outcome == "unexplained"
-        assert "720 readings here in no line" in explanation.summary
+        assert "720 measurements here in no line" in explanation.summary
         assert "the scan ends" not in text
 
 

@@ -17,7 +17,8 @@ import pytest
 from text_logs import FLASER, csm_scan, zipped
 
 from lineament import LaserScan, LogError
-from lineament.logs import objects, open_log, save_npz, summarize
+from lineament.logs import json_stream as objects
+from lineament.logs import open_log, save_npz, summarize
 
 
 @pytest.fixture

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lineament import LaserScan
-from lineament.logs import LogInfo, counters, open_log, save_npz, summarize
+from lineament.logs import LogInfo, open_log, save_npz, summarize
+from lineament.logs import info as counters
 from lineament.logs.base import Topic
 
 

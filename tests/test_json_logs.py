@@ -10,7 +10,8 @@ import pytest
 from text_logs import csm_scan
 
 from lineament import LogError
-from lineament.logs import objects, open_log
+from lineament.logs import json_stream as objects
+from lineament.logs import open_log
 
 UNITS = "rplidar_kitchenette"
 

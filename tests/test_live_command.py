@@ -332,7 +332,10 @@ def test_a_package_that_is_missing_is_one_line(monkeypatch, log, capfd, package)
     options = ["--ros", "0", "--foxglove", "0"] if package == "foxglove" else []
     assert run(["live", "--from", log, *options]) == 1
     extra = {"cyclonedds": "live", "foxglove": "foxglove"}[package]
-    message = f"lineament: live needs {package}: pip install 'lineament[{extra}]'\n"
+    message = (
+        f"lineament: live needs {package}, which is not installed: "
+        f"pip install 'lineament[{extra}]'\n"
+    )
     assert capfd.readouterr() == ("", message)
 
 

@@ -17,9 +17,8 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.live.foxglove import FoxgloveServer
 from lineament.output.foxglove import FoxgloveMessages
-from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
-from lineament.output.scene import Message, Moment
+from lineament.output.scene import Message, Moment, layers_of
 
 DEADLINE = 30.0
 MOMENT = Moment(5, 500_000_000, "laser", "map")

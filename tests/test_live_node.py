@@ -26,12 +26,12 @@ from lineament.live import (
     RosSink,
 )
 from lineament.live.counters import Counters
-from lineament.live.decoding import received_odometry, received_scan
 from lineament.live.pipeline import MOST_BEAMS, check_beams, time_of, twist_of_laser
+from lineament.live.received import received_odometry, received_scan
 from lineament.live.sinks import Publisher
-from lineament.motion.poses import compose, poses_along, twist_between
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message, Moment
+from lineament.scan.poses import compose, poses_along, twist_between
 from lineament.simulation import SENSORS, drive, room
 
 BEARINGS = np.linspace(-0.5, 0.5, 101)

@@ -32,10 +32,10 @@ from lineament.live import LiveConfig
 from lineament.live.received import Received
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.feature_points import feature_points
-from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
-from lineament.output.scene import Message, Moment
+from lineament.output.scene import Message, Moment, layers_of
+from lineament.tasks.warmup import warm_up
 
 # rospy leaves sockets open, and calls what is deprecated.
 pytestmark = [
@@ -373,6 +373,7 @@ def test_a_node_ends_though_a_listener_stands_still(program, peer):
 
 
 def test_the_command_from_scan_to_features(program, scanner):
+    warm_up(["optimal"])  # The program should not wait for a compiler.
     live = program(LIVE)
     below = {"features": "sensor_msgs/PointCloud2", "markers": "visualization_msgs/MarkerArray"}
     for name, kind in below.items():

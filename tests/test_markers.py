@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lineament import LaserScan
-from lineament.output.layers import Layer, layers_of
 from lineament.output.markers import arc_span, ellipses_of, markers_of
+from lineament.output.scene import Layer, layers_of
 
 
 @given(st.integers(0, 10_000))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lineament import LaserScan, LineamentError, LogError
-from lineament.logs import copies, open_log, save_npz
+from lineament.logs import open_log, save_npz
+from lineament.logs import sources as copies
 
 GOOD = {"ranges": np.ones((4, 3)), "angle_min": 0.0, "angle_increment": 0.1}
 

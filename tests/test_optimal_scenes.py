@@ -9,7 +9,7 @@ import pytest
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor
-from lineament.evaluation.segments import segment_scores
+from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 UNAWARE, AWARE = Extractor("optimal"), Extractor("optimal", noise=NOISE)

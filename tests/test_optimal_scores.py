@@ -69,12 +69,12 @@ def figures(parts):
     scores = Scores.total(parts)
     corners, segments, arcs = scores.corners, scores.segments, scores.arcs.counts
     return (
-        corners.counts[0.10].f1,
+        corners.counts.f1,
         segments.counts.f1,
         scores.partition.regions.f1,
         arcs.f1 if arcs.true else 1.0 - arcs.found / scores.scans,
-        corners.over_bound.over_bound_median,
-        segments.offset_over_bound.over_bound_median,
+        corners.over_bound[""].over_bound_median,
+        segments.over_bound["offset_"].over_bound_median,
         corners.consistency.median_ratio,
         segments.consistency.median_ratio,
     )

@@ -1,25 +1,32 @@
-"""Writers: what is written reads back the same; whole files or none."""
+"""Writers: whole files or none, tables that read back the same, recordings of rerun, pages."""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import textwrap
+from collections import namedtuple
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from handmade import arc, corner, features, segment
 from test_tables import random_features
 
 from lineament import LaserScan, LineamentError, RangeNoise
 from lineament.features.tables import SCHEMA, features_table
-from lineament.output import ENDINGS, open_writer, written_beside
-from lineament.output.page import write_page
+from lineament.files import written_beside
+from lineament.output import ENDINGS, open_writer, page
+from lineament.output.tables import TOPIC
+from lineament.output.writer import Writer
 
 try:
     import resource
@@ -27,10 +34,9 @@ except ModuleNotFoundError:  # Windows
     resource = None
 
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
-
-
 #: Forty beams at a pose, for formats that draw the scan.
 SCAN = LaserScan([2.0] * 40, angle_min=-1.0, angle_increment=0.05, pose=(1.0, 2.0, 0.5))
+TOPICS = ("/front", '/re"ar,\n')
 
 
 @pytest.fixture(params=ENDINGS)
@@ -38,108 +44,80 @@ def target(request, tmp_path):
     return tmp_path / f"features{request.param}"
 
 
-def write(path, scans):
-    with open_writer(path) as writer:
-        for features in scans:
-            writer.write(features, SCAN)
+def write(path, scans, topics=()):
+    with open_writer(path, topics) as writer:
+        for i, found in enumerate(scans):
+            writer.write(found, SCAN, topics[i % len(topics)] if topics else "")
 
 
-def test_parquet_reads_back_the_same(tmp_path):
-    path = tmp_path / "features.parquet"
-    scans = [random_features(i, frame_id="laser" if i else "odd") for i in range(2010)]
-    write(path, scans)
-    table = pq.read_table(path)
-    assert table.schema.equals(SCHEMA)
-    assert table.schema.field("cov_00").metadata == SCHEMA.field("cov_00").metadata
-    assert table.combine_chunks().equals(features_table(scans))
-    file = pq.ParquetFile(path)
-    assert file.num_row_groups == 3  # memory does not grow: a thousand scans a group
-    metadata = file.metadata.metadata
-    assert json.loads(metadata[b"lineament.frame_ids"]) == ["odd", "laser"]
-    assert metadata[b"lineament.scans"] == b"2010"
-    assert file.metadata.row_group(0).column(4).compression == "ZSTD"
+# What all writers share.
 
 
-def test_jsonl_reads_back_the_same(tmp_path):
-    path = tmp_path / "features.jsonl"
-    noise = RangeNoise(0.1 + 0.2, 1 / 3)
-    scans = [random_features(i, frame_id="Läser\n", noise=noise) for i in range(1005)]
-    write(path, scans)
-    data = path.read_bytes()
-    assert data.endswith(b"\n")
-    assert b"\r" not in data
-    lines = data.decode("utf-8").splitlines()
-    assert len(lines) == len(scans)
-    for i, (line, features) in enumerate(zip(lines, scans, strict=True)):
-        assert json.loads(line) == {"scan": i, **features.to_dict()}
+class Chunks(Writer):
+    """Keeps what it is given to write, in chunks of three."""
+
+    chunk = 3
+
+    def _open(self, _, files):
+        self.chunks = []
+        files.callback(self.chunks.append, "closed")
+
+    def _write(self, found, first_scan):
+        self.chunks.append((first_scan, [one.features for one in found]))
+        assert all(one.scan is None for one in found)  # tables keep no ranges
 
 
-def test_jsonl_is_strict(tmp_path):
-    path = tmp_path / "features.jsonl"
-    features = random_features(1)
-    features.corners["covariance"] = np.inf
-    features.segments["rms"] = np.nan
-    write(path, [features])
-
-    def refuse(constant):
-        raise AssertionError(constant)
-
-    record = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
-    assert record["corners"][0]["covariance"] == [[None, None], [None, None]]
-    assert record["segments"][0]["rms"] is None
-    assert record["segments"][0]["start"] == features.segments["start"][0].tolist()
-
-
-def test_docs_name_every_field_of_a_line():
-    text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1].split("\n## ")[0]
-    rows = {line.split("|")[1].strip(" `"): line for line in text.splitlines() if "| `" in line}
-    record = random_features(1, noise=RangeNoise(0.01)).to_dict()
-    assert set(rows) == {"scan", "topic", *record}
-    for name in ("noise", "segments", "corners", "arcs", "breakpoints"):
-        fields = record[name] if name == "noise" else record[name][0]
-        for field in fields:
-            assert f"`{field}`" in rows[name], (name, field)
+@pytest.mark.parametrize("n", [0, 2, 3, 4, 6])
+def test_scans_are_written_in_chunks_and_numbered(tmp_path, n):
+    writer = Chunks(tmp_path / "a")
+    for _ in range(2):  # It can be used again.
+        with writer:
+            for i in range(n):
+                writer.write(i, SCAN)
+                assert len(writer.chunks) == (i + 1) // 3
+        starts = range(0, n, 3)
+        expected = [(start, list(range(start, min(start + 3, n)))) for start in starts]
+        assert writer.chunks == [*expected, "closed"]
+        assert writer._written == n
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_log_without_scans_or_features(target):
-    nothing = random_features(0, n_beams=0, counts=(0, 0, 0, 0))
-    write(target, [])
-    if target.suffix == ".parquet":
-        assert pq.read_table(target).schema.equals(SCHEMA)
-        assert pq.read_table(target).num_rows == 0
-    elif target.suffix == ".jsonl":
-        assert target.read_bytes() == b""
-    write(target, [nothing] * 2)
-    if target.suffix == ".parquet":
-        assert pq.read_metadata(target).metadata[b"lineament.scans"] == b"2"
-    elif target.suffix == ".jsonl":
-        assert len(target.read_text(encoding="utf-8").splitlines()) == 2
+    for n in (0, 2):
+        write(target, [random_features(0, n_beams=0, counts=(0, 0, 0, 0))] * n)
+        if target.suffix == ".parquet":
+            table = pq.read_table(target)
+            assert table.schema.equals(SCHEMA)
+            assert table.num_rows == 0
+            assert pq.read_metadata(target).metadata[b"lineament.scans"] == b"%d" % n
+        elif target.suffix == ".jsonl":
+            assert len(target.read_text(encoding="utf-8").splitlines()) == n
+        else:
+            assert target.exists()
 
 
 @pytest.mark.parametrize("ending", sorted(set(ENDINGS) - {".dxf", ".rrd"}))
 def test_same_scans_give_same_bytes(tmp_path, ending):
-    target = tmp_path / f"features{ending}"
-    scans = [random_features(i) for i in range(20)]
-    write(target, scans)
-    first = target.read_bytes()
-    write(target, scans)
-    assert target.read_bytes() == first
+    files = []
+    for name in ("a", "b"):
+        write(tmp_path / f"{name}{ending}", [random_features(i) for i in range(20)])
+        files.append((tmp_path / f"{name}{ending}").read_bytes())
+    assert files[0] == files[1]
 
 
-@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
 def test_exception_leaves_the_old_file(target, error):
-    features = random_features(1)
+    found = random_features(1)
     target.write_text("old")
     with pytest.raises(error), open_writer(target) as writer:  # noqa: PT012
         for _ in range(1010 if target.suffix in {".parquet", ".csv"} else 110):
-            writer.write(features, SCAN)
+            writer.write(found, SCAN)
         raise error
     assert target.read_text() == "old"
     assert list(target.parent.iterdir()) == [target]
 
 
 def test_failure_while_the_rest_is_written_leaves_nothing(target, monkeypatch):
-    features = random_features(1)
     writer = open_writer(target)
 
     def fail(*_):
@@ -147,7 +125,7 @@ def test_failure_while_the_rest_is_written_leaves_nothing(target, monkeypatch):
 
     monkeypatch.setattr(writer, "_write", fail)
     with pytest.raises(LineamentError, match="cannot be written: No space left") as caught, writer:
-        writer.write(features, SCAN)
+        writer.write(random_features(1), SCAN)
     assert str(target) in str(caught.value)
     assert list(target.parent.iterdir()) == []
 
@@ -203,56 +181,37 @@ def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
 
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a", "a.parquet.gz"])
-def test_unknown_ending_is_told(tmp_path, name):
-    with pytest.raises(
-        LineamentError, match=r"expected one of \.parquet, \.csv, \.jsonl"
-    ) as caught:
+def test_unknown_ending_is_reported(tmp_path, name):
+    with pytest.raises(LineamentError, match=r"of \.parquet, \.csv, \.jsonl") as caught:
         open_writer(tmp_path / name)
     assert "\n" not in str(caught.value)
-    assert Path(name).suffix in str(caught.value)
+    assert (Path(name).suffix or "no ending") in str(caught.value)
 
 
-def test_writer_must_be_open(target):
-    writer = open_writer(target)
+def test_endings_may_be_in_capitals(tmp_path):
+    assert type(open_writer(tmp_path / "A.ROS2.MCAP")).__name__ == "Ros2Writer"
+    assert type(open_writer(tmp_path / "A.Mcap")).__name__ == "FoxgloveWriter"
+
+
+def test_writer_refuses_what_it_cannot_take(target):
+    writer = open_writer(target, ["/a", "/b"])
     with pytest.raises(ValueError, match="not open"):
-        writer.write(random_features(1), SCAN)
-    write(target, [])
+        writer.write(random_features(1), SCAN, "/a")
     with writer:
-        pass
-    with pytest.raises(ValueError, match="not open"):
-        writer.write(random_features(1), SCAN)
-
-
-def test_formats_that_draw_the_scan_say_so(target):
-    is_table = target.suffix in {".parquet", ".csv", ".jsonl"}
-    with open_writer(target) as writer:
-        if is_table:
-            writer.write(random_features(1))
+        with pytest.raises(ValueError, match="topic is '/c', expected one of /a, /b"):
+            writer.write(random_features(1), SCAN, "/c")
+        if target.suffix in {".parquet", ".csv", ".jsonl"}:
+            writer.write(random_features(1), topic="/b")
         else:
             with pytest.raises(ValueError, match=r"needs the scan: write\(features, scan\)"):
-                writer.write(random_features(1))
-
-
-def test_topic_must_be_one_of_those_of_the_log(target):
-    with (
-        pytest.raises(ValueError, match="topic is '/c', expected one of /a, /b"),
-        open_writer(target, ["/a", "/b"]) as writer,
-    ):
-        writer.write(random_features(1), SCAN, "/c")
-    assert not target.exists()
-
-
-def test_package_that_is_missing_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "rerun", None)
-    monkeypatch.delitem(sys.modules, "lineament.output.rrd", raising=False)
-    with pytest.raises(LineamentError, match=r"a\.rrd: files .* need the package rerun"):
-        open_writer(tmp_path / "a.rrd")
+                writer.write(random_features(1), topic="/b")
+    with pytest.raises(ValueError, match="not open"):
+        writer.write(random_features(1), SCAN, "/a")
 
 
 def test_targets_that_cannot_be(target):
-    with pytest.raises(LineamentError, match="does not exist") as caught:
+    with pytest.raises(LineamentError, match="nowhere does not exist"):
         write(target.parent / "nowhere" / target.name, [])
-    assert "nowhere" in str(caught.value)
     target.mkdir()
     with pytest.raises(LineamentError, match="is a folder"):
         write(target, [])
@@ -292,42 +251,214 @@ def test_import_is_light():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+# Tables.
+
+
+def test_parquet_reads_back_the_same(tmp_path):
+    path = tmp_path / "features.parquet"
+    scans = [random_features(i, frame_id="laser" if i else "odd") for i in range(2010)]
+    write(path, scans)
+    table = pq.read_table(path)
+    assert table.schema.equals(SCHEMA)
+    assert table.schema.field("cov_00").metadata == SCHEMA.field("cov_00").metadata
+    assert table.combine_chunks().equals(features_table(scans))
+    # Memory does not grow: a thousand scans a group.
+    file = pq.ParquetFile(path)
+    groups = [set(np.unique(file.read_row_group(k)["scan"]) // 1000) for k in range(3)]
+    assert groups == [{0}, {1}, {2}]
+    assert file.num_row_groups == 3
+    metadata = file.metadata.metadata
+    assert json.loads(metadata[b"lineament.frame_ids"]) == ["odd", "laser"]
+    assert metadata[b"lineament.scans"] == b"2010"
+    assert file.metadata.row_group(0).column(4).compression == "ZSTD"
+
+
+def test_parquet_has_a_column_of_topics_where_there_are_several(tmp_path):
+    scans = [random_features(i) for i in range(1005)]
+    write(tmp_path / "one.parquet", scans[:3], TOPICS[:1])
+    assert set(pq.read_table(tmp_path / "one.parquet")["topic"].to_pylist()) == {TOPICS[0]}
+    write(tmp_path / "two.parquet", scans, TOPICS)
+    table = pq.read_table(tmp_path / "two.parquet")
+    assert table.schema.names == [*SCHEMA.names, "topic"]
+    # The other columns are what they are without it.
+    assert table.schema.metadata == SCHEMA.metadata
+    assert table.drop_columns("topic").combine_chunks().equals(features_table(scans))
+    assert table["topic"].to_pylist() == [TOPICS[k % 2] for k in table["scan"].to_pylist()]
+
+
+def value_of(text, field):
+    """Read a value of CSV as the type that the schema names."""
+    if text == "":
+        return None
+    if pa.types.is_boolean(field.type):
+        return {"true": True, "false": False}[text]
+    if pa.types.is_dictionary(field.type):
+        return text
+    return float(text) if pa.types.is_floating(field.type) else int(text)
+
+
+@pytest.mark.parametrize("topics", [(), TOPICS])
+def test_csv_reads_back_the_same(tmp_path, topics):
+    scans = [random_features(i) for i in range(1010)]
+    write(tmp_path / "a.csv", scans, topics)
+    schema = SCHEMA.append(TOPIC) if topics else SCHEMA
+    with (tmp_path / "a.csv").open(newline="", encoding="utf-8") as file:
+        lines = csv.reader(file)
+        assert next(lines) == schema.names
+        rows = [
+            {f.name: value_of(text, f) for f, text in zip(schema, line, strict=True)}
+            for line in lines
+        ]
+    expected = features_table(scans).to_pylist()
+    if topics:
+        expected = [row | {"topic": topics[row["scan"] % 2]} for row in expected]
+    assert rows == expected
+
+
+def test_csv_has_what_is_not_finite(tmp_path):
+    found = random_features(1)
+    found.segments["rms"] = [np.nan, np.inf, -np.inf]
+    write(tmp_path / "a.csv", [found])
+    with (tmp_path / "a.csv").open(newline="") as file:
+        texts = [row["rms"] for row in csv.DictReader(file) if row["kind"] == "segment"]
+    assert [float(text) for text in texts] == pytest.approx([np.nan, np.inf, -np.inf], nan_ok=True)
+
+
+@pytest.mark.parametrize("topics", [(), TOPICS])
+def test_jsonl_reads_back_the_same(tmp_path, topics):
+    path = tmp_path / "features.jsonl"
+    noise = RangeNoise(0.1 + 0.2, 1 / 3)
+    scans = [random_features(i, frame_id="Läser\n", noise=noise) for i in range(105)]
+    write(path, scans, topics)
+    data = path.read_bytes()
+    assert data.endswith(b"\n")
+    assert b"\r" not in data
+    for i, (line, found) in enumerate(zip(data.splitlines(), scans, strict=True)):
+        topic = {"topic": topics[i % 2]} if topics else {}
+        assert list(json.loads(line).items())[: 1 + len(topic)] == [("scan", i), *topic.items()]
+        assert json.loads(line) == {"scan": i, **topic, **found.to_dict()}
+
+
+def test_jsonl_is_strict(tmp_path):
+    found = random_features(1)
+    found.corners["covariance"], found.segments["rms"] = np.inf, np.nan
+    write(tmp_path / "a.jsonl", [found])
+
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    record = json.loads((tmp_path / "a.jsonl").read_text(), parse_constant=refuse)
+    assert record["corners"][0]["covariance"] == [[None, None], [None, None]]
+    assert record["segments"][0]["rms"] is None
+    assert record["segments"][0]["start"] == found.segments["start"][0].tolist()
+
+
+def test_docs_name_every_field_of_a_line():
+    text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1].split("\n## ")[0]
+    rows = {line.split("|")[1].strip(" `"): line for line in text.splitlines() if "| `" in line}
+    record = random_features(1, noise=RangeNoise(0.01)).to_dict()
+    assert set(rows) == {"scan", "topic", *record}
+    for name in ("noise", "segments", "corners", "arcs", "breakpoints"):
+        fields = record[name] if name == "noise" else record[name][0]
+        for field in fields:
+            assert f"`{field}`" in rows[name], (name, field)
+
+
+# Recordings of rerun.
+
+FOUND = features(
+    6,
+    segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
+    corners=[corner(1, 2), corner(-1, 3, kind="edge")],
+    arcs=[arc(2, 1, 0.25, 0, 1)],
+)
+
+
+def rerun(*arguments):
+    command = [str(Path(sys.executable).with_name("rerun")), "rrd", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_recording_is_whole_and_has_everything(tmp_path):
+    pytest.importorskip("rerun")
+    path = tmp_path / "a.rrd"
+    with open_writer(path) as writer:
+        for k in range(250):
+            scan = LaserScan([2.0] * 6, 0.0, 0.1, stamp=0.5 * k, pose=(k, 0.0, 0.1))
+            writer.write(FOUND, scan)
+    rerun("verify", path)
+    stats = rerun("stats", path)
+    for entity in ("", "/points", "/segments", "/arcs", "/corners", "/edges", "/ellipses"):
+        assert f"/world/scan{entity}: " in stats
+    assert "num_rows = 1 750" in stats.replace("\u2009", " ")
+    assert "log_time" not in stats
+    assert "stamp" in stats
+
+
+def test_recording_has_the_marks_of_the_layers(tmp_path):
+    pytest.importorskip("rerun")
+    path = tmp_path / "a.rrd"
+    with open_writer(path, ["/a/scan"]) as writer:
+        writer.write(FOUND, LaserScan([2.0] * 6, 0.0, 0.1, pose=(3.0, 4.0, 0.5)), "/a/scan")
+    text = rerun("print", "-vvv", path)
+    assert "/world/a/scan/corners" in text
+    for numbers in ("[1.0, 2.0, 0.0]", "[-1.0, 3.0, 0.0]", "[3.0, 4.0, 0.0]"):
+        assert numbers in text, numbers
+
+
+def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):
+    pytest.importorskip("rerun")
+    path, scan = tmp_path / "a.rrd", LaserScan([2.0] * 6, 0.0, 0.1)
+    full = namedtuple("usage", "total used free")(1, 1, 0)
+    with open_writer(path) as writer:
+        writer.write(FOUND, scan)
+    path.unlink()
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    with pytest.raises(LineamentError, match=r"a\.rrd: cannot be written: less than 32") as caught:
+        open_writer(path).__enter__()
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+# Pages.
+
+
 class _Page(HTMLParser):
     def __init__(self):
         super().__init__()
-        self.tags, self.images, self.text = [], [], []
+        self.tags, self.attributes, self.text = [], [], []
 
     def handle_starttag(self, tag, attributes):
         self.tags.append(tag)
-        if tag == "img":
-            self.images.append(dict(attributes))
+        self.attributes.append((tag, dict(attributes)))
 
     def handle_data(self, data):
         self.text.append(data)
 
 
 def test_page_is_one_file_with_its_images(tmp_path):
-    image = tmp_path / "a.png"
-    image.write_bytes(b"\x89PNG\r\n\x1a\n rest")
-    page = tmp_path / "index.html"
-    facts = [("scans", "331"), ('<b> & "c"', "µ")]
-    write_page(page, "A <demo>", facts, [('a "room" & <more>', image)], ["Note <1>."])
-    text = page.read_text(encoding="utf-8")
-    parsed = _Page()
+    path = tmp_path / "index.html"
+    parts = [
+        page.list_part([("scans", "331"), ('<b> & "c"', "µ")]),
+        page.list_part([]),
+        page.contents_part([("x<", "Where <it> is")]),
+        page.heading_part("x<", "There <it> is"),
+        page.table_part("T <1>", ["a&b"], [[("<x>", False), ("3", True)]], "N <2>"),
+        page.image_part('a "room" & <more>', b"\x89PNG\r\n\x1a\n rest"),
+        *page.text_parts(["Note <1>."]),
+    ]
+    page.write_parts(path, "A <demo>", parts)
+    text, parsed = path.read_text(encoding="utf-8"), _Page()
     parsed.feed(text)
-    assert parsed.images[0]["src"].startswith("data:image/png;base64,iVBOR")
-    assert parsed.images[0]["alt"] == 'a "room" & <more>'
-    assert {"A <demo>", '<b> & "c"', "Note <1>.", "µ"} <= set(parsed.text)
-    assert not {"b", "demo", "link", "script"} & set(parsed.tags)
+    image = next(attributes for tag, attributes in parsed.attributes if tag == "img")
+    assert image["src"] == "data:image/png;base64,iVBORw0KGgogcmVzdA=="
+    assert image["alt"] == 'a "room" & <more>'
+    shown = {"A <demo>", '<b> & "c"', "Note <1>.", "µ", "T <1>", "a&b", "<x>", "3", "N <2>"}
+    assert {*shown, "Where <it> is", "There <it> is"} <= set(parsed.text)
+    assert ("a", {"href": "#x<"}) in parsed.attributes
+    assert ("h2", {"id": "x<"}) in parsed.attributes
+    assert [a for tag, a in parsed.attributes if tag == "td"] == [{}, {"class": "number"}]
+    assert not {"b", "demo", "link", "script", "it"} & set(parsed.tags)
+    assert parsed.tags.count("dl") == 1
     assert "http" not in text
     assert "prefers-color-scheme: dark" in text
-
-
-def test_page_without_its_image_is_not_written(tmp_path):
-    page = tmp_path / "index.html"
-    with pytest.raises(LineamentError, match=r"missing\.png: cannot be read"):
-        write_page(page, "A", [], [("b", tmp_path / "missing.png")], [])
-    (tmp_path / "b.png").write_text("text")
-    with pytest.raises(LineamentError, match=r"b\.png: is no PNG"):
-        write_page(page, "A", [], [("b", tmp_path / "b.png")], [])
-    assert not page.exists()

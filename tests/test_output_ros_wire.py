@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lineament.rosmsg.packing import Packer
-from lineament.rosmsg.wire import Wire
+from lineament.rosmsg.wire import WireReader as Wire
+from lineament.rosmsg.wire import WireWriter as Packer
 
 both = pytest.mark.parametrize("encoding", ["cdr", "ros1"])
 

@@ -11,7 +11,7 @@ import pytest
 
 from lineament import Features, LaserScan
 from lineament.errors import LogError
-from lineament.evaluation.ple.benchmark import (
+from lineament.evaluation.ple import (
     Benchmark,
     benchmark_iepf,
     cast_map,

@@ -10,7 +10,7 @@ import pytest
 from worlds import BOX, fan, full_circle, random_scan, room, scan_of, vertex
 
 import lineament as ln
-from lineament.evaluation.ple.benchmark import polylines_of, score_map
+from lineament.evaluation.ple import polylines_of, score_map
 from lineament.kernels.layout import BEAM, COUNTS, FLOATS, INTS, POINTS, RHO, X, Y
 from lineament.kernels.polylines import CLOSED_COST, PLANES, fit_polylines
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lineament.motion.poses import compose, inverse, poses_along, relative, twist_between
+from lineament.scan.poses import compose, inverse, poses_along, relative, twist_between
 
 lengths = st.floats(-20, 20)
 poses = st.tuples(lengths, lengths, st.floats(-3, 3))

@@ -9,8 +9,8 @@ import pytest
 from lineament import LaserScan, LineamentError
 from lineament import reproduce as experiments
 from lineament.evaluation.counts import plain
+from lineament.evaluation.ple import Benchmark, BenchmarkResult
 from lineament.evaluation.ple import benchmark as ple
-from lineament.evaluation.ple.benchmark import Benchmark, BenchmarkResult
 from lineament.logs import save_npz
 from lineament.output.canvas import figure_bytes, new_figure
 from lineament.reproduce import (

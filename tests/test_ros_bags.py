@@ -208,9 +208,9 @@ def test_parts_that_are_missing_or_compressed(tmp_path):
 def test_a_folder_with_other_files_is_no_bag_without_metadata(tmp_path):
     folder = split_bag(tmp_path)
     (folder / "notes.txt").write_text("what is this?")
-    assert not Rosbag2Log.recognises(Head.read(folder))
+    assert not Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
     metadata(folder, [])
-    assert Rosbag2Log.recognises(Head.read(folder))
+    assert Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
 
 
 def test_a_folder_with_metadata_alone(tmp_path):

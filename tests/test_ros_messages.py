@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lineament import LaserScan
-from lineament.rosmsg.messages import laser_scan, multi_echo_scan, ring_scan
+from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
 
 ENCODINGS = [(1, "ros1"), (2, "cdr")]
 both = pytest.mark.parametrize(("ros", "encoding"), ENCODINGS)

@@ -10,7 +10,9 @@ import pytest
 from text_logs import BEAMS, FLASER, zipped
 
 from lineament import LogError
-from lineament.logs import copies, find_logs, open_log, remote
+from lineament.logs import find_logs, open_log
+from lineament.logs import sources as copies
+from lineament.logs import sources as remote
 
 # Folders and patterns
 
@@ -137,7 +139,7 @@ def test_what_cannot_be_fetched(memory, monkeypatch):
 @pytest.mark.parametrize(
     ("error", "problem"),
     [
-        (ModuleNotFoundError("No module", name="fsspec"), r"needs fsspec: pip install lineament\["),
+        (ModuleNotFoundError("No module", name="fsspec"), r"needs fsspec, .*'lineament\[remote\]'"),
         (ImportError("Install s3fs to access S3"), "needs a driver of fsspec: Install s3fs"),
         (PermissionError("a\nb"), "cannot be fetched: PermissionError: a b"),
     ],

@@ -10,7 +10,7 @@ from handmade import arc, corner, features, random_features, segment, shaken
 
 import lineament as ln
 from lineament.motion import Tracker, associate
-from lineament.motion.poses import compose, inverse, relative
+from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, building, drive, drive_poses, room, truth
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 1), (-1, 1), 31, 60))

@@ -10,7 +10,7 @@ from naive_motion import residuals
 
 import lineament as ln
 from lineament.motion import Matches, associate, estimate_motion
-from lineament.motion.poses import compose, inverse
+from lineament.scan.poses import compose, inverse
 from lineament.simulation import SENSORS, World, scene
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 3), (-1, 3), 31, 60))

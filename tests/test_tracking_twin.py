@@ -13,8 +13,8 @@ from naive_tracking import NaiveTracker
 import lineament as ln
 from lineament.motion import Tracker, associate, estimate_motion
 from lineament.motion.association import KINDS, chi_square
-from lineament.motion.poses import inverse
 from lineament.reproduce.tracking import LOGS, load_recording, stand_in_odometry
+from lineament.scan.poses import inverse
 
 SPREAD = np.array([[4e-4, 1e-4, 1e-4], [1e-4, 9e-4, -2e-4], [1e-4, -2e-4, 4e-4]])
 

@@ -16,8 +16,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lineament import LaserScan, LineamentError
 from lineament.output import open_writer
-from lineament.output.layers import layers_of
 from lineament.output.markers import markers_of
+from lineament.output.scene import layers_of
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)
@@ -242,7 +242,8 @@ def test_missing_package_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "foxglove", None)
     monkeypatch.delitem(sys.modules, "lineament.output.foxglove", raising=False)
     with pytest.raises(
-        LineamentError, match=r"end in \.mcap need the package foxglove, which is not"
+        LineamentError,
+        match=r"\.mcap: needs foxglove, .*: pip install 'lineament\[foxglove\]'",
     ):
         open_writer(tmp_path / "a.mcap")
     open_writer(tmp_path / "a.ros2.mcap")  # does without

@@ -9,8 +9,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosidl_runtime_py.utilities import get_message
 
 from lineament.live import LiveConfig
-from lineament.live.decoding import received_odometry, received_scan
-from lineament.live.received import Received
+from lineament.live.received import Received, received_odometry, received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.scene import Message
 

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
-__all__ = ["LineamentError", "LogError", "one_line"]
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+__all__ = ["EXTRAS", "LineamentError", "LogError", "needed_by", "needs", "one_line"]
+
+#: The packages that only some commands need, each with the extra that installs it.
+EXTRAS = {
+    "cyclonedds": "live",
+    "distributed": "dask",
+    "ezdxf": "cad",
+    "foxglove": "foxglove",
+    "fsspec": "remote",
+    "rerun": "rerun",
+    "scipy": "evaluation",
+    "shapely": "evaluation",
+}
 
 
 def one_line(text: str) -> str:
@@ -55,3 +70,34 @@ class LogError(LineamentError):
 
     def __reduce__(self) -> tuple[type, tuple[str, str, int | None]]:
         return type(self), (self.path, self.problem, self.line)
+
+
+def needs(package: str) -> str:
+    """Return what is wrong when an optional package is missing, with the command that installs it.
+
+    Examples
+    --------
+    >>> needs("ezdxf")
+    "needs ezdxf, which is not installed: pip install 'lineament[cad]'"
+    """
+    return f"needs {package}, which is not installed: pip install 'lineament[{EXTRAS[package]}]'"
+
+
+@contextmanager
+def needed_by(who: str) -> Iterator[None]:
+    """Turn the missing import of an optional package into a LineamentError.
+
+    Examples
+    --------
+    >>> with needed_by("DXF"):
+    ...     raise ModuleNotFoundError(name="ezdxf")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    lineament.errors.LineamentError: DXF needs ezdxf, which is not installed: pip install ...
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        raise LineamentError(f"{who} {needs(package)}") from None

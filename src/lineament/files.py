@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import LineamentError
 
-__all__ = ["made_folder", "naming_errors", "write_text", "written_beside"]
+__all__ = ["ending_of", "made_folder", "naming_errors", "write_text", "written_beside"]
 
 
 @contextmanager
@@ -94,6 +94,27 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """
     with written_beside(path) as temporary, naming_errors(path):
         temporary.write_bytes(text.encode("utf-8", errors="replace"))
+
+
+def ending_of(path: str | os.PathLike[str], endings: Iterable[str]) -> str:
+    """Return which of some endings, a longer one before one that it contains, a name has.
+
+    Raises
+    ------
+    LineamentError
+        If it has none of them.
+
+    Examples
+    --------
+    >>> ending_of("A.ros2.MCAP", [".ros2.mcap", ".mcap"])
+    '.ros2.mcap'
+    """
+    name, own = Path(path).name.lower(), Path(path).suffix.lower()
+    for ending in endings:
+        if name.endswith(ending):
+            return ending
+    problem = f"the ending {own!r} is not known" if own else "the name has no ending"
+    raise LineamentError(f"{path}: {problem}, expected one of {', '.join(endings)}")
 
 
 def made_folder(path: str | os.PathLike[str]) -> Path:

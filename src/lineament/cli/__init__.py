@@ -22,10 +22,7 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0, 1 for what went wrong, 2 for wrong usage.
-
-    What went wrong is one line on standard error.
-    """
+    """Run the command line; exit with 0, 1 for an error (one line), 2 for wrong usage."""
     sys.exit(run(arguments))
 
 

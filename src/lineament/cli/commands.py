@@ -1,4 +1,4 @@
-"""The commands. What they call is imported when they run: ``--help`` has to be quick."""
+"""The commands. Each imports what it calls when it runs: ``--help`` stays quick."""
 
 from __future__ import annotations
 
@@ -10,11 +10,21 @@ import click
 from .experiments import bench, compare, reproduce, simulate
 from .extract import extract
 from .live import live
-from .method_options import METHODS, NOISE, SET, make_extractor
-from .options import LOG, LOG_PATH, PATH, QUIET, SCAN, check_ending, reading, wrong_usage
+from .options import (
+    LOG,
+    LOG_PATH,
+    METHODS,
+    NOISE,
+    PATH,
+    QUIET,
+    SCAN,
+    SET,
+    check_ending,
+    make_extractor,
+    reading,
+    wrong_usage,
+)
 from .view import view
-
-__all__ = ["COMMANDS"]
 
 
 @click.command()
@@ -22,7 +32,7 @@ __all__ = ["COMMANDS"]
 @reading
 @QUIET
 def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
-    """Tell what LOG holds."""
+    """Print what LOG contains."""
     from ..logs import open_log, summarize
     from .progress import tracker
 

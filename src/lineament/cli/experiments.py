@@ -75,12 +75,12 @@ def reproduce(
     """Make the paper's experiments again: a page and all figures as JSON."""
     from ..reproduce import Setting, experiment_names
     from ..reproduce.report import reproduce
-    from .progress import telling
+    from .progress import status
 
     with wrong_usage():
         chosen = experiment_names(names)
-    with telling(quiet) as tell:
-        page = reproduce(output, chosen, Setting(frames, seed, data), tell)
+    with status(quiet) as show:
+        page = reproduce(output, chosen, Setting(frames, seed, data), show)
     if not quiet:
         click.echo(str(page))
 
@@ -100,7 +100,7 @@ def ple(
     data: Path, methods: tuple[str, ...], sparing: bool, output: Path | None, quiet: bool
 ) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
-    from ..evaluation.ple.benchmark import load_benchmark, method_map, run_benchmark, sparing_map
+    from ..evaluation.ple import load_benchmark, method_map, run_benchmark, sparing_map
     from ..files import write_text
     from ..reproduce.report import benchmark_tables
     from .progress import tracker

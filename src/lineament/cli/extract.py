@@ -1,4 +1,4 @@
-"""The command that makes tables of logs."""
+"""The command that writes the features of logs into tables."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import LineamentError
-from .method_options import METHOD, NOISE, SET, make_extractor
-from .options import LOG_PATH, QUIET, check_ending, reading
+from .options import LOG_PATH, METHOD, NOISE, QUIET, SET, check_ending, make_extractor, reading
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from ..extractor import Extractor
-
-__all__ = ["extract"]
 
 _COUNT = click.IntRange(min=1)
 
@@ -42,7 +39,7 @@ _COUNT = click.IntRange(min=1)
     metavar="ENDING",
     help="Format of the files in a folder.  [default: parquet]",
 )
-@click.option("--resume", is_flag=True, help="Leave logs whose files in the folder are whole.")
+@click.option("--resume", is_flag=True, help="Skip logs whose files in the folder are complete.")
 @click.option(
     "--processes", type=_COUNT, help="Work in so many processes.  [default: one a processor]"
 )
@@ -69,7 +66,7 @@ def extract(
 
     if append:
         raise click.UsageError(
-            "--append: a file is written whole or not at all; write another, or into a FOLDER/"
+            "--append: a file is written whole or not at all; write another one, or into a FOLDER/"
         )
     is_folder = output.endswith(("/", os.sep)) or Path(output).is_dir()
     if not is_folder:
@@ -118,9 +115,9 @@ def _extract_into_folder(
     dask: str | None,
 ) -> None:
     from ..tasks.bulk import extract_logs
-    from .progress import telling
+    from .progress import status
 
-    with _executor(processes, threads, dask) as executor, telling(quiet) as tell:
+    with _executor(processes, threads, dask) as executor, status(quiet) as show:
         bulk = extract_logs(
             logs,
             output,
@@ -128,7 +125,7 @@ def _extract_into_folder(
             executor=executor,
             ending=f".{(ending or 'parquet').removeprefix('.')}",
             resume=resume,
-            tell=tell,
+            show=show,
             **reading,
         )
     if not quiet:

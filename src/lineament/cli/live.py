@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .method_options import METHOD, NOISE, SET, settings_of
-from .options import PATH, QUIET, wrong_usage
+from .options import METHOD, NOISE, PATH, QUIET, SET, settings_of, wrong_usage
 
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report

@@ -1,27 +1,18 @@
-"""Options and arguments that several commands share, and what is wrong with them."""
+"""Options and arguments that several commands share, and what they make."""
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-__all__ = [
-    "KEEP_GOING",
-    "LOG",
-    "LOG_PATH",
-    "PATH",
-    "QUIET",
-    "SCAN",
-    "TOPIC",
-    "check_ending",
-    "reading",
-    "wrong_usage",
-]
+if TYPE_CHECKING:
+    from ..extractor import Extractor
 
 PATH = click.Path(path_type=Path)
 
@@ -37,7 +28,7 @@ LOG = click.argument("log", type=LOG_PATH)
 SCAN = click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
 TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
 KEEP_GOING = click.option(
-    "--keep-going", is_flag=True, help="Leave out what is faulty in a log, and count it."
+    "--keep-going", is_flag=True, help="Skip and count faulty lines and records."
 )
 _ECHO = click.option(
     "--echo",
@@ -48,14 +39,11 @@ _ECHO = click.option(
 )
 _RING = click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud to read.")
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
-QUIET = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 
 
 def reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of how a log is read, which the command gets as `reading`.
-
-    It is what `open_log` takes: ``open_log(log, **reading)``.
-    """
+    """Add the options of reading a log; the command gets them as ``open_log(log, **reading)``."""
 
     @wraps(command)
     def collecting(**given: Any) -> None:
@@ -76,8 +64,60 @@ def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = Fals
 
 @contextmanager
 def wrong_usage() -> Iterator[None]:
-    """Tell what the library finds wrong with the options, a ValueError, as wrong usage."""
+    """Report a ValueError of the library about the options as wrong usage."""
     try:
         yield
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+METHODS = click.option(
+    "-m",
+    "--method",
+    "methods",
+    multiple=True,
+    help="Name of the method; may be given again, side by side.  [default: optimal]",
+)
+SET = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A parameter of the method; may be given again.",
+)
+NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+
+
+def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
+    """Return the extractor that the options ask for."""
+    from ..extractor import Extractor
+    from ..methods import DEFAULT_METHOD, get_method
+    from ..scan import RangeNoise
+
+    name = DEFAULT_METHOD if method is None else method
+    with wrong_usage():
+        return Extractor(
+            get_method(name, **settings_of(settings)),
+            noise=None if noise is None else RangeNoise(sigma=noise),
+        )
+
+
+def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
+    """Return the parameters of a method that ``--set NAME=VALUE`` gives, by name."""
+    return dict(_setting(text) for text in settings)
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise click.UsageError(f"--set {text!r}: expected NAME=VALUE")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+        return name, value

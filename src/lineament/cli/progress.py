@@ -1,4 +1,4 @@
-"""Progress: a bar on a terminal, a plain line now and then elsewhere, nothing when quiet."""
+"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from typing import TypeVar
 
 from ..progress import Track, untracked
 
-__all__ = ["telling", "tracker"]
-
 T = TypeVar("T")
 
 #: Seconds between two plain lines, and before the first.
@@ -19,7 +17,7 @@ _PATIENCE = 2.0
 
 
 def tracker(quiet: bool) -> Track:
-    """Choose how to show how far items are."""
+    """Return the function that shows the progress of items."""
     if quiet:
         return untracked
     return _with_bar if sys.stderr.isatty() else _with_lines
@@ -49,12 +47,12 @@ def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
-    started = told = time.monotonic()
+    started = last = time.monotonic()
     for done, item in enumerate(items, 1):
         yield item
         now = time.monotonic()
-        if now - told >= _PATIENCE:
-            told, rate = now, done / (now - started)
+        if now - last >= _PATIENCE:
+            last, rate = now, done / (now - started)
             left = max(total - done, 0) / rate
             line = f"{about}: {done}/{total}, {_rate_text(rate)}, {left:.0f} s left"
             print(line, file=sys.stderr, flush=True)
@@ -65,8 +63,8 @@ def _rate_text(rate: float) -> str:
 
 
 @contextmanager
-def telling(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows in a few words what is being done."""
+def status(quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows in a few words what is being done."""
     if quiet:
         yield lambda about: None  # noqa: ARG005
     elif sys.stderr.isatty():
@@ -75,15 +73,15 @@ def telling(quiet: bool) -> Iterator[Callable[[str], None]]:
         with Console(stderr=True).status("") as status:
             yield status.update
     else:
-        yield _tell_now_and_then(time.monotonic())
+        yield _now_and_then(time.monotonic())
 
 
-def _tell_now_and_then(told: float) -> Callable[[str], None]:
-    def tell(about: str) -> None:
-        nonlocal told
+def _now_and_then(last: float) -> Callable[[str], None]:
+    def show(about: str) -> None:
+        nonlocal last
         now = time.monotonic()
-        if now - told >= _PATIENCE:
-            told = now
+        if now - last >= _PATIENCE:
+            last = now
             print(about, file=sys.stderr, flush=True)
 
-    return tell
+    return show

@@ -12,29 +12,25 @@ five hundred scenes come from the sums:
 (2, 1.0)
 
 Found and true features are matched one to one. What has fewer than `MIN_BEAMS` beams in the
-truth is too small to be demanded: missing it is no miss, and what is found there is no mistake.
+truth is too small to be demanded: to miss it or to find it is no mistake. Needs scipy.
 """
 
-from .arcs import ArcScores, arc_scores
 from .beams import MIN_BEAMS
 from .consistency import NormalisedErrors
-from .corners import CornerScores, corner_scores
 from .counts import Counts, Summable
 from .free_space import FreeSpaceScores, free_space_scores
+from .kinds import FeatureScores, arc_scores, corner_scores, segment_scores
 from .matching import match
 from .partition import PartitionScores, partition_scores
-from .ranked import RankedRepeats, ranked_repeats
-from .repeatability import Repeatability, Repeats, repeatability
+from .repeatability import RankedRepeats, Repeatability, Repeats, ranked_repeats, repeatability
 from .scores import Scores, evaluate
-from .segments import SegmentScores, segment_scores
 from .similarity import SimilarityScores, similarity_errors, similarity_scores
 from .standing import ScatterScores, StandingScores, standing_scores
 
 __all__ = [
     "MIN_BEAMS",
-    "ArcScores",
-    "CornerScores",
     "Counts",
+    "FeatureScores",
     "FreeSpaceScores",
     "NormalisedErrors",
     "PartitionScores",
@@ -43,7 +39,6 @@ __all__ = [
     "Repeats",
     "ScatterScores",
     "Scores",
-    "SegmentScores",
     "SimilarityScores",
     "StandingScores",
     "Summable",

@@ -1,116 +1,90 @@
-"""Features as sets of beams: how they overlap, and which beams lie on what is too small."""
+"""Features as sets of beams, and points as seen along beams."""
 
-from __future__ import annotations
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..scan import Array
-
-__all__ = [
-    "MIN_BEAMS",
-    "beam_masks",
-    "beam_spans",
-    "beams_of",
-    "common_beams",
-    "marked_beams",
-    "on_small_surfaces",
-    "overlap_ratios",
-    "shared_beams",
-]
-
-#: First beam and the one behind the last, (K, 2); at or beyond n where it lies over the seam.
-Spans = NDArray[np.int64]
+from ..scan import Array, LaserScan
 
 #: A true feature with fewer beams is too small to be demanded.
 MIN_BEAMS = 6
 
+Masks = NDArray[np.bool_]
+
 
 def common_beams(found: Features, truth: Features) -> int:
-    """Return the number of beams of the scan that both are of."""
+    """Return the number of beams of the scan of both."""
     n, expected = len(found.clusters), len(truth.clusters)
     if n != expected:
         raise ValueError(f"found is of a scan of {n} beams, expected {expected} as in the truth")
     return n
 
 
-def beam_spans(first: NDArray[np.int32], last: NDArray[np.int32], n: int) -> Spans:
-    """Span from the first to the last of n beams, over the seam where first > last.
+def check_beams(scan: LaserScan, features: Features) -> None:
+    """Raise ValueError if the features are of a scan with another number of beams."""
+    n = len(features.clusters)
+    if n != len(scan):
+        raise ValueError(f"features are of {n} beams, expected the scan's {len(scan)}")
+
+
+def beam_masks(first: NDArray[np.int32], last: NDArray[np.int32], n: int) -> Masks:
+    """Which of n beams lie from each first to each last beam, over the seam if first > last.
 
     Examples
     --------
-    >>> beam_spans(np.array([1, 3]), np.array([2, 0]), 4).tolist()
-    [[1, 3], [3, 5]]
-    """
-    begin = first.astype(np.int64)
-    return np.column_stack((begin, begin + (last - begin) % n + 1))
-
-
-def beams_of(table: NDArray[np.void], n: int) -> Spans:
-    """Spans of segments or arcs."""
-    return beam_spans(table["first_beam"], table["last_beam"], n)
-
-
-def beam_masks(spans: Spans, n: int) -> NDArray[np.bool_]:
-    """Which of n beams lie in each span, shape (K, n).
-
-    Examples
-    --------
-    >>> beam_masks(np.array([[1, 3], [3, 5]]), 4).astype(int)
+    >>> beam_masks(np.array([1, 3]), np.array([2, 0]), 4).astype(int)
     array([[0, 1, 1, 0],
            [1, 0, 0, 1]])
     """
-    beam, begin, end = np.arange(n), spans[:, :1], spans[:, 1:]
-    return np.asarray(((begin <= beam) & (beam < end)) | (beam + n < end))
+    ahead = (np.arange(n) - first[:, np.newaxis]) % n
+    return np.asarray(ahead <= ((last - first) % n)[:, np.newaxis])
 
 
-def shared_beams(spans: Spans, others: Spans, n: int) -> NDArray[np.int64]:
-    """Return how many beams each two spans have in common, shape (F, T).
-
-    Examples
-    --------
-    >>> shared_beams(np.array([[1, 3]]), np.array([[0, 2], [3, 6]]), 4)
-    array([[1, 1]])
-    """
-    # One of them may be a turn ahead of the other.
-    others = others[:, np.newaxis] + n * np.array([[-1], [0], [1]])
-    mine = spans[:, np.newaxis, np.newaxis]
-    begin = np.maximum(mine[..., 0], others[..., 0])
-    end = np.minimum(mine[..., 1], others[..., 1])
-    return np.asarray(np.maximum(end - begin, 0).sum(axis=2))
+def beams_of(table: NDArray[np.void], n: int) -> Masks:
+    """Which of n beams belong to each segment or arc, shape (K, n)."""
+    return beam_masks(table["first_beam"], table["last_beam"], n)
 
 
-def overlap_ratios(spans: Spans, others: Spans, n: int) -> Array:
+def shared_beams(masks: Masks, others: Masks) -> Array:
+    """Return how many beams each two masks share, shape (F, T)."""
+    return np.asarray(masks.astype(np.float64) @ others.astype(np.float64).T)
+
+
+def overlap_ratios(masks: Masks, others: Masks) -> Array:
     """Beams in both over beams in either (intersection over union), shape (F, T).
 
     Examples
     --------
-    >>> overlap_ratios(np.array([[0, 3]]), np.array([[1, 4]]), 4)
-    array([[0.5]])
+    >>> masks = beam_masks(np.array([0, 1]), np.array([2, 3]), 4)
+    >>> overlap_ratios(masks[:1], masks)
+    array([[1. , 0.5]])
     """
-    shared = shared_beams(spans, others, n)
-    sizes, other_sizes = spans[:, 1] - spans[:, 0], others[:, 1] - others[:, 0]
-    return np.asarray(shared / (sizes[:, np.newaxis] + other_sizes - shared))
+    shared = shared_beams(masks, others)
+    either = masks.sum(axis=1)[:, np.newaxis] + others.sum(axis=1) - shared
+    return np.asarray(shared / either)
 
 
-def marked_beams(spans: Spans, marks: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return how many beams of each span are marked, shape (K,).
-
-    Examples
-    --------
-    >>> marked_beams(np.array([[0, 2], [2, 5]]), np.array([True, True, False, False]))
-    array([2, 1])
-    """
-    # Twice around: a span may go on over the seam.
-    before = np.concatenate(([0], np.cumsum(np.tile(marks, 2))))
-    return np.asarray(before[spans[:, 1]] - before[spans[:, 0]])
-
-
-def on_small_surfaces(spans: Spans, truth: Features) -> NDArray[np.bool_]:
-    """Whether at least half of each span's beams meet a surface too small to be demanded."""
-    small = np.zeros(len(truth.clusters), dtype=np.bool_)
+def on_small_surfaces(masks: Masks, truth: Features) -> NDArray[np.bool_]:
+    """Whether at least half of the beams of each mask meet a surface too small to be demanded."""
+    small = np.zeros(masks.shape[1], dtype=np.bool_)
     for table in (truth.segments, truth.arcs):
-        few = table[table["n_points"] < MIN_BEAMS]
-        small |= beam_masks(beams_of(few, len(small)), len(small)).any(axis=0)
-    return np.asarray(2 * marked_beams(spans, small) >= spans[:, 1] - spans[:, 0])
+        small |= beams_of(table[table["n_points"] < MIN_BEAMS], len(small)).any(axis=0)
+    return np.asarray(2 * (masks & small).sum(axis=1) >= masks.sum(axis=1))
+
+
+def nearest_beams(scan: LaserScan, points: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Beam nearest to the bearing of each point, and whether that is within half a step of it."""
+    angles, half_step = scan.angles, 0.5 * scan.angle_increment
+    first = angles[0] - half_step
+    bearings = first + (np.arctan2(points[:, 1], points[:, 0]) - first) % (2 * math.pi)
+    nearest = np.searchsorted(0.5 * (angles[1:] + angles[:-1]), bearings)
+    return nearest, bearings <= angles[-1] + half_step
+
+
+def with_neighbours(scan: LaserScan) -> NDArray[np.intp]:
+    """Index of each beam between those of its neighbours, shape (n, 3); ends repeat themselves."""
+    n = len(scan)
+    beams = np.arange(n)[:, np.newaxis] + np.arange(-1, 2)
+    return beams % n if scan.is_full_circle else np.clip(beams, 0, n - 1)

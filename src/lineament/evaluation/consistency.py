@@ -1,7 +1,5 @@
 """Errors in units of a covariance: that of the bound, or the one that came with the feature."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Self
@@ -9,10 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
 from .counts import Summable, quantile, ratio
-
-__all__ = ["NormalisedErrors", "largest_variance", "tolerance", "usable_covariances"]
 
 #: A covariance whose eigenvalues have a smaller ratio than this has lost all its digits.
 _LEAST_EIGENVALUE = 1e-14
@@ -24,11 +21,11 @@ _DEVIATIONS = 3.0
 class NormalisedErrors(Summable):
     """Errors e of k components, as L⁻¹ e with the covariance Σ = L Lᵀ.
 
-    Where Σ is that of the errors, the squares e'Σ⁻¹e are chi-square distributed with k degrees
-    of freedom. With the covariance that a method gives they are its normalised estimation error
-    squared (NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4): `mean_ratio` above `interval`
-    is a method that trusts itself too much, below it one that trusts itself too little. With the
-    Cramér-Rao bound, `over_bound` tells how many times the least possible error there is.
+    If Σ is that of the errors, the squares e'Σ⁻¹e are chi-square distributed with k degrees of
+    freedom. With the covariance that a method gives they are its normalised estimation error
+    squared (NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4): a method with `mean_ratio` above
+    `interval` is too sure of itself, with one below it not sure enough. With the Cramér-Rao bound,
+    `over_bound` is the error in multiples of the least possible.
 
     Attributes
     ----------
@@ -50,7 +47,7 @@ class NormalisedErrors(Summable):
 
     @classmethod
     def none(cls, components: int) -> Self:
-        """Make those of no scan."""
+        """Return those of no scan."""
         return cls(np.empty((0, components)))
 
     @classmethod
@@ -62,13 +59,13 @@ class NormalisedErrors(Summable):
         return cls(whitened, len(errors) - len(whitened))
 
     @property
-    def squares(self) -> NDArray[np.float64]:
+    def squares(self) -> Array:
         """e'Σ⁻¹e of each error, shape (m,)."""
         return np.asarray(np.square(self.whitened).sum(axis=1))
 
     @property
     def mean_ratio(self) -> float:
-        """Mean of the squares over k; 1 where the covariance is right, NaN of nothing."""
+        """Mean of the squares over k: 1 if the covariance is right; NaN of nothing."""
         return ratio(float(np.square(self.whitened).sum()), self.whitened.size)
 
     @property
@@ -77,7 +74,7 @@ class NormalisedErrors(Summable):
         return quantile(self.squares, 0.5) / _chi_square(0.5, self.whitened.shape[1])
 
     def share_within(self, probability: float) -> float:
-        """Share of the errors in the ellipse that should hold this share of them."""
+        """Share of the errors within the ellipse that should hold this share of them."""
         limit = _chi_square(probability, self.whitened.shape[1])
         return ratio(int((self.squares <= limit).sum()), len(self.whitened))
 
@@ -93,21 +90,21 @@ class NormalisedErrors(Summable):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Where `mean_ratio` lies with 95 % probability if the covariance is right."""
+        """Interval of `mean_ratio` with 95 % probability if the covariance is right."""
         size = self.whitened.size
         if not size:
             return math.nan, math.nan
         return _chi_square(0.025, size) / size, _chi_square(0.975, size) / size
 
     def bound_summary(self, prefix: str = "") -> dict[str, float]:
-        """List the figures of errors that were divided by the bound."""
+        """List the figures of errors over the bound."""
         return {
             f"{prefix}over_bound": self.over_bound,
             f"{prefix}over_bound_median": self.over_bound_median,
         }
 
     def nees_summary(self) -> dict[str, float]:
-        """List the figures of errors that were divided by a method's own covariance."""
+        """List the figures of errors over the covariance that a method gives."""
         low, high = self.interval
         return {
             "nees": self.mean_ratio,
@@ -119,14 +116,7 @@ class NormalisedErrors(Summable):
 
 
 def usable_covariances(covariances: Array) -> NDArray[np.bool_]:
-    """Whether each of some covariances (m, k, k) is finite and positive definite.
-
-    Examples
-    --------
-    >>> covariances = np.array([np.eye(2), np.zeros((2, 2)), np.full((2, 2), np.nan)])
-    >>> usable_covariances(covariances).tolist()
-    [True, False, False]
-    """
+    """Whether each covariance (m, k, k) is finite and positive definite, shape (m,)."""
     usable: NDArray[np.bool_] = np.asarray(np.isfinite(covariances).all(axis=(1, 2)))
     eigenvalues = np.linalg.eigvalsh(covariances[usable])
     usable[usable] = eigenvalues[:, 0] > _LEAST_EIGENVALUE * eigenvalues[:, -1]
@@ -134,7 +124,7 @@ def usable_covariances(covariances: Array) -> NDArray[np.bool_]:
 
 
 def largest_variance(covariances: Array) -> Array:
-    """Largest eigenvalue of each of some covariances (m, k, k); 0 of one that is not usable."""
+    """Largest eigenvalue of each covariance (m, k, k); 0 of one that is not usable."""
     usable = usable_covariances(covariances)
     largest = np.zeros(len(covariances))
     largest[usable] = np.linalg.eigvalsh(covariances[usable])[:, -1]
@@ -142,12 +132,13 @@ def largest_variance(covariances: Array) -> Array:
 
 
 def tolerance(variance: Array) -> Array:
-    """Three deviations: how far off the best estimate there is may be; 0 where it is not known."""
+    """Three deviations: how far off the best possible estimate may be; 0 if it is not known."""
     return np.asarray(_DEVIATIONS * np.sqrt(np.nan_to_num(variance)))
 
 
 def _chi_square(probability: float, degrees: int) -> float:
     """Quantile of the chi-square distribution, that of a gamma distribution of half as many."""
-    from scipy.special import gammaincinv
+    with needed_by("evaluation"):
+        from scipy.special import gammaincinv
 
     return 2.0 * float(gammaincinv(degrees / 2, probability))

@@ -1,6 +1,4 @@
-"""What was found right, found, and true; and how results of many scans add up."""
-
-from __future__ import annotations
+"""Counts of what is found and true, shares and means, and how results of many scans add up."""
 
 import math
 from collections.abc import Iterable
@@ -10,22 +8,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .matching import Indices
-
-__all__ = ["Counts", "Summable"]
-
 
 @dataclass(frozen=True, slots=True)
 class Summable:
     """A result that adds up over scans, field by field.
 
-    Numbers are added, arrays of errors are put one behind the other, and results within the
-    result add up themselves. Where all fields have defaults, these are those of no scan.
+    Numbers are added, arrays are concatenated, and results within the result add up themselves.
+    The defaults of the fields are those of no scan.
     """
 
     @classmethod
     def total(cls, parts: Iterable[Self]) -> Self:
-        """Add up many results at once; those of no scan if there are none.
+        """Add up many results at once.
 
         Examples
         --------
@@ -52,16 +46,9 @@ def _joined(values: tuple[Any, ...]) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Counts(Summable):
-    """How many were found right, found, and true.
+    """Numbers of pairs of a found and a true feature, of found ones, and of true ones.
 
-    Attributes
-    ----------
-    correct : int
-        Pairs of a found and a true one.
-    found : int
-        Found ones, without those that the truth does not judge.
-    true : int
-        True ones that are demanded.
+    Found ones that the truth does not judge and true ones that are not demanded do not count.
 
     Examples
     --------
@@ -76,8 +63,8 @@ class Counts(Summable):
 
     @classmethod
     def of(
-        cls, matched: Indices, excused: NDArray[np.bool_], demanded: NDArray[np.bool_]
-    ) -> Counts:
+        cls, matched: NDArray[np.intp], excused: NDArray[np.bool_], demanded: NDArray[np.bool_]
+    ) -> Self:
         """Count one scan.
 
         Parameters
@@ -85,7 +72,7 @@ class Counts(Summable):
         matched : ndarray of int
             Found ones that are paired with a demanded one.
         excused : ndarray of bool, shape (F,)
-            Found ones that are no mistake where they are not paired.
+            Found ones that are no mistake if they are not paired.
         demanded : ndarray of bool, shape (T,)
             Whether each true one is large enough to be demanded.
         """
@@ -95,30 +82,26 @@ class Counts(Summable):
 
     @property
     def precision(self) -> float:
-        """Share of the found that are right; NaN where nothing was found."""
+        """Share of the found that are right; NaN if nothing is found."""
         return ratio(self.correct, self.found)
 
     @property
     def recall(self) -> float:
-        """Share of the true that were found; NaN where there is nothing to find."""
+        """Share of the true that are found; NaN if nothing is true."""
         return ratio(self.correct, self.true)
 
     @property
     def f1(self) -> float:
-        """Harmonic mean of precision and recall, 2 correct / (found + true); NaN of nothing."""
+        """Harmonic mean of precision and recall, 2 correct / (found + true)."""
         return ratio(2 * self.correct, self.found + self.true)
 
     def summary(self, suffix: str = "") -> dict[str, float]:
         """List the three shares by name."""
-        return {
-            f"precision{suffix}": self.precision,
-            f"recall{suffix}": self.recall,
-            f"f1{suffix}": self.f1,
-        }
+        return {f"{name}{suffix}": getattr(self, name) for name in ("precision", "recall", "f1")}
 
 
 def ratio(part: float, whole: float) -> float:
-    """Divide; NaN where there is nothing to divide by."""
+    """Divide; NaN if the whole is 0."""
     return part / whole if whole else math.nan
 
 
@@ -132,12 +115,16 @@ def quantile(values: NDArray[np.float64], share: float) -> float:
     return float(np.quantile(values, share)) if len(values) else math.nan
 
 
+def finite_figures(figures: dict[str, float]) -> dict[str, float]:
+    """Leave out the figures that nothing defines."""
+    return {name: value for name, value in figures.items() if math.isfinite(value)}
+
+
 def plain(value: object) -> Any:
-    """Make what JSON takes of numbers, arrays and what holds them; not finite becomes None.
+    """Convert numbers, arrays and containers of them to what JSON takes; not finite becomes None.
 
     Examples
     --------
-    >>> import numpy as np
     >>> plain({"rms": np.float64(0.5), "errors": np.array([1.0, np.nan])})
     {'rms': 0.5, 'errors': [1.0, None]}
     """

@@ -3,19 +3,16 @@
 Censi, *An ICP variant using a point-to-line metric*, ICRA 2008, without its tricks for speed.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
+from ..errors import needed_by
 from ..scan import Array, LaserScan, Pose
-
-__all__ = ["icp"]
 
 #: Farthest pair of points in the first round, and in the last ones [m]; halved from round to round.
 _FARTHEST, _NEAREST = 0.5, 0.1
-#: Neighbouring readings that are farther apart than this are not on one line [m].
+#: Neighbouring points that are farther apart than this are not on one line [m].
 _GAP = 0.3
 _ROUNDS, _SMALL = 40, 1e-7
 
@@ -36,29 +33,26 @@ def icp(before: LaserScan, now: LaserScan, start: Pose = (0.0, 0.0, 0.0)) -> Pos
     Returns
     -------
     (x, y, theta)
-        Pose of the later sensor in the frame of the earlier one; the start where too few points
+        Pose of the later sensor in the frame of the earlier one; the start if too few points
         can be paired.
 
     Examples
     --------
     >>> from lineament.simulation import SENSORS, room
-    >>> quiet = SENSORS["paper"]
-    >>> scans = [
-    ...     quiet.scan(room(), pose, np.random.default_rng(1))
-    ...     for pose in ((0, 0, 0), (0.1, 0, 0.05))
-    ... ]
-    >>> [abs(round(value, 2)) for value in icp(*scans)]
+    >>> rng, poses = np.random.default_rng(1), ((0, 0, 0), (0.1, 0, 0.05))
+    >>> before, now = (SENSORS["paper"].scan(room(), pose, rng) for pose in poses)
+    >>> [abs(round(value, 2)) for value in icp(before, now)]
     [0.1, 0.0, 0.05]
     """
-    from scipy.spatial import cKDTree
+    with needed_by("evaluation"):
+        from scipy.spatial import cKDTree
 
     anchors, normals = _lines(before)
     points = now.points[now.valid]
-    motion = np.array(start, dtype=np.float64)
     if len(anchors) < 3 or len(points) < 3:
         return start
     tree = cKDTree(anchors)
-    limit = _FARTHEST
+    motion, limit = np.array(start, dtype=np.float64), _FARTHEST
     for _ in range(_ROUNDS):
         c, s = math.cos(motion[2]), math.sin(motion[2])
         moved = points @ np.array([[c, s], [-s, c]])

@@ -1,13 +1,10 @@
-"""Which of the found features is which of the true ones: one to one, by assignment."""
-
-from __future__ import annotations
+"""Distances, and which found feature is which true one: one to one, by assignment."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import needed_by
 from ..scan import Array
-
-__all__ = ["match"]
 
 Indices = NDArray[np.intp]
 
@@ -18,7 +15,7 @@ def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     Parameters
     ----------
     cost : ndarray, shape (F, T)
-        What it costs to pair row f with column t; finite where it is allowed.
+        Cost of each pair; finite where it is allowed.
     allowed : ndarray of bool, shape (F, T)
         Which pairs lie within the gate.
 
@@ -31,6 +28,8 @@ def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     ------
     ValueError
         If the shapes differ, or an allowed pair has no finite cost.
+    LineamentError
+        If scipy is not installed.
 
     Examples
     --------
@@ -52,10 +51,35 @@ def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     most = excess[within].max()
     if not np.isfinite(most):
         raise ValueError(f"cost of an allowed pair is {most} above the least, expected finite")
-    from scipy.optimize import linear_sum_assignment
+    with needed_by("evaluation"):
+        from scipy.optimize import linear_sum_assignment
 
     # All pairs that there can be cost less than a single one that is not allowed.
     barred = min(within.shape) * most + 1.0
     r, c = linear_sum_assignment(np.where(within, excess, barred))
     kept = within[r, c]
     return rows[r[kept]], columns[c[kept]]
+
+
+def distances(points: Array, others: Array) -> Array:
+    """Distance of each point from each of the others, shapes (F, 2) and (T, 2) to (F, T)."""
+    difference = points[:, np.newaxis] - others
+    return np.asarray(np.hypot(difference[..., 0], difference[..., 1]))
+
+
+def match_points(
+    points: Array, others: Array, gate: float | Array
+) -> tuple[Indices, Indices, Array]:
+    """Match points by distance, within a gate; the rows, the columns, and the distances (P,)."""
+    apart = distances(points, others)
+    rows, columns = match(apart, apart <= gate)
+    return rows, columns, apart[rows, columns]
+
+
+def distances_from_segments(points: Array, segments: NDArray[np.void]) -> Array:
+    """Distance of points (…, 2) from segments, between their ends [m]; shapes are broadcast."""
+    start, arm = segments["start"], segments["end"] - segments["start"]
+    square = np.maximum((arm**2).sum(axis=-1), np.finfo(float).tiny)
+    along = np.clip(((points - start) * arm).sum(axis=-1) / square, 0.0, 1.0)
+    away = points - start - along[..., np.newaxis] * arm
+    return np.asarray(np.hypot(away[..., 0], away[..., 1]))

@@ -1,6 +1,4 @@
-"""The partition of a scan into regions: which are right, and where they end."""
-
-from __future__ import annotations
+"""The partition of a scan into clusters: which are right, and where they end."""
 
 from dataclasses import dataclass, field
 
@@ -8,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from .beams import MIN_BEAMS, beam_spans, common_beams, marked_beams
+from .beams import MIN_BEAMS, beam_masks, common_beams
 from .counts import Counts, Summable, ratio
 from .matching import match
 
-__all__ = ["PartitionScores", "partition_scores"]
-
-#: A found region is right if the beams that only one of the two has are at most so many (one at
+#: A found cluster is right if the beams that only one of the two has are at most so many (one at
 #: each end), or at most this share of those that either has.
 BEAMS_APART, SHARE_APART = 2, 0.1
 #: A found breakpoint is right if the beam on each side is at most so many off.
@@ -27,10 +23,8 @@ class PartitionScores(Summable):
 
     Attributes
     ----------
-    regions : Counts
-        Found, true and right clusters.
-    breakpoints : Counts
-        Found, true and paired breakpoints.
+    regions, breakpoints : Counts
+        Found, true and right clusters; found, true and paired breakpoints.
     pairs : int
         Pairs of beams of a scan, of those beams that are in a found or a true cluster.
     together_found, together_true, together : int
@@ -46,7 +40,7 @@ class PartitionScores(Summable):
 
     @property
     def success(self) -> float:
-        """Partition success of the paper: correct regions over true ones."""
+        """Partition success of the paper: correct clusters over true ones."""
         return self.regions.recall
 
     @property
@@ -68,8 +62,8 @@ def partition_scores(found: Features, truth: Features) -> PartitionScores:
 
     A found cluster is right if it has the beams of a true one, but for at most one at each end
     or a tenth of those that either has. A found breakpoint is right if the beams on both its
-    sides are within one of those of a true one; its kind is not asked for, and the ends of the
-    scan, which are always known, are left out.
+    sides are within one of those of a true one, whatever its kind; the ends of the scan, which
+    are always known, are left out.
 
     True clusters of fewer than `MIN_BEAMS` beams, and breakpoints next to them, are not demanded.
     Not counted as mistakes are found clusters that have at least half of their beams in those or
@@ -79,10 +73,6 @@ def partition_scores(found: Features, truth: Features) -> PartitionScores:
     ----------
     found, truth : Features
         Features of one scan.
-
-    Returns
-    -------
-    PartitionScores
 
     Raises
     ------
@@ -98,39 +88,27 @@ def partition_scores(found: Features, truth: Features) -> PartitionScores:
     (1.0, Counts(correct=1, found=1, true=1), 1.0)
     """
     n = common_beams(found, truth)
+    # Beams by true cluster (row) and found cluster (column); those of none, -1, come last.
     n_found, n_true = (int(f.clusters.max(initial=-1)) + 1 for f in (found, truth))
-    # Beams by true cluster (row) and found cluster (column); those of none come last.
-    cells = np.where(truth.clusters < 0, n_true, truth.clusters) * (n_found + 1)
-    cells += np.where(found.clusters < 0, n_found, found.clusters)
-    table = np.bincount(cells, minlength=(n_true + 1) * (n_found + 1))
-    table = table.reshape(n_true + 1, n_found + 1)
+    table = np.zeros((n_true + 1, n_found + 1), dtype=np.int64)
+    np.add.at(table, (truth.clusters, found.clusters), 1)
+    shared = table[:-1, :-1]
     true_sizes, found_sizes = table.sum(axis=1)[:-1], table.sum(axis=0)[:-1]
     demanded = np.append(true_sizes >= MIN_BEAMS, False)
-    return PartitionScores(
-        _region_counts(table, demanded),
-        _breakpoint_counts(found, truth, demanded),
-        int(_pairs(n - table[-1, -1])),
-        int(_pairs(found_sizes).sum()),
-        int(_pairs(true_sizes).sum()),
-        int(_pairs(table[:-1, :-1]).sum()),
-    )
-
-
-def _pairs(n: NDArray[np.int64]) -> NDArray[np.int64]:
-    return n * (n - 1) // 2
-
-
-def _region_counts(table: NDArray[np.int64], demanded: NDArray[np.bool_]) -> Counts:
-    found_sizes = table.sum(axis=0)[:-1]
-    shared = table[:-1, :-1]
-    either = table.sum(axis=1)[:-1, np.newaxis] + found_sizes - shared
-    # Of 6 beams or more that differ so little most are shared: no region has two such partners.
+    # Of 6 beams or more that differ so little most are shared: no cluster has two such partners.
+    either = true_sizes[:, np.newaxis] + found_sizes - shared
     right = either - shared <= np.maximum(BEAMS_APART, SHARE_APART * either)
     matched = np.flatnonzero((right & demanded[:-1, np.newaxis]).any(axis=0))
-    unjudged = table[~demanded, :-1].sum(axis=0)
     # Numbers of clusters that no beam has are no clusters.
-    excused = unjudged >= 0.5 * found_sizes
-    return Counts.of(matched, excused, demanded)
+    excused = table[~demanded, :-1].sum(axis=0) >= 0.5 * found_sizes
+    return PartitionScores(
+        Counts.of(matched, excused, demanded),
+        _breakpoint_counts(found, truth, demanded),
+        *(
+            int((sizes * (sizes - 1) // 2).sum())
+            for sizes in (n - table[-1, -1], found_sizes, true_sizes, shared)
+        ),
+    )
 
 
 def _breakpoint_counts(found: Features, truth: Features, demanded: NDArray[np.bool_]) -> Counts:
@@ -145,6 +123,6 @@ def _breakpoint_counts(found: Features, truth: Features, demanded: NDArray[np.bo
     demanded_breaks = is_judged[true_sides].all(axis=1)
     near = (off <= BREAK_BEAMS).all(axis=2) & demanded_breaks
     matched, _ = match(off.sum(axis=2).astype(np.float64), near)
-    across_small = marked_beams(beam_spans(sides[:, 0], sides[:, 1], n), is_small) > 0
+    across_small = (beam_masks(sides[:, 0], sides[:, 1], n) & is_small).any(axis=1)
     excused = across_small | ~is_judged[sides].all(axis=1)
     return Counts.of(matched, excused, demanded_breaks)

@@ -1,7 +1,5 @@
 """Whether features are found again from another place, in logs with known poses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -9,18 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..motion.poses import relative
 from ..scan import Array, LaserScan, Pose
-from .corners import vertices
+from ..scan.poses import relative
+from .beams import nearest_beams, with_neighbours
 from .counts import Summable, ratio, rms
-from .matching import match
-from .segments import ANGLE
-
-__all__ = ["Repeatability", "Repeats", "repeatability"]
+from .kinds import ANGLE, vertices
+from .matching import distances, distances_from_segments, match, match_points
 
 #: Places on a segment at which it is looked for, and the share of them that must be in view, and
 #: found again.
 _PLACES, _SHARE = 16, 0.5
+#: Turns about the sensor that move a corner to where it is not, to see what is found there; the
+#: least is an eighth of a right angle [rad], beyond the gate at any range that counts.
+TURNS, LEAST_TURN = 24, math.radians(11.25)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +31,7 @@ class Repeats(Summable):
     expected : int
         Features of the one view that are in sight of the other.
     distances : ndarray, shape (m,)
-        Of those that were found again: distance between both [m].
+        Of those that are found again: distance between both [m].
 
     Examples
     --------
@@ -46,12 +45,12 @@ class Repeats(Summable):
 
     @property
     def repeated(self) -> int:
-        """How many were found again."""
+        """How many are found again."""
         return len(self.distances)
 
     @property
     def rate(self) -> float:
-        """Share of the expected that were found again; NaN where none was expected."""
+        """Share of the expected that are found again; NaN if none is expected."""
         return ratio(self.repeated, self.expected)
 
     @property
@@ -68,6 +67,74 @@ class Repeatability(Summable):
     segments: Repeats = field(default_factory=Repeats)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedRepeats(Summable):
+    """Corners of one view that are in sight of another, ranked by a score.
+
+    Attributes
+    ----------
+    scores : ndarray, shape (m,)
+        What they are ranked by: the highest first.
+    repeated : bool array, shape (m,)
+        Whether each is found again.
+    chance : ndarray, shape (m,)
+        Probability that something is found in its place by chance.
+
+    Examples
+    --------
+    Of the two best both are found again, of the others one:
+
+    >>> ranked = RankedRepeats(
+    ...     np.array([0.2, 0.9, 0.8, 0.1]), np.array([False, True, True, True]), np.zeros(4)
+    ... )
+    >>> ranked.count_at(0.8), ranked.rate, ranked.auc
+    (2.0, 0.75, 0.6666666666666666)
+    """
+
+    scores: Array = field(default_factory=lambda: np.empty(0))
+    repeated: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+    chance: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def rate(self) -> float:
+        """Share of all that are found again, less what chance finds."""
+        rates = self.curve()[1]
+        return float(rates[-1]) if len(rates) else math.nan
+
+    @property
+    def auc(self) -> float:
+        """Probability that one that is found again has a higher score than one that is not."""
+        good, bad = self.scores[self.repeated], np.sort(self.scores[~self.repeated])
+        below = np.searchsorted(bad, good, "left") + np.searchsorted(bad, good, "right")
+        return ratio(0.5 * float(below.sum()), len(good) * len(bad))
+
+    def curve(self) -> tuple[Array, Array]:
+        """Corners repeated among the best 1, 2, …, m, and the share of these, without chance.
+
+        If a share c is found by chance, of N corners R = T + c (N - T) are found again if T
+        truly are: T/N = (R/N - c)/(1 - c). Corners of equal scores come as one.
+        """
+        order = np.argsort(-self.scores, kind="stable")
+        count = np.arange(1.0, len(order) + 1)
+        found = np.cumsum(self.repeated[order]) / count
+        chance = np.cumsum(self.chance[order]) / count
+        rate = (found - chance) / np.maximum(1.0 - chance, 1e-9)
+        ranked = self.scores[order]
+        ends = np.append(ranked[1:] != ranked[:-1], True)[: len(order)]
+        return (rate * count)[ends], rate[ends]
+
+    def rate_between(self, low: float, high: float) -> float:
+        """`rate` of those whose score is from `low` to below `high`."""
+        inside = (low <= self.scores) & (self.scores < high)
+        ranked = RankedRepeats(self.scores[inside], self.repeated[inside], self.chance[inside])
+        return ranked.rate
+
+    def count_at(self, rate: float) -> float:
+        """Most corners repeated, without chance, among the best of which this share is."""
+        repeated, rates = self.curve()
+        return float(repeated[rates >= rate].max(initial=0.0))
+
+
 def repeatability(
     scan: LaserScan,
     features: Features,
@@ -76,18 +143,15 @@ def repeatability(
     *,
     gate: float = 0.10,
 ) -> Repeatability:
-    """Look for the features of another scan in this one.
+    """Look for the features of another scan in this one; swap them for the other direction.
 
     They are moved into this scan's frame by the two poses. One is expected here if it lies in
     the field of view and within the limits of range, and a beam that passes by it (the nearest,
     or a neighbour) goes at least that far, less the gate: then nothing occludes it. A corner is
-    found again within the gate. A segment is expected if it shows this scanner its front, and at
-    least half of 16 places along it are in sight; it is found again as one whose direction
-    differs by at most 10° and which is within the gate of at least half of those in sight. Both
-    are matched one to one. Edges at jumps are left out.
-
-    Swap the scans for the other direction. A corner of which only one side is in sight from here
-    is expected all the same.
+    found again within the gate, and expected even if only one of its sides is in sight. A segment
+    is expected if it shows this scanner its front, and at least half of 16 places along it are in
+    sight; it is found again as one whose direction differs by at most 10° and which is within the
+    gate of at least half of those in sight. Both are matched one to one, edges at jumps left out.
 
     Parameters
     ----------
@@ -97,10 +161,6 @@ def repeatability(
         Whose features are looked for, with its pose.
     gate : float
         Largest distance of what is found again [m]; the errors of the poses count.
-
-    Returns
-    -------
-    Repeatability
 
     Raises
     ------
@@ -120,26 +180,64 @@ def repeatability(
     """
     if not gate > 0:
         raise ValueError(f"gate is {gate}, expected a distance > 0")
-    moved = other_features.transform(*relative(*checked_poses(scan, other_scan)))
+    moved = other_features.transform(*_motion(scan, other_scan))
+    others = vertices(moved)["position"]
+    others = others[in_sight(scan, others, gate)]
+    *_, apart = match_points(vertices(features)["position"], others, gate)
     return Repeatability(
-        _corners_again(scan, vertices(features)["position"], vertices(moved)["position"], gate),
+        Repeats(len(others), apart),
         _segments_again(scan, features.segments, moved.segments, gate),
     )
 
 
-def checked_poses(scan: LaserScan, other_scan: LaserScan) -> tuple[Pose, Pose]:
-    """Return the poses of two scans; a ValueError if one has none."""
+def ranked_repeats(
+    scan: LaserScan,
+    features: Features,
+    other_scan: LaserScan,
+    other_features: Features,
+    scores: Array,
+    *,
+    gate: float = 0.10,
+) -> RankedRepeats:
+    """Look for the corners of another scan in this one, and for what chance finds.
+
+    As `repeatability`, corner by corner. By chance a corner is found if, turned about this sensor
+    to another bearing where it would be in sight too, there is one within the gate.
+
+    Parameters
+    ----------
+    scan, features, other_scan, other_features, gate
+        As for `repeatability`.
+    scores : ndarray, shape (K,)
+        Score of each of the other's corners.
+
+    Raises
+    ------
+    ValueError
+        If a scan has no pose.
+    """
+    others = other_features.transform(*_motion(scan, other_scan)).corners["position"]
+    expected = in_sight(scan, others, gate)
+    others, positions = others[expected], features.corners["position"]
+    repeated = np.zeros(len(others), dtype=np.bool_)
+    repeated[match_points(others, positions, gate)[0]] = True
+    # Share of the turns of each corner, among those in sight, that put it near another.
+    turns = np.linspace(LEAST_TURN, 2 * math.pi - LEAST_TURN, TURNS)
+    c, s = np.cos(turns)[:, np.newaxis], np.sin(turns)[:, np.newaxis]
+    x, y = others.T
+    turned = np.stack((c * x - s * y, s * x + c * y), axis=-1).reshape(-1, 2)
+    seen = in_sight(scan, turned, gate)
+    met = (distances(turned, positions) <= gate).any(axis=1) & seen
+    seen, met = seen.reshape(TURNS, -1).sum(axis=0), met.reshape(TURNS, -1).sum(axis=0)
+    return RankedRepeats(scores[expected], repeated, met / np.maximum(seen, 1))
+
+
+def _motion(scan: LaserScan, other_scan: LaserScan) -> Pose:
+    """Pose of the other scan in the frame of this one."""
     if scan.pose is None or other_scan.pose is None:
         which = "scan" if scan.pose is None else "other_scan"
         raise ValueError(f"{which} has no pose, expected (x, y, theta)")
-    return scan.pose, other_scan.pose
-
-
-def _corners_again(scan: LaserScan, positions: Array, others: Array, gate: float) -> Repeats:
-    expected = others[in_sight(scan, others, gate)]
-    difference = positions[:, np.newaxis] - expected
-    distance = np.hypot(difference[..., 0], difference[..., 1])
-    return Repeats(len(expected), distance[match(distance, distance <= gate)])
+    return relative(scan.pose, other_scan.pose)
 
 
 def _segments_again(
@@ -155,7 +253,7 @@ def _segments_again(
     expected = in_front & (seen.mean(axis=1) >= _SHARE)
     places, seen = places[expected], seen[expected]
     # By segment here, expected segment, and place on it.
-    distance = _distances(segments[:, np.newaxis, np.newaxis], places)
+    distance = distances_from_segments(places, segments[:, np.newaxis, np.newaxis])
     n_seen = seen.sum(axis=1)
     again = ((distance <= gate) & seen).sum(axis=2) >= _SHARE * n_seen
     turn = segments["angle"][:, np.newaxis] - others["angle"][expected]
@@ -164,25 +262,10 @@ def _segments_again(
     return Repeats(int(expected.sum()), mean[match(mean, again)])
 
 
-def _distances(segments: NDArray[np.void], points: Array) -> Array:
-    """Distance of each point from its segment, between its ends [m]; shapes are broadcast."""
-    start, arm = segments["start"], segments["end"] - segments["start"]
-    length_squared = np.maximum((arm**2).sum(axis=-1), np.finfo(float).tiny)
-    along = ((points - start) * arm).sum(axis=-1) / length_squared
-    away = points - start - np.clip(along, 0.0, 1.0)[..., np.newaxis] * arm
-    return np.asarray(np.hypot(away[..., 0], away[..., 1]))
-
-
 def in_sight(scan: LaserScan, points: Array, margin: float) -> NDArray[np.bool_]:
     """Whether a scan can have seen each point: in view, in range, and with nothing before it.
 
-    Parameters
-    ----------
-    scan : LaserScan
-    points : ndarray, shape (m, 2)
-        Points in the frame of the scan [m].
-    margin : float
-        How much shorter the beam may be than the way to the point [m].
+    A beam may be shorter than the way to the point by the margin [m].
 
     Examples
     --------
@@ -192,17 +275,10 @@ def in_sight(scan: LaserScan, points: Array, margin: float) -> NDArray[np.bool_]
     >>> in_sight(wall, np.array([[3.0, 0.0], [2.05, 0.0], [1.0, 0.0], [0.0, 1.0]]), 0.1).tolist()
     [False, True, True, False]
     """
-    n = len(scan)
-    if n == 0:
+    if not len(scan):
         return np.zeros(len(points), dtype=np.bool_)
     distance = np.hypot(points[:, 0], points[:, 1])
-    half_step = 0.5 * scan.angle_increment
-    first = scan.angles[0] - half_step
-    bearing = first + (np.arctan2(points[:, 1], points[:, 0]) - first) % (2 * math.pi)
-    in_view = bearing <= scan.angles[-1] + half_step
-    nearest = np.searchsorted(0.5 * (scan.angles[1:] + scan.angles[:-1]), bearing)
-    beams = nearest[:, np.newaxis] + np.arange(-1, 2)
-    beams = beams % n if scan.is_full_circle else np.clip(beams, 0, n - 1)
-    reach = np.where(scan.valid, scan.ranges, -np.inf)[beams].max(axis=1)
+    nearest, in_view = nearest_beams(scan, points)
+    reach = np.where(scan.valid, scan.ranges, -np.inf)[with_neighbours(scan)].max(axis=1)[nearest]
     in_range = (distance >= scan.range_min) & (distance < scan.range_max)
     return np.asarray(in_view & in_range & (reach >= distance - margin))

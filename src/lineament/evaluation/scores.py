@@ -1,30 +1,17 @@
 """All scores of a scan against its truth, and of many scans together."""
 
-from __future__ import annotations
-
-import math
 from dataclasses import dataclass, field
+from functools import partial
 
 from ..features import Features
-from .arcs import ArcScores, arc_scores
-from .corners import CornerScores, corner_scores
-from .counts import Summable
+from .counts import Summable, finite_figures
+from .kinds import FeatureScores, arc_scores, corner_scores, segment_scores
 from .partition import PartitionScores, partition_scores
-from .segments import SegmentScores, segment_scores
-
-__all__ = ["Scores", "evaluate"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores(Summable):
     """Scores of some scans; they add up: ``a + b``, or `Scores.total` of many.
-
-    Attributes
-    ----------
-    scans : int
-        How many scans.
-    corners, segments, arcs, partition
-        Scores of each kind.
 
     Examples
     --------
@@ -33,9 +20,9 @@ class Scores(Summable):
     """
 
     scans: int = 0
-    corners: CornerScores = field(default_factory=CornerScores)
-    segments: SegmentScores = field(default_factory=SegmentScores)
-    arcs: ArcScores = field(default_factory=ArcScores)
+    corners: FeatureScores = field(default_factory=partial(FeatureScores.none, "corners"))
+    segments: FeatureScores = field(default_factory=partial(FeatureScores.none, "segments"))
+    arcs: FeatureScores = field(default_factory=partial(FeatureScores.none, "arcs"))
     partition: PartitionScores = field(default_factory=PartitionScores)
 
     def summary(self) -> dict[str, float]:
@@ -43,7 +30,7 @@ class Scores(Summable):
 
         Names are those of the scores' own summaries behind ``corner_``, ``segment_``, ``arc_``
         and ``partition_``: ``corner_f1_0.10``, ``segment_end_p90``, ``arc_nees``. A figure that
-        nothing defines, such as a precision where nothing was found, is left out.
+        nothing defines, such as a precision if nothing is found, is left out.
 
         Examples
         --------
@@ -51,14 +38,10 @@ class Scores(Summable):
         {'scans': 0, 'corner_nees_unusable': 0, 'segment_nees_unusable': 0, 'arc_nees_unusable': 0}
         """
         figures: dict[str, float] = {"scans": self.scans}
-        for name, part in (
-            ("corner", self.corners),
-            ("segment", self.segments),
-            ("arc", self.arcs),
-            ("partition", self.partition),
-        ):
-            figures |= {f"{name}_{key}": value for key, value in part.summary().items()}
-        return {name: value for name, value in figures.items() if math.isfinite(value)}
+        for name in ("corners", "segments", "arcs", "partition"):
+            of_kind = getattr(self, name).summary()
+            figures |= {f"{name.rstrip('s')}_{key}": value for key, value in of_kind.items()}
+        return finite_figures(figures)
 
 
 def evaluate(found: Features, truth: Features) -> Scores:
@@ -67,14 +50,10 @@ def evaluate(found: Features, truth: Features) -> Scores:
     Parameters
     ----------
     found : Features
-        What a method found.
+        Output of a method.
     truth : Features
         What a perfect method would find, in the same frame, with the Cramér-Rao bounds as
         covariances.
-
-    Returns
-    -------
-    Scores
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """Similarity error: how far each point is from the line that was fitted to it (Figure 12)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -9,10 +7,8 @@ import numpy as np
 
 from ..features import Features
 from ..scan import Array, LaserScan
-from .beams import beam_masks, beams_of
-from .counts import Summable, quantile, ratio
-
-__all__ = ["SimilarityScores", "similarity_errors", "similarity_scores"]
+from .beams import beams_of, check_beams
+from .counts import Summable, finite_figures, quantile, ratio
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,25 +49,24 @@ class SimilarityScores(Summable):
     def summary(self) -> dict[str, float]:
         """List all figures by name; those that nothing defines are left out."""
         names = ("mean", "variance", "maximum", "explained")
-        figures = {f"similarity_{name}": float(getattr(self, name)) for name in names}
-        return {name: value for name, value in figures.items() if math.isfinite(value)}
+        return finite_figures({f"similarity_{name}": getattr(self, name) for name in names})
 
 
 def similarity_errors(scan: LaserScan, features: Features) -> Array:
-    """Distance of each beam's point to its own fitted line or circle.
+    """Distance of each beam's point from its fitted line or circle.
 
     Parameters
     ----------
     scan : LaserScan
         The scan, as it was measured.
     features : Features
-        What was found in it, in its frame.
+        Features found in it, in its frame.
 
     Returns
     -------
     ndarray, shape (n,)
         Distances [m]: to the segment or arc whose beams, `first_beam` to `last_beam`, contain
-        the beam, the nearest of several; NaN where there is none or the beam is not valid.
+        the beam, the nearest of several; NaN if there is none or the beam is not valid.
 
     Raises
     ------
@@ -85,25 +80,21 @@ def similarity_errors(scan: LaserScan, features: Features) -> Array:
     >>> similarity_errors(scan, ln.extract(scan)).round(4).tolist()
     [0.0099, 0.0101, 0.0101, 0.0099, nan]
     """
-    n = len(scan)
-    if len(features.clusters) != n:
-        raise ValueError(f"features are of {len(features.clusters)} beams, expected the scan's {n}")
+    check_beams(scan, features)
+    n, lines, arcs = len(scan), features.segments, features.arcs
     points = np.where(scan.valid[:, np.newaxis], scan.points, 0.0)
-    lines, arcs = features.segments, features.arcs
     normals = np.stack((-np.sin(lines["angle"]), np.cos(lines["angle"])))
     to_lines = points @ normals - (lines["centroid"] * normals.T).sum(axis=1)
     from_center = points[:, np.newaxis] - arcs["center"]
     to_arcs = np.hypot(from_center[..., 0], from_center[..., 1]) - arcs["radius"]
     distance = abs(np.hstack((to_lines, to_arcs))).T
-    own = beam_masks(np.vstack((beams_of(lines, n), beams_of(arcs, n))), n) & scan.valid
+    own = np.vstack((beams_of(lines, n), beams_of(arcs, n))) & scan.valid
     nearest = np.min(distance, axis=0, initial=np.inf, where=own)
     return np.where(np.isfinite(nearest), nearest, np.nan)
 
 
 def similarity_scores(scan: LaserScan, features: Features) -> SimilarityScores:
-    """Collect the similarity errors of one scan.
-
-    Parameters are those of `similarity_errors`.
+    """Collect the similarity errors of one scan; parameters are those of `similarity_errors`.
 
     Examples
     --------

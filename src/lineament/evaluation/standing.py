@@ -1,7 +1,5 @@
 """Standing still: the scatter of the same feature in scan after scan, by its covariance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,12 +12,9 @@ from ..features import Features
 from ..scan import Array
 from .beams import beams_of, overlap_ratios
 from .consistency import NormalisedErrors, largest_variance, usable_covariances
-from .corners import vertices
 from .counts import Summable, ratio
-from .matching import Indices, match
-from .segments import line_errors
-
-__all__ = ["ARM_BINS", "ScatterScores", "StandingScores", "shorter_arms", "standing_scores"]
+from .kinds import line_errors, vertices
+from .matching import Indices, match, match_points
 
 #: Fewest measurements of the shorter arm of each bin; the next bin begins where it ends.
 ARM_BINS = (3, 5, 10, 30, 100)
@@ -39,9 +34,9 @@ class ScatterScores(Summable):
     arms : int32 array, shape (m,)
         Measurements of the shorter arm of each pair.
     seen : int32 array, shape (f,)
-        Measurements of the shorter arm of each feature that was looked for in the next scan.
+        Measurements of the shorter arm of each feature that is looked for in the next scan.
     again : bool array, shape (f,)
-        Whether it was found there.
+        Whether it is found there.
     """
 
     differences: NormalisedErrors = field(default_factory=lambda: NormalisedErrors.none(2))
@@ -88,10 +83,6 @@ def standing_scores(scans: Iterable[Features]) -> StandingScores:
     scans : iterable of Features
         Features of scans with the same number of beams, in the sensor's own frame.
 
-    Returns
-    -------
-    StandingScores
-
     Raises
     ------
     ValueError
@@ -115,13 +106,13 @@ def standing_scores(scans: Iterable[Features]) -> StandingScores:
                 "expected the same number"
             )
         parts.append(StandingScores(_segments(features, after), _corners(features, after)))
-    return StandingScores.total(parts) if parts else StandingScores()
+    return StandingScores.total(parts)
 
 
 def _segments(features: Features, after: Features) -> ScatterScores:
     one, other = features.segments, after.segments
     n = len(features.clusters)
-    overlap = overlap_ratios(beams_of(one, n), beams_of(other, n), n)
+    overlap = overlap_ratios(beams_of(one, n), beams_of(other, n))
     rows, columns = match(1.0 - overlap, overlap >= OVERLAP)
     first, second = one[rows], other[columns]
     errors = np.column_stack(line_errors(second, first))
@@ -136,15 +127,14 @@ def _segments(features: Features, after: Features) -> ScatterScores:
 
 def _corners(features: Features, after: Features) -> ScatterScores:
     one, other = vertices(features), vertices(after)
-    difference = one["position"][:, np.newaxis] - other["position"]
-    distance = np.hypot(difference[..., 0], difference[..., 1])
-    variance = largest_variance(one["covariance"]), largest_variance(other["covariance"])
-    spread = np.sqrt(variance[0][:, np.newaxis] + variance[1])
-    rows, columns = match(distance, distance <= np.maximum(GATE, DEVIATIONS * spread))
+    variances = largest_variance(one["covariance"])[:, np.newaxis]
+    spread = np.sqrt(variances + largest_variance(other["covariance"]))
+    gate = np.maximum(GATE, DEVIATIONS * spread)
+    rows, columns, _ = match_points(one["position"], other["position"], gate)
+    errors = one["position"][rows] - other["position"][columns]
     covariances = one["covariance"][rows] + other["covariance"][columns]
-    seen = shorter_arms(features)
-    arms = np.minimum(seen[rows], shorter_arms(after)[columns])
-    return _scores(difference[rows, columns], covariances, arms, seen, rows)
+    seen, seen_after = _shorter_arms(features), _shorter_arms(after)
+    return _scores(errors, covariances, np.minimum(seen[rows], seen_after[columns]), seen, rows)
 
 
 def _scores(
@@ -155,14 +145,12 @@ def _scores(
     found: Indices,
 ) -> ScatterScores:
     usable = usable_covariances(covariances)
-    again = np.zeros(len(seen), dtype=np.bool_)
-    again[found] = True
-    return ScatterScores(
-        NormalisedErrors.of(errors[usable], covariances[usable]), arms[usable], seen, again
-    )
+    again = np.isin(np.arange(len(seen)), found)
+    differences = NormalisedErrors.of(errors[usable], covariances[usable])
+    return ScatterScores(differences, arms[usable], seen, again)
 
 
-def shorter_arms(features: Features) -> NDArray[np.int32]:
-    """Measurements of the shorter segment of each vertex; 0 where it has not two."""
+def _shorter_arms(features: Features) -> NDArray[np.int32]:
+    """Measurements of the shorter segment of each vertex; 0 if it has not two."""
     counts = np.append(features.segments["n_points"], np.int32(0))
     return np.asarray(counts[vertices(features)["segments"]].min(axis=1))

@@ -1,7 +1,5 @@
 """How well features are followed, and the motion between frames: against known poses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,13 +9,11 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..motion import Tracks
-from ..motion.poses import compose, relative
 from ..scan import Array, Pose
+from ..scan.poses import compose, relative
 from .counts import Summable, quantile, ratio, rms
-from .matching import Indices, match
-from .segments import ANGLE, line_errors
-
-__all__ = ["MotionErrors", "TrackScores", "motion_errors", "track_scores"]
+from .kinds import ANGLE, line_errors
+from .matching import Indices, match, match_points
 
 #: Features of two frames, in one frame, are the same within this distance [m]; segments also lie
 #: side by side along this share of the shorter one.
@@ -47,18 +43,16 @@ class MotionErrors(Summable):
 
     def summary(self) -> dict[str, float]:
         """List the figures by name."""
-        return {
-            "way_rmse": rms(self.ways),
-            "way_median": quantile(self.ways, 0.5),
-            "way_p95": quantile(self.ways, 0.95),
-            "turn_rmse": rms(self.turns),
-            "turn_median": quantile(self.turns, 0.5),
-            "turn_p95": quantile(self.turns, 0.95),
-        }
+        figures = {}
+        for name, errors in (("way", self.ways), ("turn", self.turns)):
+            figures[f"{name}_rmse"] = rms(errors)
+            figures[f"{name}_median"] = quantile(errors, 0.5)
+            figures[f"{name}_p95"] = quantile(errors, 0.95)
+        return figures
 
 
 def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1) -> MotionErrors:
-    """Compare motions between successive frames, put together over some, with those of the poses.
+    """Compare motions between successive frames, composed over some, with those of the poses.
 
     Parameters
     ----------
@@ -90,13 +84,13 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
     way: list[Pose] = [(0.0, 0.0, 0.0)]
     for motion in motions:
         way.append(compose(way[-1], motion))
-    ways, turns = [], []
-    for i in range(len(poses) - step):
-        true = relative(poses[i], poses[i + step])
-        x, y, turn = relative(true, relative(way[i], way[i + step]))
-        ways.append(math.hypot(x, y))
-        turns.append(abs(turn))
-    return MotionErrors(np.array(ways), np.array(turns))
+    errors = np.array(
+        [
+            relative(relative(poses[i], poses[i + step]), relative(way[i], way[i + step]))
+            for i in range(len(poses) - step)
+        ]
+    ).reshape(-1, 3)
+    return MotionErrors(np.hypot(errors[:, 0], errors[:, 1]), abs(errors[:, 2]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +106,7 @@ class TrackScores(Summable):
     lost : int
         Of these, those that get a new number.
     lengths : ndarray, shape (m,)
-        Frames in which each track was seen.
+        Frames in which each track is seen.
     """
 
     pairs: int = 0
@@ -134,7 +128,7 @@ class TrackScores(Summable):
 def track_scores(
     frames: Sequence[Features], tracks: Sequence[Tracks], poses: Sequence[Pose]
 ) -> dict[str, TrackScores]:
-    """Count how often the numbers of segments and corners change that the poses tell to be same.
+    """Count how often the numbers of segments and corners change that are the same by the poses.
 
     The features of a frame are moved by the known poses into the frame before. Corners are the
     same within 0.10 m; segments if the centroids of both are within 0.10 m of the other's line,
@@ -176,9 +170,7 @@ def track_scores(
 
 
 def _same_corners(before: NDArray[np.void], now: NDArray[np.void]) -> tuple[Indices, Indices]:
-    apart = before["position"][:, np.newaxis] - now["position"]
-    distance = np.hypot(apart[..., 0], apart[..., 1])
-    return match(distance, distance <= _GATE)
+    return match_points(before["position"], now["position"], _GATE)[:2]
 
 
 def _same_segments(before: NDArray[np.void], now: NDArray[np.void]) -> tuple[Indices, Indices]:

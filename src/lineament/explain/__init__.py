@@ -1,5 +1,5 @@
 """What each measurement of a scan became, and why: for people who look."""
 
-from .explain import explain
+from .explain import Explanation, explain
 
-__all__ = ["explain"]
+__all__ = ["Explanation", "explain"]

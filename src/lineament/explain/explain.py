@@ -1,4 +1,4 @@
-"""Why a beam is part of a feature, or of none: a trace put into words."""
+"""Why a beam is part of a feature, or of no feature: a trace in words."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..methods.trace import Trace
-from .measurements import Line, Readings, along_beam, spans, why_invalid
+from .measurements import Line, Measurements, along_beam, spans, why_invalid
 
 __all__ = ["Explanation", "explain"]
 
-#: Fewer readings than this are no line in any of the methods.
+#: Fewer measurements than this are no line in any of the methods.
 _FEW = 4
 #: The method that finds clusters alone.
 _PARTS_ONLY = "pdbs"
 #: Angle below which neighbouring lines may be taken for one wall that bends [°].
 _SHALLOW = 20.0
-#: Beams within which an examined corner still tells something about a beam.
+#: An examined corner is reported with the beams up to this far from it.
 _NEAR = 3
 
 
@@ -46,10 +46,10 @@ class Explanation:
 
 
 def explain(trace: Trace, beam: int) -> Explanation:
-    """Tell what became of a beam in a run of a method, and why.
+    """Return what became of a beam in a run of a method, and why.
 
-    What is told is measured on the trace: its thresholds, responses and evidence are the method's
-    own; lines through readings that no feature took are fitted here, to show what they look like.
+    Thresholds, responses and evidence are those of the trace. Lines through measurements that are
+    in no feature are fitted here.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class _Question:
     def __init__(self, trace: Trace, beam: int) -> None:
         self.trace, self.beam, self.scan = trace, beam, trace.scan
         self.segments, self.arcs = trace.features.segments, trace.features.arcs
-        self.readings = Readings(trace)
+        self.measurements = Measurements(trace)
         self.steps: list[tuple[str, str]] = []
 
     def answer(self) -> Explanation:
@@ -93,20 +93,20 @@ class _Question:
         bearing = math.degrees(scan.angles[i])
         invalid = why_invalid(scan, i)
         if invalid:
-            self._note("reading", f"beam {i} at {bearing:.2f}°: {invalid}")
+            self._note("measurement", f"beam {i} at {bearing:.2f}°: {invalid}")
             return self._done("invalid", f"Invalid: {invalid}.")
         text = f"beam {i}: {scan.ranges[i]:.3f} m at {bearing:.2f}°"
-        self._note("reading", f"{text}, noise {_length(self._sigma(i))} (1 σ)")
+        self._note("measurement", f"{text}, noise {_length(self._sigma(i))} (1 σ)")
         if not math.isfinite(self.trace.filtered[i]):
-            return self._done(*self._tell_left_out())
+            return self._done(*self._left_out())
         moved = self.trace.filtered[i] - scan.ranges[i]
         if moved:
             self._note("filter", f"moved by {_signed(moved)} along its beam for the detection")
         if self.trace.clusters[i] < 0:
-            return self._done("noise", self._tell_noise())
-        self._note("cluster", f"cluster {self.trace.clusters[i]}; {self._tell_sides()}")
-        self._tell_candidates()
-        return self._done(*self._tell_feature())
+            return self._done("noise", self._noise())
+        self._note("cluster", f"cluster {self.trace.clusters[i]}; {self._sides()}")
+        self._examined()
+        return self._done(*self._feature())
 
     def _note(self, stage: str, text: str) -> None:
         self.steps.append((stage, text))
@@ -118,9 +118,7 @@ class _Question:
         noise = self.trace.features.noise
         return math.sqrt(noise.range_variance(float(self.scan.ranges[i]))) if noise else math.nan
 
-    # Before the clusters.
-
-    def _tell_left_out(self) -> tuple[str, str]:
+    def _left_out(self) -> tuple[str, str]:
         i, ranges = self.beam, self.scan.ranges
         sides = [i - 1, i + 1]
         if not 0 < i < len(self.scan) - 1 or not self.scan.valid[sides].all():
@@ -130,37 +128,35 @@ class _Question:
         self._note("filter", text)
         return "spike", "A spike: a lone reading before or behind a surface that goes on."
 
-    def _tell_noise(self) -> str:
-        """Tell of a valid reading in no cluster what holds it to its neighbours, and what not."""
-        self._note("cluster", f"none; {self._tell_sides()}")
+    def _noise(self) -> str:
+        self._note("cluster", f"none; {self._sides()}")
         count = 1 + self._count_held(-1) + self._count_held(1)
         if count == 1:
-            return "Noise: it stands alone, apart from the readings on either side."
-        return f"Noise: {count} readings hold together here, too few for a cluster."
+            return "Noise: it is alone, apart from the measurements on either side."
+        return f"Noise: {count} measurements hold together here, too few for a cluster."
 
     def _count_held(self, way: int) -> int:
         """Count the neighbours on one side, up to a spacing above its threshold."""
         here = self.beam
-        for count in range(len(self.readings)):
-            there = self.readings.neighbour(here, way)
+        for count in range(len(self.measurements)):
+            there = self.measurements.neighbour(here, way)
             if there is None or not self._holds(_later(here, there, way)):
                 return count
             here = there
-        return len(self.readings) - 1
+        return len(self.measurements) - 1
 
     def _holds(self, i: int) -> bool:
-        """Whether a reading was near enough to the one before it."""
+        """Whether a measurement is near enough to the one before it."""
         t = self.trace
         limits = (t.distance_threshold[i], t.density_threshold[i])
         return any(bool(t.spacing[i] <= limit) for limit in limits)
 
-    def _tell_sides(self) -> str:
-        return ", ".join(self._tell_side(way) for way in (-1, 1))
+    def _sides(self) -> str:
+        return ", ".join(self._side(way) for way in (-1, 1))
 
-    def _tell_side(self, way: int) -> str:
-        """Tell how far the neighbour is, and whether it is in the same cluster."""
+    def _side(self, way: int) -> str:
         t, word = self.trace, "before" if way < 0 else "after"
-        other = self.readings.neighbour(self.beam, way)
+        other = self.measurements.neighbour(self.beam, way)
         if other is None:
             return f"the scan ends {word}"
         i = _later(self.beam, other, way)
@@ -175,10 +171,8 @@ class _Question:
             return f"{apart}, near enough, yet another cluster begins{why}"
         return f"{apart}, of {_length(limit)} allowed"
 
-    # The cut.
-
-    def _tell_candidates(self) -> None:
-        """Tell the corners that were examined here, and whether they won."""
+    def _examined(self) -> None:
+        """Report the corners that were examined here, and whether they were kept."""
         t = self.trace
         if not len(t.candidates):
             return
@@ -194,7 +188,6 @@ class _Question:
             self._note("cut", f"{text}, {_figure(t.threshold)} asked; {self._verdict(k)}")
 
     def _verdict(self, k: int) -> str:
-        """Tell what became of a candidate in the end."""
         candidate = self.trace.candidates[k]
         beam = int(candidate["beam"])
         if not candidate["accepted"]:
@@ -208,29 +201,28 @@ class _Question:
             return "cut there first, then merged again"
         return "a border, but the lines on its sides do not meet there"
 
-    # The fit.
-
-    def _tell_feature(self) -> tuple[str, str]:
-        """Tell which features a reading in a cluster is part of, or why it is of none."""
+    def _feature(self) -> tuple[str, str]:
         inside = [int(k) for k in np.flatnonzero(spans(self.segments, self.beam))]
         for k in inside:
-            self._tell_segment(k)
+            self._in_segment(k)
         if inside:
             return "segment", f"Part of {' and '.join(f'segment {k}' for k in inside)}."
         arcs = np.flatnonzero(spans(self.arcs, self.beam))
         if len(arcs):
-            return "arc", self._tell_arc(int(arcs[0]))
+            return "arc", self._in_arc(int(arcs[0]))
         if self.trace.method == _PARTS_ONLY:
             return "clustered", f"In a cluster; {_PARTS_ONLY} finds no more than these."
-        return "unexplained", self._tell_unexplained()
+        return "unexplained", self._unexplained()
 
-    def _tell_segment(self, k: int) -> None:
+    def _in_segment(self, k: int) -> None:
         segment, i = self.segments[k], self.beam
         length = math.dist(segment["start"], segment["end"])
         off = along_beam(self.scan, i, segment)
         sigmas = abs(off) / self._sigma(i)
         text = f"segment {k}: {_extent(segment)}, {length:.2f} m, rms {_length(segment['rms'])}"
-        self._note("fit", f"{text}; this reading: {_signed(off)} along its beam ({sigmas:.1f} σ)")
+        self._note(
+            "fit", f"{text}; this measurement: {_signed(off)} along its beam ({sigmas:.1f} σ)"
+        )
         evidence = self.trace.evidence.get("segments")
         if evidence is None:
             return
@@ -240,11 +232,11 @@ class _Question:
         else:
             text = f"χ² would rise by {_figure(evidence[k])} if it were one line with a neighbour"
             self._note("evidence", f"{text} ({asked})")
-        self._tell_split(segment, asked)
+        self._split_here(segment, asked)
 
-    def _tell_split(self, segment: np.void, asked: str) -> None:
-        """Tell why there is no corner here: what two lines in place of one would gain."""
-        beams = self.readings.of(segment)
+    def _split_here(self, segment: np.void, asked: str) -> None:
+        """Report what two lines in place of one would gain here."""
+        beams = self.measurements.of(segment)
         at = beams.index(self.beam) if self.beam in beams else 0
         if at < _FEW or len(beams) - at < _FEW:
             return
@@ -259,22 +251,21 @@ class _Question:
             text += ": one wall that bends" if turn < _SHALLOW else ""
         self._note("evidence", text)
 
-    def _tell_arc(self, k: int) -> str:
+    def _in_arc(self, k: int) -> str:
         arc, i = self.arcs[k], self.beam
         off = float(np.hypot(*(self.scan.points[i] - arc["center"])) - arc["radius"])
         text = (
             f"arc {k}: {_extent(arc)}, radius {_length(arc['radius'])}, rms {_length(arc['rms'])}"
         )
-        self._note("fit", f"{text}; this reading: {_signed(off)} off the circle")
+        self._note("fit", f"{text}; this measurement: {_signed(off)} off the circle")
         evidence = self.trace.evidence.get("arcs")
         if evidence is not None:
             text = f"lines in its place would cost {_figure(evidence[k])} more in χ²"
             self._note("evidence", text)
         return f"Part of arc {k}."
 
-    def _tell_unexplained(self) -> str:
-        """Tell what readings in no feature look like, and how far they are off the next lines."""
-        run = self.readings.unexplained(self.beam)
+    def _unexplained(self) -> str:
+        run = self.measurements.unexplained(self.beam)
         for k in (run.before, run.after):
             if k >= 0:
                 off = along_beam(self.scan, self.beam, self.segments[k])
@@ -282,9 +273,9 @@ class _Question:
                 text = f"off the line of segment {k} by {_signed(off)} ({sigmas:.1f} σ)"
                 self._note("neighbour", text)
         count = len(run.beams)
-        where = f"{count} reading{'s' * (count > 1)} here in no line"
+        where = f"{count} measurement{'s' * (count > 1)} here in no line"
         if count < _FEW:
-            return f"In no feature: {where}, too few for one of their own."
+            return f"In no feature: {where}, too few for a line."
         line = Line.through(self.trace, run.beams)
         freedom = max(count - 2, 1)
         looks = (
@@ -293,18 +284,18 @@ class _Question:
         )
         self._note("fit", f"beams {run.beams[0]} to {run.beams[-1]}: {looks}")
         if line.chi_square > freedom + 3 * math.sqrt(2 * freedom):
-            return f"In no feature: {where}, too crooked for a line of their own."
-        return f"In no feature: {where}; one would fit them, but {self.trace.method} gave none."
+            return f"In no feature: {where}, too crooked for a line."
+        return f"In no feature: {where}; one would fit them, but {self.trace.method} found none."
 
 
 def _later(i: int, j: int, way: int) -> int:
-    """Give the later of two neighbours, whose spacing is that between them."""
+    """Return the later of two neighbours: its spacing is the one between them."""
     return i if way < 0 else j
 
 
 def _extent(feature: np.void) -> str:
     first, last, count = (feature[name] for name in ("first_beam", "last_beam", "n_points"))
-    return f"beams {first} to {last}, {count} readings"
+    return f"beams {first} to {last}, {count} measurements"
 
 
 def _length(metres: float) -> str:

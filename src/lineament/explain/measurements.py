@@ -1,4 +1,4 @@
-"""One reading against the features of its scan: is it of use, is it theirs, how far is it off."""
+"""One measurement and the features of its scan: is it valid, in which, how far off."""
 
 from __future__ import annotations
 
@@ -11,24 +11,17 @@ from numpy.typing import NDArray
 from ..methods.trace import Trace
 from ..scan import LaserScan
 
-__all__ = ["Line", "Readings", "Run", "along_beam", "spans", "why_invalid"]
-
 
 class Run(NamedTuple):
-    """Readings in a row that no feature took, and the segments next to them."""
+    """Measurements in a row that are in no feature, and the segments next to them."""
 
     beams: list[int]
     before: int  # index in the segments; -1 where the cluster ends, or an arc is next to them
     after: int
 
 
-class Readings:
-    """The beams of a trace that the detection used, in order.
-
-    Parameters
-    ----------
-    trace : Trace
-    """
+class Measurements:
+    """The beams of a trace that the detection used, in order."""
 
     def __init__(self, trace: Trace) -> None:
         self.trace = trace
@@ -38,7 +31,7 @@ class Readings:
         return len(self.beams)
 
     def neighbour(self, i: int, way: int) -> int | None:
-        """Give the next usable beam, over the seam of a full circle."""
+        """Return the next usable beam, over the seam of a full circle."""
         at = int(np.searchsorted(self.beams, i)) + way
         if not 0 <= at < len(self.beams) and not self.trace.scan.is_full_circle:
             return None
@@ -46,19 +39,19 @@ class Readings:
         return None if there == i else there
 
     def of(self, segment: np.void) -> list[int]:
-        """List those of a segment, in order, over the seam where it lies over it."""
+        """Return the beams of a segment, in order, over the seam where it crosses it."""
         first, last, n = int(segment["first_beam"]), int(segment["last_beam"]), len(self.trace.scan)
         after = (self.beams - first) % n
         return [int((first + k) % n) for k in np.sort(after[after <= (last - first) % n])]
 
     def unexplained(self, beam: int) -> Run:
-        """Find the readings about this one that are in its cluster, and in no feature either."""
+        """Return the measurements around this one in its cluster and in no feature."""
         earlier, before = self._up_to_a_feature(beam, -1, [beam])
         later, after = self._up_to_a_feature(beam, 1, [beam, *earlier])
         return Run([*reversed(earlier), beam, *later], before, after)
 
     def _up_to_a_feature(self, beam: int, way: int, seen: list[int]) -> tuple[list[int], int]:
-        """List neighbours of a beam up to a feature, and the segment that this is, or -1."""
+        """Return the neighbours of a beam up to a feature, and the index of that segment or -1."""
         clusters, features = self.trace.clusters, self.trace.features
         found: list[int] = []
         there = self.neighbour(beam, way)
@@ -72,13 +65,13 @@ class Readings:
 
 
 class Line(NamedTuple):
-    """The line a x + b y = 1 of the least χ² through readings (inverse-range regression)."""
+    """The line a x + b y = 1 of least χ² through measurements (inverse-range regression)."""
 
     a: float
     b: float
     chi_square: float
     rms: float  # [m]
-    length: float  # of its readings [m]
+    length: float  # between its first and last measurement [m]
 
     @classmethod
     def through(cls, trace: Trace, beams: list[int]) -> Line:
@@ -101,7 +94,7 @@ class Line(NamedTuple):
 
 
 def why_invalid(scan: LaserScan, i: int) -> str:
-    """Say what is wrong with a range, or nothing."""
+    """Return what is wrong with a range; empty if it is valid."""
     r = float(scan.ranges[i])
     if math.isnan(r):
         return "the range is NaN, no measurement"
@@ -125,7 +118,7 @@ def spans(records: NDArray[np.void], i: int) -> NDArray[np.bool_]:
 
 
 def along_beam(scan: LaserScan, i: int, segment: np.void) -> float:
-    """Range of a reading less that where its beam meets the line of a segment [m]."""
+    """Return a range less that at which the beam meets the line of a segment [m]."""
     nx, ny = -math.sin(segment["angle"]), math.cos(segment["angle"])
     x, y = segment["centroid"]
     slope = nx * math.cos(scan.angles[i]) + ny * math.sin(scan.angles[i])

@@ -1,7 +1,7 @@
 """What is found in a scan, and its fields: their types, units and columns are declared once."""
 
-from .features import COUNTED, TABLES, FeatureBatch, Features, noise_of, noise_row
-from .records import ARC, BREAKPOINT, CORNER, SEGMENT
+from .features import COUNTED, FeatureBatch, Features, noise_of, noise_row
+from .records import ARC, BREAKPOINT, CORNER, SEGMENT, TABLES, make_records
 
 __all__ = [
     "ARC",
@@ -12,6 +12,7 @@ __all__ = [
     "TABLES",
     "FeatureBatch",
     "Features",
+    "make_records",
     "noise_of",
     "noise_row",
 ]

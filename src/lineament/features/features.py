@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import RangeNoise
-from .records import ARC, BREAKPOINT, CORNER, SEGMENT
+from .records import TABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["COUNTED", "TABLES", "FeatureBatch", "Features"]
+__all__ = ["COUNTED", "FeatureBatch", "Features"]
 
-#: The tables of a scan, in the order in which they are written.
-TABLES = {"segments": SEGMENT, "corners": CORNER, "arcs": ARC, "breakpoints": BREAKPOINT}
 #: What is counted: edges apart from the corners.
 COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
 

@@ -1,88 +1,141 @@
-"""Where the fields of feature records lie, so that kernels can write them as plain numbers.
+"""The fields of the features, declared once: one row of `FIELDS` each.
 
-Numba can write records, but takes half a minute to compile it. So a table of records is seen as a
-matrix of float64, or of int32, over the same memory, and each field by its column there.
+From it come the types of the records, the columns and units of the table of features
+(`features.tables`), the points of a cloud (`output.feature_points`), and where kernels write.
+
+Numba can write records, but takes half a minute to compile it. So kernels see a table of records
+as a matrix of float64, or of int32, over the same memory, and each field by its column there.
 """
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: A straight piece of a surface. `covariance` is that of (offset at the centroid along the left
-#: normal of the direction [m], angle [rad]), of what is random: the noise. `misfit` is what the
-#: surface itself is off a straight line, a root mean square [m], the same in every scan. Beams run
-#: from `first_beam` to `last_beam`, over the seam of a full circle where the first is larger.
-SEGMENT = np.dtype(
-    [
-        ("start", "f8", 2),
-        ("end", "f8", 2),
-        ("centroid", "f8", 2),
-        ("angle", "f8"),
-        ("covariance", "f8", (2, 2)),
-        ("first_beam", "i4"),
-        ("last_beam", "i4"),
-        ("n_points", "i4"),
-        ("rms", "f8"),
-        ("misfit", "f8"),
-        ("cluster", "i4"),
-    ],
-    align=True,
-)
 
-#: A vertex between two segments. `opening` is the angle between its two arms [rad], `convex` says
-#: that it points towards the sensor, `segments` are indices into the scan's segments or -1.
-#: `quality` is the share of such corners that are found again from another place. `kind` is
-#: "corner", "slit" (the segments end beside a hole at their vertex) or "edge" (a segment ends, and
-#: few measurements show its face, before a jump).
-CORNER = np.dtype(
-    [
-        ("position", "f8", 2),
-        ("covariance", "f8", (2, 2)),
-        ("opening", "f8"),
-        ("convex", "?"),
-        ("beam", "i4"),
-        ("response", "f8"),
-        ("segments", "i4", 2),
-        ("quality", "f8"),
-        ("kind", "U6"),
-    ],
-    align=True,
-)
+class Field(NamedTuple):
+    """A field of the records of a table: its NumPy type, unit and meaning.
 
-#: A circular piece of a surface; `covariance` is that of (x, y, radius).
-ARC = np.dtype(
-    [
-        ("center", "f8", 2),
-        ("radius", "f8"),
-        ("covariance", "f8", (3, 3)),
-        ("first_beam", "i4"),
-        ("last_beam", "i4"),
-        ("n_points", "i4"),
-        ("rms", "f8"),
-    ],
-    align=True,
-)
+    `columns` and `points` name what its numbers fill in the table of features and in a point of
+    the cloud; those of a symmetric matrix are its upper triangle, row by row.
+    """
 
-#: Where a surface ends without a corner. `beam` are the valid beams on either side (-1 past an end
-#: of the scan), `kind` is "jump" (depth changes between them: `occluder` is the beam of the nearer
-#: side, whose point is `position`), "gap" (no valid beam between them where surfaces could go on)
-#: or "scan_end".
-BREAKPOINT = np.dtype(
-    [
-        ("beam", "i4", 2),
-        ("position", "f8", 2),
-        ("kind", "U8"),
-        ("occluder", "i4"),
-    ],
-    align=True,
-)
+    table: str
+    name: str
+    form: str
+    unit: str
+    about: str
+    columns: str
+    points: str
 
+
+#: A segment is a straight piece of a surface. Its covariance is that of (offset at the centroid
+#: along the left normal of the direction [m], angle [rad]), of what is random: the noise. `misfit`
+#: is what the surface itself is off a straight line, the same in every scan. Beams run from
+#: `first_beam` to `last_beam`, over the seam of a full circle where the first is larger.
+#:
+#: A corner is a vertex between two segments. `kind` is "corner", "slit" (the segments end beside a
+#: hole at their vertex) or "edge" (a segment ends, and few measurements show its face, before a
+#: jump); `response` is the rise of χ² or a length, as the method has it.
+#:
+#: An arc is a circular piece of a surface; its covariance is that of (x, y, radius).
+#:
+#: A breakpoint is where a surface ends without a corner. `beam` are the valid beams on either side
+#: (-1 past an end of the scan), `kind` is "jump" (depth changes between them, `position` is on the
+#: nearer side), "gap" (no valid beam between them where surfaces could go on) or "scan_end".
+FIELDS = tuple(
+    Field(*row)
+    for row in (
+        ("segments", "start", "(2,)f8", "m", "start", "start_x start_y", "start_x start_y"),
+        ("segments", "end", "(2,)f8", "m", "end", "end_x end_y", "end_x end_y"),
+        ("segments", "centroid", "(2,)f8", "m", "centroid", "x y", "x y"),
+        ("segments", "angle", "f8", "rad", "direction from start to end", "angle", "angle"),
+        ("segments", "covariance", "(2,2)f8", "m², m·rad, rad²", "of offset and angle",
+         "cov_00 cov_01 cov_11", "c00 c01 c11"),
+        ("segments", "first_beam", "i4", "", "first beam", "first_beam", "first_beam"),
+        ("segments", "last_beam", "i4", "", "last beam", "last_beam", "last_beam"),
+        ("segments", "n_points", "i4", "", "number of valid beams", "n_points", "n_points"),
+        ("segments", "rms", "f8", "m", "rms distance of its points", "rms", "rms"),
+        ("segments", "misfit", "f8", "m", "rms distance of its surface from a straight line",
+         "misfit", "misfit"),
+        ("segments", "cluster", "i4", "", "index of its cluster", "cluster", ""),
+        ("corners", "position", "(2,)f8", "m", "position", "x y", "x y"),
+        ("corners", "covariance", "(2,2)f8", "m²", "of x and y", "cov_00 cov_01 cov_11",
+         "c00 c01 c11"),
+        ("corners", "opening", "f8", "rad", "interior angle between its arms", "opening",
+         "opening"),
+        ("corners", "convex", "?", "", "points towards the sensor", "convex", "convex"),
+        ("corners", "beam", "i4", "", "its beam", "beam", "first_beam last_beam"),
+        ("corners", "response", "f8", "", "strength, in the unit of the method", "response", ""),
+        ("corners", "segments", "(2,)i4", "", "indices of its segments, or -1",
+         "segment_before segment_after", "segment_a segment_b"),
+        ("corners", "quality", "f8", "", "share found again from another place, 0 to 1",
+         "quality", "quality"),
+        ("corners", "kind", "U6", "", "corner, slit or edge", "corner", "corner"),
+        ("arcs", "center", "(2,)f8", "m", "center", "x y", "x y"),
+        ("arcs", "radius", "f8", "m", "", "radius", "radius"),
+        ("arcs", "covariance", "(3,3)f8", "m²", "of x, y and radius",
+         "cov_00 cov_01 cov_02 cov_11 cov_12 cov_22", "c00 c01 c02 c11 c12 c22"),
+        ("arcs", "first_beam", "i4", "", "first beam", "first_beam", "first_beam"),
+        ("arcs", "last_beam", "i4", "", "last beam", "last_beam", "last_beam"),
+        ("arcs", "n_points", "i4", "", "number of valid beams", "n_points", "n_points"),
+        ("arcs", "rms", "f8", "m", "rms distance of its points", "rms", "rms"),
+        ("breakpoints", "beam", "(2,)i4", "", "beams on either side", "first_beam last_beam", ""),
+        ("breakpoints", "position", "(2,)f8", "m", "position", "x y", ""),
+        ("breakpoints", "kind", "U8", "", "jump, gap or scan_end", "breakpoint", ""),
+        ("breakpoints", "occluder", "i4", "", "beam of the nearer side of a jump, or -1",
+         "occluder", ""),
+    )
+)  # fmt: skip
+
+#: The tables of a scan, in the order in which they are written, and the type of their records.
+TABLES = {
+    table: np.dtype([(f.name, f.form) for f in FIELDS if f.table == table], align=True)
+    for table in dict.fromkeys(field.table for field in FIELDS)
+}
+SEGMENT, CORNER, ARC, BREAKPOINT = TABLES.values()
+
+#: The columns of the table of features in their order; those of other fields follow.
+COLUMNS = (
+    "kind scan stamp index x y angle start_x start_y end_x end_y cov_00 cov_01 cov_11 cov_02 "
+    "cov_12 cov_22 radius opening convex response quality corner beam segment_before "
+    "segment_after first_beam last_beam n_points rms misfit cluster breakpoint occluder"
+)
+#: Unit and meaning of the columns that are not those of one field.
+SHARED_COLUMNS = {
+    "kind": ("", "segment, corner, arc, breakpoint or cluster"),
+    "scan": ("", "index of the scan in its log, from 0"),
+    "stamp": ("s", "stamp of the scan"),
+    "index": ("", "index among the features of its kind in its scan"),
+    "x": ("m", "segment: centroid; corner, breakpoint: position; arc: center"),
+    "y": ("m", "as x"),
+    "cov_00": ("m²", "of segment (offset, angle), corner (x, y), arc (x, y, radius)"),
+    "cov_01": ("m² or m·rad", "as cov_00; of a segment m·rad"),
+    "cov_11": ("m² or rad²", "as cov_00; of a segment rad²"),
+    "cov_02": ("m²", "of arc (x, y, radius)"),
+    "cov_12": ("m²", "as cov_02"),
+    "cov_22": ("m²", "as cov_02"),
+    "segment_before": ("", "corner: index of the segment before it, or -1"),
+    "segment_after": ("", "corner: index of the segment after it, or -1"),
+    "first_beam": ("", "segment, arc, cluster: first beam; breakpoint: beam before"),
+    "last_beam": ("", "segment, arc, cluster: last beam; breakpoint: beam after"),
+    "n_points": ("", "segment, arc, cluster: number of valid beams"),
+    "rms": ("m", "segment, arc: rms distance of its points"),
+}
+#: The fields of a point in their order; those of other fields follow.
+POINTS = (
+    "x y z kind track start_x start_y end_x end_y angle radius opening convex rms misfit quality "
+    "c00 c01 c02 c11 c12 c22 first_beam last_beam n_points segment_a segment_b corner"
+)
 
 KIND_NAMES = ("jump", "gap", "scan_end")
 JUMP, GAP, SCAN_END = 0, 1, 2
-#: The kinds of breakpoints as the int32 words of a field of type U8, and those of corners.
-KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
 CORNER_KINDS = ("corner", "slit", "edge")
 SHARP, SLIT, EDGE = 0, 1, 2
+#: The values of the field `kind`, by table, and as the int32 words of its text.
+KINDS = {"corners": CORNER_KINDS, "breakpoints": KIND_NAMES}
+KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
 CORNER_WORDS = np.array(CORNER_KINDS, "U6").view(np.int32).reshape(3, 6)
 
 
@@ -91,30 +144,44 @@ def words(records: NDArray[np.void]) -> NDArray[np.float64]:
     return records.view(np.float64).reshape(len(records), records.dtype.itemsize // 8)
 
 
-def _float(dtype: np.dtype[np.void], name: str) -> int:
-    return dtype.fields[name][1] // 8  # type: ignore[index]
+def make_records(table: str, rows: Sequence[Mapping[str, Any]]) -> NDArray[np.void]:
+    """Make records of a table, read-only, from their fields by name; what is left out is 0."""
+    records = np.zeros(len(rows), TABLES[table])
+    for record, row in zip(records, rows, strict=True):
+        for name, value in row.items():
+            record[name] = value
+    records.flags.writeable = False
+    return records
 
 
-def _int(dtype: np.dtype[np.void], name: str) -> int:
-    return dtype.fields[name][1] // 4  # type: ignore[index]
+def numbers(shape: tuple[int, ...]) -> list[int]:
+    """Return which of a field's numbers there are to know: of a matrix, its upper triangle."""
+    places = enumerate(np.ndindex(shape))
+    return [i for i, place in places if len(place) < 2 or place[0] <= place[1]]
 
 
-S_START, S_END, S_CENTROID, S_ANGLE, S_COVARIANCE, S_RMS, S_MISFIT = (
-    _float(SEGMENT, name)
-    for name in ("start", "end", "centroid", "angle", "covariance", "rms", "misfit")
+def kind_codes(table: str, kinds: NDArray[np.str_]) -> NDArray[np.int32]:
+    """Return the index of each kind among those of its table, -1 of one that is not there."""
+    codes = np.full(len(kinds), -1, np.int32)
+    for code, name in enumerate(KINDS[table]):
+        codes[kinds == name] = code
+    return codes
+
+
+def _at(dtype: np.dtype[np.void], names: str) -> list[int]:
+    """Return where fields are among the words of a record: of 8 bytes for floats, else of 4."""
+    fields = [dtype.fields[name] for name in names.split()]  # type: ignore[index]
+    return [offset // (8 if form.base.kind == "f" else 4) for form, offset, *_ in fields]
+
+
+S_START, S_END, S_CENTROID, S_ANGLE, S_COVARIANCE, S_RMS, S_MISFIT = _at(
+    SEGMENT, "start end centroid angle covariance rms misfit"
 )
-S_FIRST, S_LAST, S_POINTS, S_CLUSTER = (
-    _int(SEGMENT, name) for name in ("first_beam", "last_beam", "n_points", "cluster")
+S_FIRST, S_LAST, S_POINTS, S_CLUSTER = _at(SEGMENT, "first_beam last_beam n_points cluster")
+C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE, C_QUALITY = _at(
+    CORNER, "position covariance opening response quality"
 )
-C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE, C_QUALITY = (
-    _float(CORNER, name) for name in ("position", "covariance", "opening", "response", "quality")
-)
-C_CONVEX, C_BEAM, C_SEGMENTS, C_KIND = (
-    _int(CORNER, name) for name in ("convex", "beam", "segments", "kind")
-)
-B_POSITION = _float(BREAKPOINT, "position")
-B_BEAM, B_KIND, B_OCCLUDER = (_int(BREAKPOINT, name) for name in ("beam", "kind", "occluder"))
-A_CENTER, A_RADIUS, A_COVARIANCE, A_RMS = (
-    _float(ARC, name) for name in ("center", "radius", "covariance", "rms")
-)
-A_FIRST, A_LAST, A_POINTS = (_int(ARC, name) for name in ("first_beam", "last_beam", "n_points"))
+C_CONVEX, C_BEAM, C_SEGMENTS, C_KIND = _at(CORNER, "convex beam segments kind")
+A_CENTER, A_RADIUS, A_COVARIANCE, A_RMS = _at(ARC, "center radius covariance rms")
+A_FIRST, A_LAST, A_POINTS = _at(ARC, "first_beam last_beam n_points")
+B_POSITION, B_BEAM, B_KIND, B_OCCLUDER = _at(BREAKPOINT, "position beam kind occluder")

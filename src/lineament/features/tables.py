@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,64 +12,39 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from .._version import __version__
-from . import TABLES, FeatureBatch, Features
+from .features import FeatureBatch, Features
+from .records import COLUMNS, FIELDS, KINDS, SHARED_COLUMNS, TABLES, Field, kind_codes, numbers
 
 __all__ = ["SCHEMA", "batch_table", "features_table"]
 
 #: Values of the column `kind`, in the order in which the rows of a scan come.
-KINDS = ("segment", "corner", "arc", "breakpoint", "cluster")
-#: Values of the columns that tell the kind of a corner, and of a breakpoint.
-TEXTS = {"corner": ("corner", "slit", "edge"), "breakpoint": ("jump", "gap", "scan_end")}
-LABEL = np.dtype(np.int32)
+_ROWS = (*(table[:-1] for table in TABLES), "cluster")
+#: Values of the columns of text.
+_TEXTS = {f.columns: KINDS[f.table] for f in FIELDS if f.form[0] == "U"}
+_LABEL = np.dtype(np.int32)
 
 Columns = dict[str, NDArray[Any]]
 
 
-def _field(name: str, kind: pa.DataType, unit: str, about: str) -> pa.Field:
-    return pa.field(name, kind, metadata={"unit": unit, "description": about})
+def _schema() -> pa.Schema:
+    """List the columns, with units and meanings; those of fields without a place come last."""
+    text = pa.dictionary(pa.int32(), pa.string())
+    forms = {"kind": text, "scan": pa.int64(), "stamp": pa.float64(), "index": pa.int32()}
+    about = dict(SHARED_COLUMNS)
+    for field in FIELDS:
+        base = TABLES[field.table][field.name].base
+        for column in field.columns.split():
+            forms[column] = text if base.kind == "U" else pa.from_numpy_dtype(base)
+            meaning = ": ".join(filter(None, (field.table[:-1], field.about)))
+            about.setdefault(column, (field.unit, meaning))
+    fields = []
+    for name in dict.fromkeys((*COLUMNS.split(), *forms)):
+        unit, meaning = about[name]
+        fields.append(pa.field(name, forms[name], metadata={"unit": unit, "description": meaning}))
+    return pa.schema(fields, metadata={"lineament.schema": "2", "lineament.version": __version__})
 
 
-_F, _I, _TEXT = pa.float64(), pa.int32(), pa.dictionary(pa.int32(), pa.string())
-
-SCHEMA = pa.schema(
-    [
-        _field("kind", _TEXT, "", "segment, corner, arc, breakpoint or cluster"),
-        _field("scan", pa.int64(), "", "index of the scan in its log, from 0"),
-        _field("stamp", _F, "s", "stamp of the scan"),
-        _field("index", _I, "", "index among the features of its kind in its scan"),
-        _field("x", _F, "m", "segment: centroid; corner, breakpoint: position; arc: center"),
-        _field("y", _F, "m", "as x"),
-        _field("angle", _F, "rad", "segment: direction from start to end"),
-        _field("start_x", _F, "m", "segment: start"),
-        _field("start_y", _F, "m", "segment: start"),
-        _field("end_x", _F, "m", "segment: end"),
-        _field("end_y", _F, "m", "segment: end"),
-        _field("cov_00", _F, "m²", "of segment (offset, angle), corner (x, y), arc (x, y, radius)"),
-        _field("cov_01", _F, "m² or m·rad", "as cov_00; of a segment m·rad"),
-        _field("cov_11", _F, "m² or rad²", "as cov_00; of a segment rad²"),
-        _field("cov_02", _F, "m²", "of arc (x, y, radius)"),
-        _field("cov_12", _F, "m²", "as cov_02"),
-        _field("cov_22", _F, "m²", "as cov_02"),
-        _field("radius", _F, "m", "arc"),
-        _field("opening", _F, "rad", "corner: interior angle between its arms"),
-        _field("convex", pa.bool_(), "", "corner: points towards the sensor"),
-        _field("response", _F, "", "corner: strength, in the unit of the method"),
-        _field("quality", _F, "", "corner: share found again from another place, 0 to 1"),
-        _field("corner", _TEXT, "", "corner: corner, slit or edge"),
-        _field("beam", _I, "", "corner: its beam"),
-        _field("segment_before", _I, "", "corner: index of the segment before it, or -1"),
-        _field("segment_after", _I, "", "corner: index of the segment after it, or -1"),
-        _field("first_beam", _I, "", "segment, arc, cluster: first beam; breakpoint: beam before"),
-        _field("last_beam", _I, "", "segment, arc, cluster: last beam; breakpoint: beam after"),
-        _field("n_points", _I, "", "segment, arc, cluster: number of valid beams"),
-        _field("rms", _F, "m", "segment, arc: rms distance of its points"),
-        _field("misfit", _F, "m", "segment: rms distance of its surface from a straight line"),
-        _field("cluster", _I, "", "segment: index of its cluster"),
-        _field("breakpoint", _TEXT, "", "breakpoint: jump, gap or scan_end"),
-        _field("occluder", _I, "", "breakpoint: beam of the nearer side of a jump, or -1"),
-    ],
-    metadata={"lineament.schema": "2", "lineament.version": __version__},
-)
+SCHEMA = _schema()
 
 
 def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
@@ -104,7 +80,7 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
         )
         for name, dtype in TABLES.items()
     }
-    labels = np.frombuffer(b"".join([_bytes(f.clusters, LABEL) for f in scans]), LABEL)
+    labels = np.frombuffer(b"".join([_bytes(f.clusters, _LABEL) for f in scans]), _LABEL)
     beams = np.array([len(f.clusters) for f in scans], dtype=np.int64)
     stamps = np.array([f.stamp for f in scans], dtype=np.float64)
     frames = list(dict.fromkeys(f.frame_id for f in scans))
@@ -133,9 +109,9 @@ def _table(
 ) -> pa.Table:
     """Put the rows of each kind straight to where they belong: by scan, then by kind."""
     clusters, n_clusters = _cluster_columns(labels, beams, _has_ends(*parts["breakpoints"]))
-    columns = [to_columns(parts[name][0]) for name, to_columns in _COLUMNS.items()] + [clusters]
-    # Rows of each kind in each scan, shape (scans, kinds): its running sum tells where they begin.
-    counts = np.column_stack([*(parts[name][1] for name in _COLUMNS), n_clusters])
+    columns = [*(_columns(name, parts[name][0]) for name in TABLES), clusters]
+    # Rows of each kind in each scan, shape (scans, kinds): they begin at its running sum.
+    counts = np.column_stack([*(parts[name][1] for name in TABLES), n_clusters])
     begins = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
 
     n_rows = int(counts.sum())
@@ -150,7 +126,7 @@ def _table(
     scan = np.repeat(np.arange(len(counts)), counts.sum(axis=1))
 
     arrays = {
-        "kind": pa.DictionaryArray.from_arrays(kind, KINDS),
+        "kind": pa.DictionaryArray.from_arrays(kind, _ROWS),
         "scan": pa.array(scan + first_scan),
         "stamp": pa.array(stamps[scan]),
         "index": pa.array(index),
@@ -172,59 +148,31 @@ def _scatter(
     for k in np.flatnonzero(~is_null):
         values[rows[k]] = columns[k][field.name]
     array = pa.array(values, mask=is_null[kind])
-    return pa.DictionaryArray.from_arrays(array, TEXTS[field.name]) if is_text else array
+    return pa.DictionaryArray.from_arrays(array, _TEXTS[field.name]) if is_text else array
 
 
-def _segment_columns(s: NDArray[np.void]) -> Columns:
-    return {
-        **_xy(s["centroid"]),
-        **_xy(s["start"], "start_"),
-        **_xy(s["end"], "end_"),
-        **_covariance(s["covariance"]),
-        **{name: s[name] for name in ("angle", "rms", "misfit", "cluster")},
-        **_span(s),
-    }
+def _columns(table: str, records: NDArray[np.void]) -> Columns:
+    """Split the fields of records into columns of numbers; text becomes its index."""
+    columns = {}
+    for field in FIELDS:
+        if field.table == table:
+            values = records[field.name]
+            if field.form[0] == "U":
+                values = _codes(field, values)
+            shape = values.shape[1:]
+            values = values.reshape(len(values), math.prod(shape))
+            for column, i in zip(field.columns.split(), numbers(shape), strict=True):
+                columns[column] = values[:, i]
+    return columns
 
 
-def _corner_columns(c: NDArray[np.void]) -> Columns:
-    return {
-        **_xy(c["position"]),
-        **_covariance(c["covariance"]),
-        **{name: c[name] for name in ("opening", "convex", "response", "quality", "beam")},
-        "corner": _codes(c["kind"], "corner"),
-        "segment_before": c["segments"][:, 0],
-        "segment_after": c["segments"][:, 1],
-    }
-
-
-def _arc_columns(a: NDArray[np.void]) -> Columns:
-    return {
-        **_xy(a["center"]),
-        **_covariance(a["covariance"]),
-        **{name: a[name] for name in ("radius", "rms")},
-        **_span(a),
-    }
-
-
-def _breakpoint_columns(b: NDArray[np.void]) -> Columns:
-    return {
-        **_xy(b["position"]),
-        "first_beam": b["beam"][:, 0],
-        "last_beam": b["beam"][:, 1],
-        "breakpoint": _codes(b["kind"], "breakpoint"),
-        "occluder": b["occluder"],
-    }
-
-
-def _codes(kinds: NDArray[np.str_], column: str) -> NDArray[np.int32]:
-    """Return the index of each kind among the texts of its column."""
-    codes = np.full(len(kinds), -1, dtype=np.int32)
-    for code, name in enumerate(TEXTS[column]):
-        codes[kinds == name] = code
-    if len(kinds) and codes.min() < 0:
+def _codes(field: Field, kinds: NDArray[np.str_]) -> NDArray[np.int32]:
+    """Return the index of each kind among those of its table."""
+    codes = kind_codes(field.table, kinds)
+    if codes.min(initial=0) < 0:
         raise ValueError(
-            f"{column} kind is {str(kinds[codes.argmin()])!r}, "
-            f"expected one of {', '.join(TEXTS[column])}"
+            f"{field.columns} kind is {str(kinds[codes.argmin()])!r}, "
+            f"expected one of {', '.join(KINDS[field.table])}"
         )
     return codes
 
@@ -284,24 +232,3 @@ def _runs(
     used = labels[begin] >= 0
     begin, end = begin[used], end[used]
     return begin, end, np.searchsorted(behind_scan, begin, side="right")
-
-
-def _xy(points: NDArray[np.float64], prefix: str = "") -> Columns:
-    return {f"{prefix}x": points[:, 0], f"{prefix}y": points[:, 1]}
-
-
-def _span(records: NDArray[np.void]) -> Columns:
-    return {name: records[name] for name in ("first_beam", "last_beam", "n_points")}
-
-
-def _covariance(covariance: NDArray[np.float64]) -> Columns:
-    size = covariance.shape[1]
-    return {f"cov_{i}{j}": covariance[:, i, j] for i in range(size) for j in range(i, size)}
-
-
-_COLUMNS = {
-    "segments": _segment_columns,
-    "corners": _corner_columns,
-    "arcs": _arc_columns,
-    "breakpoints": _breakpoint_columns,
-}

@@ -1,11 +1,11 @@
-"""Bilateral filter of ranges (equations 4-9)."""
+"""Step 1 of Liu et al. 2023: the bilateral filter of ranges (equations 4-9)."""
 
 import math
 
 import numpy as np
 
 from . import LEAST_RANGE, contracted, helper, kernel
-from .layout import FILTERED, RANGE
+from . import layout as at
 
 F = np.float32
 #: Beyond this a range has no neighbours, and would drown theirs in float32 [m].
@@ -15,7 +15,7 @@ LANES = 32
 
 
 def scratch_shape(beams: int, half_width: int) -> tuple[int, int]:
-    """Tell the shape of the float32 scratch of `filter_ranges`."""
+    """Return the shape of the float32 scratch of `filter_ranges`."""
     padded = -(-(beams + 2 * half_width) // LANES) * LANES
     return 5, padded + half_width
 
@@ -30,17 +30,17 @@ def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, ci
 
     Parameters
     ----------
-    floats : float64 array, shape (FLOATS, n + 1)
-        RANGE is read, FILTERED written: NaN where a range is not usable.
+    floats : float64 array
+        Of the workspace, see `layout`. RANGE is read, FILTERED written: NaN where not usable.
     range_min, range_max, sigma_d, sigma_r : float
     half_width : int
     circular : bool
         Whether the window goes over the seam; else it ends at the ends of the scan.
     scratch : float32 array, see `scratch_shape`
     """
-    n, h = floats.shape[1] - 1, half_width
+    n, h, beams = floats.shape[1] - at.EXTRA, half_width, at.beams_of(floats)
     least, away = max(range_min, LEAST_RANGE), F(-1e4 * sigma_r)
-    ranges, filtered = floats[RANGE], floats[FILTERED]
+    ranges, filtered = beams[at.RANGE], beams[at.FILTERED]
     _pad(ranges, n, least, min(range_max, FARTHEST), h, circular, away, scratch[0])
     _sum_up(sigma_d, sigma_r, h, scratch)
     near, weight, shift = scratch[0, h:], scratch[1, h:], scratch[2, h:]
@@ -52,7 +52,7 @@ def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, ci
 
 @helper
 def _pad(ranges, n, least, farthest, h, circular, away, padded):
-    """Copy ranges, so far `away` where not usable that their weight is nothing.
+    """Copy ranges, so far `away` where not usable that their weight is 0.
 
     `h` more stand on either side, from over the seam of a full circle.
     """
@@ -79,7 +79,7 @@ def _sum_up(sigma_d, sigma_r, h, scratch):
         weight[i] = F(1.0)
         shift[i] = F(0.0)
     scale = F(0.125 / sigma_r)
-    # With `h` nothings in front, for the pairs with those before.
+    # With `h` zeros in front, for the pairs with those before.
     product, weighted = scratch[3, h:], scratch[4, h:]
     for i in range(h):
         scratch[3, i] = F(0.0)

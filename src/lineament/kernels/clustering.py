@@ -1,66 +1,46 @@
-"""Adaptive clustering of consecutive points on distance and density (equations 10-13)."""
+"""Steps 3 and 4 of Liu et al. 2023: clusters of consecutive points (equations 10-13)."""
 
 import math
 
 import numpy as np
 
 from . import helper, kernel
-from .layout import (
-    BEAM,
-    CLASS_FIRST,
-    CLASS_LAST,
-    CLASSES,
-    CLOSED,
-    DENSITY_THRESHOLD,
-    DISTANCE_THRESHOLD,
-    FILTERED,
-    LABEL,
-    POINTS,
-    RHO,
-    SPACING,
-    X,
-    Y,
-)
+from . import layout as at
 
 
 @kernel
-def cluster(
-    floats,
-    ints,
-    counts,
-    bearings,
-    step,
-    circular,
-    noise,
-    scale,
-    floor,
-    density_k,
-    min_points,
-):
-    """Part the usable beams of a scan into classes.
+def cluster(floats, ints, bearings, step, circular, noise, scale, floor, density_k, min_points):
+    """Part the usable beams of a scan into clusters.
 
-    A point joins the class before it if its spacing is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ plus
-    a noise floor (equation 10), or else at most T_K = μ_K + k σ_K of the class, once that has
-    three spacings (11-13): density only joins. Classes under `min_points` are noise.
+    A point joins the cluster before it if its spacing is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ plus
+    a noise floor (equation 10), or else at most T_K = μ_K + k σ_K of the cluster, once that has
+    three spacings (11-13): density only joins. Clusters under `min_points` are noise.
 
     Parameters
     ----------
-    floats, ints, counts
-        See `layout`. FILTERED is read; the lines by point, SPACING and the thresholds are written
-        (DENSITY_THRESHOLD is NaN where it was not asked), BEAM, LABEL, the classes.
+    floats, ints
+        The workspace, see `layout`. FILTERED is read; X, Y, RHO, SPACING, the thresholds
+        (DENSITY_THRESHOLD is NaN where it is not needed), BEAM, LABEL and the clusters are
+        written.
     bearings : float64 array, shape (2, n)
         Cosines and sines.
     step : float
         Δφ [rad].
     circular : bool
-        Whether the last class may go on in the first.
+        Whether the last cluster may go on in the first.
     noise : float64 array, shape (4,)
     scale, floor, density_k : float
         λ, the noise floor in units of √2 σ, and k.
     min_points : int
     """
-    count = list_points(floats, ints, bearings)
-    rho, limit, second = floats[RHO], floats[DISTANCE_THRESHOLD], floats[DENSITY_THRESHOLD]
+    work = at.named(floats, ints)
+    points = work.points
+    count = list_points(work.beams, points, work.marks, bearings)
+    rho, limit, second = (
+        points[at.RHO],
+        points[at.DISTANCE_THRESHOLD],
+        points[at.DENSITY_THRESHOLD],
+    )
     scaled_step, noise_floor = scale * step, floor * math.sqrt(2.0) * noise[0]
     after, limit_after = rho[1:], limit[1:]
     for i in range(count - 1):
@@ -68,22 +48,22 @@ def cluster(
     limit[0] = scaled_step * max(rho[0], rho[count - 1]) + noise_floor
     for i in range(count):
         second[i] = math.nan
-    part_points(floats, ints, counts, bearings, circular, count, density_k, min_points)
+    part_points(work, bearings, circular, count, density_k, min_points)
 
 
 @helper
-def list_points(floats, ints, bearings):
+def list_points(beams, points, marks, bearings):
     """List the beams whose range is not NaN, place their points, and measure their spacings.
 
     The spacing of the first point is that from the last. Returns how many there are.
     """
-    ranges, beam, spacing = floats[FILTERED], ints[BEAM], floats[SPACING]
+    ranges, beam, spacing = beams[at.FILTERED], marks[at.BEAM], points[at.SPACING]
     count = np.int64(0)
     for i in range(bearings.shape[1]):
         beam[count] = i
         count += not math.isnan(ranges[i])
-    place(floats, beam, bearings, count)
-    x, y = floats[X], floats[Y]
+    place(ranges, points, beam, bearings, count)
+    x, y = points[at.X], points[at.Y]
     x_after, y_after, spacing_after = x[1:], y[1:], spacing[1:]
     for i in range(count - 1):
         dx, dy = x_after[i] - x[i], y_after[i] - y[i]
@@ -95,9 +75,9 @@ def list_points(floats, ints, bearings):
 
 
 @helper
-def place(floats, beam, bearings, count):
+def place(ranges, points, beam, bearings, count):
     """X = ρ cos θ, y = ρ sin θ of the beams listed (equations 2, 3)."""
-    ranges, rho, x, y = floats[FILTERED], floats[RHO], floats[X], floats[Y]
+    rho, x, y = points[at.RHO], points[at.X], points[at.Y]
     cosines, sines = bearings[0], bearings[1]
     for i in range(count):
         b = beam[i]
@@ -106,43 +86,48 @@ def place(floats, beam, bearings, count):
 
 
 @helper
-def part_points(floats, ints, counts, bearings, circular, count, density_k, min_points):
-    """Label the points by class, from their spacings and the DISTANCE_THRESHOLD.
+def part_points(work, bearings, circular, count, density_k, min_points):
+    """Label the points by cluster, from their spacings and the DISTANCE_THRESHOLD.
 
-    On a full circle whose last class goes on in the first, the points are turned so that they
-    begin with it. Where all are one class that closes, the first point is put at the end again.
+    On a full circle whose last cluster goes on in the first, the points are turned so that they
+    begin with it. Where all are one cluster that closes, the first point is repeated at the end.
     """
-    beam, label = ints[BEAM], ints[LABEL]
-    spacing, limit = floats[SPACING], floats[DISTANCE_THRESHOLD]
-    classes, turn = _classes(
-        spacing, limit, floats[DENSITY_THRESHOLD], count, density_k, circular, label
+    points, beam, label, counts = (
+        work.points,
+        work.marks[at.BEAM],
+        work.marks[at.LABEL],
+        work.counts,
     )
-    closed = classes == 1 and turn == 0
+    clusters, turn = _label(points, label, count, density_k, circular)
+    closed = clusters == 1 and turn == 0
     if turn >= 0:
         if closed:
             # Opened at its farthest point: that of a polygon is always a vertex.
-            turn = _farthest(floats[RHO], count)
+            turn = _farthest(points[at.RHO], count)
         _rotate(beam, label, count, turn)
         if closed:
             beam[count], label[count] = beam[0], label[0]
             count += 1
-        place(floats, beam, bearings, count)
-    counts[POINTS], counts[CLOSED] = count, closed
-    # The first point of a closed class, which stands at its end again, counts once.
-    counts[CLASSES] = _list_classes(
-        label, count, min_points + closed, ints[CLASS_FIRST], ints[CLASS_LAST]
-    )
+        place(work.beams[at.FILTERED], points, beam, bearings, count)
+    counts[at.POINTS], counts[at.CLOSED] = count, closed
+    # The first point of a closed cluster, which is repeated at its end, counts once.
+    counts[at.CLUSTERS] = _list_clusters(label, count, min_points + closed, work.clusters)
 
 
 @helper
-def _classes(spacing, t_d, t_k, count, density_k, circular, label):
-    """Write the class of each point to `label`.
+def _label(points, label, count, density_k, circular):
+    """Write the cluster of each point to `label`.
 
-    Returns the number of classes, and the point at which the last begins if it goes on in the
+    Returns the number of clusters, and the point at which the last begins if it goes on in the
     first (and then has its number), else -1.
     """
+    spacing, t_d, t_k = (
+        points[at.SPACING],
+        points[at.DISTANCE_THRESHOLD],
+        points[at.DENSITY_THRESHOLD],
+    )
     current, start = -1, 0
-    # Sums over the spacings of the class, as far as they were asked for.
+    # Sums over the spacings of the cluster, as far as they were needed.
     total, squares, summed = 0.0, 0.0, 0
     for turn in range(count + (circular and count >= 3)):
         i = turn if turn < count else 0
@@ -171,7 +156,7 @@ def _classes(spacing, t_d, t_k, count, density_k, circular, label):
 
 @helper
 def _density_threshold(count, total, squares, density_k):
-    """T_K = μ_K + k σ_K of the spacings inside a class (equations 11-13)."""
+    """T_K = μ_K + k σ_K of the spacings inside a cluster (equations 11-13)."""
     mean = total / count
     return mean + density_k * math.sqrt(max(squares / count - mean * mean, 0.0))
 
@@ -205,8 +190,8 @@ def _reverse(beam, label, i, j):
 
 
 @helper
-def _list_classes(label, count, min_points, first, last):
-    """List the classes; those under `min_points` become noise. Returns how many are left."""
+def _list_clusters(label, count, min_points, clusters):
+    """List the clusters; those under `min_points` become noise. Returns how many are left."""
     kept, start = np.int64(0), np.int64(0)
     for i in range(count):
         if i + 1 < count and label[i + 1] == label[i]:
@@ -216,7 +201,7 @@ def _list_classes(label, count, min_points, first, last):
             for k in range(start, i + 1):
                 label[k] = number
         if number >= 0:
-            first[kept], last[kept] = start, i
+            clusters[at.FIRST, kept], clusters[at.LAST, kept] = start, i
             kept += 1
         start = i + 1
     return kept

@@ -1,4 +1,9 @@
-"""Least-squares lines through points, and the covariance of their offset and angle."""
+"""Least-squares lines through points, and the covariance of their offset and angle.
+
+Equations 23 and 24 of Liu et al. 2023; the weights of S. T. Pfister, S. I. Roumeliotis,
+J. W. Burdick, *Weighted line fitting algorithms for mobile robot map building and efficient data
+representation*, ICRA 2003.
+"""
 
 import math
 
@@ -7,6 +12,7 @@ from .noise import LEAST_SIGMA
 
 #: How a line is fitted (equations 23, 24, and what is better).
 TOTAL, Y_OF_X, WEIGHTED = 0, 1, 2
+FITS = {"total": TOTAL, "y_of_x": Y_OF_X, "weighted": WEIGHTED}
 
 
 @sums

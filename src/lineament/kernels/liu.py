@@ -1,109 +1,84 @@
-"""The stages of method `liu`, one scan after the other."""
+"""The steps of Liu et al. 2023, one scan after the other."""
+
+from typing import NamedTuple
 
 from . import kernel
+from . import layout as at
 from .bilateral import filter_ranges
 from .budget import LINK, WORST, limit_pieces
 from .clustering import cluster
 from .cutting import cut
-from .layout import RANGE
 from .measuring import measure
 from .noise import estimate_noise
 
 
+class Parameters(NamedTuple):
+    """Those of `methods.liu.Liu`; choices as the numbers that the kernels of the steps take."""
+
+    sigma_d: float
+    sigma_r: float
+    half_width: int
+    spacing_scale: float
+    noise_floor: float
+    density_k: float
+    min_points: int
+    support_radius: int
+    threshold: float
+    response: int
+    fit: int
+    measure: int
+    corner: bool
+    corner_trim: int
+    max_vertices: int
+
+
 @kernel
 def extract_rows(
-    ranges,
-    rows,
-    range_min,
-    range_max,
-    bearings,
-    step,
-    circular,
-    given_noise,
-    sigma_d,
-    sigma_r,
-    half_width,
-    scale,
-    floor,
-    density_k,
-    min_points,
-    radius,
-    threshold,
-    reading,
-    source,
-    fit,
-    sharp,
-    trim,
-    floats,
-    ints,
-    counts,
-    max_vertices,
-    filter_scratch,
-    budget_costs,
-    budget_follow,
-    noises,
-    segments,
-    corners,
-    breaks,
-    clusters,
-    offsets,
+    ranges, rows, bearings, sensor, given_noise, parameters, floats, ints, scratch, noises, tables
 ):
     """Filter, cluster, cut and measure the first `rows` scans of `ranges`, shape (m, n).
 
-    The other parameters are those of the stages. What a scan leaves in `floats`, `ints` and
-    `counts` stays there until the next.
+    What a scan leaves in the workspace stays there until the next.
+
+    Parameters
+    ----------
+    ranges : float64 array, shape (m, n)
+    rows : int
+    bearings : float64 array, shape (2, n)
+        Cosines and sines.
+    sensor : tuple
+        (range_min, range_max, step, circular).
+    given_noise : float64 array, shape (4,)
+        See `noise.estimate_noise`.
+    parameters : tuple
+        See `Parameters`; a plain tuple, which Python passes in half the time of a named one.
+    floats, ints
+        The workspace, see `layout`.
+    scratch : tuple
+        That of `bilateral.filter_ranges`, and the two arrays of `budget.limit_pieces`.
+    noises : float64 array, shape (m, 4)
+        Result: the noise of each scan.
+    tables : tuple
+        See `measuring.measure`.
     """
-    line = floats[RANGE]
+    p, line = Parameters(*parameters), at.beams_of(floats)[at.RANGE]
+    range_min, range_max, step, circular = sensor
+    filter_scratch, costs, follow = scratch
+    options = p.measure, p.fit, p.corner, p.corner_trim, 0.5 * p.support_radius, p.spacing_scale
     for row in range(rows):
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]
         noise = noises[row]
         estimate_noise(floats, range_min, range_max, given_noise, noise)
         filter_ranges(
-            floats, range_min, range_max, sigma_d, sigma_r, half_width, circular, filter_scratch
-        )
+            floats, range_min, range_max, p.sigma_d, p.sigma_r, p.half_width, circular,
+            filter_scratch,
+        )  # fmt: skip
         cluster(
-            floats,
-            ints,
-            counts,
-            bearings,
-            step,
-            circular,
-            noise,
-            scale,
-            floor,
-            density_k,
-            min_points,
-        )
-        cut(floats, ints, counts, radius, threshold, reading, min_points)
-        limit_pieces(
-            floats,
-            ints,
-            counts,
-            bearings,
-            max_vertices,
-            LINK,
-            WORST,
-            budget_costs,
-            budget_follow,
-        )
-        measure(
-            floats,
-            ints,
-            counts,
-            row,
-            source,
-            bearings,
-            circular,
-            noise,
-            fit,
-            sharp,
-            trim,
-            0.5 * radius,
-            scale,
-            segments,
-            corners,
-            breaks,
-            clusters,
-            offsets,
-        )
+            floats, ints, bearings, step, circular, noise, p.spacing_scale, p.noise_floor,
+            p.density_k, p.min_points,
+        )  # fmt: skip
+        cut(floats, ints, p.support_radius, p.threshold, p.response, p.min_points)
+        if p.max_vertices > 0:
+            limit_pieces(floats, ints, bearings, p.max_vertices, LINK, WORST, costs, follow)
+        measure(floats, ints, row, bearings, circular, noise, options, tables)

@@ -1,11 +1,15 @@
-"""Range noise of a scan, estimated from the scan itself."""
+"""Range noise of a scan, estimated from the scan itself.
+
+By the residuals of T. Gasser, L. Sroka, C. Jennen-Steinmetz, *Residual variance and residual
+pattern in nonlinear regression*, Biometrika 73 (1986), but their median in place of their mean.
+"""
 
 import math
 
 import numpy as np
 
 from . import helper, kernel, usable
-from .layout import RANGE, SPARE
+from . import layout as at
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
 LEAST_SIGMA = 1e-4
@@ -20,8 +24,8 @@ def estimate_noise(floats, range_min, range_max, given, noise):
 
     Parameters
     ----------
-    floats : float64 array, shape (FLOATS, n + 1)
-        RANGE is read.
+    floats : float64 array
+        Of the workspace, see `layout`. RANGE is read.
     range_min, range_max : float
     given : float64 array, shape (4,)
         (sigma, proportional, bearing, quantum).
@@ -31,8 +35,9 @@ def estimate_noise(floats, range_min, range_max, given, noise):
     for part in range(4):
         noise[part] = given[part]
     if math.isnan(given[0]):
-        n = floats.shape[1] - 1
-        sigma = range_sigma(floats[RANGE], n, range_min, range_max, floats[SPARE])
+        ranges, scratch = at.beams_of(floats)[at.RANGE], at.points_of(floats)[at.SPARE]
+        n = floats.shape[1] - at.EXTRA
+        sigma = range_sigma(ranges, n, range_min, range_max, scratch)
         noise[0] = sigma
         for part in range(1, 4):
             noise[part] = 0.0 * sigma
@@ -77,7 +82,7 @@ def _rounding_sigma(differences, count):
 
 @helper
 def ranked(values, count, rank):
-    """Return the value of a rank, from 0 on, of the first `count`, none of which is below 0.
+    """Return the value of a rank, from 0 on, of the first `count`, all of them at least 0.
 
     The bits of such numbers have their order, so that bisection ends after 63 rounds at most, and
     most often after twenty. It has no branches that depend on the values.

@@ -1,4 +1,4 @@
-"""Polylines through the points of a scan: at most so many vertices, and the least range error.
+"""Maps of method `optimal`: polylines of at most so many vertices with the least range error.
 
 On the ray of each vertex its inverse range is free; between two vertices the inverse range then is
 linear in theirs, whatever the direction of the line. Which points are vertices is found by dynamic
@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from . import helper, kernel
-from .layout import BEAM, POINTS, RHO, STACK_FIRST, STACK_LAST, X, Y
+from . import layout as at
 from .vertices import BEGIN, HELD, place_vertices
 
 #: Planes of the tables of costs, by point and number of vertices: of the best polylines that come
@@ -24,17 +24,18 @@ _TIE = 1e-9
 
 
 @kernel
-def fit_polylines(floats, ints, counts, bearings, budget, max_missing, link, worst, costs, follow):
-    """Lay polylines of at most `budget` vertices in all through the points of a scan.
+def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, costs, follow):
+    """Fit polylines of at most `budget` vertices in all through the points of a scan.
 
     Such that Σ (error of the range)² over the points of polylines, and `worst`² for each other
-    point, is the least. Vertices lie on the rays of readings, but where two lines of enough points
-    meet beside one. They become X and Y of their points, the lines between them the pieces.
+    point, is the least. Vertices lie on the rays of measurements, but where two lines of enough
+    points meet beside one. They become X and Y of their points, the lines between them the pieces.
 
     Parameters
     ----------
-    floats, ints, counts
-        See `layout`. BEAM, RHO, X, Y, POINTS and CLOSED are read, lines by piece rewritten.
+    floats, ints
+        The workspace, see `layout`. Points are read, X and Y of vertices and the pieces are
+        rewritten.
     bearings : float64 array, shape (2, n)
         Cosines and sines.
     budget : int
@@ -49,7 +50,8 @@ def fit_polylines(floats, ints, counts, bearings, budget, max_missing, link, wor
     follow : int64 array, shape (n + 2, budget + 1)
         Scratch.
     """
-    points, least, closed = counts[POINTS], costs[LEAST], costs[CLOSED_COST]
+    work = at.named(floats, ints)
+    points, least, closed = work.counts[at.POINTS], costs[LEAST], costs[CLOSED_COST]
     for v in range(budget + 1):
         closed[0, v] = 0.0
         for i in range(points):
@@ -57,23 +59,24 @@ def fit_polylines(floats, ints, counts, bearings, budget, max_missing, link, wor
     for i in range(points):
         for v in range(budget + 1):
             closed[i + 1, v] = min(closed[i, v] + worst * worst, least[i, v])
-        _extend(floats, ints, bearings, i, points, budget, max_missing, link, worst, costs, follow)
-    vertices = _list_vertices(ints, points, budget, worst * worst, costs, follow)
-    place_vertices(floats, ints, counts, bearings, vertices)
+        _extend(work, bearings, i, budget, max_missing, link, worst, costs, follow)
+    vertices = at.vertices_of(ints)
+    count = _list_vertices(vertices, points, budget, worst * worst, costs, follow)
+    place_vertices(work, vertices, at.rays_of(floats), bearings, count)
 
 
 @helper
-def _extend(floats, ints, bearings, i, points, budget, max_missing, link, worst, costs, follow):
-    """Lay lines from a vertex at point i to each later point that is linked with it."""
-    rho, beam, cosines, sines = floats[RHO], ints[BEAM], bearings[0], bearings[1]
+def _extend(work, bearings, i, budget, max_missing, link, worst, costs, follow):
+    """Fit lines from a vertex at point i to each later point that is linked with it."""
+    rho, beam, cosines, sines = work.points[at.RHO], work.marks[at.BEAM], bearings[0], bearings[1]
     origin, price = beam[i], worst * worst
     cc, cs, ss, uc, us, uu = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(i + 1, points):
+    for j in range(i + 1, work.counts[at.POINTS]):
         b = beam[j]
         # Bearings are taken from the first point: the sums are well conditioned anywhere.
         c = cosines[b] * cosines[origin] + sines[b] * sines[origin]
         s = sines[b] * cosines[origin] - cosines[b] * sines[origin]
-        if s <= 0.0 or not _linked(floats, beam, j, len(cosines), max_missing, link):
+        if s <= 0.0 or not _linked(work.points, beam, j, len(cosines), max_missing, link):
             return
         inner, determinant = j - i - 1, cc * ss - cs * cs
         alone = 0.0
@@ -89,29 +92,30 @@ def _extend(floats, ints, bearings, i, points, budget, max_missing, link, worst,
         # aa p² + 2 ab p q + bb q² - 2 ua p - 2 ub q + uu.
         ratio = c / s
         aa, ab, bb = cc - 2.0 * ratio * cs + ratio * ratio * ss, (cs - ratio * ss) / s, ss / (s * s)
-        _lay(costs, follow, rho[i], i, j, budget, aa, ab, bb, uc - ratio * us, us / s, uu)
+        form = aa, ab, bb, uc - ratio * us, us / s
+        _add_line(costs, follow, rho[i], i, j, budget, form, uu)
 
 
 @helper
-def _linked(floats, beam, j, beams, max_missing, link):
+def _linked(points, beam, j, beams, max_missing, link):
     """Whether a polyline may go on from the point before to this one."""
-    dx, dy = floats[X, j] - floats[X, j - 1], floats[Y, j] - floats[Y, j - 1]
+    dx, dy = points[at.X, j] - points[at.X, j - 1], points[at.Y, j] - points[at.Y, j - 1]
     return (beam[j] - beam[j - 1] - 1) % beams <= max_missing and dx * dx + dy * dy <= link * link
 
 
 @helper
-def _lay(costs, follow, rho, i, j, budget, aa, ab, bb, ua, ub, uu):
-    """Lay a line from vertex i to j, where a polyline begins at i or goes on there."""
+def _add_line(costs, follow, rho, i, j, budget, form, uu):
+    """Add the line from vertex i, where a polyline begins or goes on, to j to the tables."""
     curvature, place = costs[CURVATURE], costs[PLACE]
     least, closed = costs[LEAST], costs[CLOSED_COST]
     w, u = rho**4, 1.0 / rho
-    first, steep_first, q_first = _least_over(w, w * u, aa, ab, bb, ua, ub)
+    first, steep_first, q_first = _least_over(w, w * u, form)
     first += w * u * u + uu
     for v in range(2, min(budget, i + 2) + 1):
         total, steep, q, before = closed[i, v - 2] + first, steep_first, q_first, -1 - i
         if least[i, v - 1] < math.inf:
             w, u = curvature[i, v - 1], place[i, v - 1]
-            rise, steep_on, q_on = _least_over(w, w * u, aa, ab, bb, ua, ub)
+            rise, steep_on, q_on = _least_over(w, w * u, form)
             rise += w * u * u + uu
             if least[i, v - 1] + rise < total:
                 total, steep, q, before = least[i, v - 1] + rise, steep_on, q_on, i
@@ -120,12 +124,13 @@ def _lay(costs, follow, rho, i, j, budget, aa, ab, bb, ua, ub, uu):
 
 
 @helper
-def _least_over(w, wu, aa, ab, bb, ua, ub):
+def _least_over(w, wu, form):
     """Least of (aa + w) p² + 2 ab p q + bb q² - 2 (ua + wu) p - 2 ub q over p, as a parabola in q.
 
     Returns its least, its curvature, and where it is. A line that passes a ray behind the sensor
     costs infinitely much.
     """
+    aa, ab, bb, ua, ub = form
     a, b = w + aa, wu + ua
     steep, slope = bb - ab * ab / a, ub - ab * b / a
     if steep <= 0.0 or slope <= 0.0 or b * steep <= ab * slope:
@@ -135,13 +140,12 @@ def _least_over(w, wu, aa, ab, bb, ua, ub):
 
 
 @helper
-def _list_vertices(ints, points, budget, price, costs, follow):
-    """List the points that are vertices, STACK_FIRST, and their kinds, STACK_LAST.
+def _list_vertices(vertices, points, budget, price, costs, follow):
+    """List the points that are vertices, and their kinds.
 
     Returns their number: the least of those that cost the least.
     """
-    closed = costs[CLOSED_COST]
-    at, kind = ints[STACK_FIRST], ints[STACK_LAST]
+    closed, point, kind = costs[CLOSED_COST], vertices[at.AT], vertices[at.KIND]
     i, v, n = points, np.int64(0), np.int64(0)
     for k in range(budget + 1):
         if closed[points, k] < closed[points, v] - _TIE * price:
@@ -152,12 +156,12 @@ def _list_vertices(ints, points, budget, price, costs, follow):
             continue
         goes_on = True
         while goes_on:
-            at[n], kind[n] = i, HELD
+            point[n], kind[n] = i, HELD
             goes_on, i = follow[i, v] >= 0, max(follow[i, v], -1 - follow[i, v])
             v, n = v - 1, n + 1
-        at[n], kind[n] = i, BEGIN
+        point[n], kind[n] = i, BEGIN
         v, n = v - 1, n + 1
     for k in range(n // 2):
-        at[k], at[n - 1 - k] = at[n - 1 - k], at[k]
+        point[k], point[n - 1 - k] = point[n - 1 - k], point[k]
         kind[k], kind[n - 1 - k] = kind[n - 1 - k], kind[k]
     return n

@@ -5,12 +5,7 @@ import math
 import numpy as np
 
 from . import helper
-from ..features.records import (
-    A_CENTER, A_COVARIANCE, A_FIRST, A_LAST, A_POINTS, A_RADIUS, A_RMS, B_BEAM, B_KIND, B_OCCLUDER,
-    B_POSITION, C_CONVEX, C_COVARIANCE, C_KIND, C_OPENING, C_POSITION, C_QUALITY, CORNER_WORDS,
-    EDGE, GAP, JUMP, KIND_WORDS, S_ANGLE, S_CENTROID, S_COVARIANCE, S_END, S_FIRST, S_LAST,
-    S_MISFIT, S_POINTS, S_RMS, S_START, SCAN_END,
-)  # fmt: skip
+from ..features import records as at
 
 #: Spread of a corner at which half are found again from another place, and how fast that falls.
 _SPREAD, _FALL = 0.78, 2.4
@@ -26,28 +21,34 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
     """
     x, y = places[0], places[1]
     cx, cy, c, s, var_offset, covariance, var_angle, rms = line
-    along = c * (x[first] - cx) + s * (y[first] - cy)
-    segments[k, S_START], segments[k, S_START + 1] = cx + along * c, cy + along * s
-    along = c * (x[last] - cx) + s * (y[last] - cy)
-    segments[k, S_END], segments[k, S_END + 1] = cx + along * c, cy + along * s
-    segments[k, S_CENTROID], segments[k, S_CENTROID + 1] = cx, cy
-    segments[k, S_ANGLE], segments[k, S_RMS], segments[k, S_MISFIT] = math.atan2(s, c), rms, misfit
-    segments[k, S_COVARIANCE], segments[k, S_COVARIANCE + 1] = var_offset, covariance
-    segments[k, S_COVARIANCE + 2], segments[k, S_COVARIANCE + 3] = covariance, var_angle
-    ints[k, S_FIRST], ints[k, S_LAST], ints[k, S_POINTS] = beam[first], beam[last], count
+    row = segments[k]
+    for end, i in ((at.S_START, first), (at.S_END, last)):
+        along = c * (x[i] - cx) + s * (y[i] - cy)
+        write_end(segments, k, end, cx + along * c, cy + along * s)
+    row[at.S_CENTROID], row[at.S_CENTROID + 1], row[at.S_ANGLE] = cx, cy, math.atan2(s, c)
+    row[at.S_COVARIANCE], row[at.S_COVARIANCE + 1] = var_offset, covariance
+    row[at.S_COVARIANCE + 2], row[at.S_COVARIANCE + 3] = covariance, var_angle
+    row[at.S_RMS], row[at.S_MISFIT] = rms, misfit
+    ints[k, at.S_FIRST], ints[k, at.S_LAST], ints[k, at.S_POINTS] = beam[first], beam[last], count
+
+
+@helper
+def write_end(segments, k, end, x, y):
+    """Write where a segment starts or ends: `S_START` or `S_END`."""
+    segments[k, end], segments[k, end + 1] = x, y
 
 
 @helper
 def write_opening(segments, before, after, corners, corner_ints, k):
     """Write the angle between the arms of a corner, and which way it points."""
-    turn = segments[after, S_ANGLE] - segments[before, S_ANGLE]
+    turn = segments[after, at.S_ANGLE] - segments[before, at.S_ANGLE]
     if turn > math.pi:
         turn -= 2.0 * math.pi
     elif turn < -math.pi:
         turn += 2.0 * math.pi
-    corners[k, C_OPENING] = math.pi - abs(turn)
+    corners[k, at.C_OPENING] = math.pi - abs(turn)
     # Beams run counter-clockwise around the sensor: a right turn points towards it.
-    corner_ints[k, C_CONVEX] = turn < 0.0
+    corner_ints[k, at.C_CONVEX] = turn < 0.0
 
 
 @helper
@@ -57,19 +58,19 @@ def intersect(lines, a, b, x, y, near, corners, k):
     The lines then end there. Refused, and False, where that lies farther than `near` from the
     point (x, y) of the cut: nearly parallel lines meet anywhere.
     """
-    n1x, n1y = -math.sin(lines[a, S_ANGLE]), math.cos(lines[a, S_ANGLE])
-    n2x, n2y = -math.sin(lines[b, S_ANGLE]), math.cos(lines[b, S_ANGLE])
+    n1x, n1y = -math.sin(lines[a, at.S_ANGLE]), math.cos(lines[a, at.S_ANGLE])
+    n2x, n2y = -math.sin(lines[b, at.S_ANGLE]), math.cos(lines[b, at.S_ANGLE])
     determinant = n1x * n2y - n1y * n2x
     if abs(determinant) < 1e-6:
         return False
-    d1 = n1x * lines[a, S_CENTROID] + n1y * lines[a, S_CENTROID + 1]
-    d2 = n2x * lines[b, S_CENTROID] + n2y * lines[b, S_CENTROID + 1]
+    d1 = n1x * lines[a, at.S_CENTROID] + n1y * lines[a, at.S_CENTROID + 1]
+    d2 = n2x * lines[b, at.S_CENTROID] + n2y * lines[b, at.S_CENTROID + 1]
     px = (n2y * d1 - n1y * d2) / determinant
     py = (n1x * d2 - n2x * d1) / determinant
     if math.sqrt((px - x) * (px - x) + (py - y) * (py - y)) > near:
         return False
-    lines[a, S_END], lines[a, S_END + 1] = px, py
-    lines[b, S_START], lines[b, S_START + 1] = px, py
+    write_end(lines, a, at.S_END, px, py)
+    write_end(lines, b, at.S_START, px, py)
     s1 = offset_variance(lines, a, px, py) / (determinant * determinant)
     s2 = offset_variance(lines, b, px, py) / (determinant * determinant)
     write_place(corners, k, px, py, s1, n2y, -n2x, s2, n1y, -n1x)
@@ -79,22 +80,22 @@ def intersect(lines, a, b, x, y, near, corners, k):
 @helper
 def write_place(corners, k, x, y, first, ax, ay, second, bx, by):
     """Write where a corner is, with variances along two unit vectors: Σ = v₁ a aᵀ + v₂ b bᵀ."""
-    corners[k, C_POSITION], corners[k, C_POSITION + 1] = x, y
+    corners[k, at.C_POSITION], corners[k, at.C_POSITION + 1] = x, y
     covariance = ax * ay * first + bx * by * second
-    corners[k, C_COVARIANCE] = ax * ax * first + bx * bx * second
-    corners[k, C_COVARIANCE + 1], corners[k, C_COVARIANCE + 2] = covariance, covariance
-    corners[k, C_COVARIANCE + 3] = ay * ay * first + by * by * second
+    corners[k, at.C_COVARIANCE] = ax * ax * first + bx * bx * second
+    corners[k, at.C_COVARIANCE + 1], corners[k, at.C_COVARIANCE + 2] = covariance, covariance
+    corners[k, at.C_COVARIANCE + 3] = ay * ay * first + by * by * second
 
 
 @helper
 def offset_variance(lines, k, px, py):
     """Variance of a line's offset at a point: that at its centroid, with the lever arm."""
-    dx, dy = px - lines[k, S_CENTROID], py - lines[k, S_CENTROID + 1]
-    t = math.cos(lines[k, S_ANGLE]) * dx + math.sin(lines[k, S_ANGLE]) * dy
+    dx, dy = px - lines[k, at.S_CENTROID], py - lines[k, at.S_CENTROID + 1]
+    t = math.cos(lines[k, at.S_ANGLE]) * dx + math.sin(lines[k, at.S_ANGLE]) * dy
     return (
-        lines[k, S_COVARIANCE]
-        + 2.0 * t * lines[k, S_COVARIANCE + 1]
-        + t * t * lines[k, S_COVARIANCE + 3]
+        lines[k, at.S_COVARIANCE]
+        + 2.0 * t * lines[k, at.S_COVARIANCE + 1]
+        + t * t * lines[k, at.S_COVARIANCE + 3]
     )
 
 
@@ -105,8 +106,8 @@ def grade_corner(corners, ints, k, kind, n, m):
     That is the share of such corners found again, by how their position spreads: √(1/n + 1/m) over
     the sine of their turn.
     """
-    spread = math.sqrt(1.0 / n + 1.0 / m) / max(math.sin(corners[k, C_OPENING]), 1e-9)
-    corners[k, C_QUALITY] = 1.0 / (1.0 + (spread / _SPREAD) ** _FALL)
+    spread = math.sqrt(1.0 / n + 1.0 / m) / max(math.sin(corners[k, at.C_OPENING]), 1e-9)
+    corners[k, at.C_QUALITY] = 1.0 / (1.0 + (spread / _SPREAD) ** _FALL)
     _write_kind(ints, k, kind)
 
 
@@ -117,14 +118,14 @@ def grade_edge(corners, ints, k, prominence):
     By its prominence: the measurements of its segment, times the jump in deviations of the edge,
     times the cosine of incidence.
     """
-    corners[k, C_QUALITY] = 1.0 / (1.0 + (_PROMINENCE / prominence) ** _RISE)
-    _write_kind(ints, k, np.int64(EDGE))
+    corners[k, at.C_QUALITY] = 1.0 / (1.0 + (_PROMINENCE / prominence) ** _RISE)
+    _write_kind(ints, k, np.int64(at.EDGE))
 
 
 @helper
 def _write_kind(ints, k, kind):
     for letter in range(6):
-        ints[k, C_KIND + letter] = CORNER_WORDS[kind, letter]
+        ints[k, at.C_KIND + letter] = at.CORNER_WORDS[kind, letter]
 
 
 @helper
@@ -144,7 +145,7 @@ def write_breaks(places, beam, first, last, clusters, circular, gap, beams, brea
     if circular:
         _write_break(places, beam, before, after, gap, beams, breaks, ints, k)
         return k + 1
-    none, end = np.int64(-1), np.int64(SCAN_END)
+    none, end = np.int64(-1), np.int64(at.SCAN_END)
     _write_mark(places, after, none, beam[after], end, none, breaks, ints, k)
     _write_mark(places, before, beam[before], none, end, none, breaks, ints, k + 1)
     return k + 2
@@ -155,27 +156,27 @@ def _write_break(places, beam, before, after, gap, beams, breaks, ints, k):
     """Of a jump the nearer side occludes. Over many missing beams a surface may go on unseen."""
     near = before if places[2, before] <= places[2, after] else after
     is_gap = (beam[after] - beam[before]) % beams > gap
-    kind = np.int64(GAP if is_gap else JUMP)
+    kind = np.int64(at.GAP if is_gap else at.JUMP)
     occluder = np.int64(-1) if is_gap else beam[near]
     _write_mark(places, near, beam[before], beam[after], kind, occluder, breaks, ints, k)
 
 
 @helper
-def _write_mark(places, at, beam_before, beam_after, kind, occluder, breaks, ints, k):
-    breaks[k, B_POSITION], breaks[k, B_POSITION + 1] = places[0, at], places[1, at]
-    ints[k, B_BEAM], ints[k, B_BEAM + 1] = beam_before, beam_after
-    ints[k, B_OCCLUDER] = occluder
+def _write_mark(places, i, beam_before, beam_after, kind, occluder, breaks, ints, k):
+    breaks[k, at.B_POSITION], breaks[k, at.B_POSITION + 1] = places[0, i], places[1, i]
+    ints[k, at.B_BEAM], ints[k, at.B_BEAM + 1] = beam_before, beam_after
+    ints[k, at.B_OCCLUDER] = occluder
     for letter in range(8):
-        ints[k, B_KIND + letter] = KIND_WORDS[kind, letter]
+        ints[k, at.B_KIND + letter] = at.KIND_WORDS[kind, letter]
 
 
 @helper
 def write_arc(center_x, center_y, radius, rms, covariance, first, last, count, arcs, k):
     """Write an arc; `covariance` are (xx, xy, xr, yy, yr, rr)."""
     ints = arcs.view(np.int32)
-    arcs[k, A_CENTER], arcs[k, A_CENTER + 1] = center_x, center_y
-    arcs[k, A_RADIUS], arcs[k, A_RMS] = radius, rms
+    arcs[k, at.A_CENTER], arcs[k, at.A_CENTER + 1] = center_x, center_y
+    arcs[k, at.A_RADIUS], arcs[k, at.A_RMS] = radius, rms
     xx, xy, xr, yy, yr, rr = covariance
     for i, value in enumerate((xx, xy, xr, xy, yy, yr, xr, yr, rr)):
-        arcs[k, A_COVARIANCE + i] = value
-    ints[k, A_FIRST], ints[k, A_LAST], ints[k, A_POINTS] = first, last, count
+        arcs[k, at.A_COVARIANCE + i] = value
+    ints[k, at.A_FIRST], ints[k, at.A_LAST], ints[k, at.A_POINTS] = first, last, count

@@ -12,10 +12,9 @@ from cyclonedds.qos import Policy, Qos
 from ..errors import one_line
 from ..output.scene import Message
 from .config import LiveConfig
-from .decoding import received_odometry, received_scan
 from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
 from .raw_dds import ANY_STATE, RawReader, RawWriter
-from .received import Received
+from .received import Received, received_odometry, received_scan
 from .sinks import Publisher
 
 __all__ = ["DdsPublisher", "DdsSource", "Participant"]

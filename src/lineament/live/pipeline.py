@@ -10,9 +10,9 @@ from ..features import Features
 from ..methods import get_method
 from ..motion import Tracker, Tracks
 from ..motion.deskew import deskew
-from ..motion.poses import Twist, twist_between
 from ..motion.tracker import FASTEST
 from ..scan import LaserScan, Pose, RangeNoise
+from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 from .received import Odometry, Time
 

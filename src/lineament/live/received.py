@@ -1,41 +1,31 @@
 """Messages that a live node receives, where they come from, and where they wait."""
 
+import time
 from collections import deque
 from collections.abc import Callable
+from functools import cache, partial
 from threading import Condition
 from typing import NamedTuple, Protocol
 
-from ..motion.poses import Twist
-from ..scan import LaserScan, Pose
+from ..rosmsg.poses import Odometry, odometry
+from ..rosmsg.scans import Decoder, decoders
+from ..rosmsg.wire import Buffer, WireReader
+from ..scan import LaserScan
 
-__all__ = ["Inbox", "Odometry", "Received", "Source", "Time"]
+__all__ = [
+    "Inbox",
+    "Odometry",
+    "Received",
+    "Source",
+    "Time",
+    "received_odometry",
+    "received_scan",
+]
 
 #: Seconds and nanoseconds of a stamp, exactly as a message has them.
 Time = tuple[int, int]
 #: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
 _MOST_PUBLISHERS = 64
-
-
-class Odometry(NamedTuple):
-    """A ``nav_msgs/Odometry``.
-
-    Attributes
-    ----------
-    stamp : float
-        Its time [s].
-    twist : (v_x, v_y, omega)
-        Velocity in the frame of the moving body [m/s, m/s, rad/s].
-    pose : (x, y, theta)
-        Pose of the moving body [m, m, rad].
-    frame, child_frame : str
-        Names of the frames of the pose and of the moving body.
-    """
-
-    stamp: float
-    twist: Twist
-    pose: Pose
-    frame: str
-    child_frame: str
 
 
 class Received(NamedTuple):
@@ -137,3 +127,59 @@ class Inbox:
             queues = list(self._waiting.values())
             self._waiting.clear()
         return sorted((one for queue in queues for one in queue), key=lambda one: one.arrived)
+
+
+def received_scan(
+    publisher: str, data: Buffer, encoding: str, kind: str, echo: str = "first"
+) -> Received:
+    r"""Return what a source gives of a serialised scan that has just arrived.
+
+    Parameters
+    ----------
+    publisher : str
+        Who sent it.
+    data : bytes-like
+        The message; `Received.read` decodes it.
+    encoding : {"ros1", "cdr"}
+        How it is serialised.
+    kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
+        Its type.
+    echo : {"first", "last", "strongest"}
+        Which echo of the latter.
+
+    Raises
+    ------
+    ValueError
+        If the type is another one; from `Received.read`: if the message is malformed.
+
+    Examples
+    --------
+    >>> scan = received_scan("scanner", b"\x01\0\0\0\x02\0", "ros1", "sensor_msgs/LaserScan")
+    >>> scan.read()
+    Traceback (most recent call last):
+    ValueError: ends early: 16 bytes expected from byte 0, 6 are left
+    """
+    read = partial(_decoder(kind, echo), data, encoding)
+    return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
+
+
+@cache
+def _decoder(kind: str, echo: str) -> Decoder:
+    known = decoders(echo, ring=None)
+    if kind not in known:
+        raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
+    return known[kind]
+
+
+def received_odometry(publisher: str, data: Buffer, encoding: str) -> Received:
+    """Return what a source gives of a serialised ``nav_msgs/Odometry`` that has just arrived."""
+    return Received(publisher, partial(odometry, data, encoding), time.monotonic(), True)
+
+
+def _stamp(data: Buffer, encoding: str) -> Time | None:
+    """Stamp in the header of a message, exactly; None if there is no header."""
+    try:
+        seconds, nanoseconds, _ = WireReader(data, encoding).numbers("header")
+    except ValueError:
+        return None
+    return seconds, nanoseconds

@@ -11,8 +11,7 @@ from typing import Any
 from ..errors import LineamentError, one_line
 from ..output.scene import Message
 from .config import LiveConfig
-from .decoding import received_odometry, received_scan
-from .received import Inbox, Received
+from .received import Inbox, Received, received_odometry, received_scan
 from .sinks import Publisher
 
 __all__ = ["Ros1Node", "Ros1Publisher", "Ros1Source"]

@@ -4,11 +4,10 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 
-from ..errors import LineamentError
+from ..errors import needed_by
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
 from ..scan import LaserScan
@@ -108,26 +107,19 @@ def _ends(
         source = source or ros1.Ros1Source(node, config)
         sinks.append(RosSink(ros1.Ros1Publisher(node, config.depth), RosMessages("ros1"), config))
     elif config.ros == 2:
-        dds = _imported("dds", "cyclonedds", "live")
+        with needed_by("live"):
+            dds = import_module(".dds", __package__)
         participant = dds.Participant(config.domain, localhost=config.localhost)
         stack.enter_context(closing(participant))
         source = source or dds.DdsSource(participant, config)
         publisher = dds.DdsPublisher(participant, config.depth)
         sinks.append(RosSink(publisher, RosMessages("cdr"), config))
     if config.foxglove is not None:
-        foxglove = _imported("foxglove", "foxglove", "foxglove")
+        with needed_by("live"):
+            foxglove = import_module(".foxglove", __package__)
         server = foxglove.FoxgloveServer(config.host, config.foxglove, config.name)
         stack.enter_context(closing(server))
         write(f"Foxglove: open a connection to {server.address}")
         sinks.append(FoxgloveSink(server, foxglove.FoxgloveMessages(), config))
     assert source is not None  # `LiveConfig` requires a log where there is no ROS.
     return source, sinks
-
-
-def _imported(module: str, package: str, extra: str) -> ModuleType:
-    try:
-        return import_module(f".{module}", __package__)
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != package:
-            raise
-        raise LineamentError(f"live needs {package}: pip install 'lineament[{extra}]'") from None

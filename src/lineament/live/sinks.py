@@ -5,10 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..output.layers import layers_of
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
 from ..scan import LaserScan
 from .config import LiveConfig
 from .counters import Report

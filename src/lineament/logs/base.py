@@ -1,13 +1,8 @@
-"""What every log offers, and what a reader must tell about its format."""
-
-from __future__ import annotations
+"""What every log offers, and what a reader says about its format."""
 
 import os
-import stat
-import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from operator import itemgetter
@@ -16,14 +11,9 @@ from typing import ClassVar, TypeVar
 
 from ..errors import LogError
 from ..scan import LaserScan
-from .lines import GZIP, chunks, reading
-
-__all__ = ["ECHOES", "Head", "Log", "ReadOptions", "Topic"]
 
 T = TypeVar("T")
 
-#: How much of a file is looked at to find its format [bytes].
-HEAD_SIZE = 1 << 16
 #: How many messages about faults are kept.
 MAX_FAULTS = 10
 #: Which return of a beam that has several can be asked for.
@@ -32,27 +22,7 @@ ECHOES = ("first", "last", "strongest")
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How to make scans of messages that hold more than one; formats without them pass it over.
-
-    Parameters
-    ----------
-    echo : str
-        Which return of a beam that has several: ``first``, ``last`` or ``strongest``.
-    ring : int, optional
-        Which ring of a point cloud is the scan.
-    pose_topic : str, optional
-        Which topic gives the poses.
-
-    Raises
-    ------
-    ValueError
-        If a value is none of these.
-
-    Examples
-    --------
-    >>> ReadOptions(echo="last").ring is None
-    True
-    """
+    """How ROS messages become scans, as `open_log` takes it; ValueError if a value is wrong."""
 
     echo: str = "first"
     ring: int | None = None
@@ -63,26 +33,16 @@ class ReadOptions:
             raise ValueError(f"echo is {self.echo!r}, expected {' or '.join(ECHOES)}")
         if self.ring is not None and (type(self.ring) is not int or self.ring < 0):
             raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
-        if self.pose_topic is not None and not (
-            isinstance(self.pose_topic, str) and self.pose_topic
-        ):
-            raise ValueError(f"pose_topic is {self.pose_topic!r}, expected the name of a topic")
+        topic = self.pose_topic
+        if topic is not None and not (isinstance(topic, str) and topic):
+            raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
 
 
 @dataclass(frozen=True)
 class Topic:
     """One kind of messages in a log, of scans or of anything else.
 
-    Parameters
-    ----------
-    name : str
-        As it is asked for.
-    type : str
-        Type of its messages; empty where the name says it all.
-    count : int
-        How many there are.
-    publishers : int
-        How many senders the log knows of.
+    `count` messages from `publishers` senders; `type` is empty where the name says it all.
     """
 
     name: str
@@ -93,72 +53,15 @@ class Topic:
 
 @dataclass(frozen=True)
 class Head:
-    """The beginning of a file, from which readers recognise their format.
+    """The beginning of a file or folder, from which readers recognise their format.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        The file or folder.
-    data : bytes
-        Its first bytes, decompressed where it is gzip; empty for a folder.
-    is_directory : bool
-        Whether it is a folder.
-    is_gzip : bool
-        Whether the file is compressed.
+    `data` is decompressed where the file is gzip, and empty for a folder.
     """
 
     path: Path
     data: bytes
     is_directory: bool = False
     is_gzip: bool = False
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Head:
-        """Read the head of `path`; LogError if there is no such file, or nothing in it."""
-        try:
-            where = Path(path)
-        except TypeError:
-            raise LogError(path, "is no path, expected the path of a log") from None
-        with reading(path):
-            mode = where.stat().st_mode
-            if stat.S_ISDIR(mode):
-                return cls(where, b"", is_directory=True)
-            # Pipes and devices cannot be read twice, and may never answer.
-            if not stat.S_ISREG(mode):
-                raise LogError(path, "is no regular file, expected a log")
-            with where.open("rb") as file:
-                first = file.read(HEAD_SIZE)
-        if not first:
-            raise LogError(path, "is empty, expected a log")
-        if not first.startswith(GZIP):
-            return cls(where, first)
-        return cls(where, _decompressed_head(path), is_gzip=True)
-
-    @classmethod
-    def of(cls, path: Path, first: bytes) -> Head:
-        """Make the head of a file that is not at hand, from its first bytes as they are stored."""
-        if not first.startswith(GZIP):
-            return cls(path, first)
-        plain = b""
-        with suppress(zlib.error):
-            plain = zlib.decompressobj(wbits=31).decompress(first, HEAD_SIZE)
-        return cls(path, plain, is_gzip=True)
-
-
-def _decompressed_head(path: str | os.PathLike[str]) -> bytes:
-    data = b""
-    try:
-        for chunk in chunks(path):
-            data += chunk
-            if len(data) >= HEAD_SIZE:
-                break
-    except LogError:
-        # A broken stream is reported when the log is read, with how far that went.
-        if not data:
-            raise
-    if not data:
-        raise LogError(path, "is empty once decompressed, expected a log")
-    return data[:HEAD_SIZE]
 
 
 class Log(ABC):
@@ -167,10 +70,10 @@ class Log(ABC):
     Parameters
     ----------
     path : path-like
-        The file. Its ``str`` is what errors call it, which is not the path itself where the log
+        The file. Its ``str`` is what errors call it; this is not the path itself where the log
         is a temporary copy of what an archive or an address holds.
     topic : str, optional
-        Which scans to read; all, or the reader's own choice, if None.
+        Which scans to read; all, or the reader's choice, if None.
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
     options : ReadOptions
@@ -178,20 +81,12 @@ class Log(ABC):
 
     Attributes
     ----------
-    source : path-like
-        The file as it was given: what is opened, and what errors are made of.
-    path : pathlib.Path
-        The file that is read.
-    name : str
-        What a person calls it, for messages.
-    topic : str or None
-        The topic that was asked for.
-    options : ReadOptions
-        The options.
+    source, path, name
+        The file as it was given, as a ``pathlib.Path``, and as messages call it.
     skipped : int
-        How many faults the last iteration went over; 0 unless `keep_going`.
+        How many faults the last iteration skipped; 0 unless `keep_going`.
     faults : list of str
-        What the first of these faults were.
+        The first of these faults.
     """
 
     #: Name of the format.
@@ -200,8 +95,10 @@ class Log(ABC):
     description: ClassVar[str]
     #: Usual endings, lower case, of files in this format.
     endings: ClassVar[tuple[str, ...]]
-    #: Whether the reader jumps about in the file, which must then not be compressed as a whole.
+    #: Whether the reader seeks in the file, which must then not be compressed as a whole.
     needs_seek: ClassVar[bool] = False
+    #: The one topic of a format whose scans are all of a kind.
+    only_topic: ClassVar[str] = "scan"
 
     def __init__(
         self,
@@ -211,8 +108,7 @@ class Log(ABC):
         keep_going: bool = False,
         options: ReadOptions = ReadOptions(),
     ) -> None:
-        # A temporary copy lives as long as this.
-        self.source = path
+        self.source = path  # A temporary copy lives as long as this.
         self.path = Path(path)
         self.name = str(path)
         self.topic = topic
@@ -223,7 +119,7 @@ class Log(ABC):
         self._open()
 
     def _open(self) -> None:  # noqa: B027 (nothing to do is a way to open)
-        """Look into the file as far as it takes to know that it is a log, and has the topic."""
+        """Read as much of the file as shows that it is a log, and has the topic."""
 
     @classmethod
     @abstractmethod
@@ -231,9 +127,9 @@ class Log(ABC):
         """Whether a file that begins so is in this format."""
 
     @property
-    @abstractmethod
     def topics(self) -> list[str]:
         """The topics of the log that carry scans."""
+        return [self.only_topic]
 
     @abstractmethod
     def __len__(self) -> int:
@@ -244,7 +140,7 @@ class Log(ABC):
         """Read each scan, with its topic, from the start; faults go through `_fault`."""
 
     def contents(self) -> list[Topic]:
-        """Tell all that the log holds, scans and other messages, in the log's own words."""
+        """Return all kinds of messages in the log, scans and others; empty where unknown."""
         return []
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:
@@ -264,7 +160,7 @@ class Log(ABC):
         return map(itemgetter(1), self.items())
 
     def scan(self, index: int) -> LaserScan:
-        """Read one scan by its index, from 0; those before it are read and left.
+        """Read one scan by its index, from 0; those before it are read too.
 
         Raises
         ------
@@ -294,6 +190,8 @@ class Log(ABC):
         except LogError as error:
             self._fault(error)
 
-    def _no_such_topic(self, topics: list[str]) -> LogError:
-        known = ", ".join(topics) if topics else "none that carries scans"
-        return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")
+    def _check_topic(self) -> None:
+        if self.topic is not None and self.topic not in self.topics:
+            known = ", ".join(self.topics) or "none that carries scans"
+            problem = f"has no topic {self.topic!r}; topics there are: {known}"
+            raise LogError(self.name, problem)

@@ -1,14 +1,10 @@
-"""Bearings that text logs round or leave out: exact steps, and what SICK scanners do."""
-
-from __future__ import annotations
+"""Bearings as text logs have them: rounded, left out, in degrees, or in any order."""
 
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-__all__ = ["SICK_RANGE_MAX", "bearing_fields", "sick_step", "snap"]
 
 #: Range from which a SICK scanner saw nothing, where the log does not say otherwise [m].
 SICK_RANGE_MAX = 50.0
@@ -18,6 +14,8 @@ _ANGLES_PER_DEGREE = 12
 _ROUNDING = 6e-7
 #: Beyond this there are no bearings, but what a file may hold all the same [rad].
 _FARTHEST = 1e6
+#: Bearings [rad] that go farther than a turn, and some rounding, are degrees.
+_RADIANS = 2 * math.pi + 0.1
 
 
 def snap(angle: float) -> float:
@@ -53,18 +51,10 @@ def sick_step(n: int) -> float:
 
 @np.errstate(over="ignore", invalid="ignore")  # Absurd bearings: `LaserScan` refuses them.
 def bearing_fields(angles: NDArray[np.float64]) -> dict[str, Any]:
-    """Return the fields of `LaserScan` for bearings that a text lists.
+    """Return the fields of `LaserScan` for bearings [rad] that a text lists, with 6 decimals.
 
-    Parameters
-    ----------
-    angles : ndarray, shape (n,)
-        Bearings [rad], perhaps rounded to 6 decimals.
-
-    Returns
-    -------
-    dict
-        ``angle_min`` and ``angle_increment`` where the steps are even but for the rounding, else
-        ``angles``.
+    They are ``angle_min`` and ``angle_increment`` where the steps are even but for the rounding,
+    else ``angles``.
 
     Examples
     --------
@@ -81,3 +71,26 @@ def bearing_fields(angles: NDArray[np.float64]) -> dict[str, Any]:
             if increment > 0 and off.max() <= 2 * _ROUNDING:
                 return {"angle_min": start, "angle_increment": increment}
     return {"angles": angles}
+
+
+def by_bearing(
+    angles: NDArray[np.float64], *, degrees: bool | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the order of beams by bearing, and their bearings [rad], which increase.
+
+    Of several with one bearing, the first is kept. Bearings are degrees where asked for or, if
+    that is None, where one is beyond ±2π; ValueError if one is not finite.
+
+    Examples
+    --------
+    >>> order, angles = by_bearing(np.array([90.0, 0.0, 90.0]))
+    >>> order.tolist(), angles.round(3).tolist()
+    ([1, 0], [0.0, 1.571])
+    """
+    bad = np.flatnonzero(~np.isfinite(angles))
+    if len(bad):
+        raise ValueError(f"bearing {bad[0] + 1} is {angles[bad[0]]}, expected a finite one")
+    if degrees or (degrees is None and np.abs(angles).max(initial=0.0) > _RADIANS):
+        angles = np.radians(angles)
+    increasing, order = np.unique(angles, return_index=True)
+    return order, increasing

@@ -1,116 +1,116 @@
-"""CARMEN logs: text lines FLASER, RLASER and ROBOTLASER1 among others, plain or gzip.
+"""CARMEN logs: text lines FLASER, RLASER and ROBOTLASER1 among others.
 
-The robots' own logs and their SLAM-corrected versions. All other messages are passed over.
+The robots' logs and their SLAM-corrected versions. All other messages are passed over.
 """
-
-from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 
-from ..scan import LaserScan
-from .base import Head
-from .bearings import SICK_RANGE_MAX, sick_step
-from .linelog import LineLog
-from .lines import BOM
-from .robotlaser import check_count, parse_robotlaser
-from .words import Numbers, floats, whole_number
+from ..scan import LaserScan, Pose
+from .bearings import SICK_RANGE_MAX, sick_step, snap
+from .linelog import Fields, LineLog, Parser, number_parser
 
-__all__ = ["CarmenLog"]
-
-FRAME = "laser"
-
-_KNOWN = re.compile(
-    rb"(?m)^[ \t]*(?:PARAM|SYNC|ODOM|NEFF|TRUEPOS|[FR]LASER|LASER[345]|RAWLASER\d|ROBOTLASER\d"
-    rb"|VERTEX2|EDGE2)[ \t]"
+_KINDS = (
+    *("PARAM", "SYNC", "ODOM", "NEFF", "TRUEPOS", "FLASER", "RLASER", "LASER3", "LASER4", "LASER5"),
+    *(f"{name}{i}" for name in ("RAWLASER", "ROBOTLASER") for i in range(10)),
+    *("VERTEX2", "EDGE2"),
 )
-#: The bulk of the lines of most logs, known by their beginning, which is quicker.
-_OFTEN = (b"ODOM ", b"NEFF ")
 _LASER_MAX = re.compile(rb"(?:robot|laser)_(front|rear)_?laser_max$")
 _PARAM_TOPIC = {b"front": "FLASER", b"rear": "RLASER"}
 
-# After the ranges of FLASER: x y theta odom_x odom_y odom_theta ipc_timestamp host logger_time.
-_TAIL = 9
+# Behind the poses: odometry, time of IPC, host, time of the logger.
+_LASER = "ranges* x y theta _ _ _ stamp _ _"
+_ROBOTLASER = (
+    "_ start _ step limit _ _ ranges* remissions* x y theta robot_x robot_y robot_theta "
+    "_ _ _ _ _ stamp _ _"
+)
+_FIELDS = {
+    "FLASER": Fields("FLASER", _LASER),
+    "RLASER": Fields("RLASER", _LASER),
+    "ROBOTLASER1": Fields("ROBOTLASER1", _ROBOTLASER),
+}
 
 
 class CarmenLog(LineLog):
     """A CARMEN log; front scans (FLASER, ROBOTLASER1) unless another topic is asked for.
 
-    Beams of FLASER and RLASER start at -90°, in steps of exactly 1° (180 or 181 beams), 0.5°
-    (360, 361) or π/(n-1). Their `range_max` is that of the last ``PARAM robot_front_laser_max``
-    (or ``laser_front_laser_max``, ``robot_rear_laser_max``, …) before them, else 50 m, beyond
-    which SICK scanners report that they saw nothing (51.15, 81.83, 81.91). ROBOTLASER1 has its
-    own. Poses are those of the laser as logged, stamps the robot's own (``ipc_timestamp``).
-
-    Raises
-    ------
-    LogError
-        If there is no such topic, or no scan line at all.
+    `range_max` of FLASER and RLASER is that of the last ``PARAM`` ``…_laser_max`` before them, else
+    that from which SICK scanners report that they saw nothing (51.15, 81.83, 81.91). Poses are
+    those of the laser as logged, stamps the robot's (``ipc_timestamp``).
     """
 
     format = "carmen"
     description = "CARMEN (FLASER, ROBOTLASER1)"
     endings = (".log", ".clf", ".carmen")
+    kinds = _KINDS
+    signature = re.compile(rb"(?m)^[ \t]*(?:%s)[ \t]" % "|".join(_KINDS).encode())
     scan_kinds = ("FLASER", "ROBOTLASER1", "RLASER")
     read_kinds = ("FLASER", "ROBOTLASER1")
+    other_kinds = ("PARAM",)
 
-    @classmethod
-    def recognises(cls, head: Head) -> bool:
-        """Whether a line near the beginning is a message of CARMEN."""
-        return _KNOWN.search(head.data.removeprefix(BOM)) is not None
-
-    @staticmethod
-    def _kind(line: bytes) -> str:
-        # The longest name has 11 letters: no need to split the thousand characters behind it.
-        words = line[:24].split(None, 1)
-        name = words[0].decode("latin-1") if words else ""
-        return name if name in CarmenLog.scan_kinds or _KNOWN.match(line) else ""
-
-    def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        numbers = Numbers()
+    def _parser(self) -> Parser:
         range_max = dict.fromkeys(self.scan_kinds, SICK_RANGE_MAX)
-        for number, line in self._lines():
-            if line.startswith(_OFTEN):
-                continue
-            name = self._kind(line)
-            if name in self._wanted:
-                try:
-                    scan = _parse(name, line.split(), numbers, range_max[name])
-                except (ValueError, OverflowError) as error:
-                    self._bad_line(number, error)
-                else:
-                    yield name, scan
-            elif name == "PARAM":
-                _read_limit(line.split(), range_max)
+
+        def parse(kind: str, line: bytes) -> LaserScan | None:
+            if kind == "PARAM":
+                _read_limit(line, range_max)
+                return None
+            if kind == "ROBOTLASER1":
+                return robotlaser(line)
+            read = _FIELDS[kind].read(line)
+            ranges = read["ranges"]
+            return LaserScan(
+                ranges,
+                -math.pi / 2,
+                sick_step(len(ranges)),
+                range_max=range_max[kind],
+                stamp=read["stamp"],
+                frame_id="laser",
+                pose=(read["x"], read["y"], read["theta"]),
+            )
+
+        return parse
 
 
-def _parse(name: str, words: list[bytes], numbers: Numbers, range_max: float) -> LaserScan:
-    if name == "ROBOTLASER1":
-        return parse_robotlaser(words, numbers, range_max, FRAME)
-    if len(words) < 2:
-        raise ValueError(f"{name} has nothing behind it, expected the number of ranges")
-    n = whole_number(f"{name}: the number of ranges", words[1])
-    check_count(name, "ranges", n, len(words) - 2 - _TAIL, _TAIL)
-    x, y, theta, *_, stamp = floats(f"{name} pose and stamp: value", words[2 + n : 9 + n])
+def robotlaser(line: bytes, corrected: Pose | None = None) -> LaserScan:
+    """Return the scan of a line ROBOTLASER1, which CARMEN logs and graphs of poses have.
+
+    A corrected pose of the robot [m, m, rad] replaces that of the line; the laser moves along.
+    """
+    read = _FIELDS["ROBOTLASER1"].read(line)
+    ranges, remissions = read["ranges"], read["remissions"]
+    pose = read["x"], read["y"], read["theta"]
+    if corrected is not None:
+        robot = read["robot_x"], read["robot_y"], read["robot_theta"]
+        pose = corrected if pose == robot else _moved(pose, robot, corrected)
     return LaserScan(
-        numbers.vector(f"{name} range", words[2 : 2 + n]),
-        -math.pi / 2,
-        sick_step(n),
-        range_max=range_max,
-        stamp=stamp,
-        frame_id=FRAME,
-        pose=(x, y, theta),
+        ranges,
+        snap(read["start"]),
+        snap(read["step"]),
+        range_max=read["limit"] if read["limit"] > 0 else SICK_RANGE_MAX,
+        stamp=read["stamp"],
+        frame_id="laser",
+        intensities=remissions if 0 < len(remissions) == len(ranges) else None,
+        pose=pose,
     )
 
 
-def _read_limit(words: list[bytes], range_max: dict[str, float]) -> None:
-    """Take over the largest range that a PARAM line gives; other lines are none of ours."""
+def _moved(laser: Pose, robot: Pose, corrected: Pose) -> Pose:
+    """Return the pose of the laser, which is fixed to the robot, with the robot at `corrected`."""
+    x, y = laser[0] - robot[0], laser[1] - robot[1]
+    turn = corrected[2] - robot[2]
+    cos, sin = math.cos(turn), math.sin(turn)
+    return corrected[0] + cos * x - sin * y, corrected[1] + sin * x + cos * y, laser[2] + turn
+
+
+def _read_limit(line: bytes, range_max: dict[str, float]) -> None:
+    """Take over the largest range that a PARAM line gives; others do not matter here."""
+    words = line.split()
     match = _LASER_MAX.match(words[1]) if len(words) > 2 else None
     if match is None:
         return
     try:
-        value = Numbers()[words[2]]
+        value = number_parser(line)(words[2])
     except ValueError:
         return
     if 0 < value < math.inf:

@@ -1,9 +1,8 @@
 """Scans of CSM, the Canonical Scan Matcher: JSON objects, one after the other."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,8 @@ from ..errors import LogError
 from ..scan import LaserScan, Pose
 from .base import Head, Log
 from .bearings import bearing_fields
-from .lines import BOM
-from .objects import json_objects
+from .json_stream import json_objects
 
-__all__ = ["CsmLog"]
-
-_TOPIC = "scan"
 _BEGINNING = re.compile(rb"\s*\{\s*\"")
 _KEY = re.compile(rb"\"(?:nrays|readings|min_theta)\"\s*:")
 #: Poses, the best first.
@@ -29,14 +24,8 @@ class CsmLog(Log):
     """JSON objects with ``readings`` [m] and ``theta`` [rad], or ``min_theta`` and ``max_theta``.
 
     A reading is invalid where it is null or its ``valid`` is 0. Bearings that run clockwise are
-    turned round; even steps that were rounded are made exact. The pose is the first of
-    ``true_pose``, ``estimate`` and ``odometry`` that is given; ``timestamp`` is seconds and
-    microseconds.
-
-    Raises
-    ------
-    LogError
-        If the topic is another than ``scan``, or the file does not begin with a scan.
+    reversed; even steps that were rounded are made exact. The pose is the first of ``true_pose``,
+    ``estimate`` and ``odometry`` that is given; ``timestamp`` is seconds and microseconds.
     """
 
     format = "csm"
@@ -44,30 +33,24 @@ class CsmLog(Log):
     endings = (".json", ".csm")
 
     def _open(self) -> None:
-        self._count: int | None = None
-        if self.topic not in (None, _TOPIC):
-            raise self._no_such_topic(self.topics)
+        self._check_topic()
         first = next(json_objects(self.source), None)
         if isinstance(first, LogError):
             self._fault(first)
-        if first is None or (isinstance(first, dict) and "readings" not in first):
+        elif first is None or "readings" not in first:
             raise LogError(self.source, "is no CSM log, expected JSON objects with readings")
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
         """Whether it begins as a JSON object, and names a key of a scan near the beginning."""
-        data = head.data.removeprefix(BOM)
-        return _BEGINNING.match(data) is not None and _KEY.search(data) is not None
-
-    @property
-    def topics(self) -> list[str]:
-        """The one kind of scans there is: ``scan``."""
-        return [_TOPIC]
+        return _BEGINNING.match(head.data) is not None and _KEY.search(head.data) is not None
 
     def __len__(self) -> int:
-        if self._count is None:
-            self._count = sum(isinstance(found, dict) for found in json_objects(self.source))
         return self._count
+
+    @cached_property
+    def _count(self) -> int:
+        return sum(isinstance(found, dict) for found in json_objects(self.source))
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         for i, found in enumerate(json_objects(self.source)):
@@ -79,7 +62,7 @@ class CsmLog(Log):
             except (ValueError, OverflowError) as error:
                 self._fault(LogError(self.name, f"scan {i}: {error}"))
             else:
-                yield _TOPIC, scan
+                yield self.only_topic, scan
 
 
 def _scan(found: dict[str, Any]) -> LaserScan:
@@ -90,9 +73,11 @@ def _scan(found: dict[str, Any]) -> LaserScan:
     angles = _angles(found, n)
     if n > 1 and angles[-1] < angles[0]:
         readings, angles = readings[::-1], angles[::-1]
-    return LaserScan(
-        readings, **bearing_fields(angles), stamp=_stamp(found.get("timestamp")), pose=_pose(found)
-    )
+    stamp = 0.0
+    if found.get("timestamp") is not None:
+        seconds, microseconds = _numbers("timestamp", found["timestamp"], 2)
+        stamp = float(seconds + 1e-6 * microseconds)
+    return LaserScan(readings, **bearing_fields(angles), stamp=stamp, pose=_pose(found))
 
 
 def _numbers(name: str, values: object, length: int | None = None) -> NDArray[np.float64]:
@@ -115,13 +100,6 @@ def _angles(found: dict[str, Any], n: int) -> NDArray[np.float64]:
     if not np.isfinite(limits).all():
         raise ValueError("has neither theta nor finite min_theta and max_theta")
     return np.linspace(limits[0], limits[1], n)
-
-
-def _stamp(timestamp: object) -> float:
-    if timestamp is None:
-        return 0.0
-    seconds, microseconds = _numbers("timestamp", timestamp, 2)
-    return float(seconds + 1e-6 * microseconds)
 
 
 def _pose(found: dict[str, Any]) -> Pose | None:

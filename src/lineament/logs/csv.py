@@ -1,106 +1,189 @@
-"""Scans as CSV: a row a scan, below a header."""
-
-from __future__ import annotations
+"""Scans as CSV: a row a scan below a header, or a row a beam of one scan."""
 
 import re
-from collections.abc import Iterator
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Any
+
+import numpy as np
 
 from ..errors import LogError
 from ..scan import LaserScan
 from .base import Head, Log
-from .columns import Columns
-from .words import Numbers, floats
+from .bearings import bearing_fields, by_bearing
+from .linelog import LineLog, Parser, number_parser, numbers, scalar
+from .lines import numbered_lines
 
-__all__ = ["CsvLog"]
+#: Most rows of one scan.
+MAX_BEAMS = 1 << 20
 
-_TOPIC = "scan"
+# A row a scan.
 _BEARINGS = ("angle_min", "angle_increment")
 _SCALARS = (*_BEARINGS, "stamp", "range_min", "range_max", "scan_time", "time_increment")
 _POSE = ("x", "y", "theta")
 _RANGE = re.compile(r"r\d+$")
+# A row a beam. Names of the bearings, and whether they are degrees; None where the numbers show.
+_BEARING = ("angle", "bearing", "theta", "azimuth")
+_DEGREES: dict[str, bool | None] = {
+    **dict.fromkeys(_BEARING),
+    **{f"{name}_rad": False for name in _BEARING},
+    **{f"{name}_deg": True for name in _BEARING},
+}
+_DISTANCES = ("range", "distance", "radius", "r")
+_INTENSITIES = ("intensity",)
 
 
-class CsvLog(Log):
-    """One scan a row, below a header that names the columns.
-
-    Columns: ``angle_min`` and ``angle_increment`` [rad], the ranges ``r0``, ``r1``, … [m], and any
-    of ``stamp``, ``range_min``, ``range_max``, ``scan_time``, ``time_increment``, ``frame_id`` and
-    the pose ``x``, ``y``, ``theta``; others are left out. An empty range is a beam that returned
-    nothing, any other empty cell a value that is not known. A row with fewer beams than the
-    header has names ends after its last one.
-
-    Raises
-    ------
-    LogError
-        If the topic is another than ``scan``, or there is no such header.
-    """
+class _Csv(Log):
+    """Rows of cells, below a header or not."""
 
     format = "csv"
-    description = "CSV (angle_min, angle_increment, r0, r1, … under a header)"
     endings = (".csv", ".tsv")
 
-    def _open(self) -> None:
-        if self.topic not in (None, _TOPIC):
-            raise self._no_such_topic(self.topics)
-        columns = Columns.of_file(self.source)
-        if columns is None or not _has_scans(columns):
-            raise LogError(self.source, f"is no {self.description}")
-        self._columns = columns
-        self._count: int | None = None
+    @staticmethod
+    @abstractmethod
+    def _fits(names: list[str], width: int) -> bool:
+        """Whether these columns, whose names may be missing, are of this kind of table."""
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
-        """Whether the first row is a header with bearings and ranges."""
-        columns = Columns.of_head(head)
-        return columns is not None and _has_scans(columns)
+        """Whether the first row fits."""
+        return cls._fits(*_columns(head.data.split(b"\n"))[1:])
 
-    @property
-    def topics(self) -> list[str]:
-        """The one kind of scans there is: ``scan``."""
-        return [_TOPIC]
+    def _open(self) -> None:
+        rows = (line for _, line in numbered_lines(self.source))
+        self._delimiter, self._names, width = _columns(rows)
+        if not self._fits(self._names, width):
+            raise LogError(
+                self.source,
+                "is no CSV of scans, expected rows of angle,range, or a header with angle and "
+                "range, or with angle_min, angle_increment and r0, r1, …",
+            )
+        super()._open()
 
-    def __len__(self) -> int:
-        if self._count is None:
-            count = 0
-            try:
-                for _ in self._columns.rows(self.source):
-                    count += 1
-            except LogError:
-                if not self.keep_going:
-                    raise
-            self._count = count
-        return self._count
-
-    def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        numbers, columns = Numbers(), self._columns
-        places = {name: i for i, name in enumerate(columns.names) if not _RANGE.match(name)}
-        ranges = [i for i, name in enumerate(columns.names) if _RANGE.match(name)]
-        for number, line in self._until_broken(columns.rows(self.source)):
-            try:
-                scan = _scan(columns.cells(line), places, ranges, numbers)
-            except (ValueError, OverflowError) as error:
-                self._fault(LogError(self.name, str(error), line=number))
-            else:
-                yield _TOPIC, scan
+    def _lines(self) -> Iterator[tuple[int, bytes]]:
+        """Yield each row below the header with the number of its line."""
+        rows = ((number, line) for number, line in numbered_lines(self.source) if _is_row(line))
+        return islice(rows, 1 if self._names else 0, None)
 
 
-def _has_scans(columns: Columns) -> bool:
-    return {*_BEARINGS, "r0"} <= set(columns.names)
+def _columns(lines: Iterable[bytes]) -> tuple[bytes, list[str], int]:
+    """Return what the first row shows: the delimiter, names unless it is numbers, the width."""
+    row = next(filter(_is_row, lines), b"")
+    delimiter = next((sign for sign in (b",", b";", b"\t") if sign in row), b",")
+    cells = _cells(row, delimiter)
+    try:
+        numbers("column", cells)
+    except ValueError:
+        return delimiter, [cell.decode("utf-8", "replace").lower() for cell in cells], len(cells)
+    return delimiter, [], len(cells)
 
 
-def _scan(
-    cells: list[bytes], places: dict[str, int], ranges: list[int], numbers: Numbers
-) -> LaserScan:
-    if len(cells) > len(places) + len(ranges):
-        raise ValueError(f"has {len(cells)} columns, expected {len(places) + len(ranges)}")
-    given = {name: cells[i] for name, i in places.items() if i < len(cells) and cells[i]}
+def _cells(row: bytes, delimiter: bytes) -> list[bytes]:
+    return [cell.strip(b' \t\r"') for cell in row.split(delimiter)]
+
+
+def _is_row(line: bytes) -> bool:
+    return not (line.isspace() or not line or line.lstrip().startswith(b"#"))
+
+
+class CsvLog(_Csv, LineLog):
+    """One scan a row, below a header that names the columns; see ``docs/logs.md``.
+
+    An empty range is a beam that returned nothing, any other empty cell a value that is not known.
+    A row with fewer beams than the header has names ends after its last one.
+    """
+
+    description = "CSV (angle_min, angle_increment, r0, r1, … under a header)"
+    scan_kinds = read_kinds = ("scan",)
+
+    @staticmethod
+    def _fits(names: list[str], _: int) -> bool:
+        return {*_BEARINGS, "r0"} <= set(names)
+
+    def _kind(self, line: bytes) -> str:  # noqa: ARG002 (each row is a scan)
+        return self.only_topic
+
+    def _parser(self) -> Parser:
+        ranges = [i for i, name in enumerate(self._names) if _RANGE.match(name)]
+        others = {name: i for i, name in enumerate(self._names) if not _RANGE.match(name)}
+        return lambda _, row: _scan(
+            _cells(row, self._delimiter), ranges, others, number_parser(row)
+        )
+
+
+def _scan(cells: list[bytes], ranges: list[int], others: dict[str, int], number: Any) -> LaserScan:
+    if len(cells) > len(ranges) + len(others):
+        raise ValueError(f"has {len(cells)} columns, expected {len(ranges) + len(others)}")
+    given = {name: cells[i] for name, i in others.items() if i < len(cells) and cells[i]}
     fields: dict[str, Any] = {
-        name: floats(f"{name}: value", [given[name]])[0] for name in _SCALARS if name in given
+        name: scalar(name, given[name], number) for name in _SCALARS if name in given
     }
     if "frame_id" in given:
         fields["frame_id"] = given["frame_id"].decode("utf-8", "replace")
     if all(name in given for name in _POSE):
-        fields["pose"] = tuple(floats("x, y, theta: value", [given[name] for name in _POSE]))
+        fields["pose"] = tuple(numbers("x, y, theta", [given[name] for name in _POSE], number))
     words = [cells[i] or b"nan" for i in ranges if i < len(cells)]
-    return LaserScan(numbers.vector("range", words), **fields)
+    return LaserScan(numbers("range", words, number), **fields)
+
+
+class CsvBeamsLog(_Csv):
+    """Rows ``angle,range`` of one scan, under a header or none; see ``docs/logs.md``.
+
+    Bearings are degrees where the header says so or, if it says nothing, where one is beyond ±2π.
+    Rows may come in any order; of several with one bearing the first is kept.
+    """
+
+    description = "CSV (angle,range)"
+
+    @staticmethod
+    def _fits(names: list[str], width: int) -> bool:
+        return min(_beam_places(names)[:2]) >= 0 if names else width == 2
+
+    def _open(self) -> None:
+        super()._open()
+        self._check_topic()
+
+    def __len__(self) -> int:
+        return 1
+
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        beams = np.array(list(self._beams()), np.float64).reshape(-1, 3)
+        degrees = _DEGREES[self._names[_beam_places(self._names)[0]]] if self._names else None
+        try:
+            order, angles = by_bearing(beams[:, 0], degrees=degrees)
+            ranges, intensities = beams[order, 1], beams[order, 2]
+            known = None if np.isnan(intensities).all() else intensities
+            scan = LaserScan(ranges, **bearing_fields(angles), intensities=known)
+        except ValueError as error:
+            self._fault(LogError(self.name, str(error)))
+        else:
+            yield self.only_topic, scan
+
+    def _beams(self) -> Iterator[Iterable[float]]:
+        """Yield bearing, range and intensity of each row."""
+        places = _beam_places(self._names)
+        expected = max(places) + 1
+        for count, (number, row) in enumerate(self._until_broken(self._lines())):
+            cells = _cells(row, self._delimiter)
+            try:
+                if count >= MAX_BEAMS:
+                    raise ValueError(f"more than {MAX_BEAMS} beams")
+                if len(cells) < expected:
+                    raise ValueError(f"has {len(cells)} columns, expected {expected}")
+                words = [b"nan" if i < 0 else cells[i] or b"nan" for i in places]
+                yield numbers("angle, range, intensity: value", words)
+            except ValueError as error:
+                self._fault(LogError(self.name, str(error), line=number))
+                if count >= MAX_BEAMS:
+                    return
+
+
+def _beam_places(names: list[str]) -> list[int]:
+    """Return the columns of bearing, range and intensity; -1 where there is none."""
+    if not names:
+        return [0, 1, -1]
+    return [
+        next((names.index(name) for name in known if name in names), -1)
+        for known in (_DEGREES, _DISTANCES, _INTENSITIES)
+    ]

@@ -1,103 +1,77 @@
 """What a log holds, in a few lines: its scans, their geometry, time, ranges and poses."""
 
-from __future__ import annotations
-
 import math
+import statistics
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import one_line
-from ..scan import LaserScan
+from ..scan import LaserScan, Pose
 from .base import Log, Topic
-from .counters import Clock, Geometry, Ranges, Way
 
-__all__ = ["LogInfo", "TopicInfo", "summarize"]
-
-_FRAMES = 16
-#: How many topics are looked at, and how many kinds of messages are listed.
-_TOPICS = 32
-_LISTED = 20
+#: How many frames, topics and kinds of messages are listed.
+_FRAMES, _TOPICS, _LISTED = 16, 32, 20
 #: Ends of the types of messages that poses can be taken from.
 _POSE_TYPES = ("/PoseStamped", "/PoseWithCovarianceStamped", "/Odometry", "/TFMessage")
 #: Stamps between these are seconds since 1970, and make a date (1990 to 2100).
 _LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
+#: Stamps make a rate when at least this share of their steps goes forward, and at most that share
+#: backwards: two clocks have no common rate.
+_FORWARD, _BACKWARD = 0.5, 0.1
+#: Ranges are counted in steps of 1 mm up to here [m], for a median in constant memory.
+_LONGEST = 1e3
+#: Most steps of stamps, and ranges to be counted, that are kept.
+_BUFFER = 1 << 16
 
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """What the scans of one topic are like.
-
-    Parameters
-    ----------
-    name : str
-        The topic.
-    scans : int
-        Scans read.
-    beams : (int, int)
-        Least and largest number of beams.
-    field_of_view, resolution : float
-        First to last bearing, and step between beams [rad], of the first scan with most beams.
-    full_circle : bool
-        Whether that scan goes all around.
-    start, duration : float or None
-        Earliest stamp [s], and latest minus earliest; None where stamps are missing.
-    rate : float or None
-        Scans per second, from the median of the stamp steps that go forward; None where most
-        stamps stand still, or many run backwards.
-    backwards : int
-        How many stamps are before the one that precedes them.
-    valid : float
-        Share of beams that are valid.
-    ranges : (float, float, float) or None
-        Least, median (to 1 mm) and largest valid range [m]; None where no beam is valid.
-    limits : (float, float)
-        Least `range_min` and largest `range_max` of the scans [m]; 0 and inf where unknown.
-    intensities : float
-        Share of scans with intensities.
-    poses : float
-        Share of scans with a pose.
-    travelled : float
-        Length of the way from pose to pose [m].
-    frame_ids : tuple of str
-        Names of frames, in order of appearance, the first 16.
-    """
+    """What the scans of one topic are like; angles in radians."""
 
     name: str
     scans: int
-    beams: tuple[int, int]
-    field_of_view: float
-    resolution: float
-    full_circle: bool
-    start: float | None
-    duration: float | None
-    rate: float | None
-    backwards: int
-    valid: float
-    ranges: tuple[float, float, float] | None
-    limits: tuple[float, float]
-    intensities: float
-    poses: float
-    travelled: float
-    frame_ids: tuple[str, ...]
+    beams: tuple[int, int]  # Least and largest number.
+    field_of_view: float  # First to last bearing of the first scan with most beams.
+    resolution: float  # Step between its beams.
+    full_circle: bool  # Whether it goes all around.
+    start: float | None  # Earliest stamp [s]; None where stamps are missing.
+    duration: float | None  # Latest stamp minus earliest [s].
+    rate: float | None  # Scans per second: of the median step of stamps that go forward.
+    backwards: int  # Stamps before the one that precedes them.
+    valid: float  # Share of beams that are valid.
+    ranges: tuple[float, float, float] | None  # Least, median (to 1 mm), largest valid range [m].
+    limits: tuple[float, float]  # Least `range_min` and largest `range_max` [m].
+    intensities: float  # Share of scans with intensities.
+    poses: float  # Share of scans with a pose.
+    travelled: float  # Length of the way from pose to pose [m].
+    frame_ids: tuple[str, ...]  # In order of appearance, the first 16.
 
     def rows(self) -> list[tuple[str, str]]:
         """Names and values for a person to read, angles in degrees."""
+        low, high = self.beams
+        span = "full circle" if self.full_circle else f"{math.degrees(self.field_of_view):.4g}°"
+        beams = f"{low}" if low == high else f"{low} to {high}"
+        beams += f", {span}, every {math.degrees(self.resolution):.4g}°"
+        ranges = f"{100 * self.valid:.1f} % valid"
+        if self.limits[1] < math.inf:
+            ranges += f" (limits {self.limits[0]:.4g} to {self.limits[1]:.4g} m)"
+        if self.ranges is not None:
+            low_range, median, high_range = self.ranges
+            ranges = f"{low_range:.2f} to {high_range:.2f} m, median {median:.2f} m, {ranges}"
+        way = f", {self.travelled:.1f} m travelled" if self.scans > 1 else ""
+        several = ": more than one scanner on this topic?" if len(self.frame_ids) > 1 else ""
         return [
             ("scans", f"{self.scans}"),
-            ("beams", self._beams()),
+            ("beams", beams + ", with intensities" * bool(self.intensities)),
             ("time", self._time()),
-            ("ranges", self._ranges()),
-            ("poses", self._poses()),
-            ("frames", self._frames()),
+            ("ranges", ranges),
+            ("poses", f"{100 * self.poses:.0f} % of scans{way}" if self.poses else "none"),
+            ("frames", (", ".join(self.frame_ids) or "not named") + several),
         ]
-
-    def _beams(self) -> str:
-        low, high = self.beams
-        count = f"{low}" if low == high else f"{low} to {high}"
-        span = "full circle" if self.full_circle else f"{math.degrees(self.field_of_view):.4g}°"
-        more = ", with intensities" if self.intensities else ""
-        return f"{count}, {span}, every {math.degrees(self.resolution):.4g}°{more}"
 
     def _time(self) -> str:
         if self.start is None or self.duration is None:
@@ -113,26 +87,6 @@ class TopicInfo:
             parts.append(f"{self.backwards} stamps run backwards")
         return ", ".join(parts)
 
-    def _ranges(self) -> str:
-        valid = f"{100 * self.valid:.1f} % valid"
-        low, high = self.limits
-        if high < math.inf:
-            valid += f" (limits {low:.4g} to {high:.4g} m)"
-        if self.ranges is None:
-            return valid
-        low, median, high = self.ranges
-        return f"{low:.2f} to {high:.2f} m, median {median:.2f} m, {valid}"
-
-    def _frames(self) -> str:
-        several = ": more than one scanner on this topic?" if len(self.frame_ids) > 1 else ""
-        return (", ".join(self.frame_ids) or "not named") + several
-
-    def _poses(self) -> str:
-        if not self.poses:
-            return "none"
-        way = f", {self.travelled:.1f} m travelled" if self.scans > 1 else ""
-        return f"{100 * self.poses:.0f} % of scans{way}"
-
 
 @dataclass(frozen=True)
 class LogInfo:
@@ -145,11 +99,9 @@ class LogInfo:
     topics : tuple of TopicInfo
         The topics that were read, in order of appearance, the first 32.
     contents : tuple of Topic
-        All that the log says it holds, scans and other messages.
-    skipped : int
-        Faults gone over.
-    unread : int
-        Scans of further topics.
+        All kinds of messages in the log.
+    skipped, unread : int
+        Number of faults that were skipped, and of scans of further topics.
     """
 
     path: str
@@ -184,24 +136,20 @@ class LogInfo:
     def _holds(self) -> list[tuple[str, str]]:
         """One row for each kind of messages, in columns."""
         shown = self.contents[:_LISTED]
-        widths = [
-            max((len(text) for text in column), default=0)
-            for column in ([t.name for t in shown], [t.type for t in shown])
-        ]
-        texts = [f"{t.name:<{widths[0]}}  {t.type:<{widths[1]}}".rstrip() for t in shown]
-        width = max(map(len, texts), default=0)
-        values = [
-            f"{text:<{width}}  {t.count}"
-            + (f", {t.publishers} publishers" if t.publishers > 1 else "")
-            for text, t in zip(texts, shown, strict=True)
-        ]
+        names = max((len(topic.name) for topic in shown), default=0)
+        types = max((len(topic.type) for topic in shown), default=0)
+        values = []
+        for topic in shown:
+            several = f", {topic.publishers} publishers" if topic.publishers > 1 else ""
+            kind = f"{topic.type:<{types}}  " if types else ""
+            values.append(f"{topic.name:<{names}}  {kind}{topic.count}{several}")
         if len(self.contents) > _LISTED:
             values.append(f"and {len(self.contents) - _LISTED} more topics")
         return [("" if i else "holds", value) for i, value in enumerate(values)]
 
 
 def summarize(log: Log, items: Iterable[tuple[str, LaserScan]] | None = None) -> LogInfo:
-    """Read a log once and tell what it holds, in bounded memory.
+    """Read a log once and report what it holds, in bounded memory.
 
     Parameters
     ----------
@@ -230,60 +178,121 @@ def summarize(log: Log, items: Iterable[tuple[str, LaserScan]] | None = None) ->
     >>> topic.scans, topic.beams, topic.rate, topic.ranges
     (2, (2, 2), 2.0, (1.0, 1.5, 2.0))
     """
-    parts: dict[str, _Part] = {}
+    counters: dict[str, _Counter] = {}
     unread = 0
     for topic, scan in log.items() if items is None else items:
-        if topic not in parts and len(parts) >= _TOPICS:
-            unread += 1
-            continue
-        parts.setdefault(topic, _Part()).add(scan)
+        if topic not in counters:
+            if len(counters) >= _TOPICS:
+                unread += 1
+                continue
+            counters[topic] = _Counter(scan)
+        counters[topic].add(scan)
     return LogInfo(
         path=log.name,
         format=log.format,
-        topics=tuple(part.told(name) for name, part in parts.items()),
+        topics=tuple(counter.info(name) for name, counter in counters.items()),
         contents=tuple(log.contents()),
         skipped=log.skipped,
         unread=unread,
     )
 
 
-class _Part:
-    """What is counted of one topic."""
+class _Counter:
+    """What is counted over the scans of a topic, in constant memory."""
 
-    def __init__(self) -> None:
-        self.count = self.with_intensities = 0
-        self.geometry, self.clock, self.ranges, self.way = Geometry(), Clock(), Ranges(), Way()
+    def __init__(self, first: LaserScan) -> None:
+        self.scans = self.beams = self.valid = self.with_intensities = self.with_pose = 0
+        self.least, self.widest = len(first), first
+        self.start = self.end = self.stamp = first.stamp
+        # Steps of stamps that go forward are thinned: every second one goes when there are many.
+        self.forward, self.backwards, self.stride = 0, 0, 1
+        self.steps: list[float] = []
+        self.limits = first.range_min, first.range_max
+        # Ranges that wait to be counted, and how many are.
+        self.waiting: list[NDArray[np.float64]] = []
+        self.counted = 0
+        self.low, self.high = math.inf, -math.inf
+        self.histogram = np.zeros(0, dtype=np.int64)
+        self.travelled, self.pose = 0.0, first.pose
         self.frames: dict[str, None] = {}
 
     def add(self, scan: LaserScan) -> None:
-        self.count += 1
-        self.geometry.add(scan)
-        self.clock.add(scan.stamp)
-        self.ranges.add(scan)
+        self.scans += 1
+        self.beams += len(scan)
+        self.least = min(self.least, len(scan))
+        if len(scan) > len(self.widest):
+            self.widest = scan
         self.with_intensities += scan.intensities is not None
-        self.way.add(scan.pose)
         if scan.frame_id and len(self.frames) < _FRAMES:
             self.frames[scan.frame_id] = None
+        self._add_stamp(scan.stamp)
+        self._add_pose(scan.pose)
+        self.limits = min(self.limits[0], scan.range_min), max(self.limits[1], scan.range_max)
+        ranges = scan.ranges[scan.valid]
+        self.valid += len(ranges)
+        if len(ranges):
+            self.waiting.append(ranges)
+        if self.valid - self.counted >= _BUFFER:
+            self._count_ranges()
 
-    def told(self, name: str) -> TopicInfo:
-        geometry, clock = self.geometry, self.clock
-        start, duration = clock.span()
+    def _add_stamp(self, stamp: float) -> None:
+        step, self.stamp = stamp - self.stamp, stamp
+        self.start, self.end = min(self.start, stamp), max(self.end, stamp)
+        self.backwards += step < 0
+        if step > 0:
+            if self.forward % self.stride == 0:
+                self.steps.append(step)
+            self.forward += 1
+            if len(self.steps) >= _BUFFER:
+                self.steps, self.stride = self.steps[::2], 2 * self.stride
+
+    def _add_pose(self, pose: Pose | None) -> None:
+        if pose is not None:
+            self.with_pose += 1
+            self.travelled += math.dist(pose[:2], (self.pose or pose)[:2])
+            self.pose = pose
+
+    def _count_ranges(self) -> None:
+        values = np.concatenate(self.waiting)
+        self.waiting, self.counted = [], self.valid
+        self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
+        bins = np.rint(1000 * np.minimum(values, _LONGEST)).astype(np.int64)
+        counts = np.bincount(bins, minlength=len(self.histogram))
+        counts[: len(self.histogram)] += self.histogram
+        self.histogram = counts
+
+    def _ranges(self) -> tuple[float, float, float] | None:
+        if self.waiting:
+            self._count_ranges()
+        if not self.valid:
+            return None
+        ranks = ((self.valid - 1) // 2 + 1, self.valid // 2 + 1)
+        median = float(np.mean(np.searchsorted(np.cumsum(self.histogram), ranks))) / 1000
+        # Half a millimetre of rounding must not carry it past the extremes.
+        low, high = float(self.low), float(self.high)
+        return low, min(max(median, low), high), high
+
+    def info(self, name: str) -> TopicInfo:
+        has_stamps = (self.start, self.end) != (0, 0)  # A log without stamps has zeros.
+        most_forward = self.forward >= _FORWARD * (self.scans - 1)
+        has_rate = self.steps and most_forward and self.backwards <= _BACKWARD * (self.scans - 1)
+        widest = self.widest
         return TopicInfo(
             name=name,
-            scans=self.count,
-            beams=(geometry.least, geometry.most),
-            field_of_view=geometry.field_of_view,
-            resolution=geometry.resolution,
-            full_circle=geometry.full_circle,
-            start=start,
-            duration=duration,
-            rate=clock.rate(),
-            backwards=clock.backwards,
-            valid=self.ranges.count / max(geometry.total, 1),
-            ranges=self.ranges.quantiles(),
-            limits=self.ranges.limits,
-            intensities=self.with_intensities / max(self.count, 1),
-            poses=self.way.count / max(self.count, 1),
-            travelled=self.way.length,
+            scans=self.scans,
+            beams=(self.least, len(widest)),
+            field_of_view=float(np.ptp(widest.angles)) if len(widest) else 0.0,
+            resolution=widest.angle_increment if len(widest) else 0.0,
+            full_circle=widest.is_full_circle if len(widest) else False,
+            start=self.start if has_stamps else None,
+            duration=self.end - self.start if has_stamps else None,
+            rate=1 / statistics.median(self.steps) if has_rate else None,
+            backwards=self.backwards,
+            valid=self.valid / max(self.beams, 1),
+            ranges=self._ranges(),
+            limits=self.limits,
+            intensities=self.with_intensities / self.scans,
+            poses=self.with_pose / self.scans,
+            travelled=self.travelled,
             frame_ids=tuple(self.frames),
         )

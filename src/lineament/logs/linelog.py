@@ -1,36 +1,41 @@
-"""What the logs of text lines have in common: lines of several kinds, some of them scans."""
+"""Logs of text lines: what a line is, which numbers its words are, and which scan they make."""
 
-from __future__ import annotations
-
+import re
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Collection, Iterator
-from typing import ClassVar
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import LogError
-from .base import Log, Topic
+from ..scan import LaserScan
+from .base import Head, Log, Topic
 from .lines import numbered_lines
 
-__all__ = ["LineLog"]
+#: Makes a scan of a line of some kind; None where the line holds what later scans need.
+Parser = Callable[[str, bytes], LaserScan | None]
 
 
 class LineLog(Log):
     """A log of text lines, plain or gzip; some kinds of them hold a scan each.
 
-    A format tells the kind of a line (`_kind`) and makes scans of them (`_items`, over `_lines`).
-
-    Raises
-    ------
-    LogError
-        If there is no such topic, or no line with a scan at all.
+    A format states how its lines begin and what makes scans of them (`_parser`).
     """
 
-    #: The kinds of lines that hold a scan.
+    #: What the beginning of a file in this format contains.
+    signature: ClassVar[re.Pattern[bytes]]
+    #: The kinds of lines, which are their first words.
+    kinds: ClassVar[tuple[str, ...]] = ()
+    #: The kinds of lines that hold a scan, and those that are read unless one is asked for.
     scan_kinds: ClassVar[tuple[str, ...]]
-    #: Those that are read unless one is asked for.
     read_kinds: ClassVar[tuple[str, ...]]
+    #: The kinds of lines that hold what the scans behind them need.
+    other_kinds: ClassVar[tuple[str, ...]] = ()
 
     def _open(self) -> None:
+        self._known = {kind.encode(): kind for kind in self.kinds}
         self._counts: Counter[str] | None = None
         self._wanted = self.read_kinds if self.topic is None else (self.topic,)
         # Stops at the first scan: a good log opens at once, however long it is.
@@ -39,10 +44,38 @@ class LineLog(Log):
         if not known or not any(found[name] for name in self._wanted):
             raise self._no_scans(found)
 
-    @staticmethod
+    @classmethod
+    def recognises(cls, head: Head) -> bool:
+        """Whether the beginning of the file contains the signature of the format."""
+        return cls.signature.search(head.data) is not None
+
     @abstractmethod
-    def _kind(line: bytes) -> str:
-        """Name the kind of a line; empty for one that is none of the format's."""
+    def _parser(self) -> Parser:
+        """Return what makes scans of the lines of one iteration."""
+
+    def _kind(self, line: bytes) -> str:
+        """Return the kind of a line; empty for one that the format does not know."""
+        # No need to split the thousand characters behind it.
+        words = line[:24].split(None, 1)
+        return self._known.get(words[0], "") if words else ""
+
+    def _lines(self) -> Iterator[tuple[int, bytes]]:
+        return numbered_lines(self.source)
+
+    def _items(self) -> Iterator[tuple[str, LaserScan]]:
+        parse = self._parser()
+        needed = {*self._wanted, *self.other_kinds}
+        for number, line in self._until_broken(self._lines()):
+            kind = self._kind(line)
+            if kind not in needed:
+                continue
+            try:
+                scan = parse(kind, line)
+            except (ValueError, OverflowError) as error:
+                self._fault(LogError(self.name, str(error), line=number))
+            else:
+                if scan is not None:
+                    yield kind, scan
 
     @property
     def topics(self) -> list[str]:
@@ -50,7 +83,7 @@ class LineLog(Log):
         return [name for name in self.scan_kinds if self._all_counts()[name]]
 
     def contents(self) -> list[Topic]:
-        """Tell all kinds of lines that the log holds."""
+        """Return all kinds of lines in the log."""
         return [Topic(name, "", count) for name, count in self._all_counts().most_common()]
 
     def __len__(self) -> int:
@@ -65,11 +98,11 @@ class LineLog(Log):
         """Count the lines of each kind, without parsing, up to the first one of `until`."""
         counts: Counter[str] = Counter()
         try:
-            for _, line in numbered_lines(self.source):
-                name = self._kind(line)
-                if name:
-                    counts[name] += 1
-                    if name in until:
+            for _, line in self._lines():
+                kind = self._kind(line)
+                if kind:
+                    counts[kind] += 1
+                    if kind in until:
                         break
         except LogError:
             # Without a scan before the break there is nothing to keep going with.
@@ -77,22 +110,109 @@ class LineLog(Log):
                 raise
         return counts
 
-    def _lines(self) -> Iterator[tuple[int, bytes]]:
-        """Read the lines with their numbers; a stream that breaks is a fault at its end."""
-        return self._until_broken(numbered_lines(self.source))
-
-    def _bad_line(self, number: int, error: Exception) -> None:
-        """Report what is wrong with a line."""
-        self._fault(LogError(self.name, str(error), line=number))
-
     def _no_scans(self, found: Counter[str]) -> LogError:
         topics = [name for name in self.scan_kinds if found[name]]
         if not found:
             return LogError(self.name, f"is no log of {self.description}")
         if self.topic is not None:
-            return self._no_such_topic(topics)
+            known = ", ".join(topics) or "none that carries scans"
+            return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")
         there = ", ".join(f"{name} ({count})" for name, count in found.most_common(8))
         choose = f"; choose topic {topics[0]}" if topics else ""
         return LogError(
             self.name, f"holds {there}, expected {' or '.join(self.read_kinds)}{choose}"
         )
+
+
+class Fields:
+    """The words of a line by name, as a pattern gives them.
+
+    In the pattern ``x`` is a number, ``_`` a word that is not read, and ``ranges*`` a count and as
+    many numbers. Words behind a pattern without such a list are not read.
+
+    Examples
+    --------
+    >>> line = Fields("Laser", "ranges* stamp _").read(b"Laser 2 1.5 81.83 7 host")
+    >>> line["ranges"].tolist(), line["stamp"]
+    ([1.5, 81.83], 7.0)
+    """
+
+    def __init__(self, kind: str, pattern: str) -> None:
+        self._kind, self._least = kind, len(pattern.split())
+        #: Numbers by their places, how many words these are, and the list behind them.
+        self._pieces: list[tuple[list[tuple[str, int]], int, str]] = []
+        for piece in re.split(r"(?<=\*)", pattern):
+            names = piece.split()
+            name = names.pop().removesuffix("*") if "*" in piece else ""
+            places = [(name, at) for at, name in enumerate(names) if name != "_"]
+            self._pieces.append((places, len(names), name))
+
+    def read(self, line: bytes) -> dict[str, Any]:
+        """Return numbers and arrays by name; ValueError if the line does not fit."""
+        kind, words, number = self._kind, line.split(), number_parser(line)
+        if len(words) <= self._least:
+            raise ValueError(f"{kind} has {len(words) - 1} values, expected {self._least} or more")
+        values: dict[str, Any] = {}
+        at, behind = 1, self._least
+        for i, (places, width, name) in enumerate(self._pieces):
+            try:
+                for field, place in places:
+                    values[field] = number(words[at + place])
+            except ValueError:
+                raise _no_number(f"{kind} {field}", words[at + place]) from None
+            at, behind = at + width + 1, behind - width - 1
+            if name:
+                count = words[at - 1]
+                if not count.isdigit() or len(count) > 9:
+                    raise _no_number(f"{kind}: the number of {name}", count, "a whole number")
+                n, left = int(count), len(words) - at - behind
+                # Behind the last list are as many words as the pattern has.
+                if n > left or (n < left and i == len(self._pieces) - 2):
+                    where = f" before its last {behind} values" if behind else ""
+                    raise ValueError(f"{kind} says {n} {name} and has {left} of them{where}")
+                values[name] = numbers(name.removesuffix("s"), words[at : at + n], number)
+                at += n
+        return values
+
+
+def number_parser(line: bytes) -> Callable[[bytes], float]:
+    """Return what makes numbers of the words of a line: Python's own notation 1_0 is refused."""
+    return _plain_float if b"_" in line else float
+
+
+def _plain_float(word: bytes) -> float:
+    if b"_" in word:
+        raise ValueError
+    return float(word)
+
+
+def numbers(
+    what: str, words: list[bytes], number: Callable[[bytes], float] = _plain_float
+) -> NDArray[np.float64]:
+    """Return words as numbers; ValueError, which names the first that is none, if not.
+
+    Examples
+    --------
+    >>> numbers("range", [b"1.5", b"x"])
+    Traceback (most recent call last):
+    ValueError: range 2 of 2 is 'x', expected a number
+    """
+    try:
+        return np.fromiter(map(number, words), np.float64, len(words))
+    except ValueError:
+        for i, word in enumerate(words):
+            scalar(f"{what} {i + 1} of {len(words)}", word, number)
+        raise
+
+
+def scalar(what: str, word: bytes, number: Callable[[bytes], float] = _plain_float) -> float:
+    """Return a word as a number; ValueError if it is none."""
+    try:
+        return number(word)
+    except ValueError:
+        raise _no_number(what, word) from None
+
+
+def _no_number(what: str, word: bytes, expected: str = "a number") -> ValueError:
+    shown = word[:24].decode("ascii", "backslashreplace")  # Whatever its bytes.
+    return ValueError(f"{what} is '{shown}', expected {expected}")

@@ -1,43 +1,34 @@
 """Scans from bags of ROS messages, whatever the container."""
 
-from __future__ import annotations
-
-import os
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
-from ..rosmsg.messages import CLOUD, decoders
+from ..rosmsg.scans import CLOUD, decoders
+from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
-from .base import Log, ReadOptions, Topic
-from .ros_bag import Bag, Buffer, Connection
+from .base import Log, Topic
+from .ros_bag import Bag, Connection
 from .ros_poses import PoseFinder
-
-__all__ = ["RosLog"]
 
 #: How many topics an error lists.
 _LISTED = 20
 
-_Ready = Sequence[tuple[str, LaserScan]]
-
 
 class RosLog(Log):
-    """Scans of a bag: those of the topic that is asked for, or of all, as the bag has them.
+    """Scans of a bag: those of the topic that is asked for, or of all, in the order of the bag.
 
     Parameters
     ----------
-    path : path-like
-        The bag.
-    topic : str, optional
-        Topic of the scans; all that carry scans if None.
-    keep_going : bool
-        Skip and count broken chunks and malformed messages instead of raising an error.
+    path, topic, keep_going
+        As for :class:`~lineament.logs.base.Log`. Broken chunks are faults, and so are malformed
+        messages.
     options : ReadOptions
         Which echo of ``MultiEchoLaserScan``; which ring of ``PointCloud2``, whose topics carry
         scans only where a ring is chosen; and the topic of poses, as
         :class:`~lineament.logs.ros_poses.PoseFinder` takes it. Poses are those of the frame that
-        the topic is about, and never guessed: none without a topic.
+        the topic is about, and never guessed: without a topic there are none.
 
     Raises
     ------
@@ -47,21 +38,15 @@ class RosLog(Log):
         0 among those of its topic; and where the bag is broken or cut off, after all that is whole.
     """
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        topic: str | None = None,
-        *,
-        keep_going: bool = False,
-        options: ReadOptions = ReadOptions(),  # noqa: B008 (frozen)
-    ) -> None:
-        super().__init__(path, topic, keep_going=keep_going, options=options)
+    needs_seek = True
+
+    def _open(self) -> None:
         self._decoders = decoders(self.options.echo, self.options.ring)
         self._bags = self._open_bags()
         self._counts: Counter[Connection] = Counter()
         for bag in self._bags:
             self._counts.update(bag.counts())
-        self._wanted = self.topics if topic is None else [topic]
+        self._wanted = self.topics if self.topic is None else [self.topic]
         if not any(name in self.topics for name in self._wanted):
             raise self._no_scans()
         self._pose_finder()
@@ -83,7 +68,7 @@ class RosLog(Log):
         )
 
     def contents(self) -> list[Topic]:
-        """Tell all topics, with their types, messages and, in a ROS 1 bag, publishers."""
+        """Return all topics, with their types, messages and, in a ROS 1 bag, publishers."""
         kinds: dict[tuple[str, str], list[int]] = {}
         for connection, count in sorted(self._counts.items()):
             kinds.setdefault(connection[:2], []).append(count)
@@ -116,7 +101,9 @@ class RosLog(Log):
                 else:
                     yield from ready
 
-    def _read(self, connection: Connection, data: Buffer, finder: PoseFinder | None) -> _Ready:
+    def _read(
+        self, connection: Connection, data: Buffer, finder: PoseFinder | None
+    ) -> Sequence[tuple[str, LaserScan]]:
         """Read one message: the scans that are ready after it, by topic."""
         topic, kind = connection.topic, connection.type
         if finder and topic in finder.topics and kind in finder.types:
@@ -134,11 +121,8 @@ class RosLog(Log):
         except ValueError as error:
             raise LogError(self.name, str(error)) from None
         if finder.topic not in self._topics_of(finder.types):
-            wanted = " or ".join(finder.types)
-            raise LogError(
-                self.name,
-                f"has no {wanted} on {finder.topic!r}; topics there are: {self._listing()}",
-            )
+            wanted = f"{' or '.join(finder.types)} on {finder.topic!r}"
+            raise LogError(self.name, f"has no {wanted}; topics there are: {self._listing()}")
         return finder
 
     def _topics_of(self, types: Container[str]) -> list[str]:
@@ -150,8 +134,9 @@ class RosLog(Log):
         hint = ""
         if self.options.ring is None and self._topics_of((CLOUD,)):
             hint = "; choose a ring to read a PointCloud2"
-        problem = f"has no {wanted}{on}; topics there are: {self._listing()}{hint}"
-        return LogError(self.name, problem)
+        return LogError(
+            self.name, f"has no {wanted}{on}; topics there are: {self._listing()}{hint}"
+        )
 
     def _listing(self) -> str:
         known = self.contents()

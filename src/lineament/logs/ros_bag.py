@@ -1,20 +1,17 @@
 """What the containers of ROS messages have in common: connections, bounded reads, compression."""
 
-from __future__ import annotations
-
 import os
+import struct
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 from ..errors import LogError
 from ..rosmsg.wire import Buffer
 from .lines import reading
-
-__all__ = ["MAX_PIECE", "Bag", "Buffer", "Connection", "Fault", "Source", "decompress"]
 
 #: Largest chunk, record or message that is held in memory [bytes].
 MAX_PIECE = 1 << 28
@@ -24,18 +21,9 @@ Fault = Callable[[LogError], None]
 
 
 class Connection(NamedTuple):
-    """Who wrote a message: its topic, its type and how it is serialised.
+    """Who wrote a message: topic, type as ROS 1 writes it, serialisation, node ("" if not known).
 
-    Parameters
-    ----------
-    topic : str
-        Name of the topic.
-    type : str
-        Type of the messages in the manner of ROS 1, ``sensor_msgs/LaserScan``.
-    encoding : str
-        ``ros1``, ``cdr``, or another one that cannot be read here.
-    publisher : str
-        Name of the node; empty where the bag does not tell.
+    The serialisation is ``ros1``, ``cdr``, or another one that cannot be read here.
     """
 
     topic: str
@@ -44,27 +32,17 @@ class Connection(NamedTuple):
     publisher: str = ""
 
     @classmethod
-    def named(cls, topic: str, kind: str, encoding: str, publisher: str = "") -> Connection:
-        """Make a connection of what a bag says; a type of ROS 2, ``sensor_msgs/msg/LaserScan`` too.
+    def named(cls, topic: str, kind: str, encoding: str, publisher: str = "") -> Self:
+        """Make a connection from the names in a bag; ``sensor_msgs/msg/LaserScan`` of ROS 2 too.
 
-        Letters that cannot be printed come of damage, and go: errors are one line.
+        Letters that cannot be printed come from damage, and go: errors are one line.
         """
         names = topic, kind.replace("/msg/", "/"), encoding, publisher
-        return cls(*(name if name.isprintable() else _printable(name) for name in names))
-
-
-def _printable(name: str) -> str:
-    return "".join(letter for letter in name if letter.isprintable())
+        return cls(*("".join(filter(str.isprintable, name)) for name in names))
 
 
 class Bag(ABC):
-    """One file of messages.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; its ``str`` is what errors call it.
-    """
+    """One file of messages; its ``str`` is what errors call it."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path
@@ -75,66 +53,73 @@ class Bag(ABC):
     ) -> Iterator[tuple[Connection, Buffer]]:
         """Read the messages on `topics`, or all if None, from the start in the bag's order.
 
-        What is broken goes through `fault`; reading goes on behind it where that is possible.
+        Faults go through `fault`; reading goes on behind them where that is possible.
         """
-
-    def counts(self) -> Counter[Connection]:
-        """Count the messages of each connection: by the index where there is one.
-
-        Raises
-        ------
-        LogError
-            If the file is broken before its first message.
-        """
-        counts = self._indexed_counts()
-        if counts is not None:
-            return counts
-        # What is broken is told when the messages are read: here it only ends the count.
-        faults: list[LogError] = []
-
-        def note(error: LogError) -> None:
-            faults.append(error.fresh())
-
-        counted = Counter(connection for connection, _ in self.messages(None, note))
-        if faults and not counted:
-            raise faults[0].fresh()
-        return counted
 
     @abstractmethod
-    def _indexed_counts(self) -> Counter[Connection] | None:
-        """Count by the index alone; None where there is none or it makes no sense."""
+    def counts(self) -> Counter[Connection]:
+        """Count the messages of each connection; LogError if the bag is broken at its start."""
 
 
-class Source:
-    """A file that is read piece by piece, each checked against what is left before it is taken.
+class RecordReader(ABC):
+    """Reads a file of records once: those on `topics`, or all if None.
 
-    Parameters
-    ----------
-    path : path-like
-        The file; its ``str`` is what errors call it.
-
-    Attributes
-    ----------
-    at : int
-        Where it stands [bytes].
+    Each piece is checked against what is left of the file before it is taken. `at` is the place
+    that it has reached [bytes].
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path, self.at = path, 0
+    def __init__(self, path: str | os.PathLike[str], topics: Collection[str] | None = None) -> None:
+        self.path, self.at, self._topics = path, 0, topics
+        self._connections: dict[int, Connection | None] = {}
         with reading(path):
             self._file = Path(path).open("rb")  # noqa: SIM115 (closed by __exit__)
             self._size = os.fstat(self._file.fileno()).st_size
 
-    def __enter__(self) -> Source:
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
+
+    @abstractmethod
+    def records(self) -> Iterator[tuple[int, Any, Buffer]]:
+        """Read all records from the start: their places, heads and data."""
+
+    @abstractmethod
+    def unpacked(self, head: Any, data: Buffer) -> Iterator[tuple[Any, Buffer]]:
+        """Read the records in a chunk; of another record itself."""
+
+    @abstractmethod
+    def message(self, head: Any, data: Buffer) -> tuple[Connection, Buffer] | None:
+        """Take one record: note a connection, return a message that is wanted."""
+
+    @abstractmethod
+    def indexed_counts(self) -> Counter[Connection]:
+        """Count by the index alone; empty, or an error, where it is missing or makes no sense."""
+
+    def wanted(self, connection: Connection) -> Connection | None:
+        """Return a connection if its topic is wanted."""
+        is_wanted = self._topics is None or connection.topic in self._topics
+        return connection if is_wanted else None
+
+    def note(self, number: int, connection: Connection) -> None:
+        """Remember a connection by its number."""
+        self._connections[number] = self.wanted(connection)
+
+    def sender(self, number: int) -> Connection | None:
+        """Return the connection of a number if it is wanted; ValueError if it is not known."""
+        if number not in self._connections:
+            raise ValueError(f"message of connection {number}, which is not described before it")
+        return self._connections[number]
+
+    def counted(self, counts: Iterable[tuple[int, int]]) -> Counter[Connection]:
+        """Add up counts of messages, by the numbers of their connections."""
+        total: Counter[Connection] = Counter()
+        for number, count in counts:
+            connection = self.sender(number)
+            if connection is not None:
+                total[connection] += count
+        return total
 
     @property
     def left(self) -> int:
@@ -143,8 +128,9 @@ class Source:
 
     def take(self, n: int, what: str) -> bytes:
         """Read the next `n` bytes; LogError if they are not all there, or too many."""
-        if n > self.left or n > MAX_PIECE:
-            raise self._refused(n, what)
+        self._check(n, what)
+        if n > MAX_PIECE:
+            raise self.wrong(f"{what} has {n} bytes, expected at most {MAX_PIECE >> 20} MiB")
         try:
             data = self._file.read(n)
         except OSError as error:
@@ -156,8 +142,7 @@ class Source:
 
     def skip(self, n: int, what: str) -> None:
         """Go over the next `n` bytes; LogError if they are not all there."""
-        if n > self.left:
-            raise self._refused(n, what)
+        self._check(n, what)
         self.go(self.at + n)
 
     def go(self, at: int) -> None:
@@ -170,29 +155,63 @@ class Source:
         """Make an error that says where in the file it is."""
         return LogError(self.path, f"byte {self.at}: {problem}")
 
-    def _refused(self, n: int, what: str) -> LogError:
+    def _check(self, n: int, what: str) -> None:
         if n > self.left:
-            return self.wrong(f"is cut off: {what} has {n} bytes, {self.left} are left")
-        return self.wrong(f"{what} has {n} bytes, expected at most {MAX_PIECE >> 20} MiB")
+            raise self.wrong(f"is cut off: {what} has {n} bytes, {self.left} are left")
+
+
+class RecordBag(Bag):
+    """A bag that is a chain of records, some of them chunks of records.
+
+    It is read from the start, record by record; its index is used for counts alone. So a bag
+    without an index, or with a wrong one, is read like any other.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], reader: type[RecordReader]) -> None:
+        super().__init__(path)
+        self._reader = reader
+
+    def messages(
+        self, topics: Collection[str] | None, fault: Fault
+    ) -> Iterator[tuple[Connection, Buffer]]:
+        """Read the messages in the order of the file; see `Bag`."""
+        with self._reader(self.path, topics) as reader:
+            try:
+                for at, head, data in reader.records():
+                    try:
+                        for record in reader.unpacked(head, data):
+                            message = reader.message(*record)
+                            if message is not None:
+                                yield message
+                    except (ValueError, struct.error) as error:
+                        # The length of the record still leads to the next one.
+                        fault(LogError(self.path, f"byte {at}: {error}"))
+            except LogError as error:
+                fault(error)
+
+    def counts(self) -> Counter[Connection]:
+        """Count the messages of each connection: by the index where there is one; see `Bag`."""
+        with self._reader(self.path) as reader, suppress(LogError, ValueError, struct.error):
+            counts = reader.indexed_counts()
+            if counts:
+                return counts
+        # Faults are reported when the messages are read: here they only end the count.
+        faults: list[LogError] = []
+        messages = self.messages(None, lambda error: faults.append(error.fresh()))
+        counted = Counter(connection for connection, _ in messages)
+        if faults and not counted:
+            raise faults[0].fresh()
+        return counted
 
 
 def decompress(codec: str, data: Buffer, size: int) -> Buffer:
-    """Decompress a chunk that says how large it becomes, and never more than that.
-
-    Parameters
-    ----------
-    codec : str
-        ``none`` or empty, ``bz2``, ``lz4`` or ``zstd``.
-    data : bytes-like
-        The compressed chunk.
-    size : int
-        Its size once decompressed [bytes].
+    """Decompress a chunk that says how large it becomes [bytes], and never more than that.
 
     Raises
     ------
     ValueError
-        If the codec is not known, the data is broken, or its size is another one or more than
-        `MAX_PIECE`.
+        If the codec is not none, bz2, lz4 or zstd, the data is broken, or its size is another one
+        or more than `MAX_PIECE`.
 
     Examples
     --------
@@ -206,8 +225,9 @@ def decompress(codec: str, data: Buffer, size: int) -> Buffer:
         plain = data
     elif codec in _DECOMPRESSORS:
         try:
-            plain = _DECOMPRESSORS[codec](data, size)
-        # The libraries have errors of their own: RuntimeError, OSError, ZstdError, EOFError.
+            # One byte more than expected is asked for, so that a chunk that is longer shows.
+            plain = _DECOMPRESSORS[codec](data, size + 1)
+        # The libraries have their own errors: RuntimeError, OSError, ZstdError, EOFError.
         except Exception as error:
             raise ValueError(f"{codec} data is broken: {error}") from None
     else:
@@ -218,31 +238,24 @@ def decompress(codec: str, data: Buffer, size: int) -> Buffer:
     return plain
 
 
-# One byte more than expected is asked for, so that a chunk that is longer shows.
-
-
-def _bz2(data: Buffer, size: int) -> bytes:
+def _bz2(data: Buffer, most: int) -> bytes:
     import bz2
 
-    return bz2.BZ2Decompressor().decompress(data, size + 1)
+    return bz2.BZ2Decompressor().decompress(data, most)
 
 
-def _lz4(data: Buffer, size: int) -> bytes:
+def _lz4(data: Buffer, most: int) -> bytes:
     from lz4.frame import LZ4FrameDecompressor
 
-    plain: bytes = LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    plain: bytes = LZ4FrameDecompressor().decompress(data, max_length=most)
     return plain
 
 
-def _zstd(data: Buffer, size: int) -> bytes:
+def _zstd(data: Buffer, most: int) -> bytes:
     from zstandard import ZstdDecompressor
 
     # Its one-shot function trusts the size in the frame's own header; a stream does not.
-    return ZstdDecompressor(max_window_size=MAX_PIECE).stream_reader(data).read(size + 1)
+    return ZstdDecompressor(max_window_size=MAX_PIECE).stream_reader(data).read(most)
 
 
-_DECOMPRESSORS: dict[str, Callable[[Buffer, int], bytes]] = {
-    "bz2": _bz2,
-    "lz4": _lz4,
-    "zstd": _zstd,
-}
+_DECOMPRESSORS = {"bz2": _bz2, "lz4": _lz4, "zstd": _zstd}

@@ -1,29 +1,21 @@
-"""Poses from ROS topics: odometry, stamped poses and transforms, at the stamps of the scans."""
-
-from __future__ import annotations
+"""Poses of scans from ROS topics: odometry, stamped poses and transforms, at their stamps."""
 
 import math
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterator
 from itertools import pairwise
 
-from ..rosmsg.wire import Wire
+from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, stamped_poses
+from ..rosmsg.wire import Buffer
 from ..scan import LaserScan, Pose
-from .ros_bag import Buffer, Connection
-
-__all__ = ["POSE_TYPES", "TRANSFORMS", "PoseFinder", "plane_pose"]
+from ..scan.poses import compose
+from .ros_bag import Connection
 
 #: Poses that are held of each track, and scans that wait for a pose after theirs.
 MAX_POSES = 4096
 MAX_WAITING = 64
-#: Poses are nearer [m, rad]: what is computed of them stays finite.
+#: Poses are nearer [m, rad]: what is computed from them stays finite.
 FARTHEST = 1e100
-
-#: Types of messages of transforms, whose edges are chosen by the names of their frames.
-TRANSFORMS = ("tf2_msgs/TFMessage", "tf/tfMessage")
-
-_Edge = tuple[str, str]
 
 
 class PoseFinder:
@@ -59,64 +51,58 @@ class PoseFinder:
                 f"pose topic is {wanted!r}, expected frames as in {self.topic}:odom->base_link"
             )
         self.topics = (self.topic, f"{self.topic}_static") if chain else (self.topic,)
-        self._tracks = {edge: _Track() for edge in (pairwise(frames) if chain else [("", "")])}
+        #: Types of messages that the topic may have.
+        self.types = TRANSFORMS if chain else tuple(POSE_TYPES)
+        self._tracks = {edge: _Track() for edge in pairwise(frames)} or {("", ""): _Track()}
         self._waiting: deque[tuple[str, LaserScan]] = deque()
 
-    @property
-    def types(self) -> tuple[str, ...]:
-        """Types of messages that the topic may have."""
-        return TRANSFORMS if len(self.topics) == 2 else tuple(POSE_TYPES)
-
     def learn(self, connection: Connection, data: Buffer) -> list[tuple[str, LaserScan]]:
-        """Take a message with poses, and give the scans, by topic, that were waiting for it.
+        """Take a message with poses, and return the scans, by topic, that waited for it.
 
         Raises
         ------
         ValueError
             If the message is malformed or its numbers are not finite.
         """
-        wire = Wire(data, connection.encoding)
-        if connection.type in TRANSFORMS:
-            is_static = connection.topic != self.topic
-            for edge, stamp, pose in _transforms(wire):
-                if edge in self._tracks:
-                    self._tracks[edge].add(-math.inf if is_static else stamp, pose)
-        else:
-            self._tracks["", ""].add(*POSE_TYPES[connection.type](wire))
+        is_chain, is_static = len(self.topics) > 1, connection.topic != self.topic
+        for found in stamped_poses(data, connection.encoding, connection.type):
+            edge = (_frame(found.frame), _frame(found.child_frame)) if is_chain else ("", "")
+            if edge in self._tracks:
+                self._tracks[edge].add(-math.inf if is_static else found.stamp, found.pose)
         return self._release(MAX_WAITING)
 
     def wait(self, topic: str, scan: LaserScan) -> list[tuple[str, LaserScan]]:
-        """Let a scan wait for its pose, and give those, by topic, that have waited enough."""
+        """Let a scan wait for its pose, and return those, by topic, that have waited enough."""
         self._waiting.append((topic, scan))
         return self._release(MAX_WAITING)
 
     def finish(self) -> list[tuple[str, LaserScan]]:
-        """Give the scans that are left."""
+        """Return the scans that are left."""
         return self._release(0)
 
     def _release(self, most: int) -> list[tuple[str, LaserScan]]:
         ready = []
         while self._waiting:
             topic, scan = self._waiting[0]
-            if len(self._waiting) <= most and not self._covers(scan.stamp):
+            is_covered = all(track.covers(scan.stamp) for track in self._tracks.values())
+            if len(self._waiting) <= most and not is_covered:
                 break
             self._waiting.popleft()
             ready.append((topic, scan.with_pose(self._pose(scan.stamp))))
         return ready
 
-    def _covers(self, stamp: float) -> bool:
-        return all(track.covers(stamp) for track in self._tracks.values())
-
     def _pose(self, stamp: float) -> Pose | None:
-        pose: Pose | None = (0.0, 0.0, 0.0)
+        pose = (0.0, 0.0, 0.0)
         for track in self._tracks.values():
             link = track.at(stamp)
-            pose = None if pose is None or link is None else _compose(pose, link)
+            if link is None:
+                return None
+            pose = compose(pose, link)
         return pose
 
 
 class _Track:
-    """Poses by stamp, the newest `MAX_POSES` of them."""
+    """Poses by stamp, the newest `MAX_POSES` of them; a stamp of -inf holds at all times."""
 
     def __init__(self) -> None:
         self._stamps: list[float] = []
@@ -141,57 +127,17 @@ class _Track:
         i = bisect_right(self._stamps, stamp)
         if i == 0:
             return None
+        x, y, theta = self._poses[i - 1]
         if i == len(self._stamps) or self._is_static:
-            return self._poses[i - 1]
+            return x, y, theta
         before, after = self._stamps[i - 1], self._stamps[i]
-        return _between(self._poses[i - 1], self._poses[i], (stamp - before) / (after - before))
-
-
-def _between(a: Pose, b: Pose, share: float) -> Pose:
-    turn = math.remainder(b[2] - a[2], 2 * math.pi)
-    theta = math.remainder(a[2] + share * turn, 2 * math.pi)
-    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), theta
-
-
-def _compose(a: Pose, b: Pose) -> Pose:
-    c, s = math.cos(a[2]), math.sin(a[2])
-    theta = math.remainder(a[2] + b[2], 2 * math.pi)
-    return a[0] + c * b[0] - s * b[1], a[1] + s * b[0] + c * b[1], theta
+        share = (stamp - before) / (after - before)
+        next_x, next_y, next_theta = self._poses[i]
+        turn = math.remainder(next_theta - theta, 2 * math.pi)
+        heading = math.remainder(theta + share * turn, 2 * math.pi)
+        return x + share * (next_x - x), y + share * (next_y - y), heading
 
 
 def _frame(name: str) -> str:
     # Frames of ROS 1 may begin with a slash, in part of the messages.
     return name.strip().removeprefix("/")
-
-
-def plane_pose(wire: Wire) -> Pose:
-    """Take a position and a quaternion: what they are in the plane."""
-    x, y, _, qx, qy, qz, qw = wire.numbers("7d")
-    return x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-
-
-def _stamped(wire: Wire) -> tuple[float, Pose]:
-    stamp, _ = wire.header()
-    return stamp, plane_pose(wire)
-
-
-def _stamped_of_child(wire: Wire) -> tuple[float, Pose]:
-    stamp, _ = wire.header()
-    wire.text()
-    return stamp, plane_pose(wire)
-
-
-def _transforms(wire: Wire) -> Iterator[tuple[_Edge, float, Pose]]:
-    for _ in range(wire.count()):
-        stamp, parent = wire.header()
-        child = wire.text()
-        yield (_frame(parent), _frame(child)), stamp, plane_pose(wire)
-
-
-#: How to read each type of message that is a pose of its own: the stamp and the pose.
-POSE_TYPES: dict[str, Callable[[Wire], tuple[float, Pose]]] = {
-    "geometry_msgs/PoseStamped": _stamped,
-    "geometry_msgs/PoseWithCovarianceStamped": _stamped,
-    "geometry_msgs/TransformStamped": _stamped_of_child,
-    "nav_msgs/Odometry": _stamped_of_child,
-}

@@ -1,28 +1,25 @@
 """ROS 2 bags: a folder with ``metadata.yaml`` and its parts, or one ``.db3`` (sqlite3) alone.
 
-The parts tell all that is needed; ``metadata.yaml`` is read for their order alone, so that a
+The parts hold all that is needed; ``metadata.yaml`` is read for their order alone, so that a
 folder without one, or with one that is wrong about them, is read like any other.
 """
-
-from __future__ import annotations
 
 import os
 import re
 import sqlite3
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from ..errors import LogError
+from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Head
 from .lines import reading
-from .mcap import McapBag
+from .mcap import McapReader
 from .ros import RosLog
-from .ros_bag import MAX_PIECE, Bag, Buffer, Connection, Fault, decompress
-
-__all__ = ["Rosbag2Log", "Sqlite3Bag"]
+from .ros_bag import MAX_PIECE, Bag, Connection, Fault, RecordBag, decompress
 
 _MAGIC = b"SQLite format 3\0"
 _METADATA = "metadata.yaml"
@@ -45,6 +42,7 @@ _COMPUTED = (
     "SELECT t.name, c.name FROM sqlite_master AS t, pragma_table_xinfo(t.name) AS c "
     "WHERE t.name IN ('topics', 'messages') AND c.hidden"
 )
+_TOPICS = "SELECT id, name, type, serialization_format FROM topics"
 _MESSAGES = "SELECT topic_id, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
 
 
@@ -58,7 +56,6 @@ class Rosbag2Log(RosLog):
     format = "rosbag2"
     description = "ROS 2 bag (sensor_msgs)"
     endings = (".db3",)
-    needs_seek = True
 
     #: Parts that the metadata list and that are not there.
     _missing: Sequence[str] = ()
@@ -69,17 +66,17 @@ class Rosbag2Log(RosLog):
         with reading(self.name):
             parts = _parts(self.path)
             self._missing = [part.name for part in parts if not part.is_file()]
-        self._tell_missing()
+        self._report_missing()
         bags = [_bag(part) for part in parts if part.name not in self._missing]
         if not bags:
             raise LogError(self.name, "holds no part of a ROS 2 bag, expected .db3 or .mcap")
         return bags
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        self._tell_missing()
+        self._report_missing()
         yield from super()._items()
 
-    def _tell_missing(self) -> None:
+    def _report_missing(self) -> None:
         for name in self._missing:
             self._fault(LogError(self.name, f"has no {name}, which {_METADATA} lists"))
 
@@ -122,7 +119,7 @@ def _holds_one_bag(folder: Path) -> bool:
 def _bag(part: Path) -> Bag:
     if part.suffix == ".zstd":
         raise LogError(part, "is compressed as a whole: decompress it first (zstd -d)")
-    return McapBag(part) if part.suffix == ".mcap" else Sqlite3Bag(part)
+    return RecordBag(part, McapReader) if part.suffix == ".mcap" else Sqlite3Bag(part)
 
 
 class Sqlite3Bag(Bag):
@@ -133,14 +130,10 @@ class Sqlite3Bag(Bag):
     ) -> Iterator[tuple[Connection, Buffer]]:
         """Read the messages by the time when they were received; see `Bag`."""
         try:
-            with closing(self._connect()) as database:
-                connections = {
-                    number: connection
-                    for number, connection in self._connections(database).items()
-                    if topics is None or connection.topic in topics
-                }
-                query = _MESSAGES.format(",".join("?" * len(connections)))
-                for number, data in database.execute(query, tuple(connections)):
+            with self._opened() as (database, connections):
+                wanted = [n for n, c in connections.items() if topics is None or c.topic in topics]
+                query = _MESSAGES.format(",".join("?" * len(wanted)))
+                for number, data in database.execute(query, wanted):
                     try:
                         message = _uncompressed(data)
                     except ValueError as error:
@@ -149,59 +142,42 @@ class Sqlite3Bag(Bag):
                         yield connections[number], message
         except LogError as error:
             fault(error)
-        except _BROKEN as error:
-            fault(self._broken(error))
 
-    def _indexed_counts(self) -> Counter[Connection]:
+    def counts(self) -> Counter[Connection]:
         """Count by the database; LogError if that is broken."""
-        try:
-            with closing(self._connect()) as database:
-                connections = self._connections(database)
-                counts = dict.fromkeys(connections, 0)
-                query = "SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"
-                counts.update(row for row in database.execute(query) if row[0] in connections)
-        except _BROKEN as error:
-            raise self._broken(error) from None
         total: Counter[Connection] = Counter()
-        for number, count in counts.items():
-            total[connections[number]] += count
+        with self._opened() as (database, connections):
+            counts = dict(database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY 1"))
+            for number, connection in connections.items():
+                total[connection] += counts.get(number, 0)
         return total
 
-    def _connect(self) -> sqlite3.Connection:
-        """Open the database, without any chance of writing or waiting."""
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[sqlite3.Connection, dict[int, Connection]]]:
+        """Open the database, without any chance of writing or waiting; what it raises is one line.
+
+        Refused are those without the tables, or with views and columns that could compute.
+        """
         path = Path(self.path).absolute()
-        database = sqlite3.connect(f"{path.as_uri()}?{_mode(path)}", uri=True)
         try:
-            if not _shares(path):  # Else it would keep its shared memory in a file.
-                database.execute("PRAGMA locking_mode = EXCLUSIVE")
-            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_PIECE)
-            database.execute("PRAGMA trusted_schema = OFF")
-            self._check_tables(database)
-        except BaseException:
-            database.close()
-            raise
-        return database
-
-    def _check_tables(self, database: sqlite3.Connection) -> None:
-        """Refuse a database without the tables, or with views and columns that could compute."""
-        tables = {str(row[0]) for row in database.execute(_TABLES)}
-        if not {"topics", "messages"} <= tables:
-            names = ", ".join(sorted(tables)) or "none"
-            problem = f"is no ROS 2 bag, expected the tables topics and messages; it has: {names}"
-            raise LogError(self.path, problem)
-        for name, column in database.execute(_COMPUTED):
-            problem = f"is no ROS 2 bag: column {column} of its table {name} is computed"
-            raise LogError(self.path, problem)
-
-    def _connections(self, database: sqlite3.Connection) -> dict[int, Connection]:
-        query = "SELECT id, name, type, serialization_format FROM topics"
-        return {
-            number: Connection.named(str(topic), str(kind), str(encoding))
-            for number, topic, kind, encoding in database.execute(query)
-        }
-
-    def _broken(self, error: Exception) -> LogError:
-        return LogError(self.path, f"cannot be read as a ROS 2 bag (sqlite3): {error}")
+            with closing(sqlite3.connect(f"{path.as_uri()}?{_mode(path)}", uri=True)) as database:
+                if not _shares(path):  # Else it would keep its shared memory in a file.
+                    database.execute("PRAGMA locking_mode = EXCLUSIVE")
+                database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MAX_PIECE)
+                database.execute("PRAGMA trusted_schema = OFF")
+                tables = {str(row[0]) for row in database.execute(_TABLES)}
+                if not {"topics", "messages"} <= tables:
+                    names = ", ".join(sorted(tables)) or "none"
+                    problem = f"expected the tables topics and messages; it has: {names}"
+                    raise LogError(self.path, f"is no ROS 2 bag, {problem}")
+                for name, column in database.execute(_COMPUTED):
+                    problem = f"column {column} of its table {name} is computed"
+                    raise LogError(self.path, f"is no ROS 2 bag: {problem}")
+                topics = database.execute(_TOPICS)
+                yield database, {n: Connection.named(*map(str, names)) for n, *names in topics}
+        except _BROKEN as error:
+            problem = f"cannot be read as a ROS 2 bag (sqlite3): {error}"
+            raise LogError(self.path, problem) from None
 
 
 def _shares(path: Path) -> bool:

@@ -1,7 +1,5 @@
 """Scans of RPLIDAR units as JSON: for each unit a list of pairs of numbers."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -15,11 +13,8 @@ from numpy.typing import NDArray
 from ..errors import LogError
 from ..scan import LaserScan, Pose
 from .base import Head, Log
-from .lines import BOM
-from .objects import MAX_OBJECT, json_objects
-from .turn import one_turn
-
-__all__ = ["RplidarLog"]
+from .bearings import by_bearing
+from .json_stream import MAX_OBJECT, json_objects
 
 _NUMBER = rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _BEGINNING = re.compile(
@@ -39,11 +34,6 @@ class RplidarLog(Log):
 
     A file ``transforms.json`` in the same folder gives poses: ``{"a": {"b": 3 × 3 matrix}}`` takes
     points of unit a to the frame of unit b. The world is the frame of the first unit.
-
-    Raises
-    ------
-    LogError
-        If there is no such unit, or the file is no such object.
     """
 
     format = "rplidar"
@@ -61,14 +51,13 @@ class RplidarLog(Log):
         }
         if not self._units:
             raise LogError(self.source, f"is no {self.description}")
-        if self.topic not in (None, *self._units):
-            raise self._no_such_topic(self.topics)
+        self._check_topic()
         self._wanted = self.topics if self.topic is None else [self.topic]
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
         """Whether it begins as an object whose first value is a list of pairs of numbers."""
-        return _BEGINNING.match(head.data.removeprefix(BOM)) is not None
+        return _BEGINNING.match(head.data) is not None
 
     @property
     def topics(self) -> list[str]:
@@ -84,7 +73,7 @@ class RplidarLog(Log):
         for unit in self._wanted:
             try:
                 ranges, bearings = _polar(_pairs(self._units[unit]))
-                order, angles = one_turn(bearings)
+                order, angles = by_bearing(bearings)
                 pose = (0.0, 0.0, 0.0) if unit == world else _pose(transforms, unit, world)
                 scan = LaserScan(
                     ranges[order],

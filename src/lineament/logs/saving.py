@@ -1,38 +1,163 @@
-"""Scans to logs, by the ending of the file."""
+"""Scans to logs: CARMEN and npz, by the ending of the file."""
 
-from __future__ import annotations
-
+import gzip
+import math
 import os
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..files import naming_errors, written_beside
 from ..scan import LaserScan
-from .carmen_writer import save_carmen
-from .npz import save_npz
+from .npz import KEYS, SCALARS
 
-__all__ = ["SAVED_ENDINGS", "save_log"]
+_CARMEN_HEADER = """\
+# CARMEN Logfile
+# ROBOTLASER1 laser_type start_angle field_of_view angular_resolution maximum_range accuracy \
+remission_mode num_readings [range_readings] num_remissions [remission_values] \
+laser_pose_x laser_pose_y laser_pose_theta robot_pose_x robot_pose_y robot_pose_theta \
+laser_tv laser_rv forward_safety_dist side_safety_dist turn_axis \
+timestamp ipc_hostname logger_timestamp
+"""
 
-#: What writes a log of each ending. A new format is one file and one line here.
+
+def save_carmen(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
+    """Write scans as a CARMEN log, each as it comes; see `save_log`."""
+    i = -1
+    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as plain:
+        is_gzip = Path(path).name.lower().endswith(".gz")
+        # Without name and time: the same scans give the same file.
+        packed = gzip.GzipFile("", "wb", 6, plain, mtime=0) if is_gzip else nullcontext(plain)
+        with packed as file:
+            file.write(_CARMEN_HEADER.encode())
+            for i, scan in enumerate(scans):
+                file.write(_carmen_line(i, scan).encode())
+        if i < 0:
+            raise ValueError("there are no scans to write")
+
+
+def _carmen_line(i: int, scan: LaserScan) -> str:
+    if scan.pose is None:
+        raise ValueError(f"scan {i} has no pose, which a CARMEN log holds for every scan")
+    if not scan.is_regular:
+        raise ValueError(f"scan {i} has irregular bearings, which a CARMEN log cannot hold")
+    if not scan.range_max < math.inf:
+        raise ValueError(f"scan {i} has no finite range_max, which a CARMEN log needs")
+    ranges = np.where(scan.valid, scan.ranges, scan.range_max).tolist()
+    remissions = [] if scan.intensities is None else scan.intensities.tolist()
+    span = (len(ranges) - 1) * scan.angle_increment
+    laser = (0, scan.angle_min, span, scan.angle_increment, scan.range_max, 0, 0)
+    stopped = (0, 0, 0, 0, 0)
+    words = [
+        *("ROBOTLASER1", *laser, len(ranges), *ranges, len(remissions), *remissions),
+        *(*scan.pose, *scan.pose, *stopped, scan.stamp, "lineament", scan.stamp),
+    ]
+    return " ".join(map(str, words)) + "\n"
+
+
+def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: ArrayLike) -> None:
+    """Write scans that share their bearings as an npz log, beside `path` and then renamed.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; one that exists is replaced.
+    scans : iterable of LaserScan
+        At least one; all are held in memory until written.
+    **extra : array_like
+        Further keys, such as ``source`` or ``licence``.
+
+    Raises
+    ------
+    ValueError
+        If there are no scans or no beams, bearings differ, only some scans have intensities, or
+        an extra key is one of the log's own or holds objects.
+    LineamentError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from lineament.logs import open_log
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "two.npz")
+    >>> save_npz(path, [LaserScan([1.0, 2.0], 0.0, 0.1, stamp=t) for t in (7.0, 7.5)])
+    >>> [scan.stamp for scan in open_log(path)]
+    [7.0, 7.5]
+    """
+    arrays = _pack(list(scans))
+    for key, value in extra.items():
+        if key in KEYS:
+            raise ValueError(f"extra key {key} is one of the log's own")
+        arrays[key] = np.asarray(value)
+        if arrays[key].dtype.hasobject:
+            raise ValueError(f"extra key {key} holds objects, expected numbers or text")
+    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+
+def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
+    if not scans:
+        raise ValueError("there are no scans to write")
+    first = scans[0]
+    if not len(first):
+        raise ValueError("scan 0 has no beams, expected at least one")
+    for i, scan in enumerate(scans):
+        if scan.is_regular != first.is_regular or not np.array_equal(scan.angles, first.angles):
+            raise ValueError(f"scan {i} has other bearings than scan 0, expected the same for all")
+        if (scan.intensities is None) != (first.intensities is None):
+            raise ValueError(f"scan {i} and scan 0: only one of them has intensities")
+    arrays = {"ranges": _lossless(np.stack([scan.ranges for scan in scans]))}
+    if first.is_regular:
+        arrays["angle_min"] = np.array(first.angle_min)
+        arrays["angle_increment"] = np.array(first.angle_increment)
+    else:
+        arrays["angles"] = first.angles
+    arrays["stamps"] = np.array([scan.stamp for scan in scans])
+    for key in (*SCALARS, "frame_id"):
+        values = np.array([getattr(scan, key) for scan in scans])
+        arrays[key] = values[0] if (values == values[0]).all() else values
+    intensities = [scan.intensities for scan in scans if scan.intensities is not None]
+    if intensities:
+        arrays["intensities"] = _lossless(np.stack(intensities))
+    if any(scan.pose is not None for scan in scans):
+        unknown = (np.nan, np.nan, np.nan)
+        arrays["poses"] = np.array([scan.pose or unknown for scan in scans])
+    return arrays
+
+
+def _lossless(values: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the values as float32 where none changes, as most sensors report them."""
+    with np.errstate(over="ignore"):
+        small = values.astype(np.float32)
+    return small if np.array_equal(small, values, equal_nan=True) else values
+
+
+#: What writes a log of each ending.
 _WRITERS: dict[str, Callable[[str | os.PathLike[str], Iterable[LaserScan]], None]] = {
     ".npz": save_npz,
     ".log": save_carmen,
     ".log.gz": save_carmen,
 }
 
-#: The endings that `save_log` knows.
-SAVED_ENDINGS = tuple(_WRITERS)
-
 
 def save_log(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
-    """Write scans as a log of the format that the ending of `path` tells.
+    """Write scans as a log, in the format that the ending of `path` names.
 
-    The file appears under its name when it is whole; one that exists is replaced.
+    The file appears under its name when it is whole; one that exists is replaced. In a CARMEN log
+    numbers are written so that they read back to the same value; beams that are not valid are
+    written as the scan's `range_max`, which CARMEN takes for no return. It has no place for
+    `range_min`, `scan_time`, `time_increment` and `frame_id`.
 
     Parameters
     ----------
     path : path-like
         The file: ``.npz`` (scans that share their bearings, all held in memory), or ``.log`` or
-        ``.log.gz`` (CARMEN, written as they come; each with a pose).
+        ``.log.gz`` (CARMEN, written as they come; each with a pose, even bearings and a finite
+        `range_max`).
     scans : iterable of LaserScan
         At least one.
 
@@ -48,16 +173,15 @@ def save_log(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
     --------
     >>> import tempfile
     >>> from lineament.logs import open_log
-    >>> from lineament.simulation import SENSORS, building, drive
-    >>> path = Path(tempfile.mkdtemp(), "drive.log.gz")
-    >>> save_log(path, drive(*building(), SENSORS["lms181"], seed=1, rate=0.2))
-    >>> log = open_log(path)
-    >>> log.format, len(log), log.scan(0).pose
-    ('carmen', 18, (0.7, 5.0, 0.0))
+    >>> path = Path(tempfile.mkdtemp(), "two.log.gz")
+    >>> scan = LaserScan([1.5, math.inf], 0.0, 0.1, range_max=8.0, stamp=2.5, pose=(1, 2, 0.5))
+    >>> save_log(path, [scan, scan])
+    >>> [(scan.ranges.tolist(), scan.stamp, scan.pose) for scan in open_log(path)][1]
+    ([1.5, 8.0], 2.5, (1.0, 2.0, 0.5))
     """
     name = Path(path).name.lower()
     for ending, save in _WRITERS.items():
         if name.endswith(ending):
             save(path, scans)
             return
-    raise ValueError(f"{path}: its ending is not known, expected {' or '.join(SAVED_ENDINGS)}")
+    raise ValueError(f"{path}: its ending is not known, expected {' or '.join(_WRITERS)}")

@@ -1,4 +1,4 @@
-"""What the methods share: the run over scans, the trace, the types of their parameters."""
+"""What the methods share: the check of their parameters, the run over scans, the trace."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ __all__ = ["MethodBase"]
 class MethodBase:
     """A method that calls its kernels one by one, for one scan after the other.
 
-    Methods are frozen dataclasses that inherit from this, and say in `find` what they do.
+    Methods inherit from this, declare their parameters (see `parameters.method`), and say in `find`
+    what they do.
     """
 
     __slots__ = ()
@@ -28,13 +29,20 @@ class MethodBase:
     name: ClassVar[str]
     presets: ClassVar[tuple[str, ...]] = ()
 
+    def __post_init__(self) -> None:
+        # Each gets the type of its default, for numba compiles for each type.
+        for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
+            value, bounds = getattr(self, field.name), field.metadata["bounds"]
+            bounds.check(field.name, value)
+            object.__setattr__(self, field.name, bounds.kind(value))
+
     def own_arrays(self, beams: int) -> Any:
-        """Make the arrays that the method needs besides those of a block; none, unless it says."""
+        """Make what the method needs besides a block, for scans of so many beams."""
 
     def find(self, block: Block, row: int) -> None:
-        """Find and measure the features of the scan in a block's workspace, whose noise is known.
+        """Find and measure the features of scan `row` of a block.
 
-        `row` tells which of the block's scans it is.
+        It is in the block's workspace, and its noise is there.
         """
         raise NotImplementedError
 
@@ -51,12 +59,11 @@ class MethodBase:
         return 0.0
 
     def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
-        """Run again on a scan of which these features came, and keep every intermediate.
+        """Run again on a scan from which these features came, and keep every intermediate.
 
-        `noise` is the row that was given then: what was estimated is estimated again.
-
-        Its candidates and cuts are those of the first search, before anything was merged; where
-        none are examined, there are none. `lineament.Extractor.trace` does both.
+        `noise` is the row that was given then: what was estimated is estimated again. Candidates
+        and cuts are those of the first search, before anything was merged.
+        `lineament.Extractor.trace` does both.
         """
         block = Block(scan, noise, 1, self.own_arrays(len(scan)))
         block.load(scan.ranges)
@@ -66,11 +73,5 @@ class MethodBase:
         )
 
     def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:  # noqa: ARG002
-        """Tell how much evidence there is for each feature of the last scan, by table."""
+        """Report how much evidence there is for each feature of the last scan, by table."""
         return {}
-
-    def _settle_types(self) -> None:
-        """Make every parameter of the type of its default, for numba compiles for each type."""
-        for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
-            kind: type[Any] = type(field.default)
-            object.__setattr__(self, field.name, kind(getattr(self, field.name)))

@@ -10,30 +10,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from operator import attrgetter
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.rivals.hough import find_by_votes
-from ..kernels.rivals.stretches import MOMENTS
-from .checks import check_choice, check_count, check_number
+from ..kernels.line_fit import FITS
+from ..kernels.rivals.hough import Parameters, find_by_votes
 from .lines import LineMethod
-from .stages import FITS
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["Hough"]
 
-
-class _Scratch(NamedTuple):
-    moments: NDArray[np.float64]
-    slack: NDArray[np.float64]
-    slope: NDArray[np.float64]
-    free: NDArray[np.int64]
-    votes: NDArray[np.int32]
-    normals: NDArray[np.float64]
+_numbers = attrgetter(*Parameters._fields)
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hough(LineMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
@@ -41,43 +35,12 @@ class Hough(LineMethod):
     1. *Part* the scan at its breakpoints. In each cluster:
     2. *Vote*: each point for all lines through it, `angles` directions over half a turn; d is
        counted from the middle of the cluster, in cells of `resolution`, wider where the noise or
-       the cluster asks for it.
+       the cluster needs it.
     3. *Peak*: of the cell with the most votes, take the longest run of consecutive points near
        its line, fit a line, take the longest run near that, and again.
     4. Withdraw the run's votes, and look for the next peak, until none has `min_points`.
     5. *Settle* neighbouring pieces: about their border each point goes to the nearer line; those
        that one line fits are merged, those whose lines meet at their ends have a corner there.
-
-    Parameters
-    ----------
-    angles : int
-        Directions that are voted for: 180 are 1° apart.
-    distances : int
-        Cells of the accumulator in d. It takes 4 · `angles` · `distances` bytes, 184 kB.
-    resolution : float
-        Width of a cell in d [m], or two standard deviations of the noise if these are more; in
-        clusters wider than `distances` cells it is as wide as needed.
-    min_points : int
-        Points near its line that a piece has at least.
-    min_length : float
-        Length that a piece has at least [m].
-    max_misses : int
-        Points in a row that may lie off the line without ending a piece.
-    epsilon : float
-        Unevenness: how far a point may lie from the line without noise [m].
-    sigmas : float
-        Standard deviations of its range noise that a point may lie off besides.
-    fit : {"weighted", "total", "y_of_x"}
-        How the final lines are fitted: maximum likelihood, orthogonal or axial least squares.
-    noise_factor : float
-        Of the breakpoint detector that parts the scan first, see `PDBS`.
-    reach, grazing_angle, max_missing, max_vertices
-        As in `lineament.methods.lines.LineMethod`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of bounds. The message names it and its value.
 
     Examples
     --------
@@ -91,55 +54,38 @@ class Hough(LineMethod):
 
     name: ClassVar[str] = "hough"
 
-    angles: int = 180
-    distances: int = 256
-    resolution: float = 0.02
-    min_points: int = 4
-    min_length: float = 0.0
-    max_misses: int = 2
-    epsilon: float = 0.01
-    sigmas: float = 2.5
-    fit: str = "weighted"
-    noise_factor: float = 3.0
+    angles: int = parameter(180, "directions that are voted for: 180 are 1° apart", low=4)
+    distances: int = parameter(
+        256, "cells of the accumulator in d; it takes 4 · angles · distances bytes", low=4
+    )
+    resolution: float = parameter(
+        0.02, "width of a cell in d [m], or two deviations of the noise if these are more", above=0
+    )
+    min_points: int = parameter(4, "least points near its line of a piece", low=3)
+    min_length: float = parameter(0.0, "least length of a piece [m]", low=0)
+    max_misses: int = parameter(
+        2, "points in a row that may lie off the line without ending a piece", low=0
+    )
+    epsilon: float = parameter(
+        0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
+    )
+    sigmas: float = parameter(
+        2.5, "standard deviations of its range noise that a point may lie off besides", low=0
+    )
+    fit: str = parameter("weighted", "how the final lines are fitted", choices=FITS)
+    noise_factor: float = parameter(
+        3.0, "standard deviations of the breakpoint detector, see `PDBS`", low=0
+    )
 
-    def __post_init__(self) -> None:
-        check_number("resolution", self.resolution)
-        check_count("angles", self.angles, least=4)
-        check_count("distances", self.distances, least=4)
-        for name in ("min_length", "epsilon", "sigmas", "noise_factor"):
-            check_number(name, getattr(self, name), or_equal=True)
-        check_count("min_points", self.min_points, least=3)
-        check_count("max_misses", self.max_misses, least=0)
-        check_choice("fit", self.fit, FITS)
-        self._check_shared()
-
-    def own_arrays(self, beams: int) -> _Scratch:
-        """Make the accumulator, its directions, and room for running sums and tolerances."""
-        n, alpha = beams + 1, math.pi / self.angles * np.arange(self.angles)
-        return _Scratch(
-            np.empty((n, MOMENTS)),
-            np.empty(n),
-            np.empty(n),
-            np.empty(n, np.int64),
-            np.empty((self.angles, self.distances), np.int32),
-            np.column_stack((np.cos(alpha), np.sin(alpha))),
-        )
+    def own_arrays(self, beams: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:  # noqa: ARG002
+        """Make the accumulator and its directions."""
+        alpha = math.pi / self.angles * np.arange(self.angles)
+        votes = np.empty((self.angles, self.distances), np.int32)
+        return votes, np.column_stack((np.cos(alpha), np.sin(alpha)))
 
     def find(self, block: Block, row: int) -> None:
-        """Part, find by votes, settle the borders and fit the scan in a block's workspace."""
-        own: _Scratch = block.own
-        workspace = (block.floats, block.ints, block.counts)
+        """Part, find by votes, settle the borders and fit."""
         self._part(block, row, self.min_points, self.noise_factor)
-        find_by_votes(
-            *workspace,
-            block.noises[row],
-            self.resolution,
-            self.min_points,
-            self.min_length,
-            self.max_misses,
-            self.epsilon,
-            self.sigmas,
-            *own,
-        )
-        self._settle_borders(block, row, self.epsilon, own.moments)
+        find_by_votes(block.floats, block.ints, block.noises[row], _numbers(self), *block.own)
+        self._settle(block, row, self.epsilon)
         self._finish(block, row, fit=FITS[self.fit])

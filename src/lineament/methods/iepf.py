@@ -10,28 +10,19 @@ data*, RoMoCo 2017.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, ClassVar
 
 from ..kernels.line_fit import TOTAL, WEIGHTED
-from ..kernels.rivals.splitting import CHORD, split
-from ..kernels.rivals.stretches import MOMENTS
-from .checks import check_choice, check_count, check_number
+from ..kernels.rivals.splitting import split
+from .base import MethodBase
 from .lines import LineMethod
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["IEPF"]
 
-_LEAST = {"min_piece": 2, "corner_trim": 0, "min_points": 2}
 
-
-class _Scratch(NamedTuple):
-    tolerance: NDArray[np.float64]
-    moments: NDArray[np.float64]
-
-
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IEPF(LineMethod):
     """Iterative end point fit.
@@ -43,40 +34,12 @@ class IEPF(LineMethod):
        line, and put corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + proportion ρ + noise_factor σ_r``. The
-    preset `paper` is the plain method: a fixed tolerance, nothing merged, corners on readings.
-
-    Parameters
-    ----------
-    threshold : float
-        Tolerance that does not depend on range or noise [m].
-    proportion : float
-        Part of the tolerance that grows with range (Przybyła) [m/m].
-    noise_factor : float
-        Part of the tolerance that grows with the noise [standard deviations of a range].
-    min_piece : int
-        Points of the shortest piece that a cluster is split into.
-    merge : bool
-        Whether step 3 is done.
-    corner : {"intersection", "beam"}
-        Whether a corner lies where its lines meet, or on its reading.
-    unevenness : float
-        Of walls [m], root mean square, beside the noise: what two lines may differ by and still
-        be merged.
-    corner_trim : int
-        Readings next to a corner that the last fits leave out.
-    min_points : int
-        Clusters of fewer points are noise.
-    reach, grazing_angle, max_missing, max_vertices
-        As in `lineament.methods.lines.LineMethod`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of bounds. The message names it and its value.
+    preset `paper` is the plain method: a fixed tolerance, no merging, corners on measurements.
 
     Examples
     --------
     >>> import lineament as ln
+    >>> import numpy as np
     >>> from lineament.simulation import SENSORS, room
     >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
     >>> ln.extract(scan, method="iepf").corners["position"].round(1).tolist()
@@ -86,71 +49,52 @@ class IEPF(LineMethod):
     name: ClassVar[str] = "iepf"
     presets: ClassVar[tuple[str, ...]] = ("paper",)
 
-    threshold: float = 0.0
-    proportion: float = 0.002
-    noise_factor: float = 4.0
-    min_piece: int = 4
-    merge: bool = True
-    corner: str = "intersection"
-    unevenness: float = 0.01
-    corner_trim: int = 1
-    min_points: int = 3
+    threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
+    proportion: float = parameter(
+        0.002, "part of the tolerance that grows with range (Przybyła) [m/m]", low=0
+    )
+    noise_factor: float = parameter(
+        4.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
+    )
+    min_piece: int = parameter(4, "least points of a piece", low=2)
+    merge: bool = parameter(True, "whether step 3 is done")
+    corner: str = parameter(
+        "intersection",
+        "whether a corner lies where its lines meet, or on its measurement",
+        choices=("intersection", "beam"),
+    )
+    unevenness: float = parameter(
+        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
+    )
+    corner_trim: int = parameter(
+        1, "measurements next to a corner that the last fits leave out", low=0
+    )
+    min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def __post_init__(self) -> None:
-        for name in ("threshold", "proportion", "noise_factor", "unevenness"):
-            check_number(name, getattr(self, name), or_equal=True)
+        MethodBase.__post_init__(self)
         if self.threshold == self.proportion == self.noise_factor == 0:
             raise ValueError("threshold, proportion and noise_factor are all 0, expected one > 0")
-        for name, least in _LEAST.items():
-            check_count(name, getattr(self, name), least=least)
-        if not isinstance(self.merge, bool):
-            raise ValueError(f"merge is {self.merge!r}, expected True or False")
-        check_choice("corner", self.corner, ("intersection", "beam"))
-        self._check_shared()
 
     @classmethod
     def paper(cls, **changes: Any) -> IEPF:
-        """Make the plain method: fixed tolerance, no merging, corners on their readings."""
-        return cls(
-            **{
-                "threshold": 0.1,
-                "proportion": 0.0,
-                "noise_factor": 0.0,
-                "merge": False,
-                "corner": "beam",
-                **changes,
-            }
-        )
-
-    def own_arrays(self, beams: int) -> _Scratch:
-        """Make scratch for the splitting and the merging."""
-        n = beams + 1
-        return _Scratch(np.empty(n), np.empty((n, MOMENTS)))
+        """Make the plain method: fixed tolerance, no merging, corners on their measurements."""
+        plain = {"threshold": 0.1, "proportion": 0.0, "noise_factor": 0.0}
+        return cls(**{**plain, "merge": False, "corner": "beam", **changes})
 
     def find(self, block: Block, row: int) -> None:
-        """Cluster, split, merge and fit the scan in a block's workspace."""
-        own: _Scratch = block.own
-        workspace = (block.floats, block.ints, block.counts, block.noises[row])
-        sharp = self.corner == "intersection"
+        """Cluster, split, merge and fit."""
         self._part(block, row, self.min_points)
         split(
-            *workspace,
-            CHORD,
-            self.threshold,
-            self.proportion,
-            self.noise_factor,
-            self.min_piece,
-            own.tolerance,
-        )
+            block.floats, block.ints, block.noises[row], False, self.threshold, self.proportion,
+            self.noise_factor, self.min_piece,
+        )  # fmt: skip
         if self.merge:
-            self._settle_borders(block, row, self.unevenness, own.moments)
-        self._finish(
-            block,
-            row,
-            fit=WEIGHTED if sharp else TOTAL,
-            sharp=sharp,
-            trim=self.corner_trim if sharp else 0,
-        )
+            self._settle(block, row, self.unevenness)
+        if self.corner == "intersection":
+            self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)
+        else:
+            self._finish(block, row, fit=TOTAL, sharp=False)
 
     @property
     def least_response(self) -> float:

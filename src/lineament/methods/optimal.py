@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,9 @@ from ..kernels.polylines import PLANES, fit_polylines
 from ..kernels.vertices import hold_together
 from ..scan import LaserScan
 from .base import MethodBase
-from .checks import check_count, check_number
 from .optimal_trace import evidence_of, trace_of
-from .pdbs import part
-from .steps import measure
+from .parameters import documented, parameter
+from .steps import measure, part
 from .trace import Trace
 from .workspace import Block
 
@@ -39,18 +38,14 @@ _GRAZING = math.radians(4.0)
 
 
 class Workspace(NamedTuple):
-    """Arrays of one scan, see `kernels.optimal.layout`; the last two are those of maps."""
+    """Arrays of one scan: as in `kernels.optimal.layout.Work`, and those of maps."""
 
-    points: NDArray[np.float64]
-    beams: NDArray[np.int64]
-    spans: NDArray[np.int64]
-    pieces: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    noise: NDArray[np.float64]
+    arrays: tuple[NDArray[Any], ...]
     costs: NDArray[np.float64]
     follow: NDArray[np.int64]
 
 
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Optimal(MethodBase):
     """Lines, corners and arcs: the partition of a scan that has the least energy.
@@ -66,22 +61,6 @@ class Optimal(MethodBase):
        explains for less are arcs.
     4. *Fit* each line by maximum likelihood to the ranges.
     5. *Join* neighbouring lines at a corner where they meet between their measurements.
-
-    Parameters
-    ----------
-    evidence : float
-        Price of a line, β: by so much χ² must rise where two lines are taken for one. More finds
-        less.
-    max_missing : int
-        Missing beams in a row over which a surface goes on.
-    max_vertices : int
-        If not 0, a map instead of features: polylines of at most so many vertices in all, with
-        the least range error. Their vertices are the corners, and `evidence` does not matter.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of bounds. The message names it and its value.
 
     References
     ----------
@@ -100,26 +79,32 @@ class Optimal(MethodBase):
 
     name: ClassVar[str] = "optimal"
 
-    evidence: float = 12.0
-    max_missing: int = 6
-    max_vertices: int = 0
-
-    def __post_init__(self) -> None:
-        check_number("evidence", self.evidence)
-        check_count("max_missing", self.max_missing, least=0)
-        check_count("max_vertices", self.max_vertices, least=0)
-        self._settle_types()
+    evidence: float = parameter(
+        12.0,
+        "price of a line, β: by so much χ² must rise where two lines are taken for one; more finds "
+        "less",
+        above=0,
+    )
+    max_missing: int = parameter(6, "missing beams in a row over which a surface goes on", low=0)
+    max_vertices: int = parameter(
+        0,
+        "if not 0, a map instead of features: polylines of at most so many vertices in all, with "
+        "the least range error; their vertices are the corners, and `evidence` does not matter",
+        low=0,
+    )
 
     def own_arrays(self, beams: int) -> Workspace:
         """Make the workspace of a scan."""
         n, vertices = beams + 2, min(self.max_vertices, beams + 1) + 1
         return Workspace(
-            np.zeros((layout.POINTS, n)),
-            np.zeros((layout.BEAMS, n), np.int64),
-            np.zeros((layout.SPANS, n), np.int64),
-            np.zeros((n, layout.PIECES)),
-            np.zeros((n, layout.SUMS)),
-            np.zeros(3),
+            (
+                np.zeros((layout.POINTS, n)),
+                np.zeros((layout.BEAMS, n), np.int64),
+                np.zeros((layout.SPANS, n), np.int64),
+                np.zeros((n, layout.PIECES)),
+                np.zeros((n, layout.SUMS)),
+                np.zeros(3),
+            ),
             np.empty((PLANES, n, vertices)),
             np.empty((n, vertices), np.int64),
         )
@@ -130,43 +115,37 @@ class Optimal(MethodBase):
             MethodBase.run(self, block)
             return
         own: Workspace = block.own
+        # Plain tuples: named ones take numba a microsecond to recognise.
         extract_rows(
             block.ranges,
             block.rows,
-            block.range_min,
-            block.range_max,
             block.bearings,
-            block.circular,
             block.noise,
-            self.evidence,
-            self.max_missing,
-            own.points,
-            own.beams,
-            own.spans,
-            own.pieces,
-            own.sums,
-            own.noise,
+            (block.range_min, block.range_max, block.circular, self.evidence, self.max_missing),
+            own.arrays,
+            (
+                block.segments,
+                block.corners,
+                block.arcs,
+                block.breakpoints,
+                block.clusters,
+                block.offsets,
+            ),
             block.noises,
-            block.segments,
-            block.corners,
-            block.arcs,
-            block.breakpoints,
-            block.clusters,
-            block.offsets,
             block.counts,
         )
 
     def find(self, block: Block, row: int) -> None:
         """Lay the polylines of a map through the scan in a block's workspace."""
         own: Workspace = block.own
-        floats, ints, counts = block.floats, block.ints, block.counts
+        floats, ints = block.floats, block.ints
         part(block, row, angle=_GRAZING, max_missing=self.max_missing, min_points=3)
         fit_polylines(
-            floats, ints, counts, block.bearings, own.follow.shape[1] - 1, self.max_missing, _LINK,
+            floats, ints, block.bearings, own.follow.shape[1] - 1, self.max_missing, _LINK,
             _WORST, own.costs, own.follow,
         )  # fmt: skip
         measure(block, row, fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))
-        hold_together(floats, ints, counts, row, block.segments, block.corners, block.offsets)
+        hold_together(floats, ints, row, block.segments, block.corners, block.offsets)
 
     @property
     def least_response(self) -> float:

@@ -10,18 +10,7 @@ from numpy.typing import NDArray
 from ..features import Features
 from ..kernels.layout import FILTERED
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
-from ..kernels.optimal.layout import (
-    ARC,
-    BEAM,
-    FIRST,
-    GAIN,
-    KIND,
-    LAST,
-    LINE,
-    RHO,
-    X,
-    Y,
-)  # fmt: skip
+from ..kernels.optimal.layout import ARC, BEAM, FIRST, GAIN, KIND, LAST, LINE, RHO, Work, X, Y
 from ..scan import LaserScan
 from .trace import CANDIDATE, Trace
 from .workspace import Block
@@ -36,16 +25,16 @@ Array = NDArray[np.float64]
 
 def trace_of(block: Block, method: Optimal, scan: LaserScan, features: Features) -> Trace:
     """Make the trace of the scan that `optimal` has just run on."""
-    count, n = int(block.counts[0]), len(scan)
-    order = np.argsort(block.own.beams[BEAM, :count])
-    beam, rho = block.own.beams[BEAM, order], block.own.points[RHO, order]
+    own, count, n = Work(*block.own.arrays), int(block.counts[0]), len(scan)
+    order = np.argsort(own.beams[BEAM, :count])
+    beam, rho = own.beams[BEAM, order], own.points[RHO, order]
     filtered, spacing, limit = (np.full(n, np.nan) for _ in range(3))
     filtered[beam] = rho
     before = np.roll(np.arange(count), 1)
-    xy = block.own.points[X : Y + 1, order]
+    xy = own.points[X : Y + 1, order]
     spacing[beam] = np.hypot(*(xy - xy[:, before]))
     missing = (beam - beam[before]) % n - 1 > method.max_missing
-    limit[beam] = np.where(missing, np.nan, _largest_spacing(xy, rho, before, block.own.noise))
+    limit[beam] = np.where(missing, np.nan, _largest_spacing(xy, rho, before, own.noise))
     if not block.circular and count:
         spacing[beam[0]] = limit[beam[0]] = np.nan
     block.floats[FILTERED, :n] = filtered
@@ -77,7 +66,7 @@ def _largest_spacing(xy: Array, rho: Array, before: NDArray[np.intp], noise: Arr
 
 def evidence_of(block: Block) -> dict[str, Array]:
     """Rise of χ² without each feature of the last scan, by table."""
-    own, surfaces = block.own, int(block.counts[2])
+    own, surfaces = Work(*block.own.arrays), int(block.counts[2])
     kind, first, end = own.spans[KIND, :surfaces], own.spans[FIRST], own.spans[LAST] + 1
     rise = np.full(surfaces + 1, np.inf)
     for k in range(1, surfaces):

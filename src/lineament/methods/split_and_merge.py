@@ -10,28 +10,19 @@ ICRA 2003.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import ClassVar
 
 from ..kernels.line_fit import WEIGHTED
-from ..kernels.rivals.splitting import LINE, split
-from ..kernels.rivals.stretches import MOMENTS
-from .checks import check_count, check_number
+from ..kernels.rivals.splitting import split
+from .base import MethodBase
 from .lines import LineMethod
+from .parameters import documented, parameter
 from .workspace import Block
 
 __all__ = ["SplitAndMerge"]
 
-_LEAST = {"min_piece": 2, "corner_trim": 0, "min_points": 2}
 
-
-class _Scratch(NamedTuple):
-    tolerance: NDArray[np.float64]
-    moments: NDArray[np.float64]
-
-
+@documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplitAndMerge(LineMethod):
     """Split-and-merge.
@@ -46,32 +37,10 @@ class SplitAndMerge(LineMethod):
 
     The tolerance of a point at range ρ is ``threshold + noise_factor σ_r``.
 
-    Parameters
-    ----------
-    threshold : float
-        Tolerance that does not depend on range or noise [m].
-    noise_factor : float
-        Part of the tolerance that grows with the noise [standard deviations of a range].
-    min_piece : int
-        Points of the shortest piece that a cluster is split into.
-    unevenness : float
-        Of walls [m], root mean square, beside the noise: what two lines may differ by and still
-        be merged.
-    corner_trim : int
-        Readings next to a corner that the last fits leave out.
-    min_points : int
-        Clusters of fewer points are noise.
-    reach, grazing_angle, max_missing, max_vertices
-        As in `lineament.methods.lines.LineMethod`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of bounds. The message names it and its value.
-
     Examples
     --------
     >>> import lineament as ln
+    >>> import numpy as np
     >>> from lineament.simulation import SENSORS, room
     >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
     >>> ln.extract(scan, method="split_and_merge").corners["position"].round(1).tolist()
@@ -80,42 +49,32 @@ class SplitAndMerge(LineMethod):
 
     name: ClassVar[str] = "split_and_merge"
 
-    threshold: float = 0.0
-    noise_factor: float = 2.0
-    min_piece: int = 4
-    unevenness: float = 0.01
-    corner_trim: int = 1
-    min_points: int = 3
+    threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
+    noise_factor: float = parameter(
+        2.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
+    )
+    min_piece: int = parameter(4, "least points of a piece", low=2)
+    unevenness: float = parameter(
+        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
+    )
+    corner_trim: int = parameter(
+        1, "measurements next to a corner that the last fits leave out", low=0
+    )
+    min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def __post_init__(self) -> None:
-        for name in ("threshold", "noise_factor", "unevenness"):
-            check_number(name, getattr(self, name), or_equal=True)
+        MethodBase.__post_init__(self)
         if self.threshold == self.noise_factor == 0:
             raise ValueError("threshold and noise_factor are both 0, expected one > 0")
-        for name, least in _LEAST.items():
-            check_count(name, getattr(self, name), least=least)
-        self._check_shared()
-
-    def own_arrays(self, beams: int) -> _Scratch:
-        """Make scratch for the splitting and the merging."""
-        n = beams + 1
-        return _Scratch(np.empty(n), np.empty((n, MOMENTS)))
 
     def find(self, block: Block, row: int) -> None:
-        """Cluster, split, merge and fit the scan in a block's workspace."""
-        own: _Scratch = block.own
-        workspace = (block.floats, block.ints, block.counts, block.noises[row])
+        """Cluster, split, merge and fit."""
         self._part(block, row, self.min_points)
         split(
-            *workspace,
-            LINE,
-            self.threshold,
-            0.0,
-            self.noise_factor,
-            self.min_piece,
-            own.tolerance,
-        )
-        self._settle_borders(block, row, self.unevenness, own.moments)
+            block.floats, block.ints, block.noises[row], True, self.threshold, 0.0,
+            self.noise_factor, self.min_piece,
+        )  # fmt: skip
+        self._settle(block, row, self.unevenness)
         self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)
 
     @property

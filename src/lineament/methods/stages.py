@@ -1,45 +1,30 @@
-"""The stages of the methods as functions of their own: filter, cluster, cut, fit.
+"""The stages of method `liu` as functions: filter, cluster, cut, fit.
 
-Each checks what it is given and calls one kernel. The methods call the same kernels, without the
-detour over Python.
+Each checks what it is given and calls one kernel. The methods call the same kernels directly.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import noise_of, noise_row
+from ..kernels import layout as at
 from ..kernels.bilateral import filter_ranges, scratch_shape
 from ..kernels.clustering import cluster
-from ..kernels.corner_operator import PRODUCT, RELATIVE, TANGENT, response_along
+from ..kernels.corner_operator import RESPONSES, response_along
 from ..kernels.cutting import cut
-from ..kernels.layout import (
-    BEAM,
-    BEFORE,
-    CLASS_FIRST,
-    CLASS_LAST,
-    CLASSES,
-    CLOSED,
-    FILTERED,
-    FIRST,
-    LABEL,
-    LAST,
-    PIECES,
-    POINTS,
-    X,
-    Y,
-)
-from ..kernels.line_fit import TOTAL, WEIGHTED, Y_OF_X
+from ..kernels.line_fit import FITS
 from ..scan import LaserScan, RangeNoise
 from . import steps
-from .checks import check_choice, check_count, check_number
+from .liu import Liu
+from .parameters import Bounds, bounds_of
 from .trace import candidate_records
 from .workspace import Block
 
 __all__ = [
-    "FITS",
-    "RESPONSES",
     "adaptive_clusters",
     "bilateral_filter",
     "corner_response",
@@ -49,10 +34,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-#: Names of the readings of the corner response, and of the line fits.
-RESPONSES = {"relative": RELATIVE, "tangent": TANGENT, "product": PRODUCT}
-FITS = {"total": TOTAL, "y_of_x": Y_OF_X, "weighted": WEIGHTED}
 
 
 def bilateral_filter(
@@ -84,22 +65,15 @@ def bilateral_filter(
     >>> bilateral_filter(scan).round(3).tolist()
     [2.033, 2.035, 2.033, 5.0]
     """
-    check_number("sigma_d", sigma_d)
-    check_number("sigma_r", sigma_r)
-    check_count("half_width", half_width, least=0)
+    _check(sigma_d=sigma_d, sigma_r=sigma_r, half_width=half_width)
     block = _block(scan)
-    scratch = np.empty(scratch_shape(len(scan), int(half_width)), np.float32)
     filter_ranges(
-        block.floats,
-        block.range_min,
-        block.range_max,
-        float(sigma_d),
-        float(sigma_r),
-        int(half_width),
-        block.circular,
-        scratch,
-    )
-    return block.floats[FILTERED, : len(scan)]
+        block.floats, block.range_min, block.range_max, float(sigma_d), float(sigma_r),
+        int(half_width), block.circular,
+        np.empty(scratch_shape(len(scan), int(half_width)), np.float32),
+    )  # fmt: skip
+    filtered: Array = block.work.beams[at.FILTERED, : len(scan)]
+    return filtered
 
 
 def estimate_noise(scan: LaserScan) -> RangeNoise | None:
@@ -129,32 +103,30 @@ def adaptive_clusters(
     min_points: int = 3,
     noise: RangeNoise | None = None,
 ) -> NDArray[np.int32]:
-    """Part the valid beams of a scan into classes, on distance and density.
+    """Part the valid beams of a scan into clusters, on distance and density.
 
-    A point joins the class before it if its spacing d is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ
-    (equation 10) plus the noise floor, or at most T_K = μ_K + k σ_K of the spacings in the class
-    (11-13). In a full circle the last class goes on in the first by the same rule.
+    A point joins the cluster before it if its spacing d is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ
+    (equation 10) plus the noise floor, or at most T_K = μ_K + k σ_K of the spacings in the cluster
+    (11-13). In a full circle the last cluster goes on in the first by the same rule.
 
     Parameters
     ----------
     scan : LaserScan
     ranges : array_like, shape (n,), optional
         Ranges to use in place of the scan's own, such as filtered ones [m].
-    spacing_scale : float
-        λ.
+    spacing_scale, density_k : float
+        λ and k.
     noise_floor : float
         Added to T_d, in units of √2 σ.
-    density_k : float
-        k.
     min_points : int
-        Classes of fewer points are noise.
+        Clusters of fewer points are noise.
     noise : RangeNoise, optional
         σ of the noise floor; estimated from the scan if it is not given.
 
     Returns
     -------
     int32 array, shape (n,)
-        Class of each beam, -1 for invalid beams and noise.
+        Cluster of each beam, -1 for invalid beams and noise.
 
     Examples
     --------
@@ -162,10 +134,8 @@ def adaptive_clusters(
     >>> adaptive_clusters(scan).tolist()
     [0, 0, 0, 0, 1, 1, 1, -1]
     """
-    check_number("spacing_scale", spacing_scale)
-    check_number("noise_floor", noise_floor, or_equal=True)
-    check_number("density_k", density_k, or_equal=True)
-    check_count("min_points", min_points, least=1)
+    _check(spacing_scale=spacing_scale, noise_floor=noise_floor, density_k=density_k)
+    Bounds(int, low=1).check("min_points", min_points)
     n = len(scan)
     used = np.where(scan.valid, scan.ranges, np.nan)
     if ranges is not None:
@@ -174,38 +144,31 @@ def adaptive_clusters(
             raise ValueError(f"ranges has shape {used.shape}, expected ({n},), one for each beam")
         used[~scan.valid] = np.nan
     block = _block(scan)
-    block.floats[FILTERED, :n] = used
+    block.work.beams[at.FILTERED, :n] = used
     cluster(
-        *_workspace(block),
-        block.bearings,
-        block.step,
-        block.circular,
-        noise_row(noise or estimate_noise(scan)),
-        float(spacing_scale),
-        float(noise_floor),
-        float(density_k),
-        int(min_points),
-    )
-    count = block.counts[POINTS]
+        block.floats, block.ints, block.bearings, block.step, block.circular,
+        noise_row(noise or estimate_noise(scan)), float(spacing_scale), float(noise_floor),
+        float(density_k), int(min_points),
+    )  # fmt: skip
     labels = np.full(n, -1, np.int32)
-    labels[block.ints[BEAM, :count]] = block.ints[LABEL, :count]
+    beam, label = block.work.marks[[at.BEAM, at.LABEL], : block.counts[at.POINTS]]
+    labels[beam] = label
     return labels
 
 
 def corner_response(
     points: ArrayLike, *, support_radius: int = 6, response: str = "relative"
 ) -> Array:
-    """Response of the corner detection operator along one class (equations 15-22).
+    """Response of the corner detection operator along one cluster (equations 15-22).
 
     Parameters
     ----------
     points : array_like, shape (m, 2)
-        Points of the class in beam order [m].
+        Points of the cluster in beam order [m].
     support_radius : int
-        Points on either side, truncated at the ends of the class.
+        Points on either side, truncated at the ends of the cluster.
     response : {"relative", "tangent", "product"}
-        The reading: Σd to the tangent over Σ|s| [-], Σd to the tangent [m], or that times Σd to
-        the chord [m²].
+        Σd to the tangent over Σ|s| [-], Σd to the tangent [m], or that times Σd to the chord [m²].
 
     Returns
     -------
@@ -219,10 +182,9 @@ def corner_response(
     [0.35, 0.51, 0.71, 0.51, 0.35]
     """
     xy = _points(points)
-    check_count("support_radius", support_radius, least=1)
-    check_choice("response", response, RESPONSES)
+    _check(support_radius=support_radius, response=response)
     out = np.empty(len(xy))
-    response_along(*_columns(xy), int(support_radius), RESPONSES[response], out)
+    response_along(*xy.T.copy(), int(support_radius), RESPONSES[response], out)
     return out
 
 
@@ -234,7 +196,7 @@ def primary_corners(
     response: str = "relative",
     min_points: int = 3,
 ) -> NDArray[np.void]:
-    """Find the corners of one class: the farthest point from the chord, again and again.
+    """Find the corners of one cluster: the farthest point from the chord, again and again.
 
     Steps 5-7 with equations 14-22: a candidate whose response exceeds the threshold is a corner,
     and both sides of it are searched in turn; a branch ends at its first rejected candidate.
@@ -242,7 +204,7 @@ def primary_corners(
     Parameters
     ----------
     points : array_like, shape (m, 2)
-        Points of the class in beam order [m].
+        Points of the cluster in beam order [m].
     support_radius, response
         As in `corner_response`.
     threshold : float
@@ -264,18 +226,15 @@ def primary_corners(
     [6]
     """
     xy = _points(points)
-    check_count("support_radius", support_radius, least=1)
-    check_number("threshold", threshold, or_equal=True)
-    check_choice("response", response, RESPONSES)
-    check_count("min_points", min_points, least=2)
-    block = _one_class(xy, noise_row(None))
-    cut(
-        *_workspace(block),
-        int(support_radius),
-        float(threshold),
-        RESPONSES[response],
-        int(min_points),
+    _check(
+        support_radius=support_radius,
+        threshold=threshold,
+        response=response,
+        min_points=min_points,
     )
+    block = _one_cluster(xy, noise_row(None))
+    kind, least = RESPONSES[response], int(min_points)
+    cut(block.floats, block.ints, int(support_radius), float(threshold), kind, least)
     return candidate_records(block, float(threshold))
 
 
@@ -304,17 +263,23 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
     ([2.0, 0.0], 1.5708)
     """
     xy = _points(points)
-    check_choice("fit", fit, FITS)
+    _check(fit=fit)
     if len(xy) < 2:
         raise ValueError(f"points has {len(xy)} points, expected at least 2")
     if not xy.any(axis=1).all():
         raise ValueError("points has a point at the origin, expected points that a beam can meet")
-    block = _one_class(xy, noise_row(noise or RangeNoise(sigma=1.0)))
-    block.ints[[FIRST, LAST, BEFORE], 0] = 0, len(xy) - 1, -1
-    block.counts[PIECES] = 1
+    block = _one_cluster(xy, noise_row(noise or RangeNoise(sigma=1.0)))
+    block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
+    block.counts[at.PIECES] = 1
     steps.measure(block, 0, fit=FITS[fit], sharp=False)
     line: np.void = block.written()[0][0]
     return line
+
+
+def _check(**given: Any) -> None:
+    """Check values by the bounds of the method's parameters of these names."""
+    for name, value in given.items():
+        bounds_of(Liu, name).check(name, value)
 
 
 def _block(scan: LaserScan) -> Block:
@@ -324,24 +289,19 @@ def _block(scan: LaserScan) -> Block:
     return block
 
 
-def _workspace(block: Block) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    return block.floats, block.ints, block.counts
-
-
-def _one_class(xy: Array, noise: Array) -> Block:
-    """Points as a scan of their own, all of one open class."""
-    m, rho = len(xy), np.hypot(*_columns(xy))
+def _one_cluster(xy: Array, noise: Array) -> Block:
+    """Make a scan of points, all of one open cluster."""
+    m, rho = len(xy), np.hypot(*xy.T)
     # The bearings do not matter but for their sines and cosines; points need not be in order.
-    block = Block(LaserScan(rho, 0.0, 1.0 / max(m, 1)), noise, 1)
-    block.load(rho)
-    block.take(0)
+    block = _block(LaserScan(rho, 0.0, 1.0 / max(m, 1)))
     with np.errstate(invalid="ignore"):
         block.bearings[:] = xy.T / rho
     block.noises[0] = noise
-    block.ints[BEAM, :m], block.ints[LABEL, :m] = np.arange(m), 0
-    block.ints[[CLASS_FIRST, CLASS_LAST], 0] = 0, m - 1
-    block.floats[[X, Y], :m] = xy.T
-    block.counts[[POINTS, CLOSED, CLASSES]] = m, False, min(m, 1)
+    block.work.beams[at.RANGE, :m] = rho  # Also of points at the origin.
+    block.work.marks[at.BEAM, :m], block.work.marks[at.LABEL, :m] = np.arange(m), 0
+    block.work.clusters[[at.FIRST, at.LAST], 0] = 0, m - 1
+    block.work.points[[at.X, at.Y], :m] = xy.T
+    block.counts[[at.POINTS, at.CLOSED, at.CLUSTERS]] = m, False, min(m, 1)
     return block
 
 
@@ -354,7 +314,3 @@ def _points(points: ArrayLike) -> Array:
     if not np.isfinite(xy).all():
         raise ValueError("points has a value that is not finite")
     return xy
-
-
-def _columns(xy: Array) -> tuple[Array, Array]:
-    return xy[:, 0].copy(), xy[:, 1].copy()

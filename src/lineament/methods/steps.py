@@ -1,4 +1,4 @@
-"""Steps that the methods share: the noise before everything else, the measuring after it."""
+"""Steps that methods share: the noise first; clusters; at the end the budget and the measuring."""
 
 from __future__ import annotations
 
@@ -10,14 +10,53 @@ from ..kernels.layout import RANGE
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure as _measure
 from ..kernels.noise import estimate_noise as _estimate_noise
+from ..kernels.rivals.pdbs import BORGES_ALDON, part_by_distance
 from .workspace import Block
 
-__all__ = ["budget_scratch", "estimate_noise", "limit_vertices", "measure"]
+__all__ = ["budget_scratch", "estimate_noise", "limit_vertices", "measure", "part"]
 
 
 def estimate_noise(block: Block, row: int) -> None:
     """Fill the noise of the scan in a block's workspace: that given, or estimated from it."""
     _estimate_noise(block.floats, block.range_min, block.range_max, block.noise, block.noises[row])
+
+
+def part(
+    block: Block,
+    row: int,
+    *,
+    rule: int = BORGES_ALDON,
+    constant: float = 3.0,
+    angle: float,
+    max_missing: int,
+    min_points: int,
+) -> None:
+    """Part scan `row` of a block, which is in its workspace, into clusters.
+
+    Parameters are those of `kernels.rivals.pdbs.part_by_distance`; by default the breakpoint
+    detector of Borges and Aldon, with the angle λ and three standard deviations.
+    """
+    part_by_distance(
+        block.floats, block.ints, block.bearings, block.sensor, block.noises[row],
+        (rule, constant, angle), max_missing, min_points,
+    )  # fmt: skip
+
+
+def limit_vertices(block: Block, max_vertices: int) -> None:
+    """Join or leave out pieces until they have no more vertices than allowed; 0 allows any number.
+
+    See `kernels.budget.limit_pieces`.
+    """
+    if max_vertices:
+        costs, follow = budget_scratch(block.beams, max_vertices)
+        budget = len(follow[0]) - 1
+        limit_pieces(block.floats, block.ints, block.bearings, budget, LINK, WORST, costs, follow)
+
+
+def budget_scratch(beams: int, max_vertices: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Make the tables of `kernels.budget.limit_pieces`; no scan needs 2 (n + 1) vertices."""
+    shape = (beams + 2, min(max_vertices, 2 * beams + 2) + 1)
+    return np.empty((2, *shape)), np.empty(shape, np.int64)
 
 
 def measure(
@@ -31,58 +70,11 @@ def measure(
     reach: float = 3.0,
     gap: float = 6.0,
 ) -> None:
-    """Fit the pieces of the scan in a block's workspace, and write its features.
+    """Fit the pieces of scan `row` of a block, which is in its workspace; write its features.
 
-    Parameters
-    ----------
-    block : Block
-        Whose points are listed and whose classes are cut into pieces (see `kernels.layout`).
-    row : int
-        Which of the block's scans it is; they are measured in order.
-    source, fit, sharp, trim, reach, gap
-        As in `kernels.measuring.measure`.
+    Scans are measured in order. Parameters are those of `kernels.measuring.Options`.
     """
     _measure(
-        block.floats,
-        block.ints,
-        block.counts,
-        row,
-        source,
-        block.bearings,
-        block.circular,
-        block.noises[row],
-        fit,
-        sharp,
-        trim,
-        reach,
-        gap,
-        block.segments,
-        block.corners,
-        block.breakpoints,
-        block.clusters,
-        block.offsets,
-    )
-
-
-def limit_vertices(block: Block, max_vertices: int) -> None:
-    """Join or leave out pieces until they have no more vertices than allowed; 0 allows any number.
-
-    Parameters
-    ----------
-    block : Block
-        In whose workspace the classes of a scan are cut into pieces.
-    max_vertices : int
-        As in `kernels.budget.limit_pieces`.
-    """
-    if max_vertices:
-        costs, follow = budget_scratch(block.beams, max_vertices)
-        limit_pieces(
-            block.floats, block.ints, block.counts, block.bearings,
-            len(follow[0]) - 1, LINK, WORST, costs, follow,
-        )  # fmt: skip
-
-
-def budget_scratch(beams: int, max_vertices: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Make the tables of `kernels.budget.limit_pieces`; no scan needs 2 (n + 1) vertices."""
-    shape = (beams + 2, min(max_vertices, 2 * beams + 2) + 1)
-    return np.empty((2, *shape)), np.empty(shape, np.int64)
+        block.floats, block.ints, row, block.bearings, block.circular, block.noises[row],
+        (source, fit, sharp, trim, reach, gap), block.tables,
+    )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..kernels import layout
+from ..kernels import layout as at
 from ..scan import LaserScan
 from .workspace import Block
 
@@ -46,9 +46,9 @@ class Trace:
         Distance of each valid beam's filtered point to that of the valid beam before it [m].
     distance_threshold, density_threshold : float64 array, shape (n,)
         What the spacing was compared with (equations 10, 11-13) [m]; the second is NaN where it
-        was not asked.
+        was not needed.
     clusters : int32 array, shape (n,)
-        Class of each beam, noise as -1.
+        Cluster of each beam, noise as -1.
     candidates : structured array of dtype `CANDIDATE`
         Primary corners in the order in which they were examined.
     threshold : float
@@ -92,10 +92,10 @@ def trace_of(
         scan=scan,
         method=method,
         features=features,
-        filtered=block.floats[layout.FILTERED, : len(scan)],
-        spacing=block.by_beam(layout.SPACING),
-        distance_threshold=block.by_beam(layout.DISTANCE_THRESHOLD),
-        density_threshold=block.by_beam(layout.DENSITY_THRESHOLD),
+        filtered=block.work.beams[at.FILTERED, : len(scan)],
+        spacing=block.by_beam(at.SPACING),
+        distance_threshold=block.by_beam(at.DISTANCE_THRESHOLD),
+        density_threshold=block.by_beam(at.DENSITY_THRESHOLD),
         clusters=features.clusters,
         candidates=candidates,
         threshold=threshold,
@@ -106,12 +106,11 @@ def trace_of(
 
 def candidate_records(block: Block, threshold: float) -> NDArray[np.void]:
     """Candidates of the last scan of a block as records."""
-    count = block.counts[layout.CANDIDATES]
-    at = block.ints[layout.CANDIDATE, :count]
-    records = np.zeros(count, CANDIDATE)
-    records["beam"] = block.ints[layout.BEAM, at]
-    records["cluster"] = block.ints[layout.LABEL, at]
-    records["chord_distance"] = block.floats[layout.CHORD_DISTANCE, :count]
-    records["response"] = block.floats[layout.CANDIDATE_RESPONSE, :count]
+    candidates = block.work.candidates[:, : block.counts[at.CANDIDATES]]
+    points = candidates[at.POINT].astype(int)
+    records = np.zeros(len(points), CANDIDATE)
+    records["beam"], records["cluster"] = block.work.marks[[at.BEAM, at.LABEL]][:, points]
+    records["chord_distance"] = candidates[at.CHORD_DISTANCE]
+    records["response"] = candidates[at.RESPONSE]
     records["accepted"] = records["response"] > threshold
     return records

@@ -24,8 +24,8 @@ class Block:
     """What goes into the kernels and comes out of them, for up to `capacity` scans.
 
     A method's ``run`` reads the ranges, the bearings and `noise`, and fills `noises` and the tables
-    scan after scan. `floats`, `ints` and `counts` (see `kernels.layout`) are the workspace of one
-    scan; `own` is the method's own. All of it is kept from call to call: nothing is allocated.
+    scan after scan. `floats` and `ints` are the workspace of one scan, `work` its parts by name,
+    see `kernels.layout`; `own` is what the method needs besides. All is kept from call to call.
 
     Parameters
     ----------
@@ -47,12 +47,13 @@ class Block:
         self.bearings = np.stack((np.cos(frame.angles), np.sin(frame.angles)))
         self.step, self.circular = frame.angle_increment, frame.is_full_circle
         self.range_min, self.range_max = frame.range_min, frame.range_max
+        self.sensor = self.range_min, self.range_max, self.step, self.circular
         self.noise, self.own = noise, own
         self.noises = np.empty((capacity, 4))
         self.ranges = np.empty((capacity, n))
-        self.floats = np.empty((layout.FLOATS, n + 1))
-        self.ints = np.empty((layout.INTS, n + 1), np.int64)
-        self.counts = np.zeros(layout.COUNTS, np.int64)  # Few methods find arcs.
+        self.floats, self.ints = layout.workspace(n)
+        self.work = layout.named(self.floats, self.ints)
+        self.counts = self.work.counts
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
         self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
         self.segments, self.corners, self.arcs, self.breakpoints = map(words, self._records)
@@ -79,7 +80,12 @@ class Block:
 
     def take(self, row: int) -> None:
         """Put a scan into the workspace, for kernels that are called one by one."""
-        self.floats[layout.RANGE, : self.beams] = self.ranges[row]
+        self.work.beams[layout.RANGE, : self.beams] = self.ranges[row]
+
+    @property
+    def tables(self) -> tuple[NDArray[Any], ...]:
+        """Results of the kernels: segments, corners, breakpoints, clusters, offsets."""
+        return self.segments, self.corners, self.breakpoints, self.clusters, self.offsets
 
     def raw(self) -> list[bytes]:
         """Copy the records that the last run wrote, as bytes, in the order of the tables."""
@@ -97,11 +103,11 @@ class Block:
             for raw, (dtype, none) in zip(self.raw(), _TABLES, strict=True)
         ]
 
-    def by_beam(self, line: int) -> Array:
-        """Spread a line of the workspace, by usable beam, over all beams; NaN on the others."""
+    def by_beam(self, row: int) -> Array:
+        """Spread a row of the points, by usable beam, over all beams; NaN on the others."""
         spread = np.full(self.beams, np.nan)
-        usable = ~np.isnan(self.floats[layout.FILTERED, : self.beams])
-        spread[usable] = self.floats[line, : int(usable.sum())]
+        usable = ~np.isnan(self.work.beams[layout.FILTERED, : self.beams])
+        spread[usable] = self.work.points[row, : int(usable.sum())]
         if not self.circular and usable.any():
             spread[np.argmax(usable)] = np.nan  # Nothing lies before the first.
         return spread

@@ -14,7 +14,7 @@ sensor, `Tracker.twist`, is what :func:`lineament.deskew` needs for the next sca
 from typing import TYPE_CHECKING
 
 from .._lazy import lazily
-from .poses import Twist, compose, inverse, poses_along, relative, twist_between
+from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_between
 
 if TYPE_CHECKING:
     from .association import Matches, associate

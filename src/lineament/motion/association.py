@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
 from ..features.records import C_COVARIANCE
-from ..kernels.tracking.assignment import PATHS
 from ..kernels.tracking.association import associate as kernel
 from ..kernels.tracking.association import move
 from ..scan import Array
@@ -108,35 +107,15 @@ def associate(
     spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
     x, y, theta = map(float, motion)
     earlier, moved = words_of(before), words_of(now)
-    _add_misfits(moved[1], now)
+    # Walls are off straight lines in both frames, and their corners with them.
+    squares = np.append(now.segments["misfit"] ** 2, 0.0)
+    both = 2.0 * squares[now.corners["segments"]].sum(axis=1)
+    moved[1][:, C_COVARIANCE] += both
+    moved[1][:, C_COVARIANCE + 3] += both
     move(*moved, x, y, theta)
-    rows, columns = max(map(len, moved)), max(map(len, earlier))
-    columns += rows + 1
-    owners = np.empty((len(KINDS), columns), np.int64)
-    kernel(
-        earlier,
-        moved,
-        (_sides(before.corners, _EDGE_BEFORE), _sides(now.corners, _EDGE_NOW)),
-        spread,
-        (x, y),
-        float(roughness),
-        gates,
-        np.empty((rows, columns)),
-        np.empty((PATHS, columns)),
-        np.empty(rows),
-        np.empty(columns, np.int64),
-        owners,
-    )
-    pairs = (_pairs(row[: len(table)]) for row, table in zip(owners, earlier, strict=True))
-    return Matches(before, now, *pairs)
-
-
-def _add_misfits(words: Array, features: Features) -> None:
-    """Add to the covariances of corners by what their walls are off straight lines, seen twice."""
-    squares = np.append(features.segments["misfit"] ** 2, 0.0)
-    both = 2.0 * squares[features.corners["segments"]].sum(axis=1)
-    words[:, C_COVARIANCE] += both
-    words[:, C_COVARIANCE + 3] += both
+    sides = _sides(before.corners, _EDGE_BEFORE), _sides(now.corners, _EDGE_NOW)
+    owners = kernel(earlier, moved, sides, spread, (x, y), float(roughness), gates)
+    return Matches(before, now, *map(_pairs, owners))
 
 
 def is_landmark(corners: NDArray[np.void]) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Array, LaserScan
-from .poses import Twist, poses_along
+from ..scan.poses import Twist, poses_along
 
 __all__ = ["beam_times", "deskew"]
 
@@ -59,7 +59,7 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     scan : LaserScan
     twist : (v_x, v_y, omega) or None
         Velocity of the sensor in its own frame [m/s, m/s, rad/s], given, or from two poses
-        (:func:`~lineament.motion.poses.twist_between`), or of the last scans
+        (:func:`~lineament.scan.poses.twist_between`), or of the last scans
         (:attr:`lineament.motion.Tracker.twist`). None where it is not known.
 
     Returns

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.tracking.motion import MATRICES, NOT_POSITIVE, NOT_THERE
+from ..kernels.tracking.motion import NOT_POSITIVE, NOT_THERE
 from ..kernels.tracking.motion import estimate_motion as kernel
-from ..kernels.tracking.residuals import COLUMNS
 from ..scan import Array, Pose
+from ..scan.poses import Twist, twist_between
 from .association import KINDS, Matches, chi_square, matrix_of, words_of
-from .poses import Twist, twist_between
 
 __all__ = ["Motion", "estimate_motion"]
 
@@ -124,7 +123,7 @@ def estimate_motion(
     spread = _UNKNOWN if covariance is None else matrix_of(covariance)
     before, now = matches.before, matches.now
     x, y, theta = map(float, prior)
-    count, found = len(matches), np.empty((3, 3, 3))
+    found = np.empty((3, 3, 3))
     lost = kernel(
         words_of(before),
         words_of(now),
@@ -134,10 +133,6 @@ def estimate_motion(
         spread,
         float(roughness),
         (chi_square(_RIGHT, 2), chi_square(0.5, 2)),
-        np.empty(len(now.segments), np.bool_),
-        np.empty((count, COLUMNS)),
-        np.empty(count),
-        np.empty((MATRICES, 3, 3)),
         found,
     )
     if lost == NOT_POSITIVE:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ..features import TABLES, Features
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
+from ..scan.poses import Twist, inverse, poses_along, relative
 from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
 from .estimate import Motion, estimate_motion
-from .poses import Twist, inverse, poses_along, relative
 
 __all__ = ["Tracker", "Tracks"]
 

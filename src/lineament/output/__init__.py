@@ -1,23 +1,22 @@
-"""Features to files: one module a format, imported when it is used."""
+"""Features to files: one writer a format, imported when it is used."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
-from ..errors import LineamentError
-from ..files import written_beside
+from ..errors import needed_by
+from ..files import ending_of
 from .writer import Writer
 
-__all__ = ["ENDINGS", "Writer", "open_writer", "written_beside"]
+__all__ = ["ENDINGS", "Writer", "open_writer"]
 
-#: Module and class of the writer of each ending. A new format is one file and one line here.
+#: Module and class of the writer of each ending. A new format is one class and one line here.
 _WRITERS = {
-    ".parquet": ("parquet", "ParquetWriter"),
-    ".csv": ("csv", "CsvWriter"),
-    ".jsonl": ("jsonl", "JsonLinesWriter"),
+    ".parquet": ("tables", "ParquetWriter"),
+    ".csv": ("tables", "CsvWriter"),
+    ".jsonl": ("tables", "JsonLinesWriter"),
     ".ros2.mcap": ("mcap", "Ros2Writer"),  # before the ending that it contains
     ".mcap": ("mcap", "FoxgloveWriter"),
     ".rrd": ("rrd", "RerunWriter"),
@@ -30,7 +29,7 @@ ENDINGS = tuple(_WRITERS)
 
 
 def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Writer:
-    """Make a writer of features for a file, of the format that its ending tells.
+    """Make a writer of features for a file, in the format of its ending.
 
     Parameters
     ----------
@@ -55,6 +54,7 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> import lineament as ln
     >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
     >>> path = Path(tempfile.mkdtemp()) / "features.jsonl"
@@ -63,22 +63,7 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
     >>> path.read_text(encoding="utf-8")[:25]
     '{"scan": 0, "stamp": 0.0,'
     """
-    name = Path(path).name.lower()
-    for ending in _WRITERS:
-        if name.endswith(ending):
-            return _make(path, topics, ending)
-    own = Path(path).suffix.lower()
-    told = f"the ending {own!r} is not known" if own else "the name has no ending"
-    raise LineamentError(f"{path}: {told}, expected one of {', '.join(ENDINGS)}")
-
-
-def _make(path: str | os.PathLike[str], topics: Sequence[str], ending: str) -> Writer:
-    module, name = _WRITERS[ending]
-    try:
+    module, name = _WRITERS[ending_of(path, ENDINGS)]
+    with needed_by(f"{path}:"):
         writer: Writer = getattr(import_module(f".{module}", __name__), name)(path, topics)
-    except ModuleNotFoundError as error:
-        raise LineamentError(
-            f"{path}: files that end in {ending} need the package {error.name}, "
-            "which is not installed"
-        ) from None
     return writer

@@ -1,25 +1,26 @@
-"""Empty figures and whole picture files: no display, no global state of matplotlib."""
+"""Empty figures and whole picture files, without a display or the global state of matplotlib."""
 
 from __future__ import annotations
 
 import io
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import LineamentError
-from ..files import naming_errors, written_beside
+from ..files import ending_of, naming_errors, written_beside
+from ..scan import Array
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 INK, FAINT, GRID = "#1b1f24", "#9aa1a9", "#e9ecef"
 CORNER_COLOR, EDGE_COLOR = "#d1242f", "#eba0a5"
-BREAK_COLOR, ARC_COLOR = "#8a5a00", "#8250df"
+BREAK_COLOR, ARC_COLOR, WAY_COLOR = "#8a5a00", "#8250df", "#0969da"
+_TEXT_COLOR, _FRAME_COLOR = "#57606a", "#d0d7de"
 
 #: Colours of clusters; neighbours in this list are easy to tell apart, also with colour blindness.
 PALETTE = np.array(
@@ -41,16 +42,12 @@ DPI = 150
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
-    """Tell the ending of a picture file; a LineamentError if it is not known."""
-    ending = Path(path).suffix.lower()
-    if ending not in _METADATA:
-        told = f"the ending {ending!r} is not known" if ending else "the name has no ending"
-        raise LineamentError(f"{path}: {told}, expected one of {', '.join(PICTURE_ENDINGS)}")
-    return ending
+    """Return the ending of a picture file; a LineamentError if it is not known."""
+    return ending_of(path, PICTURE_ENDINGS)
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure of some inches that needs no display."""
+    """Make an empty figure [inch] that needs no display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -69,29 +66,26 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         naming_errors(path),
         mpl.rc_context({"svg.hashsalt": "lineament"}),
     ):
-        figure.savefig(
-            temporary,
-            format=ending[1:],
-            dpi=DPI,
-            metadata=_METADATA[ending],
-            bbox_inches="tight",
-            pad_inches=0.15,
-        )
+        _write(figure, temporary, ending, DPI)
 
 
 def figure_bytes(figure: Figure, dpi: int = DPI) -> bytes:
-    """Give the bytes of a figure as a PNG file, and free its memory."""
+    """Return a figure as the bytes of a PNG file, and free its memory."""
     buffer = io.BytesIO()
+    _write(figure, buffer, ".png", dpi)
+    figure.clear()
+    return buffer.getvalue()
+
+
+def _write(figure: Figure, file: Path | IO[bytes], ending: str, dpi: int) -> None:
     figure.savefig(
-        buffer,
-        format="png",
+        file,
+        format=ending[1:],
         dpi=dpi,
-        metadata=_METADATA[".png"],
+        metadata=_METADATA[ending],
         bbox_inches="tight",
         pad_inches=0.15,
     )
-    figure.clear()
-    return buffer.getvalue()
 
 
 def settle(figure: Figure) -> None:
@@ -100,8 +94,8 @@ def settle(figure: Figure) -> None:
     figure.set_layout_engine("none")
 
 
-def style(axes: Axes, title: str, subtitle: str = "") -> None:
-    """Give a panel its title, a light grid, and quiet edges."""
+def style(axes: Axes, title: str, subtitle: str = "", xlabel: str = "", ylabel: str = "") -> None:
+    """Give a panel its title, the names of its axes, a light grid, and quiet edges."""
     axes.set_title(
         title, loc="left", fontsize=12, fontweight="bold", color=INK, pad=20 if subtitle else 6
     ).set_parse_math(False)
@@ -113,32 +107,31 @@ def style(axes: Axes, title: str, subtitle: str = "") -> None:
             xycoords="axes fraction",
             textcoords="offset points",
             fontsize=8.5,
-            color="#57606a",
+            color=_TEXT_COLOR,
         )
+    axes.set_xlabel(xlabel, fontsize=9, color=_TEXT_COLOR)
+    axes.set_ylabel(ylabel, fontsize=9, color=_TEXT_COLOR)
     axes.grid(color=GRID, linewidth=0.7)
     axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8, color=FAINT, labelcolor="#57606a")
+    axes.tick_params(labelsize=8, color=FAINT, labelcolor=_TEXT_COLOR)
     for spine in axes.spines.values():
-        spine.set_color("#d0d7de")
+        spine.set_color(_FRAME_COLOR)
 
 
-def style_plane(axes: Axes, title: str, subtitle: str, points: NDArray[np.float64]) -> None:
+def style_plane(axes: Axes, title: str, subtitle: str, points: Array) -> None:
     """Make a panel a plan in metres that shows all of these points (n, 2), of equal axes."""
-    style(axes, title, subtitle)
-    points = np.vstack([points[np.isfinite(points).all(axis=1)], np.zeros((0, 2))])
-    low, high = (
-        (points.min(axis=0), points.max(axis=0)) if len(points) else (-np.ones(2), np.ones(2))
-    )
+    style(axes, title, subtitle, "x [m]", "y [m]")
+    points = points[np.isfinite(points).all(axis=1)]
+    points = points if len(points) else np.array([[-1.0, -1.0], [1.0, 1.0]])
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = max(0.04 * float((high - low).max()), 0.05)
     axes.set_xlim(low[0] - margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("x [m]", fontsize=9, color="#57606a")
-    axes.set_ylabel("y [m]", fontsize=9, color="#57606a")
 
 
-def plane_size(points: NDArray[np.float64], width: float) -> float:
-    """Height [inch] of a panel of some width that shows these points, within reason."""
+def plane_height(points: Array, width: float) -> float:
+    """Return the height [inch] of a panel of some width that shows these points, within reason."""
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 2:
         return width
@@ -148,17 +141,28 @@ def plane_size(points: NDArray[np.float64], width: float) -> float:
     return float(np.clip(inside * extent[1] / extent[0], 0.4 * width, 1.4 * width))
 
 
-def colors_of(labels: NDArray[np.int32]) -> NDArray[np.str_]:
-    """Colour of each beam by its cluster."""
-    return PALETTE[np.asarray(labels) % len(PALETTE)]
+def add_legend(figure: Figure) -> None:
+    """Draw one legend for all panels of a figure, below them."""
+    handles: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(str(label), handle)
+    figure.legend(
+        list(handles.values()),
+        list(handles),
+        loc="outside lower center",
+        ncols=8,
+        fontsize=9,
+        frameon=False,
+    )
 
 
-def count(number: int, one: str, many: str = "") -> str:
+def count(number: int, one: str) -> str:
     """Write a number of things.
 
     Examples
     --------
-    >>> count(1, "class", "classes"), count(2, "corner")
-    ('1 class', '2 corners')
+    >>> count(1, "cluster"), count(2, "corner")
+    ('1 cluster', '2 corners')
     """
-    return f"{number} {one if number == 1 else many or one + 's'}"
+    return f"{number} {one}" if number == 1 else f"{number} {one}s"

@@ -1,217 +1,154 @@
-"""What the figures are made of: beams, segments, corners, arcs, breakpoints."""
+"""What figures are made of: beams, segments, corners, arcs, breakpoints, and texts beside them."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..scan import LaserScan
-from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, colors_of, style
-from .markers import arc_span
+from ..scan import Array, LaserScan
+from .canvas import ARC_COLOR, BREAK_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, PALETTE, style
+from .markers import arc_span, ellipses_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-
 #: Smaller similarity errors are drawn as this one [m]: a log axis has no place for 0.
 LEAST_ERROR = 2e-4
+#: Share of the errors of a corner that lie within three deviations.
+THREE_SIGMA = 1 - math.exp(-4.5)
+#: More positions than this get no texts.
+MAX_LABELS = 29
 
 
 def draw_beams(axes: Axes, scan: LaserScan, clusters: NDArray[np.int32]) -> Array:
-    """Points by cluster, noise, invalid beams at the rim, the sensor; gives what must be seen."""
-    valid, points = scan.valid, scan.points
-    known, noise = valid & (clusters >= 0), valid & (clusters < 0)
-    rim = draw_rim(axes, scan)
-    x, y = points.T
-    axes.scatter(x[known], y[known], s=13, c=colors_of(clusters[known]), linewidths=0, zorder=3)
-    if noise.any():
-        axes.plot(
-            x[noise],
-            y[noise],
-            "x",
-            markersize=3.8,
-            color="#868e96",
-            markeredgewidth=0.8,
-            zorder=3,
-            label="noise",
-        )
+    """Draw points by cluster, noise, invalid beams at the rim, and the sensor.
+
+    Returns the points (n, 2) that the panel must show.
+    """
+    known, noise = scan.valid & (clusters >= 0), scan.valid & (clusters < 0)
+    rim = _draw_rim(axes, scan)
+    x, y = scan.points[known].T
+    axes.scatter(x, y, s=13, c=PALETTE[clusters[known] % len(PALETTE)], linewidths=0, zorder=3)
+    _draw_points(axes, scan.points[noise], "noise", marker="x", ms=3.8, c="#868e96", mew=0.8)
     draw_sensor(axes)
-    return np.vstack([points[valid], rim, np.zeros((1, 2))])
+    return np.vstack([scan.points[scan.valid], rim, np.zeros((1, 2))])
+
+
+def _draw_points(axes: Axes, points: Array, label: str, **style: Any) -> None:
+    """Draw the finite of some points; without one the legend has no line for them."""
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points):
+        axes.plot(*points.T, ls="none", label=label, **{"zorder": 3} | style)
 
 
 def draw_sensor(axes: Axes) -> None:
     """Draw a triangle at the origin that looks along the x axis."""
-    axes.plot(
-        [0],
-        [0],
-        marker=(3, 0, -90),
-        markersize=9,
-        color=INK,
-        linestyle="none",
-        label="sensor",
-        zorder=6,
+    _draw_points(
+        axes, np.zeros((1, 2)), "sensor", marker=(3, 0, -90), markersize=9, color=INK, zorder=6
     )
 
 
-def draw_rim(axes: Axes, scan: LaserScan) -> Array:
-    """Faint ticks just outside the data, in the directions from which nothing came back."""
+def _draw_rim(axes: Axes, scan: LaserScan) -> Array:
+    """Draw faint ticks just outside the data in the directions from which nothing came back.
+
+    Returns their outer ends (m, 2).
+    """
     from matplotlib.collections import LineCollection
 
     invalid = ~scan.valid
     if not invalid.any():
         return np.zeros((0, 2))
-    rim, length = _rim(scan)
+    rim, gap = _rim(scan)
     directions = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))[invalid]
-    ticks = np.stack((rim[invalid, None] * directions, (rim[invalid, None] + length) * directions))
-    axes.add_collection(
-        LineCollection(
-            list(ticks.swapaxes(0, 1)),
-            colors=FAINT,
-            linewidths=0.7,
-            label="no return",
-            zorder=1,
-        ),
-        autolim=False,
+    inner = (rim[invalid] + gap)[:, None] * directions
+    outer: Array = inner + 0.6 * gap * directions
+    ticks = LineCollection(
+        list(np.stack((inner, outer), axis=1)), colors=FAINT, linewidths=0.7, label="no return"
     )
-    ends: Array = ticks[1]
-    return ends
+    axes.add_collection(ticks, autolim=False)
+    return outer
 
 
 def _rim(scan: LaserScan) -> tuple[Array, float]:
-    """Distance of a ring around what each beam's neighbourhood saw, and the length of a tick."""
+    """Return the distance of what each beam's neighbourhood saw, and a gap to keep from it [m]."""
     ranges = np.where(scan.valid, scan.ranges, 0.0)
     if not ranges.any():
-        return np.ones(len(scan)), 0.05
-    gap = 0.05 * float(ranges.max())
+        return np.ones(len(scan)), 0.08
     bins = np.floor(np.degrees(scan.angles) / 8).astype(int)
     bins -= bins.min()
     farthest = np.zeros(bins.max() + 3)
-    np.maximum.at(farthest, bins + 1, ranges)
-    # With both neighbours, so that a tick never lies between points.
-    farthest = np.maximum(farthest[1:-1], np.maximum(farthest[:-2], farthest[2:]))
+    for shift in range(3):  # with both neighbours, so that a tick never lies between points
+        np.maximum.at(farthest, bins + shift, ranges)
     known = np.flatnonzero(farthest)
-    outline = np.interp(np.arange(len(farthest)), known, farthest[known])
-    return outline[bins] + gap, 0.6 * gap
+    return np.interp(bins + 1, known, farthest[known]), 0.05 * float(ranges.max())
 
 
 def draw_segments(axes: Axes, segments: NDArray[np.void]) -> None:
-    """Lines with a short mark across each end."""
-    from matplotlib.collections import LineCollection
-
-    lines = np.stack((segments["start"], segments["end"]), axis=1)
-    lines = lines[np.isfinite(lines).all(axis=(1, 2))]
-    if not len(lines):
-        return
-    axes.add_collection(
-        LineCollection(
-            list(lines), colors=INK, linewidths=1.0, capstyle="round", label="segment", zorder=4
-        ),
-        autolim=False,
-    )
-    for start, end in lines:
+    """Draw lines with a short mark across each end."""
+    label = "segment"
+    for start, end in zip(segments["start"], segments["end"], strict=True):
+        if not np.isfinite([start, end]).all():
+            continue
+        if label:
+            axes.plot([], [], color=INK, linewidth=1.0, label=label)  # without the marks
+            label = ""
         across = math.degrees(math.atan2(end[1] - start[1], end[0] - start[0]))
-        axes.plot(
-            *np.array([start, end]).T,
-            marker=(2, 0, across),
-            markersize=6,
-            markeredgewidth=1.0,
-            color=INK,
-            linestyle="none",
-            zorder=4,
-        )
+        ends = np.column_stack((start, end))
+        axes.plot(*ends, color=INK, lw=1.0, marker=(2, 0, across), ms=6, mew=1.0, zorder=4)
 
 
 def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
-    """Markers, with 3 σ ellipses where they can be seen in a plan of some extent [m].
+    """Draw corners, with 3 σ ellipses where they can be seen in a plan of some extent [m].
 
     Edges are smaller and lighter than corners, and have no ellipse.
     """
     from matplotlib.patches import Ellipse
 
-    finite = np.isfinite(corners["position"]).all(axis=1)
-    corners = corners[finite]
     is_edge = corners["kind"] == "edge"
-    corners, edges = corners[~is_edge], corners[is_edge]
     for drawn, size, color, name in (
-        (edges, 4.0, EDGE_COLOR, "edge"),
-        (corners, 5.5, CORNER_COLOR, "corner"),
+        (corners[is_edge], 4.0, EDGE_COLOR, "edge"),
+        (corners[~is_edge], 5.5, CORNER_COLOR, "corner"),
     ):
-        if len(drawn):
-            axes.plot(
-                *drawn["position"].T,
-                marker="D",
-                markersize=size,
-                markerfacecolor="none",
-                markeredgecolor=color,
-                markeredgewidth=size / 4,
-                linestyle="none",
-                label=name,
-                zorder=5,
-            )
+        shape = {"marker": "D", "ms": size, "mfc": "none", "mec": color, "mew": size / 4}
+        _draw_points(axes, drawn["position"], name, **shape, zorder=5)
+    corners = corners[~is_edge]
     label = "3 σ of a corner"
-    for corner in corners[np.isfinite(corners["covariance"]).all(axis=(1, 2))]:
-        variances, axes_of = np.linalg.eigh(corner["covariance"])
-        half = 3 * np.sqrt(np.maximum(variances, 0))
-        if not 0.012 * extent < half[1] < extent:  # hidden by the marker, or no knowledge at all
-            continue
-        axes.add_patch(
-            Ellipse(
-                tuple(corner["position"]),
-                2 * half[1],
-                2 * half[0],
-                angle=math.degrees(math.atan2(axes_of[1, 1], axes_of[0, 1])),
-                facecolor=CORNER_COLOR + "22",
-                edgecolor=CORNER_COLOR,
-                linewidth=0.8,
-                label=label,
-                zorder=4.5,
+    for x, y, a, b, turn in ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA):
+        if 0.012 * extent < a < extent:  # else hidden by the marker, or no knowledge at all
+            shape = {"facecolor": CORNER_COLOR + "22", "edgecolor": CORNER_COLOR, "linewidth": 0.8}
+            turned = math.degrees(turn)
+            axes.add_patch(
+                Ellipse((x, y), 2 * a, 2 * b, angle=turned, label=label, zorder=4.5, **shape)
             )
-        )
-        label = ""
+            label = ""
 
 
 def draw_breakpoints(axes: Axes, breakpoints: NDArray[np.void]) -> None:
-    """Small markers where surfaces end."""
-    positions = breakpoints["position"]
-    positions = positions[np.isfinite(positions).all(axis=1)]
-    if len(positions):
-        axes.plot(
-            *positions.T,
-            marker="o",
-            markersize=3.6,
-            markerfacecolor="white",
-            markeredgecolor=BREAK_COLOR,
-            markeredgewidth=0.9,
-            linestyle="none",
-            label="breakpoint",
-            zorder=4.2,
-        )
+    """Draw small rings where surfaces end."""
+    shape = {"marker": "o", "ms": 3.6, "mfc": "white", "mec": BREAK_COLOR, "mew": 0.9}
+    _draw_points(axes, breakpoints["position"], "breakpoint", **shape, zorder=4.2)
 
 
 def draw_arcs(axes: Axes, arcs: NDArray[np.void], scan: LaserScan) -> None:
     """Draw the part of each circle that was seen and, thinly, the whole of it."""
     label = "arc"
     for arc in arcs[np.isfinite(arcs["center"]).all(axis=1) & np.isfinite(arcs["radius"])]:
-        whole = _circle(arc, 0.0, 2 * math.pi)
-        seen = _circle(arc, *arc_span(arc, scan))
-        axes.plot(*whole, color=ARC_COLOR, linewidth=0.5, linestyle=(0, (2, 3)), zorder=4.05)
-        axes.plot(*seen, color=ARC_COLOR, linewidth=2.0, label=label, zorder=4.1)
+        for span, name, line in (
+            ((0.0, 2 * math.pi), "", {"linewidth": 0.5, "linestyle": (0, (2, 3)), "zorder": 4.05}),
+            (arc_span(arc, scan), label, {"linewidth": 2.0, "zorder": 4.1}),
+        ):
+            turn = np.linspace(*span, 181)
+            circle = np.column_stack((np.cos(turn), np.sin(turn)))
+            axes.plot(*(arc["center"] + arc["radius"] * circle).T, c=ARC_COLOR, label=name, **line)
         label = ""
 
 
-def _circle(arc: np.void, first: float, last: float) -> tuple[Array, Array]:
-    turn = np.linspace(first, last, 181)
-    x, y = arc["center"]
-    return x + arc["radius"] * np.cos(turn), y + arc["radius"] * np.sin(turn)
-
-
 def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float) -> None:
-    """All features of a scan, over its beams."""
+    """Draw all features of a scan, over its beams."""
     draw_arcs(axes, features.arcs, scan)
     draw_segments(axes, features.segments)
     draw_breakpoints(axes, features.breakpoints)
@@ -219,19 +156,81 @@ def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float
 
 
 def draw_errors(axes: Axes, scan: LaserScan, errors: Array) -> None:
-    """Distance of each point from its own line, by bearing, on a scale that all methods share."""
+    """Draw the distance of each point from its line, by bearing, on a scale that never changes."""
     known = errors[np.isfinite(errors)]
-    told = (
+    about = (
         f"similarity error: mean {1e3 * known.mean():.1f} mm, largest {1e3 * known.max():.0f} mm"
         if len(known)
         else "no lines, no similarity error"
     )
-    style(axes, "", told)
+    style(axes, "", about, "bearing [°]", "error [m]")
     bearings = np.degrees(scan.angles)
     axes.plot(bearings, np.maximum(errors, LEAST_ERROR), ".", markersize=3, color=INK)
     axes.set_yscale("log")
     axes.set_ylim(1e-4, 10.0)
-    axes.set_xlabel("bearing [°]", fontsize=9, color="#57606a")
-    axes.set_ylabel("error [m]", fontsize=9, color="#57606a")
     if len(scan) > 1:
         axes.set_xlim(*bearings[[0, -1]])
+
+
+def label_points(axes: Axes, positions: Array, values: Array, obstacles: Array) -> None:
+    """Write a number beside each position, where it hides the fewest points and no other number.
+
+    The axes must have their final limits and place in the figure. Many positions get no numbers.
+    """
+    from matplotlib.patheffects import withStroke
+
+    finite = np.isfinite(positions).all(axis=1)
+    positions, texts = positions[finite], [f"{value:.3g}" for value in values[finite]]
+    if len(positions) > MAX_LABELS:
+        return
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    points_of = 72 / figure.dpi
+    here = axes.transData.transform(positions) * points_of
+    hidden = axes.transData.transform(obstacles[np.isfinite(obstacles).all(axis=1)]) * points_of
+    inside = np.array(axes.get_window_extent().extents) * points_of
+    boxes = np.zeros((0, 4))
+    for k, text in enumerate(texts):
+        half = np.array([4.6 * len(text), 9.0]) / 2  # of a text of 7 points
+        offsets, tried = _places(here[k], half)
+        cost = _DETOURS + _inside(tried, hidden) + 12 * _inside(tried, here)
+        cost += 60 * _overlaps(tried, boxes)
+        cost += 100 * ((tried[:, :2] < inside[:2]) | (tried[:, 2:] > inside[2:])).any(axis=1)
+        best = int(cost.argmin())
+        boxes = np.vstack((boxes, tried[best]))
+        axes.annotate(
+            text,
+            tuple(positions[k]),
+            xytext=tuple(offsets[best]),
+            textcoords="offset points",
+            fontsize=7,
+            color=CORNER_COLOR,
+            ha="center",
+            va="center",
+            zorder=7,
+            path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )
+
+
+#: Where a text is tried, in twelve directions and ever farther away, and what the way costs.
+_RINGS, _TURNS = np.repeat([1.0, 1.7, 2.6, 4.0, 6.0], 12), np.tile(np.arange(12) * math.pi / 6, 5)
+_DIRECTIONS = np.column_stack((np.cos(_TURNS), np.sin(_TURNS)))
+_DETOURS = 4 * _RINGS
+
+
+def _places(here: Array, half: Array) -> tuple[Array, Array]:
+    """Return the offsets (n, 2) of the middle of a text, and its boxes (n, 4), in points."""
+    offsets = _DIRECTIONS * (half + 6 * _RINGS[:, None])
+    return offsets, np.hstack((here + offsets - half, here + offsets + half))
+
+
+def _inside(boxes: Array, points: Array) -> NDArray[np.int64]:
+    """Return how many of some points lie in each box (left, bottom, right, top)."""
+    inside = (points > boxes[:, None, :2]) & (points < boxes[:, None, 2:])
+    return np.asarray(inside.all(axis=2).sum(axis=1))
+
+
+def _overlaps(boxes: Array, others: Array) -> NDArray[np.int64]:
+    """Return how many of some other boxes each box overlaps."""
+    apart = (boxes[:, None, :2] >= others[:, 2:]) | (others[:, :2] >= boxes[:, None, 2:])
+    return np.asarray((~apart.any(axis=2)).sum(axis=1))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
+import numpy as np
 from ezdxf import units
 from ezdxf.document import Drawing
 from ezdxf.filemanagement import new
@@ -15,7 +15,7 @@ __all__ = ["DxfWriter"]
 
 #: Layers and their colours, as numbers of AutoCAD: black or white, red, light red, magenta, grey.
 LAYERS = {"WALLS": 7, "CORNERS": 1, "EDGES": 11, "ARCS": 6, "ELLIPSES": 8}
-#: Name under which each wall tells in how many views it was seen.
+#: Name under which each wall has the number of views in which it was seen.
 APPLICATION = "LINEAMENT"
 #: Points are drawn as crosses of this size [m].
 CROSS, CROSS_SIZE = 3, 0.1
@@ -43,14 +43,14 @@ def _add(drawing: Drawing, plan: Plan) -> None:
     for layer, points in (("CORNERS", markers.corners), ("EDGES", markers.edges)):
         for point in points.tolist():
             space.add_point(point, {"layer": layer})
-    for x, y, radius, first, last in markers.arcs.tolist():
-        if last - first >= 2 * math.pi - 1e-6:
-            space.add_circle((x, y), radius, {"layer": "ARCS"})
+    on_arcs = {"layer": "ARCS"}
+    for (x, y, radius, *turn), is_whole in plan.arcs():
+        if is_whole:
+            space.add_circle((x, y), radius, on_arcs)
         else:
-            turn = math.degrees(first) % 360, math.degrees(last) % 360
-            space.add_arc((x, y), radius, *turn, dxfattribs={"layer": "ARCS"})
-    for x, y, a, b, direction in markers.ellipses.tolist():
+            first, last = np.degrees(turn) % 360
+            space.add_arc((x, y), radius, first, last, dxfattribs=on_arcs)
+    for x, y, a, b, direction in markers.ellipses:
         if a > 0:  # CAD knows no ellipse without an extent, and no thinner one than this
-            axis = (a * math.cos(direction), a * math.sin(direction))
-            ratio = max(b / a, 1e-6)
-            space.add_ellipse((x, y), axis, ratio, dxfattribs={"layer": "ELLIPSES"})
+            axis = (a * np.cos(direction), a * np.sin(direction))
+            space.add_ellipse((x, y), axis, max(b / a, 1e-6), dxfattribs={"layer": "ELLIPSES"})

@@ -2,40 +2,62 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import Features
+from ..features import TABLES, Features
+from ..features.records import FIELDS, POINTS, kind_codes, numbers
 
 if TYPE_CHECKING:
     from ..motion import Tracks
 
 __all__ = ["ARC_POINT", "CORNER_POINT", "FEATURE_POINT", "SEGMENT_POINT", "feature_points"]
 
-#: What the field `kind` tells.
+#: Values of the field `kind`.
 SEGMENT_POINT, CORNER_POINT, ARC_POINT = range(3)
+_TABLES = ("segments", "corners", "arcs")
+#: Types of the fields of a point.
+_FORMS = {"z": "<f4", "kind": "<u4", "track": "<i4"} | {
+    point: "<f4" if np.dtype(field.form).base.kind in "fb" else "<i4"
+    for field in FIELDS
+    for point in field.points.split()
+}
 
-#: The fields in their order: names, with their type before them.
-_FIELDS = (
-    ("<f4", "x", "y", "z"),
-    ("<u4", "kind"),
-    ("<i4", "track"),
-    ("<f4", "start_x", "start_y", "end_x", "end_y", "angle", "radius", "opening", "convex", "rms"),
-    ("<f4", "misfit", "quality"),
-    ("<f4", "c00", "c01", "c02", "c11", "c12", "c22"),
-    ("<i4", "first_beam", "last_beam", "n_points", "segment_a", "segment_b", "corner"),
+#: One feature, in fields of four bytes: position (centroid of a segment, position of a corner,
+#: centre of an arc; z = 0) [m], kind (0 segment, 1 corner, 2 arc), track (-1 without tracking), and
+#: what `lineament.features.records.FIELDS` leads to a point: `convex` is 0 or 1, `corner` 0 corner,
+#: 1 slit, 2 edge, a corner has its beam in both beams. A field that a kind does not fill is NaN, or
+#: -1 where it is an integer.
+FEATURE_POINT = np.dtype(
+    [(name, _FORMS[name]) for name in dict.fromkeys((*POINTS.split(), *_FORMS))]
 )
 
-#: One feature, in 28 fields of four bytes: position (centroid of a segment, position of a corner,
-#: centre of an arc; z = 0) [m], kind (0 segment, 1 corner, 2 arc), track (-1 without tracking),
-#: ends [m] and angle [rad] of a segment, radius of an arc [m], opening [rad] and convexity (0 or 1)
-#: of a corner, rms of a segment or arc [m], misfit of a segment [m], quality of a corner (0 to 1),
-#: upper triangle of the covariance (segment: offset, angle; corner: x, y; arc: x, y, radius), beams
-#: (a corner has its own in both), number of points, segments of a corner and its kind (0 corner,
-#: 1 slit, 2 edge). A field that a kind does not fill is NaN, or -1 where it is an integer.
-FEATURE_POINT = np.dtype([(name, form) for form, *names in _FIELDS for name in names])
+
+def _moves(table: str, kind: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return which words of a record, all floats or all integers, go to which words of a point."""
+    taken: list[int] = []
+    put: list[int] = []
+    dtype, names = TABLES[table], FEATURE_POINT.names or ()
+    for field in FIELDS:
+        form = np.dtype(field.form)
+        if field.table == table and form.base.kind == kind:
+            first = dtype.fields[field.name][1] // form.base.itemsize  # type: ignore[index]
+            words = [first + i for i in numbers(form.shape)]
+            points = [names.index(name) for name in field.points.split()]
+            taken += words * (len(points) // len(words))
+            put += points
+    return np.array(taken), np.array(put)
+
+
+_MOVES = {table: (_moves(table, "f"), _moves(table, "i")) for table in _TABLES}
+#: Points of which only the kind is known, as words.
+_EMPTY = np.zeros(3, FEATURE_POINT)
+for _name, _form in _FORMS.items():
+    _EMPTY[_name] = {"<f4": np.nan, "<i4": -1, "<u4": 0}[_form]
+_EMPTY["z"], _EMPTY["kind"] = 0.0, range(3)
+_EMPTY_WORDS = _EMPTY.view("<i4").reshape(3, -1)
 
 
 def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[np.void]:
@@ -68,31 +90,31 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
     >>> [point[name].item() for name in ("kind", "n_points", "radius", "track")]
     [0, 5, nan, -1]
     """
-    from ..kernels.feature_words import fill_points  # Numba takes long to import.
-
-    tables = features.segments, features.corners, features.arcs
-    words = np.empty((sum(map(len, tables)), FEATURE_POINT.itemsize // 4), "<f4")
-    forms = [form for table in tables for form in _forms(table)]
-    with np.errstate(over="ignore"):  # What no float32 holds is infinite, whether compiled or not.
-        fill_points(*forms, words, words.view("<i4"))
-    points = words.view(FEATURE_POINT).reshape(len(words))
+    tables = [getattr(features, name) for name in _TABLES]
+    counts = [len(table) for table in tables]
+    ints = np.repeat(_EMPTY_WORDS, counts, axis=0)
+    floats, points, begin = ints.view("<f4"), ints.view(FEATURE_POINT).reshape(len(ints)), 0
+    with np.errstate(over="ignore"):  # What no float32 holds is infinite.
+        for name, table in zip(_TABLES, tables, strict=True):
+            if len(table) == 0:
+                continue
+            # A copy has no gaps.
+            data, end = table.tobytes(), begin + len(table)
+            (taken, put), (ints_taken, ints_put) = _MOVES[name]
+            words = np.frombuffer(data, "f8").reshape(len(table), -1)
+            floats[begin:end, put] = words[:, taken]
+            words = np.frombuffer(data, "i4").reshape(len(table), -1)
+            ints[begin:end, ints_put] = words[:, ints_taken]
+            begin = end
+    corners = slice(counts[0], counts[0] + counts[1])
+    points["convex"][corners] = features.corners["convex"]
+    points["corner"][corners] = kind_codes("corners", features.corners["kind"])
     if tracks is not None:
-        numbers = tracks.segments, tracks.corners, tracks.arcs
-        if [*map(len, numbers)] != [*map(len, tables)]:
+        numbers_of = tracks.segments, tracks.corners, tracks.arcs
+        if [*map(len, numbers_of)] != counts:
             raise ValueError(
-                f"tracks have {_counts(numbers)} segments, corners and arcs, expected "
-                f"{_counts(tables)}, as the features"
+                f"tracks have {', '.join(str(len(n)) for n in numbers_of)} segments, corners and "
+                f"arcs, expected {', '.join(map(str, counts))}, as the features"
             )
-        points["track"] = np.concatenate(numbers)
+        points["track"] = np.concatenate(numbers_of)
     return points
-
-
-def _forms(table: NDArray[np.void]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Give the words of records as kernels take them: as floats, and as integers half as long."""
-    n, size = len(table), table.itemsize
-    data = table.tobytes()  # A copy has no gaps, and is always of the type the kernel is made for.
-    return np.ndarray((n, size // 8), np.float64, data), np.ndarray((n, size // 4), np.int32, data)
-
-
-def _counts(tables: tuple[NDArray[Any], ...]) -> str:
-    return ", ".join(str(len(table)) for table in tables)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import astuple
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import TABLES, Features
-from ..scan import LaserScan, Pose
-from . import canvas, drawing, stage_panels
-from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK, count
-from .labels import label_points
+from ..features import Features
+from ..scan import Array, LaserScan, Pose
+from . import canvas, drawing
+from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, FAINT, INK, WAY_COLOR, count
+from .markers import Markers, markers_of
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -31,21 +31,12 @@ _PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch
 def plot_scan(
     scan: LaserScan, features_by_method: Mapping[str, Features], path: str | os.PathLike[str]
 ) -> None:
-    """Draw what some methods found in one scan into a file: see `scan_figure`.
-
-    Parameters
-    ----------
-    scan, features_by_method
-        As of `scan_figure`.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
+    """Write the picture that `scan_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file.
 
     Raises
     ------
     LineamentError
         If the ending is not known or the file cannot be written.
-    ValueError
-        As `scan_figure`.
     """
     canvas.check_ending(path)
     canvas.save(scan_figure(scan, features_by_method), path)
@@ -54,12 +45,12 @@ def plot_scan(
 def scan_figure(
     scan: LaserScan,
     features_by_method: Mapping[str, Features],
-    errors_by_method: Mapping[str, NDArray[np.float64]] | None = None,
+    errors_by_method: Mapping[str, Array] | None = None,
 ) -> Figure:
     """Draw what some methods found in one scan, one panel a method, side by side.
 
     Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
-    data tell where nothing came back. The number beside a corner is its response. Edges are drawn
+    data show where nothing came back. The number beside a corner is its response. Edges are drawn
     lighter than corners, without a number.
 
     Parameters
@@ -84,11 +75,11 @@ def scan_figure(
         raise ValueError("features_by_method is empty, expected at least one method")
     for method, features in features_by_method.items():
         _check_beams(scan, features.clusters, method)
-    n_methods, has_strips = len(features_by_method), errors_by_method is not None
+    n_methods = len(features_by_method)
     columns = min(n_methods, 3 if n_methods <= 9 else 4)
     rows = math.ceil(n_methods / columns)
-    height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), _PANEL)
-    heights = [height + 0.9, _STRIP] if has_strips else [height + 0.9]
+    height = _height(scan, _PANEL) + 0.9
+    heights = [height] if errors_by_method is None else [height, _STRIP]
     figure = canvas.new_figure(_PANEL * columns, sum(heights) * rows + 0.3)
     grid = figure.subplots(
         len(heights) * rows, columns, squeeze=False, height_ratios=heights * rows
@@ -96,82 +87,136 @@ def scan_figure(
     panels, strips = grid[:: len(heights)].ravel(), grid[1 :: len(heights)].ravel()
     for axes in [*panels[n_methods:], *strips[n_methods:]]:
         axes.remove()
-    for axes, (method, features) in zip(panels, features_by_method.items(), strict=False):
-        shown = drawing.draw_beams(axes, scan, features.clusters)
-        canvas.style_plane(axes, method, _counts(features), shown)
-        drawing.draw_features(axes, features, scan, _extent(axes))
-    if errors_by_method is not None:
-        for axes, method in zip(strips, features_by_method, strict=False):
-            drawing.draw_errors(axes, scan, errors_by_method[method])
-    _legend(figure)
+    for k, (method, features) in enumerate(features_by_method.items()):
+        shown = drawing.draw_beams(panels[k], scan, features.clusters)
+        canvas.style_plane(panels[k], method, _about(features), shown)
+        drawing.draw_features(panels[k], features, scan, _extent(panels[k]))
+        if errors_by_method is not None:
+            drawing.draw_errors(strips[k], scan, errors_by_method[method])
+    canvas.add_legend(figure)
     canvas.settle(figure)
     for axes, features in zip(panels, features_by_method.values(), strict=False):
-        corners = features.corners[features.corners["response"] != 0]  # edges, the truth
-        texts = [f"{response:.3g}" for response in corners["response"]]
-        label_points(axes, corners["position"], texts, scan.points[scan.valid])
+        corners = features.corners[features.corners["response"] != 0]  # edges and truth have none
+        points = scan.points[scan.valid]
+        drawing.label_points(axes, corners["position"], corners["response"], points)
     return figure
 
 
 def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
-    """Draw the stages of one run: filter, spacing against its thresholds, classes, corners.
+    """Draw the stages of one run: filter, spacing against its thresholds, clusters, corners.
 
     Of a method that examines no candidates, the corners and edges that it found are drawn.
-
-    Parameters
-    ----------
-    trace : Trace
-        Every intermediate of the run.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
 
     Raises
     ------
     LineamentError
-        If the ending is not known or the file cannot be written.
+        If the ending of the path is not ``.png``, ``.svg`` or ``.pdf``, or it cannot be written.
     ValueError
-        If the classes do not have the scan's number of beams.
+        If the clusters do not have the scan's number of beams.
     """
     canvas.check_ending(path)
-    scan, candidates = trace.scan, trace.candidates
+    scan = trace.scan
     _check_beams(scan, trace.clusters, trace.method)
-    height = canvas.plane_size(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), 6.2)
+    height = _height(scan, 6.2)
     figure = canvas.new_figure(13, 4.0 + height + 1.0)
     panels = figure.subplots(2, 2, height_ratios=[3.2, height])
-    stage_panels.draw_filter(panels[0, 0], trace)
-    stage_panels.draw_spacing(panels[0, 1], trace)
-
-    shown = drawing.draw_beams(panels[1, 0], scan, trace.clusters)
-    n_classes = len(np.unique(trace.clusters[trace.clusters >= 0]))
-    n_noise = int((scan.valid & (trace.clusters < 0)).sum())
-    about = f"{count(n_classes, 'class', 'classes')} · {count(n_noise, 'noise point')}"
-    canvas.style_plane(panels[1, 0], "c  Classes", about, shown)
-
-    positions = stage_panels.draw_candidates(panels[1, 1], trace)
-    n_accepted = int(candidates["accepted"].sum())
-    about = (
-        f"{count(len(candidates), 'candidate')} · {n_accepted} accepted · "
-        f"threshold {trace.threshold:.4g} · {count(len(trace.features.segments), 'segment')}"
-    )
-    if not len(candidates):  # a method that examines none
-        about = _counts(trace.features)
-    canvas.style_plane(panels[1, 1], "d  Corners", about, shown)
-    if not len(candidates):
-        drawing.draw_corners(panels[1, 1], trace.features.corners, _extent(panels[1, 1]))
-    for axes in panels.ravel():
+    _draw_filter(panels[0, 0], trace)
+    _draw_spacing(panels[0, 1], trace)
+    shown = _draw_clusters(panels[1, 0], trace)
+    positions = _draw_candidates(panels[1, 1], trace, shown)
+    for axes, below in zip(panels.ravel(), (0.13, 0.13, 0.1, 0.1), strict=True):
         if axes.get_legend_handles_labels()[0]:
             axes.legend(
                 fontsize=8,
                 loc="upper left",
-                bbox_to_anchor=(0, -0.13 if axes in panels[0] else -0.1),
+                bbox_to_anchor=(0, -below),
                 ncols=5,
                 frameon=False,
                 borderaxespad=0,
                 handletextpad=0.4,
             )
     canvas.settle(figure)
-    texts = [f"{response:.3g}" for response in candidates["response"]]
-    label_points(panels[1, 1], positions, texts, scan.points[scan.valid])
+    points = scan.points[scan.valid]
+    drawing.label_points(panels[1, 1], positions, trace.candidates["response"], points)
     canvas.save(figure, path)
+
+
+def _draw_filter(axes: Axes, trace: Trace) -> None:
+    """Draw raw and filtered ranges by bearing, and the beams without a return."""
+    scan, degrees = trace.scan, np.degrees(trace.scan.angles)
+    about = f"{count(int(scan.valid.sum()), 'valid beam')} of {len(scan)}"
+    canvas.style(axes, "a  Filter", about, "bearing [°]", "range [m]")
+    raw = np.where(scan.valid, scan.ranges, np.nan)
+    axes.plot(degrees, raw, ".", color=FAINT, markersize=3.5, label="raw")
+    axes.plot(degrees, trace.filtered, color=WAY_COLOR, linewidth=1.0, label="filtered")
+    bad = degrees[~scan.valid]
+    if len(bad):
+        low = np.full(len(bad), 0.015)  # of the height of the panel
+        place = axes.get_xaxis_transform()
+        axes.plot(bad, low, "|", c=CORNER_COLOR, ms=7, transform=place, label="no return")
+    axes.set_ylim(bottom=0)
+    axes.margins(x=0.01)
+
+
+def _draw_spacing(axes: Axes, trace: Trace) -> None:
+    """Draw the spacing of the beams, what it was compared with, and where clusters end."""
+    beams = np.arange(len(trace.scan))
+    labels, used = trace.clusters, np.flatnonzero(trace.scan.valid)
+    breaks = used[1:][labels[used[1:]] != labels[used[:-1]]]
+    about = count(len(breaks), "break")
+    canvas.style(axes, "b  Spacing", about, "beam", "distance to the beam before [m]")
+    # A log axis has no place for 0 (two beams that share a point).
+    spacing, far, dense = (
+        np.where(values > 0, values, np.nan)
+        for values in (trace.spacing, trace.distance_threshold, trace.density_threshold)
+    )
+    if np.isfinite([spacing, far, dense]).any():
+        axes.set_yscale("log")
+    for i, beam in enumerate(breaks):
+        axes.axvline(beam, color="#dbb0b4", linewidth=0.8, zorder=1, label="" if i else "break")
+    axes.plot(beams, spacing, ".-", color=INK, markersize=2.5, linewidth=0.5, label="spacing")
+    axes.plot(beams, far, color=WAY_COLOR, linewidth=1.2, label="distance threshold")
+    axes.plot(beams, dense, ".", color="#bc4c00", markersize=4, label="density threshold")
+    axes.margins(x=0.01)
+
+
+def _draw_clusters(axes: Axes, trace: Trace) -> Array:
+    """Draw the beams by cluster; returns the points that both plans show."""
+    scan, clusters = trace.scan, trace.clusters
+    shown = drawing.draw_beams(axes, scan, clusters)
+    n_noise = int((scan.valid & (clusters < 0)).sum())
+    about = f"{count(_n_clusters(clusters), 'cluster')} · {count(n_noise, 'noise point')}"
+    canvas.style_plane(axes, "c  Clusters", about, shown)
+    return shown
+
+
+def _draw_candidates(axes: Axes, trace: Trace, shown: Array) -> Array:
+    """Draw segments and candidates over faint points; returns the positions of the candidates."""
+    scan, candidates, accepted = trace.scan, trace.candidates, trace.candidates["accepted"]
+    axes.plot(*scan.points[scan.valid].T, ".", markersize=4, color="#c4cad0", mew=0, zorder=2)
+    drawing.draw_segments(axes, trace.features.segments)
+    drawing.draw_sensor(axes)
+    about = (
+        f"{count(len(candidates), 'candidate')} · {int(accepted.sum())} accepted · "
+        f"threshold {trace.threshold:.4g} · {count(len(trace.features.segments), 'segment')}"
+        if len(candidates)
+        else _about(trace.features)
+    )
+    canvas.style_plane(axes, "d  Corners", about, shown)
+    if not len(candidates):  # a method that examines none
+        drawing.draw_corners(axes, trace.features.corners, _extent(axes))
+    # Where the detection saw them: on the filtered ranges.
+    beams = candidates["beam"]
+    directions = np.column_stack((np.cos(scan.angles[beams]), np.sin(scan.angles[beams])))
+    positions: Array = trace.filtered[beams, None] * directions
+    for chosen, face, label in (
+        (accepted, CORNER_COLOR, "accepted"),
+        (~accepted, "white", "rejected"),
+    ):
+        if chosen.any():
+            x, y = positions[chosen].T
+            axes.plot(x, y, "o", ms=5.5, mfc=face, mec=CORNER_COLOR, label=label, zorder=5)
+    return positions
 
 
 def plot_map(
@@ -195,67 +240,50 @@ def plot_map(
     LineamentError
         If the ending is not known or the file cannot be written.
     """
-    from matplotlib.collections import EllipseCollection, LineCollection
+    from matplotlib.collections import LineCollection
 
     canvas.check_ending(path)
-    way, lines, corners, edges, arcs = _in_the_world(posed)
-    shown = np.vstack([lines.reshape(-1, 2), corners, edges, way])
-    figure = canvas.new_figure(9, canvas.plane_size(shown, 9) + 1.3)
+    way, found = _in_the_world(posed)
+    shown = np.vstack([found.segments.reshape(-1, 2), found.corners, found.edges, way])
+    figure = canvas.new_figure(9, canvas.plane_height(shown, 9) + 1.3)
     axes = figure.subplots()
-    # Walls that were seen often come out dark, what was seen once stays faint.
+    numbers = {"scans": len(way)} | {
+        name: len(getattr(found, name)) for name in ("segments", "corners", "edges", "arcs")
+    }
+    canvas.style_plane(axes, title, _counts(numbers), shown)
+    # Walls that were seen often come out dark, what was seen once stays faint; not so the legend.
     alpha = float(np.clip(60 / max(len(way), 1), 0.08, 0.9))
-    counts = [count(len(way), "scan"), count(len(lines), "segment"), count(len(corners), "corner")]
-    counts += [count(len(edges), "edge")] if len(edges) else []
-    about = " · ".join([*counts, count(len(arcs), "arc")])
-    canvas.style_plane(axes, title, about, shown)
-    axes.add_collection(LineCollection(list(lines), colors=INK, linewidths=0.9, alpha=alpha))
-    axes.plot([], [], color=INK, linewidth=1.2, label="segments")  # for the legend, not faint
-    for points, color, name in ((edges, EDGE_COLOR, "edges"), (corners, CORNER_COLOR, "corners")):
-        x, y = points.T
-        axes.plot(x, y, "o", markersize=2.2, color=color, alpha=max(alpha, 0.2), mew=0, zorder=3)
-        if len(points) or points is corners:
-            axes.plot([], [], "o", markersize=4, color=color, label=name)
-    if len(arcs):
-        radius = arcs[:, 2]
-        circles = EllipseCollection(
-            2 * radius, 2 * radius, 0 * radius, units="xy", offsets=arcs[:, :2],
-            offset_transform=axes.transData, facecolors="none", edgecolors=ARC_COLOR,
-            linewidths=0.7, alpha=alpha,
-        )  # fmt: skip
-        axes.add_collection(circles)
-        axes.plot([], [], color=ARC_COLOR, linewidth=1.2, label="arcs")
-    axes.plot(*way.T, color="#0969da", linewidth=1.3, label="way of the sensor", zorder=4)
+    for name, strips, color, width in (
+        ("segments", list(found.segments), INK, 0.9),
+        ("arcs", found.arc_strips(), ARC_COLOR, 0.7),
+    ):
+        if len(strips) or name == "segments":
+            lines = LineCollection(strips, colors=color, linewidths=width, alpha=alpha)
+            axes.add_collection(lines)
+            axes.plot([], [], color=color, linewidth=1.2, label=name)
+    for name, color in (("edges", EDGE_COLOR), ("corners", CORNER_COLOR)):
+        points = getattr(found, name)
+        axes.plot(*points.T, "o", color=color, ms=2.2, mew=0, alpha=max(alpha, 0.2), zorder=3)
+        if len(points) or name == "corners":
+            axes.plot([], [], "o", color=color, markersize=4, label=name)
+    axes.plot(*way.T, color=WAY_COLOR, linewidth=1.3, label="path of the sensor", zorder=4)
     if len(way):
-        axes.plot(*way[0], "o", color="#0969da", markersize=6, mec="white", label="start", zorder=5)
-    _legend(figure)
+        axes.plot(*way[0], "o", color=WAY_COLOR, ms=6, mec="white", label="start", zorder=5)
+    canvas.add_legend(figure)
     canvas.save(figure, path)
 
 
-def _in_the_world(
-    posed: Iterable[tuple[Pose, Features]],
-) -> tuple[NDArray[np.float64], ...]:
-    """Positions (m, 2) of the sensor, lines (l, 2, 2), corners, edges (k, 2), arcs x y r (a, 3).
+_NOTHING = tuple(np.zeros((0, *shape)) for shape in ((2, 2), (2,), (2,), (5,), (5,)))
 
-    Only what is finite.
-    """
-    way, lines, arcs = [np.zeros((0, 2))], [np.zeros((0, 2, 2))], [np.zeros((0, 3))]
-    corners, edges = [np.zeros((0, 2))], [np.zeros((0, 2))]
+
+def _in_the_world(posed: Iterable[tuple[Pose, Features]]) -> tuple[Array, Markers]:
+    """Return the positions (m, 2) of the sensor, and what was found from all of them."""
+    way, found = [], [_NOTHING]
     for pose, features in posed:
+        way.append(pose[:2])
         with np.errstate(invalid="ignore"):  # what is not finite is not drawn
-            moved = features.transform(*pose)
-        way.append(np.array([pose[:2]], dtype=np.float64))
-        lines.append(np.stack((moved.segments["start"], moved.segments["end"]), axis=1))
-        is_edge = moved.corners["kind"] == "edge"
-        corners.append(moved.corners["position"][~is_edge])
-        edges.append(moved.corners["position"][is_edge])
-        arcs.append(np.column_stack((moved.arcs["center"], moved.arcs["radius"])))
-    line = np.concatenate(lines)
-    corner, edge, arc = (np.concatenate(parts) for parts in (corners, edges, arcs))
-    return (
-        np.concatenate(way),
-        line[np.isfinite(line).all(axis=(1, 2))],
-        *(points[np.isfinite(points).all(axis=1)] for points in (corner, edge, arc)),
-    )
+            found.append(astuple(markers_of(features.transform(*pose))))
+    return np.reshape(way, (-1, 2)), Markers(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def _check_beams(scan: LaserScan, clusters: NDArray[np.int32], method: str) -> None:
@@ -263,33 +291,24 @@ def _check_beams(scan: LaserScan, clusters: NDArray[np.int32], method: str) -> N
         raise ValueError(f"{method}: clusters of {len(clusters)} beams, the scan has {len(scan)}")
 
 
+def _height(scan: LaserScan, width: float) -> float:
+    return canvas.plane_height(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), width)
+
+
 def _extent(axes: Axes) -> float:
     (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
     return max(x1 - x0, y1 - y0)
 
 
-def _legend(figure: Figure) -> None:
-    """One legend for all panels, below them."""
-    handles: dict[str, Artist] = {}
-    for axes in figure.axes:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(str(label), handle)
-    figure.legend(
-        handles=list(handles.values()),
-        labels=list(handles),
-        loc="outside lower center",
-        ncols=8,
-        fontsize=9,
-        frameon=False,
-    )
+def _n_clusters(clusters: NDArray[np.int32]) -> int:
+    return len(np.unique(clusters[clusters >= 0]))
 
 
-def _counts(features: Features) -> str:
-    n_clusters = len(np.unique(features.clusters[features.clusters >= 0]))
-    numbers = {name[:-1]: len(getattr(features, name)) for name in TABLES}
-    n_edges = int((features.corners["kind"] == "edge").sum())
-    numbers["corner"] -= n_edges
-    counts = [count(number, name) for name, number in numbers.items()]
-    if n_edges:
-        counts.insert(2, count(n_edges, "edge"))
-    return " · ".join([*counts, count(n_clusters, "cluster")])
+def _about(features: Features) -> str:
+    return _counts(features.counts() | {"clusters": _n_clusters(features.clusters)})
+
+
+def _counts(counts: dict[str, int]) -> str:
+    """Write how many things of each kind there are; edges only if there are some."""
+    kept = {name: number for name, number in counts.items() if number or name != "edges"}
+    return " · ".join(count(number, name[:-1]) for name, number in kept.items())

@@ -1,7 +1,5 @@
 """Foxglove's own messages, in Protobuf: its 3D panel draws them as they are."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -9,16 +7,16 @@ import numpy as np
 from foxglove import messages as fg
 
 from ..scan import LaserScan, Pose
-from .layers import Layer
-from .scene import LAST_STAMP, Message, Moment, SceneMessages, cloud_of
+from .scene import LAST_STAMP, Layer, Message, Moment, SceneMessages, cloud_of
 
-__all__ = ["FoxgloveMessages"]
+_UPRIGHT = fg.Quaternion(w=1.0)
+_ORIGIN = fg.Pose(position=fg.Vector3(), orientation=_UPRIGHT)
 
 
 class FoxgloveMessages(SceneMessages):
     """Makes ``foxglove.LaserScan``, ``PointCloud``, ``SceneUpdate`` and ``FrameTransform``.
 
-    Beams that are not valid are NaN: the message has no limits of the range to tell them by.
+    Beams that are not valid are NaN: the message has no limits of the range to exclude them.
     """
 
     encoding, profile = "protobuf", ""
@@ -31,70 +29,57 @@ class FoxgloveMessages(SceneMessages):
     def transform(self, topic: str, moment: Moment, pose: Pose) -> Message:
         """``FrameTransform``: where the frame of the scan is in the world."""
         x, y, theta = pose
-        return _message(
-            topic,
-            fg.FrameTransform(
-                timestamp=_time(moment),
-                parent_frame_id=moment.world,
-                child_frame_id=moment.frame,
-                translation=fg.Vector3(x=x, y=y),
-                rotation=fg.Quaternion(z=math.sin(theta / 2), w=math.cos(theta / 2)),
-            ),
+        transform = fg.FrameTransform(
+            timestamp=_time(moment),
+            parent_frame_id=moment.world,
+            child_frame_id=moment.frame,
+            translation=fg.Vector3(x=x, y=y),
+            rotation=fg.Quaternion(z=math.sin(theta / 2), w=math.cos(theta / 2)),
         )
+        return _message(topic, transform)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
         """``LaserScan``; invalid beams are NaN."""
         intensities = scan.intensities
-        return _message(
-            topic,
-            fg.LaserScan(
-                timestamp=_time(moment),
-                frame_id=moment.frame,
-                pose=_ORIGIN,
-                start_angle=scan.angle_min,
-                end_angle=scan.angle_min + (len(scan) - 1) * scan.angle_increment,
-                ranges=np.where(scan.valid, scan.ranges, np.nan).tolist(),
-                intensities=None if intensities is None else intensities.tolist(),
-            ),
+        laser_scan = fg.LaserScan(
+            **_placed(moment),
+            pose=_ORIGIN,
+            start_angle=scan.angle_min,
+            end_angle=scan.angle_min + (len(scan) - 1) * scan.angle_increment,
+            ranges=np.where(scan.valid, scan.ranges, np.nan).tolist(),
+            intensities=None if intensities is None else intensities.tolist(),
         )
+        return _message(topic, laser_scan)
 
     def points(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
         """``PointCloud`` of the valid points: x, y, z and intensity."""
         names, cloud = cloud_of(scan)
         number = fg.PackedElementFieldNumericType.Float32
-        return _message(
-            topic,
-            fg.PointCloud(
-                timestamp=_time(moment),
-                frame_id=moment.frame,
-                pose=_ORIGIN,
-                point_stride=4 * len(names),
-                fields=[
-                    fg.PackedElementField(name=name, offset=4 * k, type=number)
-                    for k, name in enumerate(names)
-                ],
-                data=cloud.tobytes(),
-            ),
+        point_cloud = fg.PointCloud(
+            **_placed(moment),
+            pose=_ORIGIN,
+            point_stride=4 * len(names),
+            fields=[
+                fg.PackedElementField(name=name, offset=4 * k, type=number)
+                for k, name in enumerate(names)
+            ],
+            data=cloud.tobytes(),
         )
+        return _message(topic, point_cloud)
 
     def features(self, topic: str, moment: Moment, layers: tuple[Layer, ...]) -> Message:
         """``SceneUpdate``: one entity a layer."""
         # An entity takes the place of the one that had its name: nothing has to be deleted.
         entities = [
             fg.SceneEntity(
-                timestamp=_time(moment),
-                frame_id=moment.frame,
+                **_placed(moment),
                 id=layer.name,
                 lines=[_line(layer, strip) for strip in layer.strips],
-                spheres=[_sphere(layer, point) for point in layer.points.tolist()],
+                spheres=[_sphere(layer, x, y) for x, y in layer.points.tolist()],
             )
             for layer in layers
         ]
         return _message(topic, fg.SceneUpdate(entities=entities))
-
-
-_UPRIGHT = fg.Quaternion(w=1.0)
-_ORIGIN = fg.Pose(position=fg.Vector3(), orientation=_UPRIGHT)
 
 
 def _message(topic: str, message: Any) -> Message:
@@ -102,9 +87,13 @@ def _message(topic: str, message: Any) -> Message:
 
 
 def _time(moment: Moment) -> fg.Timestamp:
-    # What comes live may have a stamp that is none: it is shown as the first or the last.
+    # What comes live may have an impossible stamp: it is shown as the first or the last.
     seconds = min(max(moment.seconds, 0), LAST_STAMP)
     return fg.Timestamp(sec=seconds, nsec=moment.nanoseconds)
+
+
+def _placed(moment: Moment) -> dict[str, Any]:
+    return {"timestamp": _time(moment), "frame_id": moment.frame}
 
 
 def _color(layer: Layer) -> fg.Color:
@@ -122,8 +111,7 @@ def _line(layer: Layer, strip: Any) -> fg.LinePrimitive:
     )
 
 
-def _sphere(layer: Layer, point: list[float]) -> fg.SpherePrimitive:
-    x, y = point
+def _sphere(layer: Layer, x: float, y: float) -> fg.SpherePrimitive:
     return fg.SpherePrimitive(
         pose=fg.Pose(position=fg.Vector3(x=x, y=y), orientation=_UPRIGHT),
         size=fg.Vector3(x=layer.size, y=layer.size, z=layer.size),

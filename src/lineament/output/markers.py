@@ -1,9 +1,4 @@
-"""Features as marks to be drawn: lines, points, arcs and ellipses, as plain arrays.
-
-What the writers of scenes and plans, and the live node, make their own messages of.
-"""
-
-from __future__ import annotations
+"""Features as marks to be drawn: lines, points, arcs and ellipses, as plain arrays."""
 
 import math
 from dataclasses import dataclass
@@ -12,11 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..scan import LaserScan
-
-__all__ = ["FARTHEST", "LEVEL", "Markers", "arc_span", "ellipses_of", "is_drawn", "markers_of"]
-
-Array = NDArray[np.float64]
+from ..scan import Array, LaserScan
 
 #: Share of the errors that lie within an ellipse.
 LEVEL = 0.95
@@ -76,9 +67,7 @@ class Markers:
         for x, y, radius, first, last in self.arcs:
             n = max(math.ceil(TURN * (last - first) / (2 * math.pi)), 2) + 1
             turn = first + (last - first) / (n - 1) * np.arange(n)
-            strip = np.empty((n, 2))
-            strip[:, 0], strip[:, 1] = x + radius * np.cos(turn), y + radius * np.sin(turn)
-            strips.append(strip)
+            strips.append(np.stack((x + radius * np.cos(turn), y + radius * np.sin(turn)), axis=1))
         return strips
 
     def ellipse_strips(self) -> Array:
@@ -115,7 +104,7 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
     [[[2.0, -0.04], [2.0, 0.04]]]
     """
     segments, corners, arcs = features.segments, features.corners, features.arcs
-    lines = np.empty((len(segments), 2, 2))
+    lines = np.empty((len(segments), 2, 2))  # faster than stacked, as below
     lines[:, 0], lines[:, 1] = segments["start"], segments["end"]
     drawn = corners[is_drawn(corners["position"])]
     is_edge = drawn["kind"] == "edge"
@@ -140,10 +129,7 @@ def is_drawn(values: Array) -> NDArray[np.bool_]:
 
 
 def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
-    """First and last direction [rad] from the centre to the points of an arc.
-
-    A whole turn where none of its beams is valid.
-    """
+    """First and last direction [rad] from the centre of an arc to its points; all without them."""
     first, last, n = int(arc["first_beam"]), int(arc["last_beam"]), len(scan)
     if not (0 <= first < n and 0 <= last < n):
         return 0.0, 2 * math.pi
@@ -155,8 +141,7 @@ def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
     angles = angles[~np.isnan(angles)]  # of beams that are not valid
     if not len(angles):
         return 0.0, 2 * math.pi
-    turns = np.rint((angles[1:] - angles[:-1]) / (2 * math.pi))
-    angles[1:] -= 2 * math.pi * turns.cumsum()
+    angles[1:] -= 2 * math.pi * np.rint(np.diff(angles) / (2 * math.pi)).cumsum()
     return float(angles.min()), float(angles.max())
 
 

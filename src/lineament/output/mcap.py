@@ -1,7 +1,5 @@
 """MCAP files: the scans, what is found in them, and where they were taken, by topic."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -11,20 +9,16 @@ from mcap.writer import Writer as File
 
 from .._version import __version__
 from ..errors import LineamentError
-from ..scan import LaserScan
-from .layers import layers_of
 from .markers import markers_of
-from .scene import Message, Moment, SceneMessages
+from .scene import Message, Moment, SceneMessages, layers_of
 from .writer import Found, Writer
-
-__all__ = ["FoxgloveWriter", "McapWriter", "Ros2Writer"]
 
 #: Topic of scans whose log names none.
 SCAN_TOPIC = "/scan"
 
 
 class McapWriter(Writer):
-    """Writes the messages of each scan, as `SceneMessages` has them.
+    """Writes the messages of each scan, as `SceneMessages` makes them.
 
     Parameters
     ----------
@@ -50,8 +44,11 @@ class McapWriter(Writer):
 
     def _write(self, found: list[Found], first_scan: int) -> None:
         for i, (features, scan, topic) in enumerate(found, first_scan):
-            assert scan is not None  # `write` has seen to it
-            moment = self._moment(scan, i)
+            assert scan is not None  # `write` has checked it
+            try:
+                moment = Moment.of(scan)
+            except ValueError as error:
+                raise LineamentError(f"{self.path}: scan {i} {error}") from None
             layers = layers_of(markers_of(features, scan))
             for message in self._scene.messages(topic or SCAN_TOPIC, moment, scan, layers):
                 channel, time = self._channel(message), moment.time
@@ -59,12 +56,6 @@ class McapWriter(Writer):
 
     def _close(self) -> None:
         self._file.finish()  # type: ignore[no-untyped-call]
-
-    def _moment(self, scan: LaserScan, index: int) -> Moment:
-        try:
-            return Moment.of(scan)
-        except ValueError as error:
-            raise LineamentError(f"{self.path}: scan {index} {error}") from None
 
     def _channel(self, message: Message) -> int:
         topic, kind, _ = message

@@ -6,9 +6,7 @@ import base64
 import os
 from collections.abc import Iterable
 from html import escape
-from pathlib import Path
 
-from ..errors import LineamentError
 from ..files import write_text
 
 __all__ = [
@@ -18,7 +16,6 @@ __all__ = [
     "list_part",
     "table_part",
     "text_parts",
-    "write_page",
     "write_parts",
 ]
 
@@ -49,89 +46,47 @@ th { color: var(--soft); font-weight: 500; vertical-align: bottom; }
 td.number { text-align: right; white-space: nowrap; }
 .note { color: var(--soft); font-size: .9rem; margin: .4rem 0 0; }
 """
-
-
-def write_page(
-    path: str | os.PathLike[str],
-    title: str,
-    facts: Iterable[tuple[str, str]],
-    figures: Iterable[tuple[str, str | os.PathLike[str]]],
-    notes: Iterable[str] = (),
-) -> None:
-    """Write one HTML file with the images inside it, that needs no network.
-
-    Parameters
-    ----------
-    path : path-like
-        The page.
-    title : str
-        Its title.
-    facts : iterable of (str, str)
-        Names and values, shown as a list above the figures.
-    figures : iterable of (str, path-like)
-        Caption and PNG file of each figure; the caption is the image's text, too.
-    notes : iterable of str
-        Paragraphs below the figures.
-
-    Raises
-    ------
-    LineamentError
-        If an image cannot be read or the page cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> page = Path(tempfile.mkdtemp()) / "index.html"
-    >>> write_page(page, "Demo", [("scans", "331")], [], ["Made by one command."])
-    >>> "<dt>scans</dt><dd>331</dd>" in page.read_text(encoding="utf-8")
-    True
-    """
-    images = [image_part(caption, _png(image)) for caption, image in figures]
-    write_parts(path, title, [list_part(facts), *images, *text_parts(notes)])
+_NUMBER = ' class="number"'
 
 
 def write_parts(path: str | os.PathLike[str], title: str, parts: Iterable[str]) -> None:
     """Write one HTML file of parts, such as those that the functions below make.
 
-    Parameters
-    ----------
-    path : path-like
-        The page.
-    title : str
-        Its title.
-    parts : iterable of str
-        What stands below the title, in HTML; empty ones are left out.
+    It needs no network. Empty parts are left out.
 
     Raises
     ------
     LineamentError
         If the page cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> page = Path(tempfile.mkdtemp()) / "index.html"
+    >>> write_parts(page, "Demo", [list_part([("scans", "331")]), *text_parts(["1 < 2"])])
+    >>> "<dt>scans</dt><dd>331</dd>" in page.read_text(encoding="utf-8")
+    True
     """
     lines = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
         f"<h1>{escape(title)}</h1>",
-        *(part for part in parts if part),
+        *filter(None, parts),
         "</body>\n</html>\n",
     ]
     write_text(path, "\n".join(lines))
 
 
 def list_part(facts: Iterable[tuple[str, str]]) -> str:
-    """Names and values as a list; nothing of none."""
+    """Make a list of names and values; nothing without one."""
     rows = "\n".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
     return f"<dl>\n{rows}\n</dl>" if rows else ""
 
 
 def text_parts(paragraphs: Iterable[str]) -> list[str]:
-    """Plain text as paragraphs.
-
-    Examples
-    --------
-    >>> text_parts(["1 < 2"])
-    ['<p>1 &lt; 2</p>']
-    """
+    """Make paragraphs of plain text."""
     return [f"<p>{escape(paragraph)}</p>" for paragraph in paragraphs]
 
 
@@ -142,13 +97,7 @@ def contents_part(entries: Iterable[tuple[str, str]]) -> str:
 
 
 def heading_part(name: str, text: str) -> str:
-    """Make a heading that `contents_part` links to.
-
-    Examples
-    --------
-    >>> heading_part("noise", "Noise points")
-    '<h2 id="noise">Noise points</h2>'
-    """
+    """Make a heading that `contents_part` links to."""
     return f'<h2 id="{escape(name)}">{escape(text)}</h2>'
 
 
@@ -157,22 +106,19 @@ def table_part(
 ) -> str:
     """Make a table; each cell is its text, and whether it is a number."""
     head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-    lines = [
-        "<tr>"
-        + "".join(
-            f'<td class="number">{escape(text)}</td>' if is_number else f"<td>{escape(text)}</td>"
-            for text, is_number in row
-        )
-        + "</tr>"
+    body = [
+        "".join(f"<td{_NUMBER if is_number else ''}>{escape(text)}</td>" for text, is_number in row)
         for row in rows
     ]
-    below = f'<p class="note">{escape(note)}</p>\n' if note else ""
-    return (
-        f'<div class="table">\n<table>\n<caption>{escape(title)}</caption>\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n"
-        + "\n".join(lines)
-        + f"\n</tbody>\n</table>\n{below}</div>"
-    )
+    lines = [
+        '<div class="table">\n<table>',
+        f"<caption>{escape(title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>",
+        *(f"<tr>{cells}</tr>" for cells in body),
+        "</tbody>\n</table>",
+        *([f'<p class="note">{escape(note)}</p>'] if note else []),
+        "</div>",
+    ]
+    return "\n".join(lines)
 
 
 def image_part(caption: str, png: bytes) -> str:
@@ -182,13 +128,3 @@ def image_part(caption: str, png: bytes) -> str:
         f'<figure>\n<img src="data:image/png;base64,{data}" alt="{text}">\n'
         f"<figcaption>{text}</figcaption>\n</figure>"
     )
-
-
-def _png(image: str | os.PathLike[str]) -> bytes:
-    try:
-        content = Path(image).read_bytes()
-    except OSError as error:
-        raise LineamentError(f"{image}: cannot be read: {error.strerror}") from error
-    if not content.startswith(b"\x89PNG\r\n\x1a\n"):
-        raise LineamentError(f"{image}: is no PNG file")
-    return content

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -18,18 +19,23 @@ from .floor_plan import FloorPlan
 from .markers import Markers, markers_of
 from .writer import Found, Writer
 
-__all__ = ["MIN_VIEWS", "Plan", "PlanWriter"]
+__all__ = ["Plan", "PlanWriter"]
 
 #: How often a part of a wall must have been seen to be drawn; once, in a log of few scans.
 MIN_VIEWS, FEW = 3, 10
 
 
 class Plan(NamedTuple):
-    """What is drawn, how often each of its segments was seen, and a line that tells what it is."""
+    """What is drawn, how often each of its segments was seen, and a caption."""
 
     markers: Markers
     views: NDArray[np.int64]
     caption: str
+
+    def arcs(self) -> list[tuple[list[float], bool]]:
+        """Return the rows of the arcs, each with whether it is a whole circle."""
+        arcs = self.markers.arcs
+        return [(arc, arc[4] - arc[3] >= 2 * math.pi - 1e-6) for arc in arcs.tolist()]
 
 
 class PlanWriter(Writer):
@@ -64,49 +70,39 @@ class PlanWriter(Writer):
         self.min_views = min_views
 
     def _open(self, temporary: Path, files: ExitStack) -> None:  # noqa: ARG002  (open at the end)
-        self._temporary = temporary
-        self._floor = FloorPlan()
-        self._first: Found | None = None
+        self._temporary, self._floor = temporary, FloorPlan()
 
     def _write(self, found: list[Found], first_scan: int) -> None:
         for i, one in enumerate(found, first_scan):
-            if i == 0:
+            if i == 0:  # placed when the next one comes: alone it needs no pose
                 self._first = one
                 continue
-            if self._first is not None:
+            if i == 1:
                 self._place(self._first, 0)
-                self._first = None
             self._place(one, i)
 
     def _place(self, found: Found, index: int) -> None:
-        assert found.scan is not None  # `write` has seen to it
-        if found.scan.pose is None:
+        pose = found.scan.pose if found.scan else None
+        if pose is None:
             raise LineamentError(
                 f"{self.path}: scan {index} has no pose, expected poses: several scans are drawn "
                 "where they were taken"
             )
-        self._floor.add(found.features.transform(*found.scan.pose))
+        self._floor.add(found.features.transform(*pose))
 
     def _close(self) -> None:
-        self._draw(self._temporary, self._plan())
-
-    def _plan(self) -> Plan:
-        if self._first is not None:
-            markers = markers_of(self._first.features, self._first.scan)
-            views, told = np.ones(len(markers.segments), dtype=np.int64), ""
+        least = self.min_views or (MIN_VIEWS if self._written >= FEW else 1)
+        if self._written == 1:
+            least, markers = 1, markers_of(self._first.features, self._first.scan)
+            views = np.ones(len(markers.segments), dtype=np.int64)
         else:
-            least = self.min_views or (MIN_VIEWS if self._written >= FEW else 1)
             markers, views = self._floor.markers(least)
-            told = f", each seen {count(least, 'time')} at least" if least > 1 else ""
-        walls = count(len(markers.segments), "wall")
-        corners, edges = count(len(markers.corners), "corner"), count(len(markers.edges), "edge")
-        found = (
-            f"{walls}, {corners} and {edges} (lighter)"
-            if len(markers.edges)
-            else f"{walls} and {corners}"
-        )
-        scans = count(self._written, "scan")
-        return Plan(markers, views, f"{found} of {scans}{told}")
+        found = f"{count(len(markers.segments), 'wall')}, {count(len(markers.corners), 'corner')}"
+        if len(markers.edges):
+            found += f", {count(len(markers.edges), 'edge')} (lighter)"
+        often = f", each seen {count(least, 'time')} at least" if least > 1 else ""
+        caption = f"{' and '.join(found.rsplit(', ', 1))} of {count(self._written, 'scan')}{often}"
+        self._draw(self._temporary, Plan(markers, views, caption))
 
     @abstractmethod
     def _draw(self, temporary: Path, plan: Plan) -> None:

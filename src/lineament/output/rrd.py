@@ -8,18 +8,17 @@ import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .layers import Layer, layers_of
 from .markers import markers_of
+from .scene import layers_of
 from .writer import Found, Writer
 
 __all__ = ["RerunWriter"]
 
-# rerun's own log would tell of a full disk in several lines. It is set up by the import.
+# Rerun's log, which the import sets up, would report a full disk in several lines.
 _LOGGED = os.environ.get("RUST_LOG")
 os.environ.setdefault("RUST_LOG", "off")
 import rerun as rr  # noqa: E402
@@ -39,7 +38,7 @@ SPARE, PATIENCE = 1 << 25, 10.0
 class RerunWriter(Writer):
     """Writes ``world/TOPIC`` with the pose of each scan, and below it points and layers.
 
-    rerun keeps single precision.
+    Rerun keeps single precision.
     """
 
     needs_scan = True
@@ -51,10 +50,10 @@ class RerunWriter(Writer):
         self._recording = rr.RecordingStream(
             "lineament", recording_id="lineament", send_properties=False
         )
-        # Neither the time nor the order of writing is any of a reader's business.
+        # When and in which order the file was written is of no use to a reader.
         self._recording.set_log_time_enabled(False)
         self._recording.set_log_tick_enabled(False)
-        with _told_as_os_error():
+        with _as_os_error():
             self._recording.save(temporary)
         files.callback(self._recording.disconnect)
 
@@ -62,10 +61,10 @@ class RerunWriter(Writer):
         self._check_room()
         for i, one in enumerate(found, first_scan):
             self._log(one, i)
-        self._flush_recording()
+        with _as_os_error():
+            self._recording.flush(timeout_sec=PATIENCE)
 
     def _close(self) -> None:
-        self._flush_recording()
         self._recording.disconnect()
         # The last bytes are written without a word about failure.
         with self._temporary.open("rb") as file:
@@ -75,16 +74,12 @@ class RerunWriter(Writer):
 
     def _check_room(self) -> None:
         if shutil.disk_usage(self._temporary.parent).free < SPARE:
-            told = f"less than {SPARE >> 20} MB are left on the disk, and rerun needs them"
-            raise OSError(errno.ENOSPC, told)
-
-    def _flush_recording(self) -> None:
-        with _told_as_os_error():
-            self._recording.flush(timeout_sec=PATIENCE)
+            problem = f"less than {SPARE >> 20} MB are left on the disk, and rerun needs them"
+            raise OSError(errno.ENOSPC, problem)
 
     def _log(self, found: Found, index: int) -> None:
         features, scan, topic = found
-        assert scan is not None  # `write` has seen to it
+        assert scan is not None  # `needs_scan`
         recording, place = self._recording, f"world/{(topic or 'scan').strip('/')}"
         recording.set_time(SCAN, sequence=index)
         recording.set_time(STAMP, duration=scan.stamp)
@@ -95,24 +90,21 @@ class RerunWriter(Writer):
         points = _flat(scan.points[scan.valid])
         recording.log(f"{place}/points", rr.Points3D(points, radii=0.015, colors=(120, 128, 136)))
         for layer in layers_of(markers_of(features, scan)):
-            recording.log(f"{place}/{layer.name}", _marks(layer))
+            color, radius = [round(255 * part) for part in layer.color], layer.size / 2
+            marks = (
+                rr.Points3D(_flat(layer.points), radii=radius, colors=color)
+                if layer.name in {"corners", "edges"}
+                else rr.LineStrips3D(list(map(_flat, layer.strips)), radii=radius, colors=color)
+            )
+            recording.log(f"{place}/{layer.name}", marks)
 
 
 @contextmanager
-def _told_as_os_error() -> Iterator[None]:
+def _as_os_error() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
         raise OSError(errno.EIO, f"rerun says: {error}") from None
-
-
-def _marks(layer: Layer) -> Any:
-    color = [round(255 * part) for part in layer.color]
-    if layer.name in {"corners", "edges"}:
-        return rr.Points3D(_flat(layer.points), radii=layer.size / 2, colors=color)
-    return rr.LineStrips3D(
-        [_flat(strip) for strip in layer.strips], radii=layer.size / 2, colors=color
-    )
 
 
 def _flat(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,24 +1,80 @@
-"""Messages of a scan, of its pose and of what is found in it: what files and live topics share."""
-
-from __future__ import annotations
+"""Scenes of scans: the layers that 3-D viewers draw, and the messages that carry them."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan import LaserScan, Pose
-from .layers import Layer
-
-__all__ = ["LAST_STAMP", "Message", "Moment", "SceneMessages", "cloud_of", "single"]
+from ..scan import Array, LaserScan, Pose
+from .markers import Markers
 
 NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
 LAST_STAMP = 2**31 - 1
-#: Frames of logs that name none; poses are told in the first.
+#: Frames of logs that name none; poses are in the first.
 WORLD_FRAME, LASER_FRAME = "map", "laser"
+
+_NOTHING = np.zeros((0, 2))
+
+
+class Layer(NamedTuple):
+    """Marks of one kind that are drawn alike.
+
+    Attributes
+    ----------
+    name : str
+        Name of the entity, or namespace of the marker.
+    color : tuple
+        Red, green, blue and opacity, 0 to 1.
+    size : float
+        Width of the lines, or diameter of the spheres [m].
+    strips : sequence of float64 arrays, shape (n, 2), or one array, shape (m, n, 2)
+        Vertices that are joined by lines [m]; in one array where all strips have as many.
+    points : float64 array, shape (m, 2)
+        Centres of spheres [m].
+    """
+
+    name: str
+    color: tuple[float, float, float, float]
+    size: float
+    strips: Sequence[Array] | Array
+    points: Array = _NOTHING
+
+    @property
+    def pairs(self) -> Array:
+        """Both ends of each straight piece of the strips, one after the other, shape (2 k, 2).
+
+        What a list of lines takes, where one message has to hold many strips.
+        """
+        strips = [self.strips] if isinstance(self.strips, np.ndarray) else self.strips
+        pieces = [
+            np.repeat(strip, 2, axis=-2)[..., 1:-1, :].reshape(-1, 2)
+            for strip in strips  # each of them one, or many of as many vertices
+        ]
+        return np.concatenate(pieces) if pieces else _NOTHING
+
+
+def layers_of(markers: Markers) -> tuple[Layer, ...]:
+    """Make the layers segments, arcs, corners, edges and ellipses; those without marks too.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.output.markers import markers_of
+    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
+    >>> layers = layers_of(markers_of(ln.extract(scan), scan))
+    >>> [(layer.name, len(layer.strips), len(layer.points)) for layer in layers]
+    [('segments', 1, 0), ('arcs', 0, 0), ('corners', 0, 0), ('edges', 0, 0), ('ellipses', 0, 0)]
+    """
+    return (
+        Layer("segments", (0.16, 0.47, 0.84, 1.0), 0.03, markers.segments),
+        Layer("arcs", (0.51, 0.31, 0.87, 1.0), 0.03, markers.arc_strips()),
+        Layer("corners", (0.82, 0.14, 0.18, 1.0), 0.08, (), markers.corners),
+        Layer("edges", (0.94, 0.65, 0.67, 1.0), 0.05, (), markers.edges),
+        Layer("ellipses", (0.93, 0.60, 0.20, 1.0), 0.01, markers.ellipse_strips()),
+    )
 
 
 class Message(NamedTuple):
@@ -32,8 +88,8 @@ class Message(NamedTuple):
 class Moment(NamedTuple):
     """When and where a scan was taken: its stamp in two parts, its frame, the frame of its pose.
 
-    Seconds and nanoseconds are apart, as in the messages: a stamp of today in one float is known
-    to 0.2 µs only.
+    Seconds and nanoseconds are apart, as in the messages: one float holds a stamp of today to
+    0.2 µs only.
     """
 
     seconds: int
@@ -42,7 +98,7 @@ class Moment(NamedTuple):
     world: str
 
     @classmethod
-    def of(cls, scan: LaserScan) -> Moment:
+    def of(cls, scan: LaserScan) -> Self:
         """Make the moment of a scan; its frame is ``laser`` where it names none.
 
         Raises
@@ -71,14 +127,14 @@ class Moment(NamedTuple):
 
 
 class SceneMessages(ABC):
-    """Makes the messages of one family: one subclass each for those of ROS and of Foxglove.
+    """Makes the messages of one family: those of ROS or of Foxglove.
 
     Attributes
     ----------
     encoding : str
-        How the bytes of the messages are to be read: ``cdr``, ``ros1`` or ``protobuf``.
+        Serialisation of the messages: ``cdr``, ``ros1`` or ``protobuf``.
     profile : str
-        What an MCAP file with these messages is called: ``ros2``, ``ros1`` or nothing.
+        Profile of an MCAP file with these messages: ``ros2``, ``ros1`` or none.
     """
 
     encoding: str
@@ -108,29 +164,29 @@ class SceneMessages(ABC):
 
     @abstractmethod
     def transform(self, topic: str, moment: Moment, pose: Pose) -> Message:
-        """Tell where the frame of the scan is in the world."""
+        """Make a message of where the frame of the scan is in the world."""
 
     @abstractmethod
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
-        """Tell a scan with regular bearings."""
+        """Make a message of a scan with regular bearings."""
 
     @abstractmethod
     def points(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
-        """Tell a scan by its points."""
+        """Make a message of the valid points of a scan: x, y, z and intensity."""
 
     @abstractmethod
     def features(self, topic: str, moment: Moment, layers: tuple[Layer, ...]) -> Message:
-        """Tell the features of a scan, in place of those that were told before."""
+        """Make a message of the features of a scan, which replaces the one before."""
 
 
-def single(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Make single precision of double; what is too large for it is infinite."""
+def single(values: Array) -> NDArray[np.float32]:
+    """Convert to single precision; what is too large for it becomes infinite."""
     with np.errstate(over="ignore"):
         return values.astype("<f4")
 
 
 def cloud_of(scan: LaserScan) -> tuple[tuple[str, ...], NDArray[np.float32]]:
-    """Names of the fields, and the fields (m, 3 or 4), of the valid points of a scan."""
+    """Return names of the fields, and the fields (m, 3 or 4), of the valid points of a scan."""
     columns = [scan.points, np.zeros((len(scan), 1))]
     if scan.intensities is not None:
         columns.append(scan.intensities[:, None])

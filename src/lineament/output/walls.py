@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Wall", "offsets_between"]
+from ..scan import Array
 
-Array = NDArray[np.float64]
+__all__ = ["Wall", "offsets_between"]
 
 #: The most that may lie between two lines that touch [m].
 GAP = 0.2
@@ -28,56 +29,55 @@ class Wall:
     ----------
     origin, axis : float64 array, shape (2,)
         Where places are counted from [m], and the direction in which they are.
-    length, first, second
-        Sums over the metres seen: of 1, of the points (2,) from the origin, of their products
-        (2, 2).
+    moments : float64 array, shape (3, 3)
+        Integral over all metres seen of v vᵀ, where v = (1, x, y) from the origin.
     changes : dict of int to int
         By how much the number of views changes at each cell.
     """
 
     origin: Array
     axis: Array
-    length: float = 0.0
-    first: Array = field(default_factory=lambda: np.zeros(2))
-    second: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    moments: Array = field(default_factory=lambda: np.zeros((3, 3)))
     changes: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def along(cls, line: Array) -> Self:
+        """Make a wall on a line (2, 2) that nothing was seen of yet."""
+        return cls(line[0], (line[1] - line[0]) / math.dist(*line))
+
+    @property
+    def length(self) -> float:
+        """Length of all that was seen, as often as it was seen [m]."""
+        return float(self.moments[0, 0])
 
     def see(self, line: Array) -> None:
         """Add one view of a part of the wall, from start to end, shape (2, 2)."""
-        start, end = line - self.origin
-        length, middle, half = math.dist(start, end), (start + end) / 2, (end - start) / 2
-        self.length += length
-        self.first += length * middle
-        self.second += length * (middle[:, None] * middle + half[:, None] * half / 3)
+        middle, half = np.ones(3), np.zeros(3)
+        middle[1:], half[1:] = line.mean(axis=0) - self.origin, (line[1] - line[0]) / 2
+        length = math.dist(*line)
+        self.moments += length * (middle[:, None] * middle + half[:, None] * half / 3)
         self._count(self._cells(line), 1)
 
     def absorb(self, other: Wall) -> None:
         """Add all views of another wall."""
-        self.length, self.first, self.second = self._joint(other)
+        self.moments = self._joint(other)
         stretches, views = other.stretches()
         for ends, number in zip(self._cells(other.at(stretches)), views, strict=True):
             self._count(ends, number)
 
-    def _joint(self, other: Wall) -> tuple[float, Array, Array]:
-        """Give the sums over what was seen of both."""
-        shift = other.origin - self.origin
-        mixed = np.outer(shift, other.first)
-        second = other.second + mixed + mixed.T + other.length * np.outer(shift, shift)
-        return (
-            self.length + other.length,
-            self.first + other.first + other.length * shift,
-            self.second + second,
-        )
+    def _joint(self, other: Wall) -> Array:
+        """Return the moments of what was seen of both."""
+        shift = np.eye(3)
+        shift[1:, 0] = other.origin - self.origin
+        return self.moments + shift @ other.moments @ shift.T
 
     def spread(self, other: Wall) -> float:
-        """Root mean square distance [m] of what was seen of both from their common line."""
-        length, first, second = self._joint(other)
-        mean = first / length
-        variances = np.linalg.eigvalsh(second / length - np.outer(mean, mean))
-        return math.sqrt(max(float(variances[0]), 0.0))
+        """Return the rms distance [m] of what was seen of both from their common line."""
+        _, covariance = _mean_and_covariance(self._joint(other))
+        return math.sqrt(max(float(np.linalg.eigvalsh(covariance)[0]), 0.0))
 
     def shared(self, other: Wall) -> float:
-        """Share of what was seen of another wall that lies beside what was seen of this one."""
+        """Return the share of what was seen of another wall that lies beside what this one has."""
         own, _ = self.stretches()
         theirs = np.sort(self._cells(other.at(other.stretches()[0])), axis=1)
         low = np.maximum(own[:, None, 0], theirs[:, 0])
@@ -95,9 +95,9 @@ class Wall:
             self.changes[cell] = self.changes.get(cell, 0) + change
 
     def at(self, cells: NDArray[np.int64]) -> Array:
-        """Points (..., 2) [m] of the line through all that was seen, at places on the axis."""
-        mean = self.first / self.length
-        (xx, xy), (_, yy) = (self.second / self.length - mean[:, None] * mean).tolist()
+        """Return the points (..., 2) [m] at places of the line through all that was seen."""
+        mean, covariance = _mean_and_covariance(self.moments)
+        (xx, xy), (_, yy) = covariance.tolist()
         angle = math.atan2(2 * xy, xx - yy) / 2
         direction = np.array([math.cos(angle), math.sin(angle)])
         along = (CELL * cells - mean @ self.axis) / (direction @ self.axis)
@@ -105,18 +105,18 @@ class Wall:
         return points
 
     def ends(self) -> Array:
-        """First and last point that was seen, shape (2, 2)."""
+        """Return the first and last point that was seen, shape (2, 2)."""
         return self.at(np.array([min(self.changes), max(self.changes)]))
 
     def stretches(self) -> tuple[NDArray[np.int64], list[int]]:
-        """First cell and cell behind the last (n, 2), and views, of each stretch seen alike."""
+        """Return first cell and cell behind the last (n, 2), and views, of each part seen alike."""
         cells = sorted(self.changes)
         views = np.cumsum([self.changes[cell] for cell in cells])[:-1]
         ends = np.column_stack((cells[:-1], cells[1:]))
         return ends[views > 0], views[views > 0].tolist()
 
     def pieces(self, min_views: int) -> list[tuple[Array, Array, float]]:
-        """Start, end and mean views of what was seen often enough."""
+        """Return start, end and mean views of what was seen often enough."""
         pieces: list[list[int]] = []
         for (begin, end), views in zip(*self.stretches(), strict=True):
             if views < min_views:
@@ -130,22 +130,25 @@ class Wall:
         ]
 
 
-def offsets_between(lines: Array, walls: Array, angles: Array) -> Array:
-    """How far each line (n, 2, 2) lies beside each wall (m, 2, 2); infinite where it does not.
+def _mean_and_covariance(moments: Array) -> tuple[Array, Array]:
+    mean = moments[0, 1:] / moments[0, 0]
+    return mean, moments[1:, 1:] / moments[0, 0] - mean[:, None] * mean
 
-    That is the larger distance of the ends of the shorter from the line of the longer.
+
+def offsets_between(lines: Array, walls: Array, angles: Array) -> Array:
+    """Return how far each line (n, 2, 2) lies beside each wall (m, 2, 2) [m].
+
+    That is the larger distance of the ends of the shorter from the line of the longer. It is
+    infinite where their directions differ by more than the angle (n,) of the line [rad], or more
+    than `GAP` lies between them.
     """
     offsets = np.full((len(lines), len(walls)), np.inf)
-    if not len(lines) or not len(walls):
+    if not offsets.size:
         return offsets
+    # Most walls are far from all lines; NaN is.
     low, high = lines.min(axis=(0, 1)) - GAP, lines.max(axis=(0, 1)) + GAP
-    x, y = walls[..., 0].T, walls[..., 1].T
-    near = np.flatnonzero(
-        (np.maximum(*x) >= low[0])
-        & (np.minimum(*x) <= high[0])
-        & (np.maximum(*y) >= low[1])
-        & (np.minimum(*y) <= high[1])
-    )
+    is_near = (walls.max(axis=1) >= low) & (walls.min(axis=1) <= high)
+    near = np.flatnonzero(is_near.all(axis=1))
     walls = walls[near]
     own, length = _directions(lines)
     others, other_length = _directions(walls)

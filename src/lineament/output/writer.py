@@ -20,7 +20,7 @@ __all__ = ["Found", "Writer"]
 class Found(NamedTuple):
     """What was found in one scan, the scan, and the topic of its log.
 
-    The scan is None where a writer was not given it, the topic "" where it is not told.
+    The scan is None where the writer was not given it, the topic "" where it is not known.
     """
 
     features: Features
@@ -51,11 +51,8 @@ class Writer(ABC):
     needs_scan: ClassVar[bool] = False
 
     def __init__(self, path: str | os.PathLike[str], topics: Sequence[str] = ()) -> None:
-        self.path = path
-        self.topics = tuple(topics)
+        self.path, self.topics = path, tuple(topics)
         self._stack, self._files = ExitStack(), ExitStack()
-        self._waiting: list[Found] = []
-        self._written = 0
         self._is_open = False
 
     def __enter__(self) -> Self:
@@ -65,8 +62,8 @@ class Writer(ABC):
             with naming_errors(self.path):
                 self._open(temporary, self._files)
             self._stack = stack.pop_all()
-        self._waiting, self._written = [], 0
-        self._is_open = True
+        self._waiting: list[Found] = []
+        self._written, self._is_open = 0, True
         return self
 
     def __exit__(
@@ -85,7 +82,7 @@ class Writer(ABC):
             self._files.close()  # here, so that a disk that is full at the last byte is named
 
     def _abandon(self) -> None:
-        """Close what an error has left open: a full disk says so again here, and is not asked."""
+        """Close what an error has left open; a full disk, which says so again here, is known."""
         with suppress(OSError):
             self._files.close()
 
@@ -106,7 +103,7 @@ class Writer(ABC):
         LineamentError
             If the file cannot be written, or cannot hold this scan.
         ValueError
-            If the writer is not open or needs the scan, or the topic is none of its topics.
+            If the writer is not open or needs the scan, or its topics do not have the topic.
         """
         if not self._is_open:
             raise ValueError(f"the writer of {self.path} is not open: use it as a context manager")

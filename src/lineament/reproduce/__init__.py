@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 
+from ..errors import needed_by
 from .findings import Figure, Findings, Progress, Setting, Table
 
 __all__ = [
@@ -105,6 +106,8 @@ def run_experiments(
         If there is no such experiment.
     """
     chosen = experiment_names(names)
+    with needed_by("reproduce"):  # now, not when half of the experiments are done
+        import_module("scipy")
     findings = {}
     for k, name in enumerate(chosen, 1):
         module = import_module(f".{EXPERIMENTS[name]}", __name__)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluation.corners import CornerScores, corner_scores, vertices
 from ..evaluation.counts import quantile, ratio
+from ..evaluation.kinds import FeatureScores, corner_scores, vertices
 from ..extractor import Extractor
 from ..features import Features
 from ..output import canvas
@@ -166,7 +166,7 @@ class ArenaScores:
 
     Attributes
     ----------
-    corners : CornerScores
+    corners : FeatureScores
         Against the visible corners of the single scans.
     positions : ndarray, shape (m, 2)
         All found corners but edges, in the world frame [m].
@@ -179,7 +179,7 @@ class ArenaScores:
         How many scans.
     """
 
-    corners: CornerScores
+    corners: FeatureScores
     positions: Array
     false: int
     judged: int
@@ -189,10 +189,10 @@ class ArenaScores:
     def summary(self) -> dict[str, float]:
         """List all figures by name."""
         return {
-            "recall": self.corners.counts[GATE].recall,
+            "recall": self.corners.counts.recall,
             "false": ratio(self.false, len(self.positions)),
             "sharp_false": ratio(self.sharp_false, self.judged),
-            "median_error": quantile(self.corners.distances, 0.5),
+            "median_error": quantile(self.corners.errors["position"], 0.5),
             "corners_per_scan": len(self.positions) / self.scans,
         }
 
@@ -211,7 +211,7 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
     known = (_apart(together, arena.open_ends) > _UNKNOWN).all(axis=1)
     sharp_false = false & sharp & known
     return ArenaScores(
-        CornerScores.total(map(corner_scores, found, arena.truths)),
+        FeatureScores.total(map(corner_scores, found, arena.truths)),
         together,
         int(false.sum()),
         int((~false | sharp_false).sum()),
@@ -222,7 +222,7 @@ def arena_scores(arena: Arena, extractor: Extractor) -> ArenaScores:
 
 def arena_table(arena: Arena, scores: Mapping[str, ArenaScores]) -> Table:
     """Recall of the visible corners, errors, and share of false corners, by method."""
-    visible = next(iter(scores.values())).corners.counts[GATE].true
+    visible = next(iter(scores.values())).corners.counts.true
     rows = []
     for name, score in scores.items():
         figures = score.summary()

@@ -86,8 +86,7 @@ def _text(
     labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in figures.items()}
     smallest, *_, largest = (_size(low, high) for low, high in pairwise(SIZES))
     raw, filtered = (
-        scores[f"paper’s numbers, {how}"].corners.counts[0.10]
-        for how in ("not filtered", "filtered")
+        scores[f"paper’s numbers, {how}"].corners.counts for how in ("not filtered", "filtered")
     )
     return (
         "A noise point between two lines differs much from the readings on both of its sides "
@@ -179,7 +178,7 @@ def _features_table(scores: dict[str, Scores]) -> Table:
     rows = []
     for name, score in scores.items():
         corners, segments = score.corners, score.segments
-        counts = corners.counts[0.10]
+        counts = corners.counts
         rows.append(
             {
                 "liu": name,
@@ -187,9 +186,9 @@ def _features_table(scores: dict[str, Scores]) -> Table:
                 "precision": counts.precision,
                 "recall": counts.recall,
                 "F1": counts.f1,
-                "corner error, median [mm]": 1e3 * quantile(corners.distances, 0.5),
-                "offset of lines, rmse [mm]": 1e3 * rms(segments.errors[:, 0]),
-                "the same ÷ bound": segments.offset_over_bound.over_bound,
+                "corner error, median [mm]": 1e3 * quantile(corners.errors["position"], 0.5),
+                "offset of lines, rmse [mm]": 1e3 * rms(segments.errors["offset"]),
+                "the same ÷ bound": segments.over_bound["offset_"].over_bound,
             }
         )
     note = (

@@ -8,14 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 
 from ..errors import LogError
-from ..evaluation.corners import vertices
 from ..evaluation.free_space import FreeSpaceScores, free_space_scores
-from ..evaluation.ranked import RankedRepeats, ranked_repeats
+from ..evaluation.kinds import vertices
+from ..evaluation.repeatability import RankedRepeats, ranked_repeats
 from ..extractor import Extractor
 from ..features import Features
 from ..logs import find_logs
 from ..scan import LaserScan
-from .arena import GATE, ArenaScores, arena_scores, load_arena
+from .arena import ArenaScores, arena_scores, load_arena
 from .contact_sheet import contact_sheet, sheet_scans
 from .contenders import feature_methods
 from .findings import Findings, Progress, Setting, Table
@@ -280,7 +280,7 @@ def _arena_tables(scores: Mapping[str, Mapping[str, ArenaScores]]) -> list[Table
             record[f"{name}: median error [mm]"] = 1e3 * found[method]["median_error"]
         records.append(record)
     demanded = ", ".join(
-        f"{next(iter(found.values())).corners.counts[GATE].true} ({name})"
+        f"{next(iter(found.values())).corners.counts.true} ({name})"
         for name, found in scores.items()
     )
     note = f"Corners of which both walls show: {demanded}. They are found within 0.1 m."

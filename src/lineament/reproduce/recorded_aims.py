@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..evaluation.ple.benchmark import load_benchmark, run_benchmark
+from ..evaluation.ple import load_benchmark, run_benchmark
 from ..extractor import Extractor
 from .aims import TOLD, Aim, Limits
 from .arena import arena_scores, load_arena

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from ..evaluation.corners import vertices
+from ..evaluation.kinds import vertices
 from ..evaluation.repeatability import Repeatability, repeatability
 from ..evaluation.similarity import SimilarityScores, similarity_scores
 from ..extractor import Extractor

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from ..evaluation.corners import corner_scores
 from ..evaluation.counts import Counts
+from ..evaluation.kinds import corner_scores
 from ..extractor import Extractor
 from ..features import Features
 from ..scan import LaserScan
@@ -146,7 +146,7 @@ def repetition(parameters: Parameters, numbers: range) -> Repetition:
         if view.turn == 0:
             before = found[i]
         else:
-            counts.append(corner_scores(found[i], view.truth).counts[GATE])
+            counts.append(corner_scores(found[i], view.truth).by_gate[GATE])
             stability.append(corner_stability(before, found[i], view.turn, gate=GATE))
     return Repetition(
         _mean([0.5 * (c.recall + c.precision) for c in counts if c.true]),

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..evaluation.counts import plain
-from ..evaluation.ple.benchmark import BenchmarkResult
+from ..evaluation.ple import BenchmarkResult
 from ..files import made_folder, write_text
 from ..output.page import (
     contents_part,

@@ -70,7 +70,7 @@ def _simulated(kind: str, number: int, methods: dict[str, Extract]) -> tuple[Tab
     rows = []
     for name, features in found.items():
         scores = evaluate(features, true)
-        corners, segments = scores.corners.counts[0.10], scores.segments.counts
+        corners, segments = scores.corners.counts, scores.segments.counts
         rows.append(
             {
                 "method": name,

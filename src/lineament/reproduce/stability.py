@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..evaluation.corners import vertices
 from ..evaluation.counts import Summable, ratio, rms
+from ..evaluation.kinds import vertices
 from ..evaluation.matching import match
 from ..features import Features
 from ..scan import Array, LaserScan, Pose

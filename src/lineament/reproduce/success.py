@@ -114,7 +114,7 @@ def _verdict(parted: Results, cornered: Results) -> str:
         parted[name].many.partition.success
         for name in ("liu:paper, no corners", "pdbs, fixed 0.3 m")
     )
-    best, iepf = (cornered[name].many.corners.counts[0.10] for name in (LITERAL_BEST, "iepf:paper"))
+    best, iepf = (cornered[name].many.corners.counts for name in (LITERAL_BEST, "iepf:paper"))
     return (
         f"That liu parts better than PDBS {'holds' if liu > fixed else 'does not hold'} here: "
         f"{liu:.2f} against {fixed:.2f}. That it finds more corners than IEPF "
@@ -172,7 +172,7 @@ def _corner_table(results: Results, few: int) -> Table:
     rows = []
     for name, result in results.items():
         success, milliseconds = PAPER_CORNERS.get(_family(name), (None, None))
-        some, many = (scores.corners.counts[0.10] for scores in (result.few, result.many))
+        some, many = (scores.corners.counts for scores in (result.few, result.many))
         rows.append(
             {
                 "method": name,

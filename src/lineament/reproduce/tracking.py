@@ -16,8 +16,8 @@ from ..evaluation.tracking import MotionErrors, TrackScores, motion_errors, trac
 from ..extractor import Extractor
 from ..methods import DEFAULT_METHOD
 from ..motion import Tracker, Tracks
-from ..motion.poses import compose, relative
 from ..scan import LaserScan, Pose
+from ..scan.poses import compose, relative
 from .charts import dot_chart
 from .findings import Figure, Findings, Progress, Setting, Table
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..evaluation.corners import vertices
 from ..evaluation.counts import rms
+from ..evaluation.kinds import vertices
 from ..features import Features
 from ..output import canvas, drawing
 from ..scan import Array, LaserScan, Pose

@@ -1,32 +1,57 @@
-"""The two ways in which ROS messages are written as bytes: that of ROS 1, and CDR (ROS 2)."""
-
-from __future__ import annotations
+"""The two serialisations of ROS messages, read and written: that of ROS 1, and CDR (ROS 2)."""
 
 import struct
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-__all__ = ["Buffer", "Wire"]
 
 Buffer = bytes | memoryview
 
 #: CDR pads the end of a message to full words.
 _MAX_PADDING = 3
+#: Zeros up to the next multiple of an alignment, by their number.
+_PADDING = tuple(bytes(n) for n in range(8))
+_NO_FLOATS = np.zeros(0, dtype=np.float32)
+
+#: How numbers are unpacked and packed, their size in all, and their alignment.
+_Numbers = tuple[Callable[..., tuple[Any, ...]], Callable[..., bytes], int, int]
 
 
-class Wire:
+class _Form(dict[str, _Numbers]):
+    """A serialisation in one byte order: its numbers by the letters of `struct`."""
+
+    def __init__(self, is_cdr: bool, order: str) -> None:
+        self.is_cdr, self.order = is_cdr, order
+        self.start = b"\0\1\0\0" if is_cdr else b""  # as it is written
+        self.float32 = np.dtype(order + "f4")
+
+    def __missing__(self, code: str) -> _Numbers:
+        letters = code
+        if code == "header":  # Up to its frame; that of ROS 1 begins with a sequence number.
+            letters = "iII" if self.is_cdr else "4xIII"
+        form = struct.Struct(self.order + letters)
+        alignment = struct.calcsize("=" + letters[-1]) if self.is_cdr else 1
+        self[code] = numbers = form.unpack_from, form.pack, form.size, alignment
+        return numbers
+
+
+_ROS1, _CDR = _Form(False, "<"), _Form(True, "<")
+#: By the first two bytes of a message.
+_CDR_READ = {(0, 0): _Form(True, ">"), (0, 1): _CDR}
+
+
+class WireReader:
     r"""Takes the fields of one serialised message, one after the other.
 
     Parameters
     ----------
     data : bytes-like
         The message.
-    encoding : str
-        ``ros1`` (packed, little-endian) or ``cdr`` (XCDR1, whose first four bytes tell the byte
-        order; numbers are aligned to their size).
+    encoding : {"ros1", "cdr"}
+        Packed and little-endian, or XCDR1: the first four bytes say the byte order, and numbers
+        are aligned to their size, counted from behind these bytes.
 
     Raises
     ------
@@ -35,8 +60,8 @@ class Wire:
 
     Examples
     --------
-    >>> wire = Wire(b"\x02\0\0\0hi\0\0\x80\x3f", "ros1")
-    >>> wire.text(), wire.floats(1).tolist()
+    >>> reader = WireReader(b"\x02\0\0\0hi\0\0\x80\x3f", "ros1")
+    >>> reader.text(), reader.floats(1).tolist()
     ('hi', [1.0])
     """
 
@@ -47,13 +72,13 @@ class Wire:
         if encoding == "ros1":
             self._at, self._form = 0, _ROS1
         elif encoding == "cdr":
-            form = _CDR.get((data[0], data[1])) if self._size >= 4 else None
+            form = _CDR_READ.get((data[0], data[1])) if self._size >= 4 else None
             if form is None:
                 found = bytes(data[:4]).hex()
                 raise ValueError(f"begins with {found!r}, expected plain CDR: 0000 or 0001")
             self._at, self._form = 4, form
         else:
-            raise ValueError(f"encoding is {encoding!r}, expected ros1 or cdr")
+            raise _unknown(encoding)
 
     def header(self) -> tuple[float, str]:
         """Take a ``std_msgs/Header``: its stamp [s] and its frame."""
@@ -61,11 +86,10 @@ class Wire:
         return seconds + 1e-9 * nanoseconds, self._string(length)
 
     def numbers(self, code: str) -> tuple[Any, ...]:
-        """Take numbers of one size, by the letters of `struct`: B, I, II, 7fI, 6d or 7d."""
-        unpack, size, alignment = self._form.numbers[code]
+        """Take numbers of one size, by the letters of `struct`: B, iI, 7d; or "header"."""
+        unpack, _, size, alignment = self._form[code]
         at = self._at
-        if alignment:  # Counted from behind the first four bytes.
-            at += (4 - at) % alignment
+        at += (4 - at) % alignment
         self._at = at + size
         if self._at > self._size:
             raise self._too_short(size, at)
@@ -97,7 +121,7 @@ class Wire:
         return np.frombuffer(self._data, self._form.float32, n, at) if n else _NO_FLOATS
 
     def words(self) -> NDArray[np.uint32]:
-        """View all whole words of 4 bytes from here to the end; none is taken."""
+        """View all whole words of 4 bytes from here to the end, and take none."""
         n = (self._size - self._at) // 4
         return np.frombuffer(self._data, self._form.order + "u4", n, self._at)
 
@@ -117,28 +141,88 @@ class Wire:
         return ValueError(f"ends early: {n} bytes expected from byte {at}, {left} are left")
 
 
-class _Form(NamedTuple):
-    """One way of writing: byte order, and for each code its unpacking, size and alignment."""
+class WireWriter:
+    r"""Puts the fields of one message one after the other; the twin of `WireReader`.
 
-    is_cdr: bool
-    order: str
-    float32: np.dtype[np.float32]
-    numbers: dict[str, tuple[Callable[..., tuple[Any, ...]], int, int]]
+    Parameters
+    ----------
+    encoding : {"ros1", "cdr"}
+        As of `WireReader`; always little-endian.
 
-    @classmethod
-    def prepare(cls, is_cdr: bool, order: str) -> _Form:
-        # The header up to its frame; that of ROS 1 begins with a number of its own.
-        codes = {code: code for code in ("B", "I", "II", "7fI", "6d", "7d")}
-        codes["header"] = "iII" if is_cdr else "4xIII"
-        numbers = {}
-        for name, code in codes.items():
-            form = struct.Struct(order + code)
-            alignment = struct.calcsize("=" + code[-1]) if is_cdr else 0
-            numbers[name] = form.unpack_from, form.size, alignment
-        return cls(is_cdr, order, np.dtype(order + "f4"), numbers)
+    Raises
+    ------
+    ValueError
+        If the encoding is another one.
+
+    Examples
+    --------
+    >>> writer = WireWriter("ros1")
+    >>> writer.text("hi")
+    >>> writer.numbers("f", 1.0)
+    >>> writer.data
+    b'\x02\x00\x00\x00hi\x00\x00\x80?'
+    """
+
+    __slots__ = ("_form", "_out")
+
+    def __init__(self, encoding: str) -> None:
+        if encoding not in ("cdr", "ros1"):
+            raise _unknown(encoding)
+        self._form = _CDR if encoding == "cdr" else _ROS1
+        self._out = bytearray(self._form.start)
+
+    @property
+    def data(self) -> bytes:
+        """The message so far."""
+        return bytes(self._out)
+
+    @property
+    def body(self) -> bytes:
+        """The fields so far, without the beginning that says the byte order."""
+        return bytes(self._out[len(self._form.start) :])
+
+    def header(self, seconds: int, nanoseconds: int, frame: str) -> None:
+        """Put a ``std_msgs/Header``; the transport fills in the sequence number of ROS 1."""
+        raw = self._encoded(frame)
+        self.numbers("header", seconds, nanoseconds, len(raw))
+        self._out += raw
+
+    def numbers(self, code: str, *values: float) -> None:
+        """Put numbers of one size, by the letters of `struct`: B, iI, 7d."""
+        _, pack, _, alignment = self._form[code]
+        self._out += _PADDING[(4 - len(self._out)) % alignment]
+        self._out += pack(*values)
+
+    def count(self, n: int) -> None:
+        """Put the length of a sequence; an empty sequence is nothing else."""
+        self.numbers("I", n)
+
+    def text(self, text: str) -> None:
+        """Put a string."""
+        raw = self._encoded(text)
+        self.count(len(raw))
+        self._out += raw
+
+    def raw(self, data: Buffer, alignment: int = 1) -> None:
+        """Put bytes as they are; in CDR they begin at a multiple of `alignment`."""
+        if len(data):  # What has no elements is not aligned either.
+            if self._form.is_cdr:
+                self._out += _PADDING[(4 - len(self._out)) % alignment]
+            self._out += data
+
+    def array(self, values: NDArray[Any]) -> None:
+        """Put the numbers of a little-endian array row by row, without their count."""
+        self.raw(np.ascontiguousarray(values).data, values.itemsize)
+
+    def sequence(self, values: NDArray[Any]) -> None:
+        """Put the number of rows of an array, and the rows."""
+        self.count(len(values))
+        self.array(values)
+
+    def _encoded(self, text: str) -> bytes:
+        raw = text.encode("utf-8", "replace")
+        return raw + b"\0" if self._form.is_cdr else raw
 
 
-_ROS1 = _Form.prepare(False, "<")
-#: By the first two bytes of the message.
-_CDR = {(0, 0): _Form.prepare(True, ">"), (0, 1): _Form.prepare(True, "<")}
-_NO_FLOATS = np.zeros(0, dtype=np.float32)
+def _unknown(encoding: str) -> ValueError:
+    return ValueError(f"encoding is {encoding!r}, expected ros1 or cdr")

@@ -1,26 +1,11 @@
 """The fields of a scan and of its noise, as they are given: checked, and copied."""
 
-from __future__ import annotations
-
 import math
 from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-__all__ = [
-    "Array",
-    "Pose",
-    "checked_pose",
-    "finite",
-    "irregular_bearings",
-    "number",
-    "range_limits",
-    "regular_bearings",
-    "stamp_seconds",
-    "vector",
-]
 
 Array = NDArray[np.float64]
 _FLOAT64 = np.dtype(np.float64)
@@ -29,7 +14,7 @@ Pose = tuple[float, float, float]
 
 
 def number(name: str, value: object) -> float:
-    """Give a real number as a float; ValueError names the field."""
+    """Convert a real number to a float; ValueError names the field."""
     if type(value) is float:
         return value  # An isinstance of an abstract class takes a microsecond.
     if isinstance(value, Real) and not isinstance(value, bool):
@@ -38,10 +23,8 @@ def number(name: str, value: object) -> float:
 
 
 def finite(name: str, value: object) -> float:
-    """Give a finite number as a float."""
-    if type(value) is float and math.isfinite(value):
-        return value
-    given = number(name, value)
+    """Convert a finite number to a float."""
+    given = value if type(value) is float else number(name, value)
     if not math.isfinite(given):
         raise ValueError(f"{name} is {given}, expected a finite number")
     return given
@@ -89,7 +72,6 @@ def regular_bearings(first: object, step: object, n: int) -> tuple[float, float]
 @np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
 def irregular_bearings(angles: Array) -> tuple[float, float]:
     """First bearing and median step [rad] of bearings that increase, and go round once at most."""
-    n = len(angles)
     bad = np.flatnonzero(~np.isfinite(angles))
     if len(bad):
         raise ValueError(f"angles[{bad[0]}] is {angles[bad[0]]}, expected a finite bearing")
@@ -100,9 +82,9 @@ def irregular_bearings(angles: Array) -> tuple[float, float]:
         raise ValueError(
             f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
         )
-    if n == 0:
+    if len(angles) == 0:
         return 0.0, 0.0
-    step = float(np.median(steps)) if n > 1 else 0.0
+    step = float(np.median(steps)) if len(steps) else 0.0
     _check_turn("angles", angles[0], angles[-1], step)
     return float(angles[0]), step
 

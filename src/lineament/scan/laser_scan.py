@@ -1,11 +1,9 @@
 """One sweep of a 2-D laser scanner: its beams, and which of them are valid (equations 1-3)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,14 +21,12 @@ from .fields import (
     vector,
 )
 
-__all__ = ["Array", "LaserScan", "Pose", "RangeNoise"]
-
 Distance = TypeVar("Distance", float, Array)
 
 
 @dataclass(frozen=True, slots=True)
 class RangeNoise:
-    """Noise of one range reading, as standard deviations.
+    """Noise of one range, as standard deviations.
 
     The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
     each beam is off by ``bearing``.
@@ -73,7 +69,7 @@ class RangeNoise:
             object.__setattr__(self, name, value)
 
     def range_variance(self, distance: Distance) -> Distance:
-        """Variance [m²] of a reading at `distance` [m], or of each of an array of them."""
+        """Variance [m²] of a range of `distance` [m], or of each of an array of them."""
         return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
 
 
@@ -99,13 +95,13 @@ class LaserScan:
     stamp : float
         Time of the first beam [s].
     scan_time, time_increment : float
-        Time between scans and between beams [s]; 0 where unknown.
+        Time between scans and between beams [s]; 0 if unknown.
     frame_id : str
         Name of the sensor's frame.
     intensities : array_like, shape (n,), optional
-        Strength of each return, in the sensor's own unit.
+        Strength of each return, in the sensor's unit.
     pose : (x, y, theta), optional
-        Pose of the sensor in the world frame of its log [m, m, rad], where there is one.
+        Pose of the sensor in the world frame of its log [m, m, rad].
 
     Raises
     ------
@@ -124,7 +120,7 @@ class LaserScan:
     ranges: Array
     angle_min: float
     angle_increment: float
-    #: True where the bearings are ``angle_min + i * angle_increment``.
+    #: True if the bearings are ``angle_min + i * angle_increment``.
     is_regular: bool
     range_min: float
     range_max: float
@@ -201,7 +197,7 @@ class LaserScan:
 
     @cached_property
     def points(self) -> Array:
-        """X = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN where invalid."""
+        """X = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN if invalid."""
         r = np.where(self.valid, self.ranges, np.nan)
         points = np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles)))
         points.flags.writeable = False
@@ -216,18 +212,8 @@ class LaserScan:
         span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
         return span >= 2 * math.pi - 2.5 * step
 
-    def with_pose(self, pose: Pose | None) -> LaserScan:
-        """Make the same scan with another pose; they share their arrays.
-
-        Parameters
-        ----------
-        pose : (x, y, theta) or None
-            Pose of the sensor in the world frame [m, m, rad].
-
-        Raises
-        ------
-        ValueError
-            If the pose is not three finite numbers.
+    def with_pose(self, pose: Pose | None) -> Self:
+        """Return the same scan with another pose [m, m, rad]; they share their arrays.
 
         Examples
         --------
@@ -235,13 +221,13 @@ class LaserScan:
         >>> scan.with_pose((3, 4, 0)).pose, scan.pose
         ((3.0, 4.0, 0.0), None)
         """
-        other = LaserScan.__new__(LaserScan)
+        other = self.__class__.__new__(self.__class__)
         other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
         return other
 
     @classmethod
-    def from_message(cls, message: Any, *, pose: Pose | None = None) -> LaserScan:
-        """Make a scan of any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
+    def from_message(cls, message: Any, *, pose: Pose | None = None) -> Self:
+        """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
 
         Parameters
         ----------

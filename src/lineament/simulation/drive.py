@@ -1,19 +1,14 @@
 """Drives: a scanner carried along waypoints, one scan after the other."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..motion.poses import Twist
 from ..scan import Array, LaserScan
 from .sensor import Sensor
 from .worlds import World
-
-__all__ = ["drive", "drive_poses"]
 
 
 def drive_poses(
@@ -25,10 +20,8 @@ def drive_poses(
     ----------
     waypoints : array_like, shape (W, 2)
         Ends of the legs in the world frame [m]; the first leg gives the first heading.
-    speed : float
-        Speed along the legs [m/s].
-    turn_rate : float
-        Speed of the turns, each the short way round [rad/s].
+    speed, turn_rate : float
+        Speed along the legs [m/s], and of the turns, each the short way round [rad/s].
     rate : float
         Poses a second [Hz].
 
@@ -72,11 +65,9 @@ def drive(
     Parameters
     ----------
     world : World
-        What there is to see.
     waypoints : array_like, shape (W, 2)
         Ends of the legs in the world frame [m].
     sensor : Sensor
-        The scanner.
     speed, turn_rate : float
         Speed along the legs [m/s] and of the turns between them [rad/s].
     seed : int
@@ -84,19 +75,17 @@ def drive(
     rate : float, optional
         Scans a second [Hz]; the sensor's own where None.
     moving : bool
-        Whether the sensor moves while it sweeps, with the velocity that it has at the first beam;
-        else it stands still.
+        Whether the sensor moves while it sweeps, with the velocity that it has at the first beam.
 
     Returns
     -------
     iterator of LaserScan
-        One scan for each pose of :func:`drive_poses`, made when it is asked for, with its stamp
-        and its true pose.
+        One scan for each pose of :func:`drive_poses`, with its stamp and its true pose.
 
     Raises
     ------
     ValueError
-        As :func:`drive_poses`, or if the seed is negative; before the first scan is asked for.
+        As :func:`drive_poses`, or if the seed is negative; before the first scan.
 
     Examples
     --------
@@ -111,9 +100,9 @@ def drive(
     stamps, poses, twists = _course(waypoints, speed, turn_rate, rate)
     if not moving:
         twists[:] = 0.0
-    states = zip(stamps.tolist(), map(_triple, poses), map(_triple, twists), strict=True)
+    states = zip(stamps.tolist(), poses.tolist(), twists.tolist(), strict=True)
     return (
-        sensor.scan(world, pose, np.random.default_rng([seed, i]), stamp, twist)
+        sensor.scan(world, tuple(pose), np.random.default_rng([seed, i]), stamp, tuple(twist))
         for i, (stamp, pose, twist) in enumerate(states)
     )
 
@@ -130,7 +119,7 @@ def _course(
     n = math.floor(times[-1] * rate + 1e-9) + 1
     stamps = np.arange(n) / rate
     poses = np.column_stack([np.interp(stamps, times, keys[:, k]) for k in range(3)])
-    poses[:, 2] = _wrapped(poses[:, 2])
+    poses[:, 2] = math.pi - np.mod(math.pi - poses[:, 2], 2 * math.pi)
     # Legs begin at the even keys, turns at the odd ones; at the last key the drive is over.
     key = np.searchsorted(times, stamps, side="right") - 1
     is_over, is_turn = key == len(times) - 1, key % 2 == 1
@@ -140,11 +129,6 @@ def _course(
     twists[is_turn, 2] = turn_rate * turns[key[is_turn]]
     twists[is_over] = 0.0
     return stamps, poses, twists
-
-
-def _triple(row: Array) -> Twist:
-    x, y, theta = row.tolist()
-    return x, y, theta
 
 
 def _distinct(waypoints: ArrayLike) -> Array:
@@ -170,9 +154,3 @@ def _key_poses(points: Array, speed: float, turn_rate: float) -> tuple[Array, Ar
     times = np.cumsum(np.column_stack((turning, driving)).ravel())
     ends = np.repeat(points, 2, axis=0)[1:-1]
     return times, np.column_stack((ends, np.repeat(headings, 2)))
-
-
-def _wrapped(angles: Array) -> Array:
-    """Angles brought into (-π, π]."""
-    wrapped: Array = math.pi - np.mod(math.pi - angles, 2 * math.pi)
-    return wrapped

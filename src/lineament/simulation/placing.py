@@ -1,16 +1,12 @@
 """Where there is room: a floor on which a scanner and obstacles are put without touching."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..scan import Array, Pose
-from .worlds import World
-
-__all__ = ["Floor", "clearance", "is_free", "rectangle"]
+from .worlds import World, closed, rectangle
 
 #: Least distance of the scanner from every surface [m].
 _KEPT_CLEAR = 0.3
@@ -43,31 +39,21 @@ class Floor:
 
     def __init__(self, outline: ArrayLike, pose: Pose) -> None:
         self.pose = pose
-        self.world = World.of_polygons([_closed(outline)])
+        self.world = World.of_polygons([closed(outline)])
 
     def put_box(self, center: ArrayLike, width: float, depth: float, angle: float = 0.0) -> bool:
-        """Put a box, its width along `angle`; False, and nothing is put, where there is no room.
-
-        Parameters
-        ----------
-        center : array_like, shape (2,)
-            Its centre [m].
-        width, depth : float
-            Its sides [m], the longer first.
-        angle : float
-            Direction of its width [rad].
-        """
+        """Put a box, its longer side `width` along `angle`; False if there is no room for it."""
         n = min(_COVERING, math.ceil(width / depth))
         along = width * ((np.arange(n) + 0.5) / n - 0.5)
         centers = np.asarray(center) + along[:, np.newaxis] * (math.cos(angle), math.sin(angle))
         if not self._has_room(centers, math.hypot(width / n, depth) / 2):
             return False
-        walls = World.of_polygons([_closed(rectangle(center, width, depth, angle))]).segments
+        walls = World.of_polygons([closed(rectangle(center, width, depth, angle))]).segments
         self.world = World(np.vstack((self.world.segments, walls)), self.world.circles)
         return True
 
     def put_column(self, center: ArrayLike, radius: float) -> bool:
-        """Put a round column; False, and nothing is put, where there is no room."""
+        """Put a round column; False if there is no room for it."""
         at = np.asarray(center, dtype=np.float64)
         if not self._has_room(at[np.newaxis], radius):
             return False
@@ -84,28 +70,8 @@ class Floor:
         )
 
 
-def rectangle(center: ArrayLike, width: float, depth: float, angle: float = 0.0) -> Array:
-    """Vertices (4, 2) of a rectangle, counter-clockwise, its width along `angle` [rad]."""
-    c, s = math.cos(angle), math.sin(angle)
-    halves = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, depth / 2)
-    vertices: Array = np.asarray(center) + halves @ np.array([[c, s], [-s, c]])
-    return vertices
-
-
 def clearance(world: World, points: ArrayLike) -> Array:
-    """Distance of points to the nearest surface.
-
-    Parameters
-    ----------
-    world : World
-        The surfaces.
-    points : array_like, shape (n, 2)
-        Points [m].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Distances [m]; inf in an empty world.
+    """Distance of points (n, 2) from the nearest surface [m], shape (n,); inf in an empty world.
 
     Examples
     --------
@@ -126,18 +92,7 @@ def clearance(world: World, points: ArrayLike) -> Array:
 def is_free(world: World, points: ArrayLike) -> Array:
     """Whether points lie inside the outline of a world and outside its obstacles.
 
-    They do where a ray meets an odd number of walls, all of which belong to closed outlines.
-
-    Parameters
-    ----------
-    world : World
-        One closed outline, with closed obstacles and round columns in it.
-    points : array_like, shape (n, 2)
-        Points [m], on no surface.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
+    They do if a ray meets an odd number of walls, all of which belong to closed outlines.
 
     Examples
     --------
@@ -155,8 +110,3 @@ def is_free(world: World, points: ArrayLike) -> Array:
     in_column = np.hypot(x - world.circles[:, 0], y - world.circles[:, 1]) < world.circles[:, 2]
     free: Array = (met.sum(axis=1) % 2 == 1) & ~in_column.any(axis=1)
     return free
-
-
-def _closed(vertices: ArrayLike) -> Array:
-    points = np.asarray(vertices, dtype=np.float64)
-    return np.vstack((points, points[:1]))

@@ -1,14 +1,10 @@
 """Scanners of several kinds, by name."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 from ..scan import RangeNoise
 from .sensor import Sensor
-
-__all__ = ["SENSORS"]
 
 
 def _preset(

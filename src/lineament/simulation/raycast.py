@@ -1,14 +1,10 @@
 """Where beams meet a world: exact, every beam against every surface."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..scan import Array, Pose
 from .worlds import World
-
-__all__ = ["cast_rays"]
 
 #: A surface nearer than this [m] touches the sensor and is not met, whatever rounding does.
 _TOUCHING = 1e-9
@@ -34,7 +30,6 @@ def cast_rays(
     Parameters
     ----------
     world : World
-        What there is to meet.
     pose : (x, y, theta) or ndarray, shape (n, 3)
         Pose of the sensor in the world frame [m, m, rad], or its pose at each beam.
     angles : array_like, shape (n,)

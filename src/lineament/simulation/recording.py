@@ -1,7 +1,5 @@
 """Simulated logs: a drive through a building, or a scanner that stands in a scene."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator
@@ -13,14 +11,12 @@ import numpy as np
 
 from ..logs import save_log
 from ..progress import Track, untracked
-from ..scan import LaserScan, Pose
+from ..scan import LaserScan
 from .drive import drive, drive_poses
 from .presets import SENSORS
 from .scenes import SCENES, scene
 from .sensor import Sensor
-from .worlds import World, building
-
-__all__ = ["WORLDS", "sensor_like", "simulate_log"]
+from .worlds import building
 
 #: What a log can be recorded in: the storey is driven through, all others are seen from one place.
 WORLDS = ("building", *SCENES)
@@ -43,30 +39,23 @@ def simulate_log(
     Parameters
     ----------
     path : path-like
-        The log; its ending tells the format, see `lineament.logs.save_log`.
+        The log; its ending gives the format, see `lineament.logs.save_log`.
     world : str
         "building", driven through from end to end; or a kind of `SCENES`, a random one by the
         seed, in which the scanner stands still.
     sensor : Sensor
-        The scanner.
     scans : int, optional
         Number of scans; the whole drive where None, 100 where the scanner stands.
-    speed : float
-        Of the drive [m/s].
-    rate : float, optional
-        Scans a second [Hz]; the sensor's own where None.
-    seed : int
-        Of the scene and of all noise, not negative.
-    moving : bool
-        Whether the scanner moves while it sweeps, on a drive.
+    speed, rate, seed, moving
+        As for `drive`; the seed is of the scene, too.
     track : callable
-        ``track(scans, about, total)`` gives the scans, and shows how far they are.
+        ``track(scans, about, total)`` yields the scans, and shows the progress.
 
     Raises
     ------
     ValueError
         If there is no such world, a number is out of bounds, the scanner cannot move, or the
-        ending is not known.
+        ending is unknown.
     LineamentError
         If the file cannot be written.
 
@@ -97,26 +86,17 @@ def simulate_log(
         if moving:
             raise ValueError(f"the scanner stands in world {world!r}, moving needs the building")
         total = 100 if scans is None else scans
-        taken = _standing(*scene(world, seed), sensor, total, rate, seed)
+        plan, pose = scene(world, seed)
+        rngs = (np.random.default_rng([seed, i]) for i in range(total))
+        taken = (sensor.scan(plan, pose, rng, i / rate) for i, rng in enumerate(rngs))
     save_log(path, track(taken, "simulating", total))
 
 
 def sensor_like(name: str, *, sigma: float | None = None, **changes: float | None) -> Sensor:
-    """Take a preset of `SENSORS`, and change what is not None.
+    """Take a preset of `SENSORS`, and change the fields of `Sensor` that are not None.
 
-    Parameters
-    ----------
-    name : str
-        Name of the preset.
-    sigma : float, optional
-        Constant part of the range noise [m].
-    **changes
-        Other fields of `Sensor`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such preset, or a value makes no sense.
+    `sigma` is the constant part of the range noise [m]. Raises ValueError if there is no such
+    preset, or a value makes no sense.
 
     Examples
     --------
@@ -129,10 +109,3 @@ def sensor_like(name: str, *, sigma: float | None = None, **changes: float | Non
     noise = sensor.noise if sigma is None else replace(sensor.noise, sigma=sigma)
     chosen: dict[str, Any] = {key: value for key, value in changes.items() if value is not None}
     return replace(sensor, noise=noise, **chosen)
-
-
-def _standing(
-    world: World, pose: Pose, sensor: Sensor, scans: int, rate: float, seed: int
-) -> Iterator[LaserScan]:
-    for i in range(scans):
-        yield sensor.scan(world, pose, np.random.default_rng([seed, i]), i / rate)

@@ -5,18 +5,15 @@ columns with radii of 0.08-0.5 m. Walls meet only at their ends, obstacles keep 
 other surfaces, the scanner keeps 0.3 m.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..scan import Array, Pose
-from .placing import Floor, clearance, is_free, rectangle
-from .worlds import World
-
-__all__ = ["SCENES", "scene"]
+from .placing import Floor, clearance, is_free
+from .worlds import World, closed, rectangle
 
 Rng = np.random.Generator
 
@@ -76,7 +73,7 @@ def _room(rng: Rng) -> Floor:
     for i in range(4):
         start, end = corners[i], corners[(i + 1) % 4]
         vertices += _side_of_room(start, end, cuts[i], cuts[(i + 1) % 4], rng)
-    return Floor(vertices, _anywhere(World.of_polygons([[*vertices, vertices[0]]]), rng))
+    return Floor(vertices, _anywhere(vertices, rng))
 
 
 def _side_of_room(start: Array, end: Array, cut: float, next_cut: float, rng: Rng) -> list[Array]:
@@ -90,9 +87,8 @@ def _side_of_room(start: Array, end: Array, cut: float, next_cut: float, rng: Rn
     if last - first >= 0.5 and rng.random() < 0.6:
         width = rng.uniform(0.5, min(2.5, last - first))
         left = rng.uniform(first, last - width)
-        shift = (
-            rng.uniform(0.15, 0.8) if rng.random() < 0.6 else -rng.uniform(0.1, 0.4)
-        ) * outwards
+        out = rng.uniform(0.15, 0.8) if rng.random() < 0.6 else -rng.uniform(0.1, 0.4)
+        shift = out * outwards
         a, b = start + left * along, start + (left + width) * along
         vertices += [a, a + shift, b + shift, b]
     return [*vertices, end - next_cut * along] if next_cut > 0 else vertices
@@ -112,7 +108,7 @@ def _star(rng: Rng) -> Floor:
 
 
 def _least_turn(vertices: Array) -> float:
-    """Tell the least turn [rad] of a closed outline at its vertices."""
+    """Return the least turn [rad] of a closed outline at its vertices."""
     sides = np.roll(vertices, -1, axis=0) - vertices
     directions = np.arctan2(sides[:, 1], sides[:, 0])
     turns = np.angle(np.exp(1j * (np.roll(directions, -1) - directions)))
@@ -194,7 +190,7 @@ def _layers(rng: Rng) -> Floor:
 
 def _empty_hall(rng: Rng) -> Floor:
     outline = rectangle((0, 0), *rng.uniform(6, 12, 2))
-    return Floor(outline, _anywhere(World.of_polygons([[*outline, outline[0]]]), rng))
+    return Floor(outline, _anywhere(outline, rng))
 
 
 def _box(rng: Rng) -> tuple[float, float]:
@@ -203,8 +199,9 @@ def _box(rng: Rng) -> tuple[float, float]:
     return width, depth
 
 
-def _anywhere(world: World, rng: Rng) -> Pose:
-    """Draw a pose clear of every surface."""
+def _anywhere(outline: ArrayLike, rng: Rng) -> Pose:
+    """Draw a pose within an outline, clear of it."""
+    world = World.of_polygons([closed(outline)])
     ends = world.segments[:, :2]
     while True:
         x, y = rng.uniform(ends.min(axis=0), ends.max(axis=0)).tolist()
@@ -213,7 +210,7 @@ def _anywhere(world: World, rng: Rng) -> Pose:
 
 
 def _seen_from(pose: Pose, distance: float, bearing: float) -> tuple[float, float]:
-    """Tell the point at a distance from a pose, in a direction of the world."""
+    """Return the point at a distance from a pose, in a direction of the world."""
     return pose[0] + distance * math.cos(bearing), pose[1] + distance * math.sin(bearing)
 
 

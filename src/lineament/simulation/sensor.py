@@ -1,6 +1,4 @@
-"""Scanners: their beams, their motion, and what stands between a true range and a reading."""
-
-from __future__ import annotations
+"""Scanners: their beams, their motion, and what stands between a true range and a measurement."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,14 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..motion.poses import Twist, poses_along
 from ..scan import Array, LaserScan, Pose, RangeNoise
+from ..scan.poses import Twist, poses_along
 from .raycast import cast_rays
 from .worlds import World
 
-__all__ = ["Sensor"]
-
-#: Share of the beams across an occlusion edge that blend both depths: the others are won by one.
+#: Share of the beams across an occlusion edge that blend both depths.
 _BLEND_SHARE = 0.5
 #: Least step in depth of an occlusion edge: in metres, and in widths of the footprint. Smaller
 #: ones are corners and walls at grazing incidence, whose depth has no gap.
@@ -38,14 +34,14 @@ class Sensor:
     range_min, range_max : float
         Limits of ranges that are reported [m]: ``range_min <= r < range_max``.
     noise : RangeNoise
-        Noise of a reading; all four parts are applied.
+        Noise of a measurement; all four parts are applied.
     dropout : float
         Probability that a beam returns nothing.
     outlier : float
         Probability of a false return, uniform between `range_min` and the true range.
     mixed_pixel : float
         Divergence of the beam, full width [rad]. Where its two edges meet different surfaces with
-        a step in depth between, half of the readings are a blend of both depths.
+        a step in depth between, half of the measurements are a blend of both depths.
     rate : float
         Scans a second [Hz], and turns of its mirror: a beam follows the other by `time_increment`.
 
@@ -105,25 +101,10 @@ class Sensor:
         return self.angle_increment / (2 * math.pi * self.rate)
 
     def sweep(self, pose: Pose, twist: Twist) -> Array:
-        """Return the pose from which each beam is taken by a sensor that moves.
+        """Return the pose of each beam of a sensor that moves, shape (n, 3), as `poses_along`.
 
-        Its velocity is constant: see :func:`~lineament.motion.poses.poses_along`.
-
-        Parameters
-        ----------
-        pose : (x, y, theta)
-            Pose at the first beam, in the world frame [m, m, rad].
-        twist : (v_x, v_y, omega)
-            Velocity forward, to the left [m/s], turn rate [rad/s].
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-
-        Raises
-        ------
-        ValueError
-            If the twist is not three finite numbers.
+        The pose is that of the first beam, in the world frame [m, m, rad], the twist the constant
+        velocity forward and to the left [m/s], and the turn rate [rad/s].
 
         Examples
         --------
@@ -137,21 +118,9 @@ class Sensor:
         return np.column_stack((x + c * dx - s * dy, y + s * dx + c * dy, theta + turn))
 
     def ideal(self, world: World, pose: Pose) -> tuple[Array, NDArray[np.int32]]:
-        """Return the true ranges and surfaces of all beams, whatever their length.
+        """Return the true ranges and surfaces of all beams, as `cast_rays`.
 
-        Parameters
-        ----------
-        world : World
-            What there is to see.
-        pose : (x, y, theta)
-            Pose of the sensor in the world frame [m, m, rad].
-
-        Returns
-        -------
-        ranges : ndarray, shape (n,)
-            Distances [m], inf where nothing is met; neither limits nor noise are applied.
-        surface : ndarray of int32, shape (n,)
-            Number of the surface that each beam meets, -1 for none.
+        Neither limits nor noise are applied.
 
         Examples
         --------
@@ -173,12 +142,11 @@ class Sensor:
         """Simulate one sweep.
 
         In order: each beam leaves with an error of bearing; it may blend two depths; it may be
-        cut short; noise is added; the reading is rounded to the lattice; it may be lost.
+        cut short; noise is added; the range is rounded to the lattice; it may be lost.
 
         Parameters
         ----------
         world : World
-            What there is to see.
         pose : (x, y, theta)
             Pose of the sensor in the world frame [m, m, rad]; becomes the scan's.
         rng : numpy.random.Generator
@@ -187,8 +155,8 @@ class Sensor:
         stamp : float
             Time of the first beam [s].
         twist : (v_x, v_y, omega)
-            Velocity of the sensor in its own frame [m/s, m/s, rad/s], constant while it sweeps:
-            each beam is taken from its own pose (see :meth:`sweep`), the first from `pose`.
+            Velocity of the sensor in its own frame [m/s, m/s, rad/s] while it sweeps; see
+            :meth:`sweep`.
 
         Returns
         -------
@@ -255,7 +223,7 @@ class Sensor:
         finite = np.isfinite(ranges)
         distance = np.where(finite, ranges, 0.0)
         deviation = np.hypot(self.noise.sigma, self.noise.proportional * distance)
-        reading = distance + deviation * normal
+        measured = distance + deviation * normal
         if self.noise.quantum > 0:
-            reading = np.round(reading / self.noise.quantum) * self.noise.quantum
-        return np.where(finite, reading, np.inf)
+            measured = np.round(measured / self.noise.quantum) * self.noise.quantum
+        return np.where(finite, measured, np.inf)

@@ -1,7 +1,5 @@
 """What is one surface in a world of walls, and what the beams of a scanner meet of it."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from dataclasses import dataclass
@@ -13,8 +11,6 @@ from numpy.typing import NDArray
 from ..scan import Array, Pose
 from .sensor import Sensor
 from .worlds import World
-
-__all__ = ["Surfaces", "View"]
 
 #: Ends of walls nearer to each other than this [m] are one vertex.
 _SAME_VERTEX = 1e-3
@@ -48,39 +44,36 @@ class Surfaces:
     circles: Array
     joints: dict[tuple[int, int], Array]
 
-    @staticmethod
-    @lru_cache(maxsize=16)
-    def of(world: World) -> Surfaces:
-        """Find the surfaces of a world.
 
-        Examples
-        --------
-        >>> surfaces = Surfaces.of(World([[0, 0, 1, 0], [1, 0, 3, 0], [3, 0, 3, 2]]))
-        >>> surfaces.of_world.tolist(), surfaces.walls[0].tolist()
-        ([0, 0, 1], [[0.0, 0.0], [3.0, 0.0]])
-        >>> surfaces.joints[0, 1].tolist()
-        [[3.0, 0.0]]
-        """
-        ends = world.segments.reshape(-1, 2, 2)
-        meetings = _meetings(ends)
-        label = np.arange(len(ends))
-        for i, a, j, b in meetings:
-            if _goes_on(ends[i], a, ends[j], b):
-                label[label == label[j]] = label[i]
-        numbers, label = np.unique(label, return_inverse=True)
-        joints = defaultdict(list)
-        for i, a, j, _ in meetings:
-            if label[i] != label[j]:
-                joints[int(label[i]), int(label[j])].append(ends[i, a])
-        for i, j, vertex in _crossings(ends):
-            if label[i] != label[j]:
-                joints[int(label[i]), int(label[j])].append(vertex)
-        return Surfaces(
-            np.concatenate((label, len(numbers) + np.arange(len(world.circles)))),
-            np.array([_extent(ends[label == k]) for k in range(len(numbers))]).reshape(-1, 2, 2),
-            world.circles,
-            {pair: np.array(vertices) for pair, vertices in joints.items()},
-        )
+@lru_cache(maxsize=16)
+def surfaces_of(world: World) -> Surfaces:
+    """Find the surfaces of a world.
+
+    Examples
+    --------
+    >>> surfaces = surfaces_of(World([[0, 0, 1, 0], [1, 0, 3, 0], [3, 0, 3, 2]]))
+    >>> surfaces.of_world.tolist(), surfaces.walls[0].tolist()
+    ([0, 0, 1], [[0.0, 0.0], [3.0, 0.0]])
+    >>> surfaces.joints[0, 1].tolist()
+    [[3.0, 0.0]]
+    """
+    ends = world.segments.reshape(-1, 2, 2)
+    meetings = _meetings(ends)
+    label = np.arange(len(ends))
+    for i, a, j, b in meetings:
+        if _goes_on(ends[i], a, ends[j], b):
+            label[label == label[j]] = label[i]
+    numbers, label = np.unique(label, return_inverse=True)
+    joints = defaultdict(list)
+    for i, j, vertex in [*((i, j, ends[i, a]) for i, a, j, _ in meetings), *_crossings(ends)]:
+        if label[i] != label[j]:
+            joints[int(label[i]), int(label[j])].append(vertex)
+    return Surfaces(
+        np.concatenate((label, len(numbers) + np.arange(len(world.circles)))),
+        np.array([_extent(ends[label == k]) for k in range(len(numbers))]).reshape(-1, 2, 2),
+        world.circles,
+        {pair: np.array(vertices) for pair, vertices in joints.items()},
+    )
 
 
 def _meetings(ends: Array) -> list[tuple[int, int, int, int]]:
@@ -124,8 +117,7 @@ def _cross(u: Array, v: Array) -> Array:
 def _goes_on(wall: Array, a: int, other: Array, b: int) -> bool:
     """Whether `other`, from its end b, goes straight on where `wall` ends at its end a."""
     into, onwards = wall[a] - wall[1 - a], other[1 - b] - other[b]
-    cross, dot = into[0] * onwards[1] - into[1] * onwards[0], into @ onwards
-    return bool(abs(math.atan2(cross, dot)) < _STRAIGHT)
+    return bool(abs(math.atan2(_cross(into, onwards), into @ onwards)) < _STRAIGHT)
 
 
 def _extent(ends: Array) -> Array:
@@ -141,11 +133,9 @@ class View:
     Parameters
     ----------
     world : World
-        What there is to see.
     pose : (x, y, theta)
         Pose of the sensor in the world frame [m, m, rad].
     sensor : Sensor
-        Its beams and range limits.
 
     Attributes
     ----------
@@ -168,7 +158,7 @@ class View:
     """
 
     def __init__(self, world: World, pose: Pose, sensor: Sensor) -> None:
-        surfaces = Surfaces.of(world)
+        surfaces = surfaces_of(world)
         self.bearings = sensor.angles
         self.ranges, met = sensor.ideal(world, pose)
         valid = (self.ranges >= sensor.range_min) & (self.ranges < sensor.range_max)
@@ -183,14 +173,12 @@ class View:
         self.is_full_circle = sensor.n_beams >= 3 and rest <= 2.5 * sensor.angle_increment
         self.steps = np.full(len(met), sensor.angle_increment)
         self.steps[-1] = rest if self.is_full_circle else 0.0
-        self._joints_of = {
-            pair: self._to_sensor(vertices) for pair, vertices in surfaces.joints.items()
-        }
+        self._joints_of = {pair: self._to_sensor(at) for pair, at in surfaces.joints.items()}
         self._settle_vertices()
         self._look_between()
 
     def point_on_wall(self, bearing: float, surface: int) -> Array:
-        """Tell where a beam meets the line of a straight surface, shape (2,)."""
+        """Return where a beam meets the line of a straight surface, shape (2,)."""
         (px, py), (qx, qy) = self.walls[surface]
         ux, uy = math.cos(bearing), math.sin(bearing)
         # As in `cast_rays`, with the sensor at the origin.
@@ -214,9 +202,8 @@ class View:
         before, after = np.roll(self.surface, 1), np.roll(self.surface, -1)
         alone = (self.surface != before) & (self.surface != after) & (self.surface >= 0)
         for i in np.flatnonzero(alone).tolist():
-            hit = self.ranges[i] * np.array(
-                [math.cos(self.bearings[i]), math.sin(self.bearings[i])]
-            )
+            bearing = self.bearings[i]
+            hit = self.ranges[i] * np.array([math.cos(bearing), math.sin(bearing)])
             for neighbour in (before[i], after[i]):
                 vertices = self._joints_of.get((int(self.surface[i]), int(neighbour)), ())
                 if any(math.dist(vertex, hit) < _THROUGH_VERTEX for vertex in vertices):
@@ -240,6 +227,5 @@ class View:
 
 def _counter_clockwise(walls: Array) -> Array:
     """Order the ends of walls by bearing, as seen from the origin."""
-    p, q = walls[:, 0], walls[:, 1]
-    backwards = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] < 0
+    backwards = _cross(walls[:, 0], walls[:, 1]) < 0
     return np.where(backwards[:, np.newaxis, np.newaxis], walls[:, ::-1], walls)

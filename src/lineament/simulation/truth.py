@@ -1,9 +1,8 @@
 """What there is to find in a simulated scan, each feature with the bound of its accuracy."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +14,8 @@ from .sensor import Sensor
 from .surfaces import View
 from .worlds import World
 
-__all__ = ["truth"]
-
-#: A feature as the fields of its dtype.
-Record = tuple[object, ...]
+#: A feature by the names of its fields; those that it does not give are 0.
+Record = dict[str, Any]
 
 #: Fewer connected beams are noise to every method.
 _LEAST_CLUSTER = 3
@@ -27,18 +24,18 @@ _GAP = 6
 
 
 def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
-    """Tell the features of a scan as a perfect method would find them.
+    """Return the features of a scan as a perfect method would find them.
 
     Parameters
     ----------
     world : World
-        What there is to see. Walls that meet within 1 mm share a vertex; those that go straight
-        on there (within 1 mrad) are one surface.
+        Walls that meet within 1 mm share a vertex; those that go straight on there (within
+        1 mrad) are one surface.
     pose : (x, y, theta)
         Pose of the sensor, at rest, in the world frame [m, m, rad].
     sensor : Sensor
         Its beams, range limits and noise. A beam stands for the surface that its axis meets,
-        whatever a mixed pixel, an outlier or a drop-out makes of its reading.
+        whatever a mixed pixel, an outlier or a drop-out makes of its measurement.
 
     Returns
     -------
@@ -46,10 +43,10 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
         In the frame of the sensor. `noise` is the sensor's.
 
         `segments` are runs of neighbouring beams, 2 or more, on one wall. `start` and `end` are
-        its visible extent: a vertex where there is a corner; else the end of the wall, if the
+        its visible extent: a vertex if there is a corner; else the end of the wall, if the
         next beam passes it by; else half-way to the next beam, which an occluder took. They end
-        at the last beam where the scan ends. `covariance` is the bound, `centroid` that of the
-        readings' information, `rms` and `misfit` 0.
+        at the last beam if the scan ends. `covariance` is the bound, `centroid` that of the
+        information of the measurements, `rms` and `misfit` 0.
 
         `corners` are the vertices between two neighbouring beams that meet its two walls.
         `segments` has -1 for a side of one beam, and `covariance` is then NaN. `response`
@@ -59,7 +56,7 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
         NaN.
 
         `clusters` are neighbouring beams on surfaces that are connected: on the same one, or
-        across a corner; fewer than 3 are none, -1. `breakpoints` lie between neighbouring
+        across a corner; fewer than 3 are no cluster, -1. `breakpoints` lie between neighbouring
         clusters and at the ends of the scan.
 
     See Also
@@ -76,10 +73,14 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
     ([[1.4, -0.5], [3.0, 2.0]], [True, False])
     """
     view = View(world, pose, sensor)
-    turn = _seam(view)
-    runs = _runs(view, turn)
+    turn, n_walls = _seam(view), len(view.walls)
+    runs = [
+        _Run(int(view.surface[beams[0]]), int(beams[0]), int(beams[-1]), len(beams))
+        for beams in _parts(view.goes_on, turn)
+        if view.surface[beams[0]] >= 0
+    ]
     label = _clusters(view, turn)
-    listed, n_walls = [run for run in runs if run.n_beams >= 2], len(view.walls)
+    listed = [run for run in runs if run.n_beams >= 2]
     bounds = {r: _line_bound(view, r, sensor.noise) for r in listed if r.surface < n_walls}
     arcs = [_arc(view, r, sensor.noise) for r in listed if r.surface >= n_walls]
     return Features(
@@ -93,24 +94,25 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """Neighbouring beams on one surface, over the seam where the first is larger than the last."""
+class _Run(NamedTuple):
+    """Neighbouring beams on one surface, over the seam if the first is larger than the last."""
 
     surface: int
     first: int
     last: int
     n_beams: int
 
-    def beams(self, n: int) -> NDArray[np.int64]:
-        """Tell its beams in order, of a scan of n."""
-        return (self.first + np.arange(self.n_beams)) % n
+    def bearings(self, view: View) -> Array:
+        return view.bearings[(self.first + np.arange(self.n_beams)) % len(view.bearings)]
+
+    def beams(self) -> Record:
+        return {"first_beam": self.first, "last_beam": self.last, "n_points": self.n_beams}
 
 
 def _seam(view: View) -> int:
-    """Tell the beam at which to begin so that nothing connected is cut, if there is one.
+    """Return the beam at which to begin so that nothing connected is cut, if there is one.
 
-    Where all is connected around, that is at a corner, or anywhere on a circle.
+    If all is connected around, that is at a corner, or anywhere on a circle.
     """
     if not view.is_full_circle:
         return 0
@@ -135,47 +137,33 @@ def _parts(links: NDArray[np.bool_], turn: int) -> list[NDArray[np.int64]]:
     return np.split(order, np.flatnonzero(~links[order[:-1]]) + 1)
 
 
-def _runs(view: View, turn: int) -> list[_Run]:
-    return [
-        _Run(int(view.surface[beams[0]]), int(beams[0]), int(beams[-1]), len(beams))
-        for beams in _parts(view.goes_on, turn)
-        if view.surface[beams[0]] >= 0
-    ]
-
-
 def _clusters(view: View, turn: int) -> NDArray[np.int32]:
-    label, count = np.full(len(view.surface), -1, dtype=np.int32), 0
-    for beams in _parts(_connected(view), turn):
-        if len(beams) >= _LEAST_CLUSTER:
-            label[beams] = count
-            count += 1
+    label = np.full(len(view.surface), -1, dtype=np.int32)
+    large = [part for part in _parts(_connected(view), turn) if len(part) >= _LEAST_CLUSTER]
+    for k, beams in enumerate(large):
+        label[beams] = k
     return label
 
 
 def _line_bound(view: View, run: _Run, noise: RangeNoise) -> LineBound:
     start, end = view.walls[run.surface]
     angle = math.atan2(end[1] - start[1], end[0] - start[0])
-    return line_bound(view.bearings[run.beams(len(view.bearings))], start, angle, noise)
+    return line_bound(run.bearings(view), start, angle, noise)
 
 
 def _segment(view: View, run: _Run, bound: LineBound, label: NDArray[np.int32]) -> Record:
-    return (
-        _extent(view, run, 0),
-        _extent(view, run, 1),
-        bound.centroid,
-        bound.angle,
-        bound.covariance,
-        run.first,
-        run.last,
-        run.n_beams,
-        0.0,
-        0.0,
-        label[run.first],
-    )
+    return run.beams() | {
+        "start": _extent(view, run, 0),
+        "end": _extent(view, run, 1),
+        "centroid": bound.centroid,
+        "angle": bound.angle,
+        "covariance": bound.covariance,
+        "cluster": label[run.first],
+    }
 
 
 def _extent(view: View, run: _Run, which: int) -> Array:
-    """Tell where the visible part of a wall starts (0) or ends (1)."""
+    """Return where the visible part of a wall starts (0) or ends (1)."""
     beam, sign = (run.last, 1) if which else (run.first, -1)
     between = beam if which else beam - 1  # Before the first beam is the last.
     vertex: Array = view.joints[between]
@@ -190,10 +178,10 @@ def _extent(view: View, run: _Run, which: int) -> Array:
 
 def _arc(view: View, run: _Run, noise: RangeNoise) -> Record:
     x, y, radius = view.circles[run.surface - len(view.walls)].tolist()
-    bearings = view.bearings[run.beams(len(view.bearings))]
-    known = run.n_beams >= 3
-    covariance = arc_bound(bearings, (x, y), radius, noise) if known else _unknown(3)
-    return ((x, y), radius, covariance, run.first, run.last, run.n_beams, 0.0)
+    covariance: Any = np.nan
+    if run.n_beams >= 3:
+        covariance = arc_bound(run.bearings(view), (x, y), radius, noise)
+    return run.beams() | {"center": (x, y), "radius": radius, "covariance": covariance}
 
 
 def _corners(view: View, runs: list[_Run], bounds: dict[_Run, LineBound]) -> list[Record]:
@@ -205,14 +193,21 @@ def _corners(view: View, runs: list[_Run], bounds: dict[_Run, LineBound]) -> lis
         if math.isnan(vertex[0]):
             continue
         known = before in bounds and after in bounds
-        covariance = corner_bound(bounds[before], bounds[after]) if known else _unknown(2)
         turn = _turn(view, before.surface, after.surface)
-        # Beams run counter-clockwise around the sensor: a right turn points towards it.
-        shape = (math.pi - abs(turn), turn < 0)
         nearest = view.bearing_from(before.last, vertex) <= view.steps[before.last] / 2
-        beam = before.last if nearest else after.first
-        sides = (index.get(before, -1), index.get(after, -1))
-        corners.append((vertex, covariance, *shape, beam, 0.0, sides, 1.0, "corner"))
+        corners.append(
+            {
+                "position": vertex,
+                "covariance": corner_bound(bounds[before], bounds[after]) if known else np.nan,
+                "opening": math.pi - abs(turn),
+                # Beams run counter-clockwise around the sensor: a right turn points towards it.
+                "convex": turn < 0,
+                "beam": before.last if nearest else after.first,
+                "segments": (index.get(before, -1), index.get(after, -1)),
+                "quality": 1.0,
+                "kind": "corner",
+            }
+        )
     return corners
 
 
@@ -228,14 +223,15 @@ def _breakpoints(view: View, label: NDArray[np.int32], turn: int) -> list[Record
     order = order[label[order] >= 0]
     if len(order) == 0:
         return []
-    last_beams = np.flatnonzero(np.diff(label[order]))
-    breaks = [_break(view, int(order[i]), int(order[i + 1])) for i in last_beams]
+    ends = np.flatnonzero(np.diff(label[order]))
+    breaks = [_break(view, int(order[i]), int(order[i + 1])) for i in ends]
     first, last = int(order[0]), int(order[-1])
-    if not view.is_full_circle:
-        start = ((-1, first), _point(view, first), "scan_end", -1)
-        end = ((last, -1), _point(view, last), "scan_end", -1)
-        return [*breaks, start, end]
-    return breaks if _connected(view).all() else [*breaks, _break(view, last, first)]
+    if view.is_full_circle:
+        return breaks if _connected(view).all() else [*breaks, _break(view, last, first)]
+    for sides, beam in (((-1, first), first), ((last, -1), last)):
+        at = _point(view, beam)
+        breaks.append({"beam": sides, "position": at, "kind": "scan_end", "occluder": -1})
+    return breaks
 
 
 def _break(view: View, before: int, after: int) -> Record:
@@ -243,7 +239,8 @@ def _break(view: View, before: int, after: int) -> Record:
     near = before if view.ranges[before] <= view.ranges[after] else after
     is_gap = (after - before) % len(view.ranges) > _GAP
     kind, occluder = ("gap", -1) if is_gap else ("jump", near)
-    return ((before, after), _point(view, near), kind, occluder)
+    at = _point(view, near)
+    return {"beam": (before, after), "position": at, "kind": kind, "occluder": occluder}
 
 
 def _point(view: View, beam: int) -> tuple[float, float]:
@@ -251,12 +248,11 @@ def _point(view: View, beam: int) -> tuple[float, float]:
     return r * math.cos(bearing), r * math.sin(bearing)
 
 
-def _unknown(n: int) -> Array:
-    return np.full((n, n), np.nan)
-
-
-def _table(records: list[Record], dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """Make a read-only table of records."""
-    table = np.array(records, dtype)
+def _table(records: Sequence[Record], dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Make a read-only table of records; what they do not give is 0."""
+    table = np.zeros(len(records), dtype)
+    for row, record in zip(table, records, strict=True):
+        for name, value in record.items():
+            row[name] = value
     table.flags.writeable = False
     return table

@@ -1,17 +1,14 @@
 """Worlds to scan: straight walls and round columns, and floor plans made of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..scan import Array
-
-__all__ = ["World", "building", "room"]
 
 Points = Sequence[tuple[float, float]]
 
@@ -67,7 +64,7 @@ class World:
         return len(self.segments) + len(self.circles)
 
     @classmethod
-    def of_polygons(cls, polygons: Iterable[ArrayLike], circles: ArrayLike = ()) -> World:
+    def of_polygons(cls, polygons: Iterable[ArrayLike], circles: ArrayLike = ()) -> Self:
         """Make a world of polylines: a wall between every two successive vertices.
 
         Parameters
@@ -134,22 +131,32 @@ def building() -> tuple[World, Array]:
     >>> float(np.hypot(*np.diff(waypoints, axis=0).T).sum().round(1))
     37.6
     """
-    world = World.of_polygons([_ring(_OUTLINE), _ring(_PIER), *_FURNITURE], _COLUMNS)
+    world = World.of_polygons([closed(_OUTLINE), closed(_PIER), *_FURNITURE], _COLUMNS)
     waypoints = np.array(_WAY)
     waypoints.flags.writeable = False
     return world, waypoints
 
 
-def _ring(vertices: Points) -> Points:
-    return [*vertices, vertices[0]]
+def rectangle(center: ArrayLike, width: float, depth: float, angle: float = 0.0) -> Array:
+    """Vertices (4, 2) of a rectangle, counter-clockwise, its width along `angle` [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    halves = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, depth / 2)
+    vertices: Array = np.asarray(center) + halves @ np.array([[c, s], [-s, c]])
+    return vertices
 
 
-def _box(x: float, y: float, width: float, depth: float, degrees: float = 0.0) -> Points:
+def closed(vertices: ArrayLike) -> Array:
+    """Repeat the first of the vertices at the end."""
+    points = np.asarray(vertices, dtype=np.float64)
+    return np.vstack((points, points[:1]))
+
+
+def _box(x: float, y: float, width: float, depth: float, degrees: float = 0.0) -> Array:
     """Return the closed outline of a box around (x, y), turned counter-clockwise."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    a, b = width / 2, depth / 2
-    corners = ((-a, -b), (a, -b), (a, b), (-a, b))
-    return _ring([(x + c * u - s * v, y + s * u + c * v) for u, v in corners])
+    corners = rectangle((0, 0), width, depth).tolist()
+    # Not by `rectangle`, whose rounding is another: recorded drives stay what they are.
+    return closed([(x + c * u - s * v, y + s * u + c * v) for u, v in corners])
 
 
 # The free space of the storey, counter-clockwise: along the south side of the corridor from west
@@ -188,7 +195,7 @@ _NORTH_SIDE: Points = [
 ]  # fmt: skip
 _OUTLINE: Points = [*_SOUTH_SIDE, *_NORTH_SIDE]
 _PIER: Points = [(10.8, 5.9), (13.2, 5.9), (13.2, 6.05), (10.8, 6.05)]
-_FURNITURE: Sequence[Points] = (
+_FURNITURE = (
     _box(3.3, 2.4, 0.8, 1.6),
     _box(5.9, 1.5, 1.4, 0.7),
     _box(9.0, 2.2, 0.4, 1.2),

@@ -1,4 +1,4 @@
-"""The demonstration: a drive through a small building, or a log, to a table and a page."""
+"""A demonstration: a simulated drive, or a log, into a table and a page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from ..logs import open_log
 from ..progress import Track, untracked
 from .extract import extract_log
 
-__all__ = ["run_demo"]
-
-#: The methods of the pictures, the first of which makes the table.
+#: Methods in the pictures; the first makes the table.
 DEMO_METHODS = ("optimal", "liu:scale_free", "liu:paper")
 
 
@@ -24,27 +22,27 @@ def run_demo(
     *,
     track: Track = untracked,
 ) -> list[tuple[str, str]]:
-    """Simulate a drive (or take a log), extract its features, and make a page to look at.
+    """Simulate a drive (or take a log), extract its features, and make a page of pictures.
 
     Parameters
     ----------
     folder : path-like
-        Where the files go; made if it does not exist.
+        Output folder; created if missing.
     log : path-like, optional
-        A log to use in place of the simulated drive.
+        A log in place of the simulated drive.
     track : callable
-        ``track(items, about, total)`` gives the items, and shows how far they are.
+        ``track(items, about, total)`` yields the items and shows the progress.
 
     Returns
     -------
     list of (str, str)
-        What was made and measured, by name. The page is ``index.html``, the table
+        Names and values: files and figures. The page is ``index.html``, the table
         ``features.parquet``.
 
     Raises
     ------
     LineamentError
-        If the log cannot be read or the folder not be written.
+        If the log cannot be read or the folder cannot be written.
     """
     target = made_folder(folder)
     if log is None:
@@ -67,17 +65,19 @@ def run_demo(
         ("beams invalid", f"{100 * summary.invalid:.1f} %"),
         ("speed", f"{summary.scans / summary.seconds:.0f} scans/s, from file to table"),
     ]
-    from ..output.page import write_page
+    from ..output.page import image_part, list_part, text_parts, write_parts
 
     page = target / "index.html"
-    write_page(page, "lineament: lines and corners of a drive", facts, figures, [_NOTE])
+    images = [image_part(caption, image.read_bytes()) for caption, image in figures]
+    parts = [list_part(facts), *images, *text_parts([_NOTE])]
+    write_parts(page, "lineament: lines and corners of a drive", parts)
     return [*facts, ("page", str(page))]
 
 
 _NOTE = (
-    "Beside the scale-free reading of the corner response stand the paper's own parameters: in "
-    "metres, the threshold 0.66 finds only the corners of distant walls, and a class without "
-    "corners is fitted by one line."
+    "The last panel has the parameters of the paper: with the response in metres, the threshold "
+    "0.66 finds only the corners of distant walls, and one line is fitted to a cluster without "
+    "corners."
 )
 
 
@@ -89,7 +89,7 @@ def _draw(
     scan = open_log(log).scan(n_scans // 2)
     extractors = {name: Extractor(name) for name in DEMO_METHODS}
     figures = [
-        (f"Scan {n_scans // 2}: classes, segments and corners.", target / "scan.png"),
+        (f"Scan {n_scans // 2}: clusters, segments and corners.", target / "scan.png"),
         (f"The stages of {DEMO_METHODS[0]} on that scan.", target / "trace.png"),
     ]
     steps = iter(track(range(3), "drawing", 3))
@@ -101,7 +101,7 @@ def _draw(
     extractor = extractors[DEMO_METHODS[0]]
     posed = [(s.pose, extractor(s)) for s in open_log(log) if s.pose is not None]
     if posed:
-        figures.append(("All scans, by the poses of the log.", target / "map.png"))
+        figures.append(("All scans, at the poses of the log.", target / "map.png"))
         plot_map(posed, figures[-1][1], title="What was found on the whole drive")
     next(steps, None)
     return figures

@@ -21,26 +21,24 @@ __all__ = ["Extraction", "extract_log"]
 
 @dataclass(frozen=True, slots=True)
 class Extraction:
-    """What came of the extraction of one log.
+    """Result of the extraction of one log.
 
     Attributes
     ----------
     log, output : str
         The files.
     topics : list of str
-        The topics of the scans.
+        Topics of the scans.
     scans : int
-        Scans that were read.
+        Number of scans.
     features : dict of str to int
-        Features of each kind.
+        Number of features of each kind.
     invalid : float
-        Share of the beams that are invalid.
+        Share of invalid beams.
     seconds : float
         Wall time from opening the log to the finished file.
     skipped : int
-        Faulty lines or records that were left out.
-    faults : list of str
-        What the first of them were.
+        Faulty lines or records that were skipped, the first of which are in `faults`.
     """
 
     log: str
@@ -78,7 +76,7 @@ def extract_log(
 ) -> Extraction:
     """Extract the features of all scans of a log into a file.
 
-    Memory does not grow with the log. The output appears when it is whole.
+    Memory does not grow with the log. The output appears when it is complete.
 
     Parameters
     ----------
@@ -89,17 +87,16 @@ def extract_log(
     extractor : Extractor
         The method.
     topic_column : bool, optional
-        Whether tables tell the topic of each row; where the log has several, if not given.
+        Whether tables have the topic of each row; by default where the log has several.
     track : callable
-        ``track(items, name, total)`` gives the scans of the log, and shows how far they are.
+        ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
-        How the log is read: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``, as for
-        `lineament.open_log`.
+        As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``.
 
     Raises
     ------
     LineamentError
-        If the log cannot be read or the output not be written; nothing is left of it then.
+        If the log cannot be read or the output cannot be written; no partial file stays.
 
     Examples
     --------
@@ -121,9 +118,8 @@ def extract_log(
     with open_writer(output, topics if topic_column else ()) as writer:
         for topic, scan in track(log.items(), Path(log.name).name, len(log)):
             features = extractor(scan)
-            # What draws the scan is called after its topic; tables need not tell the only one.
-            told = topic if topic_column or writer.needs_scan else ""
-            writer.write(features, scan, told)
+            # Drawings of scans are named after the topic; tables need not repeat the only one.
+            writer.write(features, scan, topic if topic_column or writer.needs_scan else "")
             scans += 1
             beams += len(scan)
             valid += int(np.count_nonzero(scan.valid))

@@ -1,4 +1,4 @@
-"""Compiles and caches the kernels before they are needed."""
+"""Compile and cache the kernels before they are needed."""
 
 from __future__ import annotations
 
@@ -7,28 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["warm_up"]
-
 
 def warm_up(methods: Sequence[str] = ()) -> float:
-    """Compile the kernels of some methods, of the tracker and of `lineament live`.
+    """Compile the kernels of some methods (default: `optimal`) and of the tracker.
 
-    They are cached: the next program loads them.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        Names of methods; by default the one that is used where none is named.
-
-    Returns
-    -------
-    float
-        Seconds that it took, import of numba included.
+    They are cached on disk for the next program. Returns the seconds that it takes, the import of
+    numba included.
 
     Raises
     ------
     ValueError
-        If there is no such method.
+        If a method does not exist.
     """
     started = time.perf_counter()
     from ..extractor import Extractor

@@ -1,12 +1,10 @@
 """Maps of polylines: what the public benchmark compares, from features or from points alone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...extractor import Extractor
 from ...features import Features
@@ -14,14 +12,12 @@ from ...methods import get_method
 from ...scan import Array, LaserScan
 from .scores import cast_map
 
-__all__ = ["MapMaker", "benchmark_iepf", "iepf_map", "method_map", "polylines_of", "sparing_map"]
-
 #: Makes the polylines of a scan, arrays of shape (k, 2) [m], with at most so many vertices in all.
 MapMaker = Callable[[LaserScan, int], Sequence[Array]]
 
-#: Steeper than this to the ray, a line is not followed to where the ray would meet it.
+#: A line steeper than this to the ray is not followed to where the ray would meet it.
 _LEAST_COSINE = 0.1
-#: What a return that the map does not explain counts as being off, and the most that any does [m].
+#: Error of a return that the map does not explain, and the most that any counts [m].
 _WORST = 0.3
 #: Distances closer than this are equal but for rounding [m].
 _TIE = 1e-12
@@ -30,15 +26,7 @@ _TIE = 1e-12
 def method_map(method: str) -> MapMaker:
     """Make maps with a method of the registry, given the number of vertices as its budget.
 
-    Parameters
-    ----------
-    method : str
-        As for `lineament.extract`; the method needs the parameter ``max_vertices``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such method, or it takes no budget.
+    Raises ValueError if there is no such method, or it has no parameter ``max_vertices``.
 
     Examples
     --------
@@ -49,14 +37,12 @@ def method_map(method: str) -> MapMaker:
     [3]
     """
     get_method(method, max_vertices=1)
-    extractors: dict[int, Extractor] = {}
 
-    def make(scan: LaserScan, max_vertices: int) -> list[Array]:
-        if max_vertices not in extractors:
-            extractors[max_vertices] = Extractor(method, max_vertices=max_vertices)
-        return polylines_of(extractors[max_vertices](scan), scan)
+    @cache
+    def extractor(max_vertices: int) -> Extractor:
+        return Extractor(method, max_vertices=max_vertices)
 
-    return make
+    return lambda scan, max_vertices: polylines_of(extractor(max_vertices)(scan), scan)
 
 
 def sparing_map(method: str) -> MapMaker:
@@ -67,32 +53,21 @@ def sparing_map(method: str) -> MapMaker:
     of E. Lebarbier, *Detecting multiple change-points in the mean of Gaussian process by model
     selection*, Signal Processing 85, 2005, with the noise taken from what is left of E.
 
-    Parameters
-    ----------
-    method : str
-        As for `method_map`.
-
-    Raises
-    ------
-    ValueError
-        As `method_map` does.
-
     Examples
     --------
     >>> bearings = np.radians(np.arange(-40, 41))
     >>> ranges = 2.0 / (np.cos(bearings) + np.abs(np.sin(bearings)))  # a corner, straight ahead
     >>> ranges += np.random.default_rng(7).normal(0.0, 0.01, len(ranges))
-    >>> scan = LaserScan(ranges, angles=bearings)
-    >>> polylines = sparing_map("optimal")(scan, 10)
+    >>> polylines = sparing_map("optimal")(LaserScan(ranges, angles=bearings), 10)
     >>> [len(polyline) for polyline in polylines]
     [3]
     """
     make = method_map(method)
 
     def make_sparingly(scan: LaserScan, max_vertices: int) -> Sequence[Array]:
-        maps = [make(scan, vertices) for vertices in range(2, max_vertices + 1)]
-        penalised = [_penalised(polylines, scan, k + 2) for k, polylines in enumerate(maps)]
-        return maps[int(np.argmin(penalised))] if maps else []
+        maps = {v: make(scan, v) for v in range(2, max_vertices + 1)}
+        penalised = {v: _penalised(polylines, scan, v) for v, polylines in maps.items()}
+        return maps[min(penalised, key=penalised.__getitem__)] if maps else []
 
     return make_sparingly
 
@@ -109,20 +84,9 @@ def polylines_of(features: Features, scan: LaserScan) -> list[Array]:
     """Connect the segments of a scan at its corners.
 
     Segments that a corner joins share one vertex, midway between the end of the first and the
-    start of the second: that is the corner itself where it lies on both lines. Elsewhere a segment
+    start of the second: that is the corner itself if it lies on both lines. Elsewhere a segment
     goes on to the rays of its first and last beam. A closed outline ends in its first vertex.
-
-    Parameters
-    ----------
-    features : Features
-        In the frame of the sensor.
-    scan : LaserScan
-        That they were found in.
-
-    Returns
-    -------
-    list of ndarray, shape (k, 2)
-        Polylines in beam order [m]; k - 1 segments each.
+    Polylines are in beam order, of shape (k, 2) [m] in the frame of the sensor.
 
     Examples
     --------
@@ -136,7 +100,7 @@ def polylines_of(features: Features, scan: LaserScan) -> list[Array]:
     joints = {a: (b, c) for a, (b, c) in joints.items() if a >= 0 and b >= 0}
     open_ones = set(range(len(segments))) - {b for b, _ in joints.values()}
     polylines, drawn = [], set[int]()
-    # A closed outline has no segment to begin with: what no open one leads to is one.
+    # A closed outline has no segment to begin with: its are those to which no open one leads.
     for k in [*sorted(open_ones), *range(len(segments))]:
         if k in drawn:
             continue
@@ -158,7 +122,7 @@ def polylines_of(features: Features, scan: LaserScan) -> list[Array]:
 
 
 def _shared_vertex(before: np.void, after: np.void, angles: Array, bend: float) -> Array:
-    """Where two segments meet, midway between their ends.
+    """Vertex of two segments, midway between their ends.
 
     Nearly parallel lines may meet behind the beams of both, and the map would turn back on
     itself: then midway between them on the ray of the bend.
@@ -172,7 +136,7 @@ def _shared_vertex(before: np.void, after: np.void, angles: Array, bend: float) 
 
 
 def _on_ray(segment: np.void, end: str, bearing: float) -> Array:
-    """Where a ray meets the line of a segment; its own end where it hardly meets the line."""
+    """Where a ray meets the line of a segment; its end if it hardly meets the line."""
     normal = np.array([-math.sin(segment["angle"]), math.cos(segment["angle"])])
     ray = np.array([math.cos(bearing), math.sin(bearing)])
     cosine = normal @ ray
@@ -182,40 +146,16 @@ def _on_ray(segment: np.void, end: str, bearing: float) -> Array:
 
 
 def iepf_map(scan: LaserScan, max_vertices: int) -> list[Array]:
-    """Map a scan by `benchmark_iepf`: one polyline through all returns, whatever the gaps.
-
-    Examples
-    --------
-    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> [len(polyline) for polyline in iepf_map(scan, 10)]
-    [3]
-    """
+    """Map a scan by `benchmark_iepf`: one polyline through all returns, whatever the gaps."""
     return [benchmark_iepf(scan.points[scan.valid], max_vertices)]
 
 
 def benchmark_iepf(points: Array, max_vertices: int) -> Array:
-    """Split a polyline at the point farthest from its chord until it has so many vertices.
+    """Split a polyline of points (n, 2) at the point farthest from its chord, as the authors did.
 
-    The iterative end-point fit as the authors of the benchmark ran it: it begins with the first
-    and the last point, and splits where the distance to the infinite line through the ends of a
-    part is the largest of all parts. Of points that tie, the first is taken.
-
-    Parameters
-    ----------
-    points : array, shape (n, 2)
-        In beam order [m].
-    max_vertices : int
-        At least 2.
-
-    Returns
-    -------
-    array, shape (k, 2)
-        Some of the points, k = min(n, `max_vertices`).
-
-    Raises
-    ------
-    ValueError
-        If the shape of `points` is another, or `max_vertices` is too small.
+    The iterative end-point fit begins with the first and the last point, and splits where the
+    distance to the infinite line through the ends of a part is the largest of all parts, until
+    there are min(n, `max_vertices`) vertices. Of points that tie, the first is taken.
 
     Examples
     --------
@@ -239,8 +179,8 @@ def benchmark_iepf(points: Array, max_vertices: int) -> Array:
     return points[vertices]
 
 
-def _farthest(points: NDArray[np.float64], first: int, last: int) -> tuple[float, int]:
-    """Tell how far the point between two others is that is farthest from their line, and which."""
+def _farthest(points: Array, first: int, last: int) -> tuple[float, int]:
+    """Return the largest distance of a point between two others from their line, and which."""
     if last - first < 2:
         return -1.0, first
     chord = points[last] - points[first]

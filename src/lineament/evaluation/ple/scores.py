@@ -1,23 +1,15 @@
 """Scores of a map of polylines against the scan that it was made of, by the benchmark's rules."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import LineamentError
+from ...errors import needed_by
 from ...scan import Array, LaserScan
-
-if TYPE_CHECKING:
-    from types import ModuleType
-
-__all__ = ["MapScore", "cast_map", "score_map"]
+from ..counts import rms
 
 #: By how much a ray may pass the end of a segment and still meet it [rad].
 _MARGIN = 1e-3
@@ -25,30 +17,19 @@ _MARGIN = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class MapScore:
-    """Scores of one map.
+    """Scores of one map; NaN for what a scan without such beams, or without an outline, has not."""
 
-    Attributes
-    ----------
-    vertices : int
-        Vertices of its polylines, in all.
-    rmse : float
-        Root of the mean squared difference between measured and mapped range, over the returns
-        whose ray meets the map [m]; NaN where none does.
-    f : float
-        Share of the returns whose ray meets the map; NaN where there is no return.
-    fnr : float
-        Share of the beams without a return whose ray meets nothing; NaN where there is none.
-    area_error : float
-        (Area of the union - area of the intersection) / true area; NaN without a true outline.
-    iou : float
-        Area of the intersection / area of the union; NaN likewise.
-    """
-
+    #: Vertices of its polylines, in all.
     vertices: int
+    #: Root mean square of measured less mapped range, of the returns whose ray meets the map [m].
     rmse: float
+    #: Share of the returns whose ray meets the map.
     f: float
+    #: Share of the beams without a return whose ray meets nothing.
     fnr: float
+    #: (Area of the union - area of the intersection) / true area.
     area_error: float = math.nan
+    #: Area of the intersection / area of the union.
     iou: float = math.nan
 
 
@@ -65,14 +46,7 @@ def score_map(
         Its valid beams are the returns.
     outline : array, shape (m, 2), optional
         Vertices of the true polygon around the sensor [m]. It is compared with the polygon of the
-        map's vertices, sorted by bearing and made valid. Needs shapely.
-
-    Raises
-    ------
-    ValueError
-        If a polyline has another shape.
-    LineamentError
-        If shapely is needed and not installed.
+        map's vertices, sorted by bearing and made valid; LineamentError without shapely.
 
     Examples
     --------
@@ -83,40 +57,20 @@ def score_map(
     """
     mapped, returned = cast_map(polylines, scan.angles), scan.valid
     met = ~np.isnan(mapped)
-    errors = (mapped - scan.ranges)[returned & met]
-    area_error, iou = (math.nan, math.nan) if outline is None else _areas(polylines, outline)
     return MapScore(
-        vertices=sum(len(polyline) for polyline in polylines),
-        rmse=math.sqrt(np.mean(errors**2)) if len(errors) else math.nan,
-        f=_share(met[returned]),
-        fnr=_share(~met[~returned]),
-        area_error=area_error,
-        iou=iou,
+        sum(map(len, polylines)),
+        rms((mapped - scan.ranges)[returned & met]),
+        _share(met[returned]),
+        _share(~met[~returned]),
+        *(() if outline is None else _areas(polylines, outline)),
     )
 
 
 def cast_map(polylines: Sequence[Array], bearings: Array) -> Array:
-    """Range at which the ray of each bearing meets a map.
+    """Range [m] at which the ray of each bearing [rad] meets a map; NaN if it meets nothing.
 
     A ray meets a segment if its bearing lies between those of the ends, or within 10⁻³ rad of
     them, at its intersection with the infinite line. Of several segments the last in order counts.
-
-    Parameters
-    ----------
-    polylines : sequence of arrays, shape (k, 2)
-        In the frame of the sensor [m].
-    bearings : array, shape (n,)
-        [rad]
-
-    Returns
-    -------
-    array, shape (n,)
-        Ranges [m], NaN where the ray meets nothing.
-
-    Raises
-    ------
-    ValueError
-        If a polyline has another shape.
 
     Examples
     --------
@@ -150,7 +104,8 @@ def _share(flags: NDArray[np.bool_]) -> float:
 
 def _areas(polylines: Sequence[Array], outline: Array) -> tuple[float, float]:
     """Area error and intersection over union of a map and the true outline."""
-    shapely = _shapely()
+    with needed_by("areas"):
+        import shapely
     true = shapely.make_valid(shapely.Polygon(outline))
     vertices = np.concatenate([np.empty((0, 2)), *polylines])
     if len(vertices) < 3:
@@ -159,12 +114,3 @@ def _areas(polylines: Sequence[Array], outline: Array) -> tuple[float, float]:
     found = shapely.make_valid(shapely.Polygon(vertices[np.argsort(bearings, kind="stable")]))
     union, common = true.union(found).area, true.intersection(found).area
     return (union - common) / true.area, common / union
-
-
-def _shapely() -> ModuleType:
-    try:
-        return import_module("shapely")
-    except ImportError:
-        raise LineamentError(
-            "areas need shapely, which is not installed: pip install 'lineament[bench]'"
-        ) from None

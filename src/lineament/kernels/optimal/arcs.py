@@ -1,15 +1,12 @@
-"""Step 4: arcs in the place of lines, where one circle explains their measurements better."""
+"""Step 3: arcs in the place of lines, where one circle explains their measurements better."""
 
 import math
 
 import numpy as np
 
-from .. import helper, sums
+from .. import helper, inlined, sums
+from . import layout as at
 from .constants import ARC_RADIUS, ARC_TURN, CLUTTER, LEAST, MOST_DEVIATION, RARE, SIGMAS, TAU
-from .layout import (
-    ARC, BROKEN, COUNT, CX, CY, FIRST, GAIN, KIND, LAST, LINE, RADIUS, RHO, RMS, RR, X, XR, XX,
-    XY, Y, YR, YY,
-)  # fmt: skip
 from .partition import solve
 
 #: Steps of Gauss and Newton from the algebraic circle, to see whether there is one and to fit it.
@@ -18,39 +15,39 @@ _SEED, _STEPS = np.int64(1), np.int64(3)
 _MOST_LINES = 8
 
 
-@helper
-def find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence):
+@inlined
+def find_arcs(work, scan, lines):
     """Take the runs of lines that one circle explains better for arcs.
 
     It is decided at the scale of the noise: a column is no rounder than a wall may be uneven.
     Returns how many surfaces are left, in the order of their measurements.
     """
-    first, last, kind = spans[FIRST], spans[LAST], spans[KIND]
+    points, spans, pieces, noise = work.points, work.spans, work.pieces, work.noise
+    first, last, kind = spans[at.FIRST], spans[at.LAST], spans[at.KIND]
     kept, k, free = 0, 0, np.int64(0)
     while k < lines:
         price, gain, end, i, j = 0.0, 0.0, k, first[k], last[k]
         for m in range(k, min(k + _MOST_LINES, lines)):
-            if m > k and beams[BROKEN, first[m]]:
+            if m > k and work.beams[at.BROKEN, first[m]]:
                 break
             hidden = first[m] - last[m - 1] - 1 if m > k else 0
-            price += evidence * (1.0 + CLUTTER * hidden)
+            price += scan.evidence * (1.0 + CLUTTER * hidden)
             if _looks_round(points, first[k], last[m], noise):
-                after = first[m + 1] if m + 1 < lines else count
+                after = first[m + 1] if m + 1 < lines else scan.count
                 better, low, high = _replace(
-                    points, beams, first[k], last[m], free, after, count, noise, evidence,
-                    pieces[kept],
-                )  # fmt: skip
+                    work, scan, first[k], last[m], free, after, pieces[kept]
+                )
                 if better > -math.inf:
                     better += price
                     for line in range(k, m + 1):
-                        a, b = solve(sums, first[line], last[line] + 1)
+                        a, b = solve(work.sums, first[line], last[line] + 1)
                         better += _noise_cost(points, first[line], last[line] + 1, a, b, noise)
                 if better > gain:
                     gain, end, i, j = better, m, low, high
-        first[kept], last[kept], kind[kept] = i, j, ARC if gain > 0.0 else LINE
+        first[kept], last[kept], kind[kept] = i, j, at.ARC if gain > 0.0 else at.LINE
         if gain > 0.0:
             fit_arc(points, i, j, noise, _STEPS, pieces[kept])
-            spans[COUNT, kept], pieces[kept, GAIN] = j - i + 1, gain
+            spans[at.COUNT, kept], pieces[kept, at.GAIN] = j - i + 1, gain
         free, k, kept = j + 1, end + 1, kept + 1
     return kept
 
@@ -58,7 +55,12 @@ def find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence)
 @sums
 def _noise_cost(points, first, end, a, b, noise):
     """χ² of a line at the scale of the noise."""
-    x, y, rho, total = points[X, first:end], points[Y, first:end], points[RHO, first:end], 0.0
+    x, y, rho, total = (
+        points[at.X, first:end],
+        points[at.Y, first:end],
+        points[at.RHO, first:end],
+        0.0,
+    )
     for i in range(len(x)):
         square, off = rho[i] * rho[i], 1.0 - a * x[i] - b * y[i]
         total += off * off * square / (noise[0] + noise[1] * square)
@@ -72,7 +74,7 @@ def _looks_round(points, first, last, noise):
     It must bulge towards the scanner, and turn enough. It costs little, and hardly anything else
     gets further.
     """
-    x, y, quarter = points[X], points[Y], (3 * first + last) // 4
+    x, y, quarter = points[at.X], points[at.Y], (3 * first + last) // 4
     mx, my = _middle(points, first, last)
     ax, ay, bx, by = x[first] - mx, y[first] - my, x[last] - mx, y[last] - my
     cross, a, b = ax * by - ay * bx, ax * ax + ay * ay, bx * bx + by * by
@@ -94,18 +96,18 @@ def _middle(points, first, last):
     """Return the place in the middle of some measurements, the mean of two of an even number."""
     i = (first + last) // 2
     j = first + last - i
-    return 0.5 * (points[X, i] + points[X, j]), 0.5 * (points[Y, i] + points[Y, j])
+    return 0.5 * (points[at.X, i] + points[at.X, j]), 0.5 * (points[at.Y, i] + points[at.Y, j])
 
 
-@helper
-def _replace(points, beams, first, last, free, after, count, noise, evidence, arc):
+@inlined
+def _replace(work, scan, first, last, free, after, arc):
     """Energy, less that of the lines it replaces, which an arc saves, -inf if it cannot; its ends.
 
     From the ends of the lines on it goes as far as measurements are near the circle, `free` to
     `after`. An arc has three parameters where a line has two, and costs one and a half times as
     much; much more where another surface goes on from it, for what is round mostly stands free.
     """
-    broken, low, high = beams[BROKEN], first, last
+    points, broken, noise, low, high = work.points, work.beams[at.BROKEN], work.noise, first, last
     if not fit_arc(points, low, high, noise, _SEED, arc) < math.inf:
         return -math.inf, low, high
     while low < high and not is_on(points, arc, low, noise, 0.0):
@@ -118,22 +120,22 @@ def _replace(points, beams, first, last, free, after, count, noise, evidence, ar
     if free_of < LEAST - 1:
         return -math.inf, low, high
     chi_square = fit_arc(points, low, high, noise, _STEPS, arc)
-    ax, ay = points[X, low] - arc[CX], points[Y, low] - arc[CY]
-    bx, by = points[X, high] - arc[CX], points[Y, high] - arc[CY]
+    ax, ay = points[at.X, low] - arc[at.CX], points[at.Y, low] - arc[at.CY]
+    bx, by = points[at.X, high] - arc[at.CX], points[at.Y, high] - arc[at.CY]
     turn = math.atan2(bx * ay - by * ax, ax * bx + ay * by) % (2.0 * math.pi)
     x, y = _middle(points, low, high)
-    bulges = x * (arc[CX] - x) + y * (arc[CY] - y) > 0.0
+    bulges = x * (arc[at.CX] - x) + y * (arc[at.CY] - y) > 0.0
     likely = chi_square <= free_of + SIGMAS * math.sqrt(2.0 * free_of)
-    vague = arc[RR] > MOST_DEVIATION * MOST_DEVIATION
+    vague = arc[at.RR] > MOST_DEVIATION * MOST_DEVIATION
     if not likely or vague or turn < ARC_TURN or not bulges:
         return -math.inf, low, high
     price = 1.5
     if low > 0 and not broken[low] and is_on(points, arc, low - 1, noise, TAU):
         price += RARE
-    if high + 1 < count and not broken[high + 1] and is_on(points, arc, high + 1, noise, TAU):
+    if high + 1 < scan.count and not broken[high + 1] and is_on(points, arc, high + 1, noise, TAU):
         price += RARE
     more = (high - low) - (last - first)
-    return evidence * (CLUTTER * more - price) - chi_square, low, high
+    return scan.evidence * (CLUTTER * more - price) - chi_square, low, high
 
 
 @helper
@@ -149,8 +151,8 @@ def _follow(points, broken, arc, i, stop, way, noise):
 @helper
 def is_on(points, arc, i, noise, scale):
     """Whether a measurement is as near to an arc as by chance, at a scale of its surface [m]."""
-    off = math.hypot(points[X, i] - arc[CX], points[Y, i] - arc[CY]) - arc[RADIUS]
-    variance = noise[0] + noise[1] * points[RHO, i] * points[RHO, i] + scale * scale
+    off = math.hypot(points[at.X, i] - arc[at.CX], points[at.Y, i] - arc[at.CY]) - arc[at.RADIUS]
+    variance = noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i] + scale * scale
     return off * off <= SIGMAS * SIGMAS * variance
 
 
@@ -163,7 +165,7 @@ def fit_arc(points, first, last, noise, steps, piece):
     circle bends over it: v = σ² (cos² ψ + σ/2r).
     """
     end = last + 1
-    x, y, rho = points[X, first:end], points[Y, first:end], points[RHO, first:end]
+    x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
     n, mx, my = len(x), 0.0, 0.0
     for i in range(n):
         mx, my = mx + x[i], my + y[i]
@@ -208,7 +210,7 @@ def fit_arc(points, first, last, noise, steps, piece):
             r += (ixr * gx + iyr * gy + irr * gr) / determinant
         else:
             scale = 1.0 / determinant
-            piece[XX], piece[XY], piece[XR] = scale * ixx, scale * ixy, scale * ixr
-            piece[YY], piece[YR], piece[RR] = scale * iyy, scale * iyr, scale * irr
-    piece[CX], piece[CY], piece[RADIUS], piece[RMS] = cx, cy, r, math.sqrt(squares / n)
+            piece[at.XX], piece[at.XY], piece[at.XR] = scale * ixx, scale * ixy, scale * ixr
+            piece[at.YY], piece[at.YR], piece[at.RR] = scale * iyy, scale * iyr, scale * irr
+    piece[at.CX], piece[at.CY], piece[at.RADIUS], piece[at.RMS] = cx, cy, r, math.sqrt(squares / n)
     return chi_square

@@ -1,12 +1,12 @@
-"""Step 1: which measurements are usable, and between which a surface breaks."""
+"""Step 2: which measurements are usable, and between which a surface breaks."""
 
 import math
 
 import numpy as np
 
-from .. import helper, sums, usable
+from .. import helper, inlined, sums, usable
+from . import layout as at
 from .constants import SIGMAS, STEEPEST
-from .layout import BEAM, BROKEN, CLUSTER_FIRST, CLUSTER_LAST, RHO, SPIKE, X, Y
 
 #: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
 _NEAREST, _FARTHEST = 1e-6, 1e3
@@ -14,12 +14,13 @@ _NEAREST, _FARTHEST = 1e-6, 1e3
 _LEAST_CLUSTER = 3
 
 
-@helper
-def list_points(ranges, start, range_min, range_max, bearings, points, beams):
+@inlined
+def list_points(work, ranges, start, limits, bearings):
     """Place the usable measurements from beam `start` around. Returns how many there are."""
-    x, y, rho, beam = points[X], points[Y], points[RHO], beams[BEAM]
+    points, beam = work.points, work.beams[at.BEAM]
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     cosines, sines = bearings[0], bearings[1]
-    range_min, range_max = max(range_min, _NEAREST), min(range_max, _FARTHEST)
+    range_min, range_max = max(limits[0], _NEAREST), min(limits[1], _FARTHEST)
     count = 0
     for first, end in ((start, len(ranges)), (0, start)):
         for i in range(first, end):
@@ -40,17 +41,19 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
     return far - near > slope + 2.0 * SIGMAS * math.sqrt(noise[0] + noise[1] * far * far)
 
 
-@helper
-def is_broken(points, beams, i, j, n, noise, most_missing):
+@inlined
+def _is_broken(work, i, j, n, most_missing):
     """Whether no surface goes on from measurement i to j, the next one of a scan of n beams."""
-    x, y, rho = points[X], points[Y], points[RHO]
-    missing = (beams[BEAM, j] - beams[BEAM, i]) % n - 1 > most_missing
-    return missing or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], noise)
+    x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
+    missing = (work.beams[at.BEAM, j] - work.beams[at.BEAM, i]) % n - 1 > most_missing
+    return missing or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], work.noise)
 
 
 @sums
-def _mark_breaks(x, y, rho, beam, broken, noise, n, most_missing):
+def _mark_breaks(points, beams, count, noise, n, most_missing):
     """Mark where a surface breaks between a measurement and the one before."""
+    x, y, rho = points[at.X, :count], points[at.Y, :count], points[at.RHO, :count]
+    beam, broken = beams[at.BEAM, :count], beams[at.BROKEN, :count]
     x1, y1, rho1, beam1, broken1 = x[1:], y[1:], rho[1:], beam[1:], broken[1:]
     for i in range(len(x1)):
         apart = beam1[i] - beam[i]
@@ -58,24 +61,22 @@ def _mark_breaks(x, y, rho, beam, broken, noise, n, most_missing):
         broken1[i] = missing | _steps_out(x[i], y[i], rho[i], x1[i], y1[i], rho1[i], noise)
 
 
-@helper
-def cluster(points, beams, count, n, circular, noise, most_missing):
+@inlined
+def cluster(work, count, n, circular, most_missing):
     """Mark where a surface breaks, and drop the spikes. Returns how many measurements are left.
 
     A spike is broken from both its neighbours, while these hold together. Of two in a row neither
     is one: where beams see two surfaces in turn, both are there.
     """
-    x, y, rho, beam, broken = points[X], points[Y], points[RHO], beams[BEAM], beams[BROKEN]
-    _mark_breaks(
-        x[:count], y[:count], rho[:count], beam[:count], broken[:count], noise, n, most_missing
-    )
-    first, last, kept, spikes = np.int64(0), count - 1, 0, beams[SPIKE]
+    points, beam, broken = work.points, work.beams[at.BEAM], work.beams[at.BROKEN]
+    _mark_breaks(points, work.beams, count, work.noise, n, most_missing)
+    first, last, kept, spikes = np.int64(0), count - 1, 0, work.beams[at.SPIKE]
     if count > 0:
-        broken[0] = not circular or is_broken(points, beams, last, first, n, noise, most_missing)
+        broken[0] = not circular or _is_broken(work, last, first, n, most_missing)
     for i in range(count):
         before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
         spikes[i] = broken[i] and broken[after] and (circular or 0 < i < last)
-        if spikes[i] and is_broken(points, beams, before, after, n, noise, most_missing):
+        if spikes[i] and _is_broken(work, before, after, n, most_missing):
             spikes[i] = 0
     for i in range(count):
         before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
@@ -83,53 +84,52 @@ def cluster(points, beams, count, n, circular, noise, most_missing):
             broken[after] = 0
             continue
         if kept < i:
-            x[kept], y[kept], rho[kept] = x[i], y[i], rho[i]
+            for row in (at.X, at.Y, at.RHO):
+                points[row, kept] = points[row, i]
             beam[kept], broken[kept] = beam[i], broken[i]
         kept += 1
     return kept
 
 
-@helper
-def opening(points, beams, count):
+@inlined
+def opening(work, count):
     """Where to open a full circle: behind its largest step, or at the farthest measurement.
 
     Where nothing breaks, a polygon always has a vertex there. Also returns whether nothing does.
     """
-    rho, broken, at, largest, closed = points[RHO], beams[BROKEN], 0, -1.0, True
+    rho, broken, begin = work.points[at.RHO], work.beams[at.BROKEN], 0
+    largest, closed = -1.0, True
     for i in range(count):
         step = abs(rho[i] - rho[i - 1 if i > 0 else count - 1])
         if broken[i] and step > largest:
-            at, largest, closed = i, step, False
-        if closed and rho[i] > rho[at]:
-            at = i
-    return beams[BEAM, at], closed
+            begin, largest, closed = i, step, False
+        if closed and rho[i] > rho[begin]:
+            begin = i
+    return work.beams[at.BEAM, begin], closed
 
 
 @helper
 def list_clusters(beams, count, clusters):
     """List the clusters, from break to break, and their number by beam. Returns how many.
 
-    Fewer than three measurements are none, -1. Where no break is before the first, the last cluster
-    goes on there.
+    Beams in none, and in one of fewer than three measurements, have -1. Where no break is before
+    the first measurement, the last cluster goes on there.
     """
-    broken, first, last = beams[BROKEN], beams[CLUSTER_FIRST], beams[CLUSTER_LAST]
-    for i in range(len(clusters)):
-        clusters[i] = -1
+    beam, broken = beams[at.BEAM], beams[at.BROKEN]
+    clusters[:] = -1
     begin, found, size = 0, 0, 0
     while begin < count and not broken[begin]:
         begin += 1
     begin = begin if begin < count else 0
     for t in range(begin, begin + count):
         size += 1
-        after = t + 1 - (count if t + 1 >= count else 0)
-        if t + 1 < begin + count and not broken[after]:
+        if t + 1 < begin + count and not broken[t + 1 - (count if t + 1 >= count else 0)]:
             continue
         if size >= _LEAST_CLUSTER:
             for back in range(t + 1 - size, t + 1):
-                clusters[beams[BEAM, back - (count if back >= count else 0)]] = found
-            begins = t + 1 - size
-            first[found] = begins - (count if begins >= count else 0)
-            last[found] = t - (count if t >= count else 0)
+                clusters[beam[back - (count if back >= count else 0)]] = found
+            beams[at.CLUSTER_FIRST, found] = (t + 1 - size) % count
+            beams[at.CLUSTER_LAST, found] = t % count
             found += 1
         size = 0
     return found

@@ -1,178 +1,116 @@
-"""The steps of method `optimal`, one scan after the other."""
+"""The steps of method `optimal`, one scan after the other; ``docs/optimal.md`` derives them."""
 
 import math
 
 import numpy as np
 
-from .. import helper, kernel
+from .. import inlined, kernel
 from ...features.records import S_CLUSTER
 from ..writing import write_arc, write_breaks, write_segment
+from . import layout as at
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
-from .fits import fit_line, scatter_of_means, soften_borders
-from .joining import add_edge, are_near, cross, join
-from .layout import (
-    AA, BEAM, BROKEN, CLUSTER_FIRST, CLUSTER_LAST, COUNT, CX, CY, END, FIRST, KEY, KIND, LAST,
-    LINE, MISFIT, OA, OO, RADIUS, RHO, RMS, RR, SEGMENT, START, UX, UY, X, XR, XX, XY, Y, YR, YY,
-)  # fmt: skip
+from .fits import measure
+from .joining import join_all
 from .noise import estimate_noise
-from .partition import fill_sums, joint_cost, merge_lines, partition, solve
+from .partition import clearest_border, fill_sums, merge_lines, partition
 
 
 @kernel
-def extract_rows(
-    ranges, rows, range_min, range_max, bearings, circular, given_noise, evidence, missing,
-    points, beams, spans, pieces, sums, noise, noises, segments, corners, arcs, breaks, clusters,
-    offsets, counts,
-):  # fmt: skip
-    """Find and measure the features of the first `rows` scans of `ranges`, shape (m, n).
+def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noises, counts):
+    """Find and measure the features of some scans. The last one's stay in the workspace.
 
-    What a scan leaves in the workspace stays there until the next.
+    Parameters
+    ----------
+    ranges : float64 array, shape (m, n)
+        One scan a row [m].
+    rows : int
+        How many of them are scans.
+    bearings : float64 array, shape (2, n)
+        Cosines and sines of the bearings.
+    given : float64 array, shape (4,)
+        (sigma, proportional, bearing, quantum), NaN where they are to be estimated.
+    settings : (range_min, range_max, circular, evidence, missing)
+        Limits of the ranges [m]; whether the beams go around; price of a line; missing beams over
+        which a surface goes on.
+    arrays, results : tuples of arrays
+        As in `layout.Work` and `layout.Tables`.
+    noises : float64 array, shape (m, 4)
+        Written: the noise of each scan.
+    counts : int64 array, shape (3 or more,)
+        Written: measurements, lines and surfaces of the last scan.
     """
-    n, estimated = ranges.shape[1], math.isnan(given_noise[0])
+    range_min, range_max, circular, evidence, missing = settings
+    work, tables = at.Work(*arrays), at.Tables(*results)
+    beams, spans, n, estimated = work.beams, work.spans, ranges.shape[1], math.isnan(given[0])
+    limits = range_min, range_max
     for row in range(rows):
-        scan, start, closed, lines = ranges[row], np.int64(0), False, np.int64(0)
-        count = list_points(scan, start, range_min, range_max, bearings, points, beams)
-        estimate_noise(points, beams, count, given_noise, noise)
-        count = cluster(points, beams, count, n, circular, noise, missing)
+        start, closed, lines = np.int64(0), False, np.int64(0)
+        count = list_points(work, ranges[row], start, limits, bearings)
+        estimate_noise(work, count, given)
+        count = cluster(work, count, n, circular, missing)
         if circular and count > 0:
-            start, closed = opening(points, beams, count)
+            start, closed = opening(work, count)
         # A full circle without a break is opened anew where two lines differ the most.
         for _ in range(2 if closed else 1):
             if start > 0:
-                count = list_points(scan, start, range_min, range_max, bearings, points, beams)
-                count = cluster(points, beams, count, n, circular, noise, missing)
-            fill_sums(points, count, noise[0], noise[1], sums)
-            lines = partition(points, beams, spans, count, sums, evidence)
-            clearest = _clearest_border(spans, sums, lines) if closed else np.int64(0)
-            start = beams[BEAM, spans[FIRST, clearest]] if clearest > 0 else start
-        lines = merge_lines(points, beams, spans, points[KEY], sums, lines, noise, evidence)
-        surfaces = find_arcs(points, beams, spans, pieces, sums, lines, count, noise, evidence)
-        surfaces = _measure(points, beams, spans, pieces, sums, surfaces, noise, estimated)
-        _write_surfaces(points, beams, spans, pieces, surfaces, row, segments, arcs, offsets)
-        offsets[row + 1, 1] = _write_corners(
-            points, beams, spans, pieces, sums, surfaces, count, n, circular, closed, missing,
-            noise, segments, corners, offsets[row, 1], offsets[row, 0], evidence,
-        )  # fmt: skip
-        found = list_clusters(beams, count, clusters[row])
-        for k in range(surfaces):
-            if spans[KIND, k] == LINE:
-                ints = segments.view(np.int32)
-                ints[spans[SEGMENT, k], S_CLUSTER] = clusters[row, beams[BEAM, spans[FIRST, k]]]
-        offsets[row + 1, 3] = write_breaks(
-            points, beams[BEAM], beams[CLUSTER_FIRST], beams[CLUSTER_LAST],
-            found if not closed or beams[BROKEN, 0] or found > 1 else 0, circular, missing, n,
-            breaks, offsets[row, 3],
-        )  # fmt: skip
+                count = list_points(work, ranges[row], start, limits, bearings)
+                count = cluster(work, count, n, circular, missing)
+            fill_sums(work.points, count, work.noise[0], work.noise[1], work.sums)
+            lines = partition(work, count, evidence)
+            clearest = clearest_border(work, lines) if closed else np.int64(0)
+            start = beams[at.BEAM, spans[at.FIRST, clearest]] if clearest > 0 else start
+        scan = at.Scan(row, n, count, circular, evidence, missing)
+        lines = merge_lines(work, lines, evidence)
+        surfaces = measure(work, find_arcs(work, scan, lines), estimated)
+        for table in range(4):
+            tables.offsets[row + 1, table] = tables.offsets[row, table]
+        _write_surfaces(work, tables, scan, surfaces)
+        join_all(work, tables, scan, surfaces, closed)
+        _write_clusters(work, tables, scan, surfaces, closed)
         for part in range(4):
-            noises[row, part] = 0.0 if estimated else given_noise[part]
+            noises[row, part] = 0.0 if estimated else given[part]
         if estimated:
-            noises[row, 0] = math.sqrt(noise[0]) if count > 0 else math.nan
-            noises[row, 1] = math.sqrt(noise[1])
+            noises[row, 0] = math.sqrt(work.noise[0]) if count > 0 else math.nan
+            noises[row, 1] = math.sqrt(work.noise[1])
         counts[0], counts[1], counts[2] = count, lines, surfaces
 
 
-@helper
-def _write_corners(
-    points, beams, spans, pieces, sums, surfaces, count, n, circular, closed, missing, noise,
-    segments, corners, row, base, evidence,
-):  # fmt: skip
-    """Write the corners where surfaces meet, and the edges where they end.
-
-    The scan's own segments begin at row `base`. Returns the number of the next row of `corners`.
-    """
+@inlined
+def _write_surfaces(work, tables, scan, surfaces):
+    """Step 4: write the lines and arcs, which have no corners yet."""
+    spans, beam, following = work.spans, work.beams[at.BEAM], tables.offsets[scan.row + 1]
+    segments, ints = tables.segments, tables.segments.view(np.int32)
     for k in range(surfaces):
-        m = (k + 1) % surfaces
-        if m > k or (closed and m < k):
-            row = join(
-                points, beams, spans, pieces, sums, k, m, count, n, missing, noise, segments,
-                corners, row, base, evidence,
-            )  # fmt: skip
-    # Through a slit, a surface behind may show between two lines.
-    for k in range(surfaces):
-        m = (k + 2) % surfaces
-        both_end = (m > k or (closed and m != k)) and spans[END, k] == spans[START, m] == 0
-        if both_end and are_near(points, spans, k, m):
-            _, row = cross(
-                points, beams, spans, pieces, sums, k, m, count, noise, segments, corners, row,
-                base, evidence,
-            )  # fmt: skip
-    for k in range(surfaces):
-        for way in (-1, 1):
-            if spans[KIND, k] == LINE and not spans[END if way > 0 else START, k]:
-                row = add_edge(
-                    points, beams, spans, pieces, k, way, count, n, circular, missing, noise,
-                    segments, corners, row, base,
-                )  # fmt: skip
-    return row
-
-
-@helper
-def _clearest_border(spans, sums, lines):
-    """Return the line that χ² rises the most by if it and the one before become one; 0 if none."""
-    found, largest = np.int64(0), -1.0
-    for k in range(1, lines):
-        before = spans[FIRST, k - 1], spans[LAST, k - 1] + 1
-        rise = joint_cost(sums, before[0], before[1], spans[FIRST, k], spans[LAST, k] + 1)
-        if rise > largest:
-            found, largest = k, rise
-    return found
-
-
-@helper
-def _measure(points, beams, spans, pieces, sums, surfaces, noise, estimated):
-    """Fit the lines, and say how sure they are. Returns how many surfaces are left.
-
-    A line whose centroid is not between its ends, or that is shorter than the spacing of its beams,
-    runs along them: it is none.
-    """
-    kept = 0
-    for k in range(surfaces):
-        first, last = spans[FIRST, k], spans[LAST, k]
-        spans[FIRST, kept], spans[LAST, kept], spans[KIND, kept] = first, last, spans[KIND, k]
-        spans[COUNT, kept] = spans[COUNT, k]
-        if spans[KIND, k] == LINE:
-            a, b = solve(sums, first, last + 1)
-            p = pieces[kept]
-            spans[COUNT, kept] = fit_line(points, first, last + 1, a, b, noise, p)
-            x, y = points[X], points[Y]
-            begins = p[UX] * (x[first] - p[CX]) + p[UY] * (y[first] - p[CY])
-            ends = p[UX] * (x[last] - p[CX]) + p[UY] * (y[last] - p[CY])
-            spacing = abs(x[first] * y[first + 1] - y[first] * x[first + 1]) / points[RHO, first]
-            if not (begins < 0.0 < ends and ends - begins > spacing):
-                continue
-        else:
-            for column in range(len(pieces[k])):
-                pieces[kept, column] = pieces[k, column]
-        kept += 1
-    surfaces = kept
-    if estimated:
-        scale = scatter_of_means(points, spans, pieces, surfaces, noise)
-        for k in range(surfaces):
-            if spans[KIND, k] == LINE:
-                pieces[k, OO], pieces[k, AA] = scale * pieces[k, OO], scale * pieces[k, AA]
-    soften_borders(beams, spans, pieces, sums, surfaces)
-    return surfaces
-
-
-@helper
-def _write_surfaces(points, beams, spans, pieces, surfaces, row, segments, arcs, offsets):
-    segment, arc, beam = offsets[row, 0], offsets[row, 2], beams[BEAM]
-    ints = segments.view(np.int32)
-    for k in range(surfaces):
-        p, first, last, count = pieces[k], spans[FIRST, k], spans[LAST, k], spans[COUNT, k]
-        spans[SEGMENT, k], spans[START, k], spans[END, k] = segment, 0, 0
-        if spans[KIND, k] == LINE:
-            line = p[CX], p[CY], p[UX], p[UY], p[OO], p[OA], p[AA], p[RMS]
+        p, first, last = work.pieces[k], spans[at.FIRST, k], spans[at.LAST, k]
+        count, segment = spans[at.COUNT, k], following[0]
+        spans[at.SEGMENT, k], spans[at.START, k], spans[at.END, k] = segment, 0, 0
+        if spans[at.KIND, k] == at.LINE:
+            line = p[at.CX], p[at.CY], p[at.UX], p[at.UY], p[at.OO], p[at.OA], p[at.AA], p[at.RMS]
             write_segment(
-                points, beam, first, last, count, line, p[MISFIT], segments, ints, segment
+                work.points, beam, first, last, count, line, p[at.MISFIT], segments, ints, segment
             )
-            segment += 1
+            following[0] += 1
         else:
-            covariance = p[XX], p[XY], p[XR], p[YY], p[YR], p[RR]
-            write_arc(
-                p[CX], p[CY], p[RADIUS], p[RMS], covariance, beam[first], beam[last], count, arcs,
-                arc,
-            )  # fmt: skip
-            arc += 1
-    offsets[row + 1, 0], offsets[row + 1, 2] = segment, arc
+            spread = p[at.XX], p[at.XY], p[at.XR], p[at.YY], p[at.YR], p[at.RR]
+            x, y, radius, rms = p[at.CX], p[at.CY], p[at.RADIUS], p[at.RMS]
+            first, last = beam[first], beam[last]
+            write_arc(x, y, radius, rms, spread, first, last, count, tables.arcs, following[2])
+            following[2] += 1
+
+
+@inlined
+def _write_clusters(work, tables, scan, surfaces, closed):
+    """Step 5: write the clusters, which cluster a segment is in, and what is between them."""
+    beams, spans, clusters = work.beams, work.spans, tables.clusters[scan.row]
+    ints, following = tables.segments.view(np.int32), tables.offsets[scan.row + 1]
+    found = list_clusters(beams, scan.count, clusters)
+    for k in range(surfaces):
+        if spans[at.KIND, k] == at.LINE:
+            first = beams[at.BEAM, spans[at.FIRST, k]]
+            ints[spans[at.SEGMENT, k], S_CLUSTER] = clusters[first]
+    following[3] = write_breaks(
+        work.points, beams[at.BEAM], beams[at.CLUSTER_FIRST], beams[at.CLUSTER_LAST],
+        found if not closed or beams[at.BROKEN, 0] or found > 1 else 0, scan.circular,
+        scan.missing, scan.beams, tables.breakpoints, following[3],
+    )  # fmt: skip

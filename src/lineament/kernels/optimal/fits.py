@@ -2,20 +2,52 @@
 
 import math
 
-from .. import helper, sums
+from .. import helper, inlined, sums
 from ..line_fit import TOTAL, direction
 from ..noise import LEAST_SIGMA
+from . import layout as at
 from .constants import SIGMAS, TAU
-from .layout import (
-    AA, A, B, BROKEN, CX, CY, FIRST, KEY, KIND, LAST, LINE, MISFIT, OA, OO, RHO, RMS,
-    SCRATCH, UX, UY, X, Y,
-)  # fmt: skip
 from .partition import solve
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
 _TOGETHER = 4
 #: Deviation of what lies anywhere between two measurements, in their spacing.
 _WITHIN = 0.5 / math.sqrt(12.0)
+
+
+@inlined
+def measure(work, surfaces, estimated):
+    """Fit the lines, with their covariances. Returns how many surfaces are left.
+
+    A line whose centroid is not between its ends, or that is shorter than the spacing of its
+    beams, runs along them, and is left out.
+    """
+    spans, pieces, sums, kept = work.spans, work.pieces, work.sums, 0
+    x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
+    for k in range(surfaces):
+        first, last, p = spans[at.FIRST, k], spans[at.LAST, k], pieces[kept]
+        for row in (at.FIRST, at.LAST, at.KIND, at.COUNT):
+            spans[row, kept] = spans[row, k]
+        if spans[at.KIND, k] == at.LINE:
+            a, b = solve(sums, first, last + 1)
+            spans[at.COUNT, kept] = fit_line(work.points, first, last + 1, a, b, work.noise, p)
+            begins = p[at.UX] * (x[first] - p[at.CX]) + p[at.UY] * (y[first] - p[at.CY])
+            ends = p[at.UX] * (x[last] - p[at.CX]) + p[at.UY] * (y[last] - p[at.CY])
+            spacing = abs(x[first] * y[first + 1] - y[first] * x[first + 1]) / rho[first]
+            if not (begins < 0.0 < ends and ends - begins > spacing):
+                continue
+        else:
+            p[:] = pieces[k]
+        kept += 1
+    if estimated:
+        scale = _scatter_of_means(work, kept)
+        for k in range(kept):
+            if spans[at.KIND, k] == at.LINE:
+                pieces[k, at.OO], pieces[k, at.AA] = (
+                    scale * pieces[k, at.OO], scale * pieces[k, at.AA],
+                )  # fmt: skip
+    _soften_borders(work, kept)
+    return kept
 
 
 @sums
@@ -26,11 +58,11 @@ def fit_line(points, first, end, a, b, noise, piece):
     Roumeliotis, Burdick, ICRA 2003); what is off by more than chance at the scale of the surface
     does not count. The covariance is that of the noise alone. Returns how many count.
     """
-    x, y, rho = points[X, first:end], points[Y, first:end], points[RHO, first:end]
+    x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
     constant, growth, bearing = noise[0], noise[1], noise[2]
     norm = math.sqrt(a * a + b * b)
     distance, nx, ny, x0, y0 = 1.0 / norm, a / norm, b / norm, x[0], y[0]
-    total, sx, sy, sxx, sxy, syy, own, used = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    total, sx, sy, sxx, sxy, syy, used = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         across, square = nx * x[i] + ny * y[i], rho[i] * rho[i]
         off, share = across - distance, max(across * across / square, 1e-6)
@@ -39,7 +71,7 @@ def fit_line(points, first, end, a, b, noise, piece):
         w, dx, dy = 1.0 / variance if counts else 0.0, x[i] - x0, y[i] - y0
         total, sx, sy = total + w, sx + w * dx, sy + w * dy
         sxx, sxy, syy = sxx + w * dx * dx, sxy + w * dx * dy, syy + w * dy * dy
-        own, used = own + w * variance, used + (1.0 if counts else 0.0)
+        used += 1.0 if counts else 0.0
     sxx, sxy, syy = sxx - sx * sx / total, sxy - sx * sy / total, syy - sy * sy / total
     ux, uy = direction(sxx, sxy, syy, TOTAL)
     if ux * (x[-1] - x0) + uy * (y[-1] - y0) < 0.0:
@@ -48,31 +80,29 @@ def fit_line(points, first, end, a, b, noise, piece):
     along = ux * ux * sxx + 2.0 * ux * uy * sxy + uy * uy * syy
     mean_square = max(sxx + syy - along, 0.0) / total
     distance = ux * cy - uy * cx
-    piece[A], piece[B], piece[CX], piece[CY] = a, b, cx, cy
+    piece[at.A], piece[at.B], piece[at.CX], piece[at.CY] = a, b, cx, cy
     if abs(distance) > 0.0:
-        piece[A], piece[B] = -uy / distance, ux / distance
-    piece[UX], piece[UY] = ux, uy
-    piece[OO], piece[OA], piece[AA] = 1.0 / total, 0.0, 1.0 / along
-    piece[RMS] = math.sqrt(mean_square)
-    piece[MISFIT] = math.sqrt(max(mean_square - (used - 2.0) / total, 0.0))
+        piece[at.A], piece[at.B] = -uy / distance, ux / distance
+    piece[at.UX], piece[at.UY] = ux, uy
+    piece[at.OO], piece[at.OA], piece[at.AA] = 1.0 / total, 0.0, 1.0 / along
+    piece[at.RMS] = math.sqrt(mean_square)
+    piece[at.MISFIT] = math.sqrt(max(mean_square - (used - 2.0) / total, 0.0))
     return used
 
 
-@helper
-def scatter_of_means(points, spans, pieces, surfaces, noise):
+@inlined
+def _scatter_of_means(work, surfaces):
     """Variance of the mean of neighbouring measurements, over that of as many independent ones.
 
     Scanners smooth their ranges, so that neighbours are off alike. It is 1 for white noise, and
     taken from second differences of means of four, which a wall that bows does not change.
     """
-    squares, used = points[KEY], 0
+    points, pieces, squares, used = work.points, work.pieces, work.points[at.KEY], 0
     for k in range(surfaces):
-        first, end = spans[FIRST, k], spans[LAST, k] + 1
-        if spans[KIND, k] == LINE and end - first >= 3 * _TOGETHER:
-            _second_differences(
-                points[:, first:end], pieces[k, A], pieces[k, B], noise, points[SCRATCH],
-                squares[used:],
-            )  # fmt: skip
+        first, end = work.spans[at.FIRST, k], work.spans[at.LAST, k] + 1
+        if work.spans[at.KIND, k] == at.LINE and end - first >= 3 * _TOGETHER:
+            a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.SCRATCH]
+            _second_differences(points[:, first:end], a, b, work.noise, error, squares[used:])
             used += end - first + 1 - 3 * _TOGETHER
     mean, limit = 1.0, math.inf
     for _ in range(2 if used >= 3 * _TOGETHER else 0):
@@ -84,13 +114,13 @@ def scatter_of_means(points, spans, pieces, surfaces, noise):
         mean = total / kept
         limit = SIGMAS * SIGMAS * mean
     # Nothing is known better than the best scanner measures it.
-    return max(mean, LEAST_SIGMA * LEAST_SIGMA / noise[0])
+    return max(mean, LEAST_SIGMA * LEAST_SIGMA / work.noise[0])
 
 
 @sums
 def _second_differences(points, a, b, noise, error, squares):
     """Square the second differences of means of four errors, in units of those of white noise."""
-    x, y, rho = points[X], points[Y], points[RHO]
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     for i in range(len(x)):
         variance = noise[0] + noise[1] * rho[i] * rho[i]
         error[i] = (rho[i] - rho[i] / (a * x[i] + b * y[i])) / math.sqrt(variance)
@@ -102,18 +132,19 @@ def _second_differences(points, a, b, noise, error, squares):
         squares[i] = difference * difference / (6.0 * _TOGETHER)
 
 
-@helper
-def soften_borders(beams, spans, pieces, sums, surfaces):
+@inlined
+def _soften_borders(work, surfaces):
     """Add to the covariances what comes of borders that could as well lie elsewhere.
 
     A border lies anywhere between two measurements, and where a wall bends, it may move far until
     χ² rises by 1: by one deviation. The lines turn by as much with it.
     """
+    spans, pieces, sums = work.spans, work.pieces, work.sums
     for k in range(1, surfaces):
-        start, border, end = spans[FIRST, k - 1], spans[FIRST, k], spans[LAST, k] + 1
-        if spans[KIND, k - 1] != LINE or spans[KIND, k] != LINE or beams[BROKEN, border]:
+        start, border, end = spans[at.FIRST, k - 1], spans[at.FIRST, k], spans[at.LAST, k] + 1
+        if spans[at.KIND, k - 1] != at.LINE or spans[at.KIND, k] != at.LINE:
             continue
-        if border > spans[LAST, k - 1] + 1:
+        if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
             continue
         low, high = border - 1, border + 1
         _add_change(pieces[k - 1], solve(sums, start, low), solve(sums, start, high))
@@ -123,7 +154,7 @@ def soften_borders(beams, spans, pieces, sums, surfaces):
 @helper
 def _add_change(piece, line, other):
     """Add a share of the change from one line to another as a deviation of a piece."""
-    ux, uy, cx, cy = piece[UX], piece[UY], piece[CX], piece[CY]
+    ux, uy, cx, cy = piece[at.UX], piece[at.UY], piece[at.CX], piece[at.CY]
     along, across = line[0] * ux + line[1] * uy, line[1] * ux - line[0] * uy
     along_too, across_too = other[0] * ux + other[1] * uy, other[1] * ux - other[0] * uy
     if across * across_too == 0.0:
@@ -131,6 +162,6 @@ def _add_change(piece, line, other):
     offset = (1.0 - line[0] * cx - line[1] * cy) / across
     offset = _WITHIN * (offset - (1.0 - other[0] * cx - other[1] * cy) / across_too)
     angle = _WITHIN * (math.atan(along_too / across_too) - math.atan(along / across))
-    piece[OO] += offset * offset
-    piece[OA] += offset * angle
-    piece[AA] += angle * angle
+    piece[at.OO] += offset * offset
+    piece[at.OA] += offset * angle
+    piece[at.AA] += angle * angle

@@ -4,200 +4,198 @@ import math
 
 import numpy as np
 
-from .. import helper
-from ...features.records import (
-    C_BEAM, C_CONVEX, C_OPENING, C_RESPONSE, C_SEGMENTS, S_END, S_START, SHARP, SLIT,
-)  # fmt: skip
-from ..writing import grade_corner, grade_edge, write_opening, write_place
+from .. import helper, inlined
+from ...features import records as to
+from ..writing import grade_corner, grade_edge, write_end, write_opening, write_place
+from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
-from .layout import (
-    A, AA, ARC, B, BEAM, BROKEN, COUNT, CX, CY, END, FIRST, KIND, LAST, LINE, OA, OO, RHO, SEGMENT,
-    START, UX, UY, X, Y,
-)  # fmt: skip
 from .partition import gap, joint_cost, surface_variance
 
 
-@helper
-def join(
-    points, beams, spans, pieces, sums, k, m, count, n, missing, noise, segments, corners, row,
-    base, evidence,
-):  # fmt: skip
-    """Join surface k to the next one, m, where they meet, or break the cluster between them.
+@inlined
+def join_all(work, tables, scan, surfaces, closed):
+    """Write the corners where surfaces meet, and the edges where they end."""
+    spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
+    for k in range(surfaces):
+        m = (k + 1) % surfaces
+        if m > k or (closed and m < k):
+            _join(work, tables, scan, k, m)
+    # Through a slit, a surface behind may show between two lines.
+    for k in range(surfaces):
+        m = (k + 2) % surfaces
+        both_end = spans[at.END, k] == spans[at.START, m] == 0
+        if both_end and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
+            i, j = spans[at.LAST, k], spans[at.FIRST, m]
+            dx, dy = x[i] - x[j], y[i] - y[j]
+            if (m > k or (closed and m != k)) and dx * dx + dy * dy <= 4.0 * REACH * REACH:
+                _cross(work, tables, scan, k, m)
+    for k in range(surfaces):
+        for way in (-1, 1):
+            if spans[at.KIND, k] == at.LINE and not spans[at.END if way > 0 else at.START, k]:
+                _add_edge(work, tables, scan, k, way)
 
-    The scan's own segments begin at row `base`. Returns the number of the next row of `corners`.
-    """
-    broken, i, j = beams[BROKEN], spans[LAST, k], spans[FIRST, m]
-    joined = (beams[BEAM, j] - beams[BEAM, i]) % n - 1 <= missing
-    if joined and spans[KIND, k] == ARC:
-        joined = spans[KIND, m] == LINE and is_on(points, pieces[k], j, noise, TAU)
-    elif joined and spans[KIND, m] == ARC:
-        joined = is_on(points, pieces[m], i, noise, TAU)
+
+@inlined
+def _join(work, tables, scan, k, m):
+    """Join surface k to the next one, m, where they meet, or break the cluster between them."""
+    points, beam, broken = work.points, work.beams[at.BEAM], work.beams[at.BROKEN]
+    kinds, pieces = work.spans[at.KIND], work.pieces
+    i, j = work.spans[at.LAST, k], work.spans[at.FIRST, m]
+    joined = (beam[j] - beam[i]) % scan.beams - 1 <= scan.missing
+    if joined and kinds[k] == at.ARC:
+        joined = kinds[m] == at.LINE and is_on(points, pieces[k], j, work.noise, TAU)
+    elif joined and kinds[m] == at.ARC:
+        joined = is_on(points, pieces[m], i, work.noise, TAU)
     elif joined:
-        joined, row = cross(
-            points, beams, spans, pieces, sums, k, m, count, noise, segments, corners, row, base,
-            evidence,
-        )  # fmt: skip
-    at, step, whole, t = j, -1.0, True, i
+        joined = _cross(work, tables, scan, k, m)
+    largest, step, whole, t = j, -1.0, True, i
     while t != j:
-        before, t = t, t + 1 if t + 1 < count else 0
+        before, t = t, t + 1 if t + 1 < scan.count else 0
         if joined:
             broken[t] = 0
         whole = whole and not broken[t]
-        if abs(points[RHO, t] - points[RHO, before]) > step:
-            at, step = t, abs(points[RHO, t] - points[RHO, before])
+        if abs(points[at.RHO, t] - points[at.RHO, before]) > step:
+            largest, step = t, abs(points[at.RHO, t] - points[at.RHO, before])
     if whole and not joined:
-        broken[at] = 1
-    return row
+        broken[largest] = 1
 
 
-@helper
-def cross(
-    points, beams, spans, pieces, sums, k, m, count, noise, segments, corners, row, base, evidence
-):
-    """Write the corner of two lines, if there is one.
-
-    Returns whether they are one surface, and the number of the next row of `corners`.
-    """
-    i, j = spans[LAST, k], spans[FIRST, m]
-    joined, meets, x, y = _meet(points, beams, spans, pieces, k, m, count, noise)
-    kind = np.int64(SHARP if meets else SLIT)
-    rise = joint_cost(sums, spans[FIRST, k], i + 1, j, spans[LAST, m] + 1) if x == x else 0.0
-    known = x == x and rise >= evidence
-    if known and _add_corner(spans, pieces, k, m, x, y, kind, segments, corners, row, base):
-        corners[row, C_RESPONSE], corners.view(np.int32)[row, C_BEAM] = rise, beams[BEAM, j]
-        row += 1
-    return joined, row
+@inlined
+def _cross(work, tables, scan, k, m):
+    """Write the corner of two lines, if there is one. Returns whether they are one surface."""
+    spans, i, j = work.spans, work.spans[at.LAST, k], work.spans[at.FIRST, m]
+    joined, meets, x, y = _meet(work, scan, k, m)
+    if x == x:
+        rise = joint_cost(work.sums, spans[at.FIRST, k], i + 1, j, spans[at.LAST, m] + 1)
+        if rise >= scan.evidence:
+            kind = np.int64(to.SHARP if meets else to.SLIT)
+            _add_corner(work, tables, scan.row, k, m, x, y, kind, rise)
+    return joined
 
 
-@helper
-def are_near(points, spans, k, m):
-    """Whether two surfaces are lines that end so near to each other that both reach a corner."""
-    dx = points[X, spans[LAST, k]] - points[X, spans[FIRST, m]]
-    dy = points[Y, spans[LAST, k]] - points[Y, spans[FIRST, m]]
-    near = dx * dx + dy * dy <= 4.0 * REACH * REACH
-    return near and spans[KIND, k] == spans[KIND, m] == LINE
-
-
-@helper
-def _meet(points, beams, spans, pieces, k, m, count, noise):
+@inlined
+def _meet(work, scan, k, m):
     """Whether two neighbouring lines are one surface, whether they meet, and where (NaN: nowhere).
 
     They meet where they cross between their facing measurements, or are no farther apart there
     than by chance, if no measurement between went on behind both. If not, a face at right angles to
     the nearer one may join them, which the beams at its end graze.
     """
-    i, j, p, q = spans[LAST, k], spans[FIRST, m], pieces[k], pieces[m]
-    x, y, rho = points[X], points[Y], points[RHO]
+    points, broken, p, q = work.points, work.beams[at.BROKEN], work.pieces[k], work.pieces[m]
+    i, j = work.spans[at.LAST, k], work.spans[at.FIRST, m]
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     nearer, e, far = (p, i, j) if rho[i] <= rho[j] else (q, j, i)
-    variance = surface_variance(points, far, noise)
-    error = SIGMAS * math.sqrt(variance)
+    error = SIGMAS * math.sqrt(surface_variance(points, far, work.noise))
     between, unbroken, hole, t, depth = -1, True, False, i, 0.0
     while t != j:
-        t = t + 1 if t + 1 < count else 0
-        between, unbroken = between + 1, unbroken and not beams[BROKEN, t]
-        by_p, by_q = p[A] * x[t] + p[B] * y[t], q[A] * x[t] + q[B] * y[t]
+        t = t + 1 if t + 1 < scan.count else 0
+        between, unbroken = between + 1, unbroken and not broken[t]
+        by_p, by_q = p[at.A] * x[t] + p[at.B] * y[t], q[at.A] * x[t] + q[at.B] * y[t]
         hole = hole or (t != j and rho[t] * (min(by_p, by_q) - 1.0) > error * min(by_p, by_q))
         if t != j or e == i:
             depth = max(depth, (by_p if e == i else by_q) - 1.0)
     if e == j:
-        depth = max(depth, q[A] * x[i] + q[B] * y[i] - 1.0)
-    step = gap(points, i, j, p[A] - q[A], p[B] - q[B])
+        depth = max(depth, q[at.A] * x[i] + q[at.B] * y[i] - 1.0)
+    step = gap(points, i, j, p[at.A] - q[at.A], p[at.B] - q[at.B])
     meets = between < LEAST and not hole and step * step <= error * error
     # Corners lie near the measurements on both sides, or within their spacing and its error.
     reach_i = max(REACH, math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error)
     reach_j = max(REACH, math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error)
-    determinant = p[A] * q[B] - q[A] * p[B]
+    determinant = p[at.A] * q[at.B] - q[at.A] * p[at.B]
     inverse = 1.0 / determinant if determinant != 0.0 else math.nan
-    cx, cy = (q[B] - p[B]) * inverse, (p[A] - q[A]) * inverse
+    cx, cy = (q[at.B] - p[at.B]) * inverse, (p[at.A] - q[at.A]) * inverse
     near = math.hypot(cx - x[i], cy - y[i]) <= reach_i and (
         math.hypot(cx - x[j], cy - y[j]) <= reach_j
     )
-    beyond = (cx - p[CX]) * p[UX] + (cy - p[CY]) * p[UY] > 0.0 and (
-        (cx - q[CX]) * q[UX] + (cy - q[CY]) * q[UY] < 0.0
+    beyond = (cx - p[at.CX]) * p[at.UX] + (cy - p[at.CY]) * p[at.UY] > 0.0 and (
+        (cx - q[at.CX]) * q[at.UX] + (cy - q[at.CY]) * q[at.UY] < 0.0
     )
     if not (near and beyond):
         cx, cy = math.nan, math.nan
     joined = meets and (cx == cx or math.hypot(x[i] - x[j], y[i] - y[j]) <= reach_i + reach_j)
     if not joined and unbroken and not hole:
-        square = nearer[A] * nearer[A] + nearer[B] * nearer[B]
-        bx, by = x[e] + depth * nearer[A] / square, y[e] + depth * nearer[B] / square
+        square = nearer[at.A] * nearer[at.A] + nearer[at.B] * nearer[at.B]
+        bx, by = x[e] + depth * nearer[at.A] / square, y[e] + depth * nearer[at.B] / square
         face = (x[e] * by - y[e] * bx) / (rho[e] * math.hypot(bx, by)) * (1.0 if e == i else -1.0)
         beam = (x[i] * y[j] - y[i] * x[j]) / (rho[i] * rho[j] * (between + 1.0))
         joined = 0.5 * beam <= face <= (between + 3.0) * beam
     return joined, meets, cx, cy
 
 
-@helper
-def _add_corner(spans, pieces, k, m, x, y, kind, segments, corners, row, base):
+@inlined
+def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
     """Write the corner of two lines at (x, y), Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ, if it is known so well.
 
     Where they meet, their segments then end there.
     """
-    p, q, a, b = pieces[k], pieces[m], spans[SEGMENT, k], spans[SEGMENT, m]
-    sine = p[UX] * q[UY] - p[UY] * q[UX]
+    spans, p, q, row = work.spans, work.pieces[k], work.pieces[m], tables.offsets[scan + 1, 1]
+    segments, a, b = tables.segments, spans[at.SEGMENT, k], spans[at.SEGMENT, m]
+    sine = p[at.UX] * q[at.UY] - p[at.UY] * q[at.UX]
     first, second = _variance_at(p, x, y) / (sine * sine), _variance_at(q, x, y) / (sine * sine)
     if not first + second <= MOST_DEVIATION * MOST_DEVIATION:
-        return False
-    ints = corners.view(np.int32)
-    write_place(corners, row, x, y, first, q[UX], q[UY], second, p[UX], p[UY])
+        return
+    corners, ints = tables.corners, tables.corners.view(np.int32)
+    write_place(corners, row, x, y, first, q[at.UX], q[at.UY], second, p[at.UX], p[at.UY])
     write_opening(segments, a, b, corners, ints, row)
-    ints[row, C_SEGMENTS], ints[row, C_SEGMENTS + 1] = a - base, b - base
-    grade_corner(corners, ints, row, kind, spans[COUNT, k], spans[COUNT, m])
-    if kind == SHARP:
-        segments[a, S_END], segments[a, S_END + 1] = x, y
-        segments[b, S_START], segments[b, S_START + 1] = x, y
-    spans[END, k] = spans[START, m] = 1
-    return True
+    corners[row, to.C_RESPONSE] = rise
+    ints[row, to.C_BEAM] = work.beams[at.BEAM, spans[at.FIRST, m]]
+    ints[row, to.C_SEGMENTS] = a - tables.offsets[scan, 0]
+    ints[row, to.C_SEGMENTS + 1] = b - tables.offsets[scan, 0]
+    grade_corner(corners, ints, row, kind, spans[at.COUNT, k], spans[at.COUNT, m])
+    if kind == to.SHARP:
+        write_end(segments, a, to.S_END, x, y)
+        write_end(segments, b, to.S_START, x, y)
+    spans[at.END, k] = spans[at.START, m] = 1
+    tables.offsets[scan + 1, 1] += 1
 
 
 @helper
 def _variance_at(piece, x, y):
     """Variance of the offset of a line at a point: that at its centroid, with the lever arm."""
-    t = (x - piece[CX]) * piece[UX] + (y - piece[CY]) * piece[UY]
-    return piece[OO] + 2.0 * t * piece[OA] + t * t * piece[AA]
+    t = (x - piece[at.CX]) * piece[at.UX] + (y - piece[at.CY]) * piece[at.UY]
+    return piece[at.OO] + 2.0 * t * piece[at.OA] + t * t * piece[at.AA]
 
 
-@helper
-def add_edge(
-    points, beams, spans, pieces, k, way, count, n, circular, missing, noise, segments, corners,
-    row, base,
-):  # fmt: skip
+@inlined
+def _add_edge(work, tables, scan, k, way):
     """Write the edge at an end of line k, in direction `way`, if all is behind it for some beams.
 
-    It lies beyond the last measurement on the line, by half a spacing. Returns the number of the
-    next row of `corners`.
+    It lies beyond the last measurement on the line, by half a spacing.
     """
-    x, y, rho, beam, p = points[X], points[Y], points[RHO], beams[BEAM], pieces[k]
-    i, a = spans[LAST, k] if way > 0 else spans[FIRST, k], spans[SEGMENT, k]
+    points, spans, noise, p = work.points, work.spans, work.noise, work.pieces[k]
+    x, y, rho, beam = points[at.X], points[at.Y], points[at.RHO], work.beams[at.BEAM]
+    i, count, n = spans[at.LAST if way > 0 else at.FIRST, k], scan.count, scan.beams
     jump = math.inf
     for ahead in range(1, LEAST + 1):
-        t = (i + way * ahead) % count if circular else i + way * ahead
+        t = (i + way * ahead) % count if scan.circular else i + way * ahead
         if 0 <= t < count:
             jump = min(jump, rho[t] - rho[i])
     next_beam = beam[(i + way) % count]
     hides = SIGMAS * math.sqrt(surface_variance(points, i, noise)) < jump < math.inf
-    if not hides or (way * (next_beam - beam[i])) % n - 1 > missing:
-        return row
-    ux, uy = way * p[UX], way * p[UY]
+    if not hides or (way * (next_beam - beam[i])) % n - 1 > scan.missing:
+        return
+    ux, uy = way * p[at.UX], way * p[at.UY]
     # The spacing is that of the beams on the line: bearings are better known than ranges.
-    here, before = p[A] * x[i] + p[B] * y[i], p[A] * x[i - way] + p[B] * y[i - way]
+    here, before = p[at.A] * x[i] + p[at.B] * y[i], p[at.A] * x[i - way] + p[at.B] * y[i - way]
     dx, dy = x[i] / here - x[i - way] / before, y[i] / here - y[i - way] / before
     spacing = abs(ux * dx + uy * dy) / ((way * (beam[i] - beam[i - way])) % n)
-    along = ux * (x[i] - p[CX]) + uy * (y[i] - p[CY]) + 0.5 * spacing
+    along = ux * (x[i] - p[at.CX]) + uy * (y[i] - p[at.CY]) + 0.5 * spacing
     sine = (ux * x[i] + uy * y[i]) / rho[i]
-    px, py = p[CX] + along * ux, p[CY] + along * uy
+    px, py = p[at.CX] + along * ux, p[at.CY] + along * uy
     across, lengthwise = _variance_at(p, px, py), spacing * spacing / 12.0
     lengthwise += (noise[0] + noise[1] * rho[i] * rho[i]) * sine * sine
     if across + lengthwise > MOST_DEVIATION * MOST_DEVIATION:
-        return row
-    ints, at = corners.view(np.int32), S_END if way > 0 else S_START
-    segments[a, at], segments[a, at + 1] = px, py
+        return
+    corners, ints = tables.corners, tables.corners.view(np.int32)
+    segment, row = spans[at.SEGMENT, k], tables.offsets[scan.row + 1, 1]
+    write_end(tables.segments, segment, to.S_END if way > 0 else to.S_START, px, py)
     write_place(corners, row, px, py, lengthwise, ux, uy, across, -uy, ux)
-    corners[row, C_OPENING], corners[row, C_RESPONSE] = 0.0, 0.0
-    ints[row, C_CONVEX], ints[row, C_BEAM] = 1, beam[i]
-    ints[row, C_SEGMENTS] = a - base if way > 0 else -1
-    ints[row, C_SEGMENTS + 1] = a - base if way < 0 else -1
+    corners[row, to.C_OPENING], corners[row, to.C_RESPONSE] = 0.0, 0.0
+    ints[row, to.C_CONVEX], ints[row, to.C_BEAM] = 1, beam[i]
+    segment -= tables.offsets[scan.row, 0]
+    ints[row, to.C_SEGMENTS] = segment if way > 0 else -1
+    ints[row, to.C_SEGMENTS + 1] = segment if way < 0 else -1
     prominence = jump * abs(ux * y[i] - uy * x[i]) / (rho[i] * math.sqrt(max(lengthwise, across)))
-    grade_edge(corners, ints, row, spans[COUNT, k] * prominence)
-    return row + 1
+    grade_edge(corners, ints, row, spans[at.COUNT, k] * prominence)
+    tables.offsets[scan.row + 1, 1] += 1

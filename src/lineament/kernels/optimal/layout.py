@@ -1,4 +1,9 @@
-"""Rows of the workspace of method `optimal`, by what indexes them."""
+"""The workspace of method `optimal`: its arrays, and their rows by what indexes them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 #: Of `points`, by measurement in beam order (on a full circle from any beam on): place and range
 #: [m]; least energy of the measurements before; least energy of those of its group; what keeps it
@@ -26,3 +31,40 @@ SPANS = 7
 LINE, ARC = 0, 1
 #: Columns of the running sums: w (xx, xy, yy, x, y, 1).
 SUMS = 6
+
+
+class Work(NamedTuple):
+    """The arrays of one scan: its noise is (constant, growth, variance of a bearing)."""
+
+    points: NDArray[np.float64]
+    beams: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    pieces: NDArray[np.float64]
+    sums: NDArray[np.float64]
+    noise: NDArray[np.float64]
+
+
+class Tables(NamedTuple):
+    """The words of the features of all scans, and by scan the clusters of its beams.
+
+    `offsets` has a row a scan, and a column a table: where its records begin; while a scan is
+    written, the row behind it has where the next record goes.
+    """
+
+    segments: NDArray[np.float64]
+    corners: NDArray[np.float64]
+    arcs: NDArray[np.float64]
+    breakpoints: NDArray[np.float64]
+    clusters: NDArray[np.int32]
+    offsets: NDArray[np.int64]
+
+
+class Scan(NamedTuple):
+    """What is known of the scan at hand: its number, beams, measurements, and the parameters."""
+
+    row: Any
+    beams: Any
+    count: Any
+    circular: Any
+    evidence: Any
+    missing: Any

@@ -8,10 +8,10 @@ line. The square of that has 1.5 times the variance of a range.
 
 import math
 
-from .. import helper, sums
+from .. import inlined, sums
 from ..noise import LEAST_SIGMA, ranked
+from . import layout as at
 from .constants import MOST_DEVIATION, SIGMAS
-from .layout import BEAM, KEY, RHO, SCRATCH, X, Y
 
 #: Square of a deviation of a normal distribution, over that which a third of its squares is below.
 _THIRD = 1.0 / 0.4307**2
@@ -21,20 +21,21 @@ _WHOLE = 1.03
 _FEWEST, _OVERLAP = 24, 1.94
 
 
-@helper
-def estimate_noise(points, beams, count, given, noise):
+@inlined
+def estimate_noise(work, count, given):
     """Write the noise as (constant, growth, variance of a bearing): as given, or from the triples.
 
     By the third of them that is least off, as no clutter is; of the nearer and the farther half
     apart: it grows with range where these differ by more than chance.
     """
+    points, noise = work.points, work.noise
     least = LEAST_SIGMA * LEAST_SIGMA
     if not math.isnan(given[0]):
         noise[0] = max(given[0] * given[0] + given[3] * given[3] / 12.0, least)
         noise[1], noise[2] = given[1] * given[1], given[2] * given[2]
         return
     noise[0], noise[1], noise[2] = least, 0.0, 0.0
-    middle, used = _fill_triples(points, beams[BEAM], count)
+    middle, used = _fill_triples(points, work.beams[at.BEAM], count)
     if used < _FEWEST:
         return
     near, near_square, near_count = _least_third(points, count, 0.0, middle)
@@ -52,17 +53,17 @@ def estimate_noise(points, beams, count, given, noise):
     if growth > 0.0:
         farthest = 0.0
         for i in range(count):
-            farthest = max(farthest, points[RHO, i])
+            farthest = max(farthest, points[at.RHO, i])
         noise[1] = min(growth, (most - noise[0]) / (farthest * farthest))
 
 
 @sums
 def _fill_triples(points, beam, count):
-    """Fill KEY with the squared error of each range by its neighbours; inf where one is missing.
+    """Fill `KEY` with the squared error of each range by its neighbours; inf where one is missing.
 
     Returns the mean square of those ranges, and how many there are.
     """
-    x, y, rho, triple = points[X], points[Y], points[RHO], points[KEY]
+    x, y, rho, triple = points[at.X], points[at.Y], points[at.RHO], points[at.KEY]
     x1, y1, rho1, x2, y2 = x[1:], y[1:], rho[1:], x[2:], y[2:]
     beam2, triple1 = beam[2:], triple[1:]
     total, used = 0.0, 0.0
@@ -81,7 +82,7 @@ def _fill_triples(points, beam, count):
 @sums
 def _least_third(points, count, low, high):
     """Variance by triples of squared ranges from `low` to `high`, their mean square, and number."""
-    rho, triple, kept, n = points[RHO], points[KEY], points[SCRATCH], 0.0
+    rho, triple, kept, n = points[at.RHO], points[at.KEY], points[at.SCRATCH], 0.0
     for i in range(count):
         square = rho[i] * rho[i]
         kept[i] = triple[i] if (low <= square) & (square < high) else math.inf

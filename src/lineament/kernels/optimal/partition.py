@@ -11,12 +11,9 @@ import math
 
 import numpy as np
 
-from .. import contracted, helper
+from .. import contracted, helper, inlined
+from . import layout as at
 from .constants import BEND, CLUTTER, LEAST, RARE, SIGMAS, TAU
-from .layout import (
-    BEGINS, BROKEN, ENDS, ENERGY, FIRST, KEY, LAST, LOWEST, ORIGIN, RHO, RUNNER, RUNNING, SUMS,
-    VALUE, X, Y,
-)  # fmt: skip
 
 #: Measurements of the blocks that bound χ² from below, candidates of a group, and those that run
 #: along. They change the time, not the result.
@@ -30,10 +27,10 @@ def fill_sums(points, count, constant, growth, sums):
     A line is a x + b y = 1, and 1 - a x - b y the error of ρ over ρ: linear whatever the direction
     of the line (inverse-range regression).
     """
-    x, y, rho = points[X], points[Y], points[RHO]
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     constant += TAU * TAU
     xx, xy, yy, sx, sy, s = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for column in range(SUMS):
+    for column in range(at.SUMS):
         sums[0, column] = 0.0
     for i in range(count):
         square = rho[i] * rho[i]
@@ -82,17 +79,28 @@ def joint_cost(sums, i, j, k, m):
     return joint - cost(sums, i, j) - cost(sums, k, m)
 
 
-@helper
-def partition(points, beams, spans, count, sums, evidence):
+@inlined
+def clearest_border(work, lines):
+    """Return the line that χ² rises the most by if it and the one before become one; 0 if none."""
+    first, last, found, largest = work.spans[at.FIRST], work.spans[at.LAST], np.int64(0), -1.0
+    for k in range(1, lines):
+        rise = joint_cost(work.sums, first[k - 1], last[k - 1] + 1, first[k], last[k] + 1)
+        if rise > largest:
+            found, largest = k, rise
+    return found
+
+
+@inlined
+def partition(work, count, evidence):
     """List the lines of the partition of the least energy, in order. Returns how many there are.
 
     No line goes on over a break, so that the stretches between breaks follow one another.
     """
-    origin, first, last = beams[ORIGIN], spans[FIRST], spans[LAST]
-    points[ENERGY, 0], begin = 0.0, np.int64(0)
+    origin, first, last = work.beams[at.ORIGIN], work.spans[at.FIRST], work.spans[at.LAST]
+    work.points[at.ENERGY, 0], begin = 0.0, np.int64(0)
     for i in range(1, count + 1):
-        if i == count or beams[BROKEN, i]:
-            _part_stretch(points, beams, sums, begin, i, evidence)
+        if i == count or work.beams[at.BROKEN, i]:
+            _part_stretch(work, begin, i, evidence)
             begin = i
     lines, i = 0, count
     while i > 0:
@@ -107,7 +115,7 @@ def partition(points, beams, spans, count, sums, evidence):
 
 
 @contracted
-def _part_stretch(points, beams, sums, first, last, evidence):
+def _part_stretch(work, first, last, evidence):
     """Part the measurements first … last - 1, knowing the least energy of those before.
 
     Candidates for the beginning of the last line come in groups. A group has a key: with the blocks
@@ -115,15 +123,17 @@ def _part_stretch(points, beams, sums, first, last, evidence):
     the least energy found so far are opened. The few candidates that were least run along: they are
     always evaluated, and do not count for their group.
     """
-    energy, origin, key, lowest = points[ENERGY], beams[ORIGIN], points[KEY], points[LOWEST]
-    running, ends, begins = points[RUNNING], points[ENDS], points[BEGINS]
+    points, beams, sums = work.points, work.beams, work.sums
+    energy, key, lowest = points[at.ENERGY], points[at.KEY], points[at.LOWEST]
+    origin, runner, value = beams[at.ORIGIN], beams[at.RUNNER], points[at.VALUE]
+    running, ends, begins = points[at.RUNNING], points[at.ENDS], points[at.BEGINS]
     price, most = CLUTTER * evidence, max(1.0, (LEAST - 1) * CLUTTER) * evidence
     for j in range(first + 1, min(first + LEAST, last + 1)):
         energy[j], origin[j] = energy[j - 1] + price, -1
     if last - first < LEAST:
         return
     _bound_blocks(ends, begins, sums, first, last)
-    runner, value, oldest, bound = beams[RUNNER], points[VALUE], np.int64(0), math.inf
+    oldest, bound = np.int64(0), math.inf
     for r in range(RUNNERS):
         runner[r] = first
     total = energy[first + LEAST - 1]
@@ -134,7 +144,7 @@ def _part_stretch(points, beams, sums, first, last, evidence):
             value[r] = energy[c] + evidence + cost(sums, c, j)
             leader = c if value[r] < least else leader
             least = min(value[r], least)
-        at = leader if least < total + price else np.int64(-1)
+        found = leader if least < total + price else np.int64(-1)
         total = min(least, total + price)
         q, fresh = (i - first) // GROUP, (i - first) % GROUP == 0
         running[i] = math.inf if i == first else 0.0
@@ -143,8 +153,8 @@ def _part_stretch(points, beams, sums, first, last, evidence):
         lowest[q] = energy[i] if fresh else min(lowest[q], energy[i])
         bound = min(bound, new)
         if bound + ends[j] < total:
-            total, at, oldest = _open_groups(
-                points, beams, sums, first, j, oldest, evidence, total, at
+            total, found, oldest = _open_groups(
+                points, beams, sums, first, j, oldest, evidence, total, found
             )
             # What is so far above can never be the least again.
             while oldest < q and key[oldest] + ends[j] > total + most:
@@ -152,19 +162,20 @@ def _part_stretch(points, beams, sums, first, last, evidence):
             bound = key[oldest]
             for k in range(oldest + 1, q + 1):
                 bound = min(bound, key[k])
-        energy[j], origin[j] = total, at
+        energy[j], origin[j] = total, found
 
 
 @contracted
-def _open_groups(points, beams, sums, first, j, oldest, evidence, total, at):
+def _open_groups(points, beams, sums, first, j, oldest, evidence, total, found):
     """Open the groups whose key is less than the least energy before measurement j.
 
     The least candidate of a group that is now less than a runner takes its place, and the runner
     goes back to its own group. Returns the least energy, the candidate that it is of, and the first
     group that may still be opened.
     """
-    energy, key, lowest, running = points[ENERGY], points[KEY], points[LOWEST], points[RUNNING]
-    runner, value, ended, began = beams[RUNNER], points[VALUE], points[ENDS, j], points[BEGINS, j]
+    ended, began = points[at.ENDS, j], points[at.BEGINS, j]
+    energy, key, lowest = points[at.ENERGY], points[at.KEY], points[at.LOWEST]
+    running, runner, value = points[at.RUNNING], beams[at.RUNNER], points[at.VALUE]
     last, back = j - LEAST + 1, oldest
     for q in range(oldest, (last - 1 - first) // GROUP + 1):
         if key[q] + ended >= total:
@@ -183,7 +194,7 @@ def _open_groups(points, beams, sums, first, j, oldest, evidence, total, at):
             best = c if now < least else best
             least = min(least, now)
         key[q] = least - began
-        at = best if least < total else at
+        found = best if least < total else found
         total = min(least, total)
         worst = 0
         for r in range(1, RUNNERS):
@@ -194,7 +205,7 @@ def _open_groups(points, beams, sums, first, j, oldest, evidence, total, at):
             key[group] = min(key[group], value[worst] - began)
             back = min(back, group)
             runner[worst], value[worst] = best, least
-    return total, at, back
+    return total, found, back
 
 
 @helper
@@ -216,15 +227,15 @@ def _bound_blocks(ends, begins, sums, first, last):
             begins[i] = total
 
 
-@helper
-def merge_lines(points, beams, spans, rises, sums, lines, noise, evidence):
+@inlined
+def merge_lines(work, lines, evidence):
     """Merge neighbours that are one wall that bends, first those whose χ² rises the least.
 
     Returns how many lines are left.
     """
-    first, last = spans[FIRST], spans[LAST]
+    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.KEY]
     for k in range(1, lines):
-        rises[k] = _rise(points, beams, spans, sums, k, noise)
+        rises[k] = _rise(work, k)
     while lines > 1:
         k = 1
         for m in range(2, lines):
@@ -236,25 +247,26 @@ def merge_lines(points, beams, spans, rises, sums, lines, noise, evidence):
         for m in range(k, lines):
             first[m], last[m], rises[m] = first[m + 1], last[m + 1], rises[m + 1]
         for m in range(max(k - 1, 1), min(k + 1, lines)):
-            rises[m] = _rise(points, beams, spans, sums, m, noise)
+            rises[m] = _rise(work, m)
     return lines
 
 
-@helper
-def _rise(points, beams, spans, sums, k, noise):
+@inlined
+def _rise(work, k):
     """Rise of χ² if a line and the one before become one; inf where these are no wall that bends.
 
     They then turn by little, and are no farther apart at their border than by chance.
     """
-    start, border, end = spans[FIRST, k - 1], spans[FIRST, k], spans[LAST, k] + 1
-    if border > spans[LAST, k - 1] + 1 or beams[BROKEN, border]:
+    spans, sums, points = work.spans, work.sums, work.points
+    start, border, end = spans[at.FIRST, k - 1], spans[at.FIRST, k], spans[at.LAST, k] + 1
+    if border > spans[at.LAST, k - 1] + 1 or work.beams[at.BROKEN, border]:
         return math.inf
     a, b = solve(sums, start, border)
     c, d = solve(sums, border, end)
     if not a * c + b * d > BEND * math.sqrt((a * a + b * b) * (c * c + d * d)):
         return math.inf
     step = gap(points, border - 1, border, a - c, b - d)
-    if step * step > SIGMAS * SIGMAS * surface_variance(points, border, noise):
+    if step * step > SIGMAS * SIGMAS * surface_variance(points, border, work.noise):
         return math.inf
     return joint_cost(sums, start, border, border, end)
 
@@ -262,7 +274,7 @@ def _rise(points, beams, spans, sums, k, noise):
 @helper
 def surface_variance(points, i, noise):
     """Variance of a measurement about the line of its surface."""
-    return TAU * TAU + noise[0] + noise[1] * points[RHO, i] * points[RHO, i]
+    return TAU * TAU + noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i]
 
 
 @helper
@@ -272,8 +284,8 @@ def gap(points, i, j, a, b):
     The lines differ by a x + b y in ρ over their ranges; 0 where they cross between those beams,
     less than 0 where the first is behind.
     """
-    here = (a * points[X, i] + b * points[Y, i]) * points[RHO, i]
-    there = (a * points[X, j] + b * points[Y, j]) * points[RHO, j]
+    here = (a * points[at.X, i] + b * points[at.Y, i]) * points[at.RHO, i]
+    there = (a * points[at.X, j] + b * points[at.Y, j]) * points[at.RHO, j]
     if here * there <= 0.0:
         return 0.0
     return here if abs(here) < abs(there) else there

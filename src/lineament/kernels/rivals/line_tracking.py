@@ -1,42 +1,33 @@
-"""Lines grown point by point along the clusters."""
+"""Lines grown point by point along the clusters.
+
+V. Nguyen et al., *A comparison of line extraction algorithms using 2D range data for indoor mobile
+robotics* (2007), the "incremental" algorithm; A. Siadat et al. (1997).
+"""
 
 import math
 
 import numpy as np
 
 from .. import helper, kernel
-from ..layout import (
-    BEFORE,
-    CLASS_FIRST,
-    CLASS_LAST,
-    CLASSES,
-    FIRST,
-    LAST,
-    PIECES,
-    RESPONSE,
-    RHO,
-    X,
-    Y,
-)
+from .. import layout as at
 from ..line_fit import normal_variance
 from .stretches import line_of_sums
 
 
 @kernel
-def track_lines(floats, ints, counts, noise, threshold, noise_factor, max_misses, min_points):
+def track_lines(floats, ints, noise, threshold, noise_factor, max_misses, min_points):
     """Grow lines along the clusters of a scan.
 
     A line begins with three points. The next point is one of its points if the line predicts it:
-    if it is no farther off than its noise and the line's own allow. The line is fitted anew with
+    if it is no farther off than its noise and the line's own allow. The line is fitted again with
     every point that it gains, and ends with the last of them where more than `max_misses` points
     in a row are not predicted; there the next line begins. A line of too few points is given up,
     and the search goes on at the point after its first.
 
     Parameters
     ----------
-    floats, ints, counts
-        See `layout`. The lines by point are read; those by piece are written, and PIECES. No
-        pieces are joined: BEFORE is -1.
+    floats, ints
+        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
     noise : float64 array, shape (4,)
     threshold : float
         Distance from its line that a point without noise may have [m].
@@ -47,25 +38,25 @@ def track_lines(floats, ints, counts, noise, threshold, noise_factor, max_misses
     min_points : int
         Points of the shortest piece, three or more.
     """
-    x, y, rho, first, last = floats[X], floats[Y], floats[RHO], ints[FIRST], ints[LAST]
+    work = at.named(floats, ints)
     n = np.int64(0)
-    for c in range(counts[CLASSES]):
-        begin, end = ints[CLASS_FIRST, c], ints[CLASS_LAST, c]
+    for c in range(work.counts[at.CLUSTERS]):
+        begin, end = work.clusters[at.FIRST, c], work.clusters[at.LAST, c]
         while begin <= end:
-            reached = _track(x, y, rho, begin, end, noise, threshold, noise_factor, max_misses)
+            reached = _track(work.points, begin, end, noise, threshold, noise_factor, max_misses)
             if reached - begin + 1 < min_points:
                 begin += 1
                 continue
-            first[n], last[n] = begin, reached
-            ints[BEFORE, n], floats[RESPONSE, n] = -1, math.nan
+            work.pieces[at.FIRST, n], work.pieces[at.LAST, n] = begin, reached
             n += 1
             begin = reached + 1
-    counts[PIECES] = n
+    work.counts[at.PIECES] = n
 
 
 @helper
-def _track(x, y, rho, first, last, noise, threshold, noise_factor, max_misses):
+def _track(points, first, last, noise, threshold, noise_factor, max_misses):
     """Grow a line from the point `first` on. Returns the last point that it gained."""
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     # Sums about the first point, not the far origin, keep their digits.
     x0, y0 = x[first], y[first]
     n, end = np.int64(0), first

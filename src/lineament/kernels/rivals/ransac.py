@@ -1,137 +1,99 @@
-"""RANSAC: lines through random pairs, and the longest run of points that agree."""
+"""RANSAC: lines through random pairs, and the longest run of points that agree.
+
+M. A. Fischler, R. C. Bolles, *Random sample consensus*, Communications of the ACM 24 (1981).
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import helper, kernel
-from ..layout import (
-    CANDIDATES,
-    CLASS_FIRST,
-    CLASS_LAST,
-    CLASSES,
-    FIRST,
-    LABEL,
-    LAST,
-    PIECES,
-    POINTS,
-    RHO,
-    X,
-    Y,
-)
-from .runs import longest_run, refined_run, take_run
-from .stretches import fill_moments, fill_tolerances
+from .. import layout as at
+from .stretches import is_piece, longest_run, prepare, refined_run, take_run
 
 #: Of the generator: a prime, so that it runs through all numbers below but 0.
 PERIOD = 2147483647
 
 
+class Parameters(NamedTuple):
+    """As in `methods.ransac.Ransac`."""
+
+    trials: int
+    window: int
+    min_points: int
+    min_length: float
+    max_misses: int
+    epsilon: float
+    sigmas: float
+    seed: int
+
+
 @kernel
-def find_by_consensus(
-    floats,
-    ints,
-    counts,
-    noise,
-    trials,
-    window,
-    min_points,
-    min_length,
-    max_misses,
-    epsilon,
-    sigmas,
-    seed,
-    moments,
-    slack,
-    slope,
-    free,
-    left,
-):
+def find_by_consensus(floats, ints, noise, parameters):
     """Find the lines of a scan.
 
     Parameters
     ----------
-    floats, ints, counts
-        See `layout`. The lines by point are read; FIRST, LAST and PIECES are written.
+    floats, ints
+        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
     noise : float64 array, shape (4,)
-    trials, window, min_points, min_length, max_misses, epsilon, sigmas, seed
-        As in `methods.ransac.Ransac`.
-    moments : float64 array, shape (n + 1, MOMENTS)
-    slack, slope : float64 arrays, shape (n + 1,)
-    free, left : int64 arrays, shape (n + 1,)
-        Scratch.
+    parameters : tuple
+        See `Parameters`.
     """
-    x, y, count, first, last = floats[X], floats[Y], counts[POINTS], ints[FIRST], ints[LAST]
-    fill_moments(x, y, ints[LABEL], count, moments)
-    fill_tolerances(floats[RHO], count, noise, epsilon, sigmas, slack, slope)
-    n, state = np.int64(0), seed
-    for i in range(count):
-        free[i] = 1
-    for c in range(counts[CLASSES]):
+    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
+    prepare(work, moments, noise, p.epsilon, p.sigmas)
+    work.counts[at.PIECES] = 0
+    state = p.seed
+    for c in range(work.counts[at.CLUSTERS]):
+        first, last = work.clusters[at.FIRST, c], work.clusters[at.LAST, c]
         while True:
-            near, a, b, state = _consensus(
-                x,
-                y,
-                moments,
-                free,
-                left,
-                slack,
-                slope,
-                ints[CLASS_FIRST, c],
-                ints[CLASS_LAST, c],
-                trials,
-                window,
-                max_misses,
-                state,
-            )
-            if near < min_points or math.hypot(x[b] - x[a], y[b] - y[a]) < min_length:
+            near, a, b, state = _consensus(work, moments, first, last, p, state)
+            if not is_piece(work.points, near, a, b, p.min_points, p.min_length):
                 break
-            take_run(free, a, b, first, last, n)
-            n += 1
-    counts[PIECES], counts[CANDIDATES] = n, 0
+            take_run(work, a, b)
 
 
 @helper
-def _consensus(
-    x, y, moments, free, left, slack, slope, first, last, trials, window, max_misses, state
-):
-    """Find the longest run of free points of one class that agree with a line through two.
+def _consensus(work, moments, first, last, p, state):
+    """Find the longest run of free points of one cluster that agree with a line through two.
 
     Pairs are drawn from the free points and are `window` points apart at most. The best of their
     lines is fitted to its run, three times over, as points at random lie anywhere in the noise.
-    Returns as `runs.longest_run`, and the state of the generator.
+    Returns as `longest_run`, and the state of the generator.
     """
-    best, bx, by, bd = np.int64(0), 0.0, 0.0, 0.0
+    points, free, left = work.points, work.marks[at.FREE], work.marks[at.LEFT]
+    x, y = points[at.X], points[at.Y]
+    best, line = np.int64(0), (0.0, 0.0, 0.0)
     m = np.int64(0)
     for i in range(first, last + 1):
         left[m] = i
         m += free[i]
     if m < 2:
         return best, first, first, state
-    for _ in range(trials):
+    for _ in range(p.trials):
         state = draw(state)
         k = state % (m - 1)
         state = draw(state)
-        i, j = left[k], left[k + 1 + state % min(window, m - 1 - k)]
-        if j - i > window:
+        i, j = left[k], left[k + 1 + state % min(p.window, m - 1 - k)]
+        if j - i > p.window:
             continue
         nx, ny = y[j] - y[i], x[i] - x[j]
         norm = math.hypot(nx, ny)
         if norm == 0.0:
             continue
         nx, ny = nx / norm, ny / norm
-        d = nx * x[i] + ny * y[i]
-        near, _, _ = longest_run(x, y, free, slack, slope, first, last, nx, ny, d, 0.0, max_misses)
+        through = nx, ny, nx * x[i] + ny * y[i]
+        near, _, _ = longest_run(points, free, first, last, through, 0.0, p.max_misses)
         if near > best:
-            best, bx, by, bd = near, nx, ny, d
+            best, line = near, through
     if best == 0:
         return best, first, first, state
-    near, a, b = refined_run(
-        x, y, moments, free, slack, slope, first, last, bx, by, bd, 0.0, max_misses, 3
-    )
+    near, a, b = refined_run(work, moments, first, last, line, 0.0, p.max_misses, 3)
     return near, a, b, state
 
 
 @helper
 def draw(state):
-    """Next number of the least standard generator (Park and Miller), 1 … 2³¹ - 2."""
+    """Return the next number of the generator of Park and Miller (1988), 1 … 2³¹ - 2."""
     return state * 48271 % PERIOD

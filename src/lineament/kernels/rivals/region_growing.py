@@ -1,125 +1,85 @@
-"""Seeded region growing: straight regions that grow from a seed both ways."""
+"""Seeded region growing: straight regions that grow from a seed both ways.
 
-import math
+H. Gao, X. Zhang, Y. Fang, J. Yuan, *A line segment extraction algorithm using laser data based on
+seeded region growing*, International Journal of Advanced Robotic Systems 15 (2018).
+"""
 
-import numpy as np
+from typing import NamedTuple
 
 from .. import helper, kernel
-from ..layout import (
-    CANDIDATES,
-    CLASS_FIRST,
-    CLASS_LAST,
-    CLASSES,
-    FIRST,
-    LABEL,
-    LAST,
-    PIECES,
-    POINTS,
-    RHO,
-    X,
-    Y,
-)
-from .stretches import fill_moments, fill_tolerances, stretch_line
+from .. import layout as at
+from .stretches import is_piece, prepare, stretch_line
+
+
+class Parameters(NamedTuple):
+    """As in `methods.region_growing.RegionGrowing`."""
+
+    s_num: int
+    p_min: int
+    l_min: float
+    delta: float
+    epsilon: float
+    sigmas: float
 
 
 @kernel
-def grow_regions(
-    floats,
-    ints,
-    counts,
-    noise,
-    s_num,
-    p_min,
-    l_min,
-    delta,
-    epsilon,
-    sigmas,
-    moments,
-    slack,
-    slope,
-):
+def grow_regions(floats, ints, noise, parameters):
     """Find the straight regions of a scan. They may overlap where walls meet.
 
     Parameters
     ----------
-    floats, ints, counts
-        See `layout`. The lines by point are read; FIRST, LAST and PIECES are written.
+    floats, ints
+        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
     noise : float64 array, shape (4,)
-    s_num, p_min, l_min, delta, epsilon, sigmas
-        As in `methods.region_growing.RegionGrowing`.
-    moments : float64 array, shape (n + 1, MOMENTS)
-    slack, slope : float64 arrays, shape (n + 1,)
-        Scratch.
+    parameters : tuple
+        See `Parameters`.
     """
-    x, y, rho = floats[X], floats[Y], floats[RHO]
-    fill_moments(x, y, ints[LABEL], counts[POINTS], moments)
-    fill_tolerances(rho, counts[POINTS], noise, epsilon, sigmas, slack, slope)
-    n = np.int64(0)
-    for c in range(counts[CLASSES]):
-        n = _grow_class(
-            x,
-            y,
-            rho,
-            moments,
-            slack,
-            slope,
-            ints[CLASS_FIRST, c],
-            ints[CLASS_LAST, c],
-            s_num,
-            p_min,
-            l_min,
-            delta,
-            ints[FIRST],
-            ints[LAST],
-            n,
-        )
-    counts[PIECES], counts[CANDIDATES] = n, 0
+    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
+    prepare(work, moments, noise, p.epsilon, p.sigmas)
+    work.counts[at.PIECES] = 0
+    for c in range(work.counts[at.CLUSTERS]):
+        _grow_in_cluster(work, moments, work.clusters[at.FIRST, c], work.clusters[at.LAST, c], p)
 
 
 @helper
-def _grow_class(
-    x, y, rho, moments, slack, slope, start, stop, s_num, p_min, l_min, delta, first, last, n
-):
-    """Find the regions of one class, from `start` to `stop`. Returns the number of pieces."""
-    i, floor = start, start
-    while i + s_num - 1 <= stop:
-        a, b = i, i + s_num - 1
-        nx, ny, d, _ = stretch_line(x, y, moments, a, b)
-        if not _all_near(x, y, rho, slack, slope, a, b, nx, ny, d, delta):
+def _grow_in_cluster(work, moments, start, stop, p):
+    """Find the regions of one cluster, from `start` to `stop`."""
+    points, pieces, counts = work.points, work.pieces, work.counts
+    i, floor, delta = start, start, p.delta
+    while i + p.s_num - 1 <= stop:
+        a, b = i, i + p.s_num - 1
+        line = stretch_line(points, moments, a, b)
+        while a <= b and _is_near(points, a, line, delta):
+            a += 1
+        if a <= b:
             i += 1
             continue
-        while b < stop and _is_near(x, y, rho, slack, slope, b + 1, nx, ny, d, delta):
+        a = i
+        while b < stop and _is_near(points, b + 1, line, delta):
             b += 1
-            nx, ny, d, _ = stretch_line(x, y, moments, a, b)
-        while a > floor and _is_near(x, y, rho, slack, slope, a - 1, nx, ny, d, delta):
+            line = stretch_line(points, moments, a, b)
+        while a > floor and _is_near(points, a - 1, line, delta):
             a -= 1
-            nx, ny, d, _ = stretch_line(x, y, moments, a, b)
-        if b - a + 1 >= p_min and math.hypot(x[b] - x[a], y[b] - y[a]) >= l_min:
-            first[n], last[n] = a, b
-            n += 1
+            line = stretch_line(points, moments, a, b)
+        if is_piece(points, b - a + 1, a, b, p.p_min, p.l_min):
+            n = counts[at.PIECES]
+            pieces[at.FIRST, n], pieces[at.LAST, n] = a, b
+            counts[at.PIECES] += 1
             # The next may reach back into this one, but not over it.
             floor = a + 2
         # So does its seed, or a wall of few points would have no room for one.
-        i = b + 1 - s_num // 2
-    return n
+        i = b + 1 - p.s_num // 2
 
 
 @helper
-def _all_near(x, y, rho, slack, slope, first, last, nx, ny, d, delta):
-    for i in range(first, last + 1):
-        if not _is_near(x, y, rho, slack, slope, i, nx, ny, d, delta):
-            return False
-    return True
-
-
-@helper
-def _is_near(x, y, rho, slack, slope, i, nx, ny, d, delta):
+def _is_near(points, i, line, delta):
     """Whether a point is near a line, and near where its beam meets that line.
 
     Along the beam it is |n · p - d| / cos ψ away, with cos ψ = |n · p| / ρ.
     """
-    across = nx * x[i] + ny * y[i]
+    nx, ny, d, _ = line
+    rho, slope = points[at.RHO, i], points[at.SLOPE, i]
+    across = nx * points[at.X, i] + ny * points[at.Y, i]
     off = abs(across - d)
-    return off <= slack[i] + slope[i] * abs(d) and off * rho[i] <= (
-        delta + slope[i] * rho[i]
-    ) * abs(across)
+    on_line = off <= points[at.SLACK, i] + slope * abs(d)
+    return on_line and off * rho <= (delta + slope * rho) * abs(across)

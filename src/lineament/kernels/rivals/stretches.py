@@ -1,24 +1,29 @@
-"""Lines through stretches of consecutive points by running sums, each in O(1)."""
+"""Lines through stretches of consecutive points, in O(1) by running sums, and runs near a line.
+
+Orthogonal least squares, as K. Pearson, *On lines and planes of closest fit to systems of points in
+space*, Philosophical Magazine 2 (1901). What Hough transform, RANSAC and region growing share.
+"""
 
 import math
 
-from .. import helper
-from ..line_fit import range_variance
+import numpy as np
 
-#: Columns of the moments of a point.
-MOMENTS = 7
+from .. import helper
+from .. import layout as at
+from ..line_fit import range_variance
 
 
 @helper
-def fill_moments(x, y, label, count, moments):
-    """Sum x, y, xx, xy, yy over the points of a class before each of its points.
+def fill_moments(work, moments):
+    """Sum x, y, xx, xy, yy over the points of a cluster before each of its points.
 
-    About the first point of the class, not the far origin, so that they keep their digits; the
+    About the first point of the cluster, not the far origin, so that they keep their digits; the
     last two columns are that point.
     """
+    x, y, label = work.points[at.X], work.points[at.Y], work.marks[at.LABEL]
     x0, y0 = 0.0, 0.0
     sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(count):
+    for i in range(work.counts[at.POINTS]):
         if i == 0 or label[i] != label[i - 1]:
             x0, y0 = x[i], y[i]
             sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -34,10 +39,26 @@ def fill_moments(x, y, label, count, moments):
 
 
 @helper
-def stretch_sums(x, y, moments, first, last):
-    """Take the sums over the points `first`..`last` (inclusive) of one class."""
+def prepare(work, moments, noise, epsilon, sigmas):
+    """Fill the moments, and how far each point may lie from its line: ``slack + slope |d|``.
+
+    The noise of a range moves a point by σ_r cos ψ = σ_r |d|/ρ off a line at distance d; `sigmas`
+    times that, as much of the bearing's, and the misfit `epsilon` [m] are allowed. All points are
+    free.
+    """
+    fill_moments(work, moments)
+    rho, slack, slope = work.points[at.RHO], work.points[at.SLACK], work.points[at.SLOPE]
+    for i in range(work.counts[at.POINTS]):
+        slack[i] = epsilon + sigmas * noise[2] * rho[i]
+        slope[i] = sigmas * math.sqrt(range_variance(rho[i], noise)) / rho[i]
+        work.marks[at.FREE, i] = 1
+
+
+@helper
+def _sums(points, moments, first, last):
+    """Return the sums over the points `first`..`last` (inclusive) of one cluster."""
     a, b = moments[first], moments[last]
-    dx, dy = x[last] - b[5], y[last] - b[6]
+    dx, dy = points[at.X, last] - b[5], points[at.Y, last] - b[6]
     return (
         b[0] - a[0] + dx,
         b[1] - a[1] + dy,
@@ -79,30 +100,81 @@ def line_of_sums(x0, y0, n, sx, sy, sxx, sxy, syy):
 
 
 @helper
-def stretch_line(x, y, moments, first, last):
-    """Line through the points `first`..`last` (inclusive) of one class, as of `line_of_sums`."""
-    sx, sy, sxx, sxy, syy = stretch_sums(x, y, moments, first, last)
+def stretch_line(points, moments, first, last):
+    """Line through the points `first`..`last` (inclusive) of one cluster, as `line_of_sums`."""
+    sx, sy, sxx, sxy, syy = _sums(points, moments, first, last)
     x0, y0 = moments[first, 5], moments[first, 6]
     return line_of_sums(x0, y0, last - first + 1, sx, sy, sxx, sxy, syy)
 
 
 @helper
-def joint_line(x, y, moments, first, last, other_first, other_last):
-    """Line through two stretches of one class, without the points between."""
-    ax, ay, axx, axy, ayy = stretch_sums(x, y, moments, first, last)
-    bx, by, bxx, bxy, byy = stretch_sums(x, y, moments, other_first, other_last)
+def joint_line(points, moments, first, last, other_first, other_last):
+    """Line through two stretches of one cluster, without the points between."""
+    ax, ay, axx, axy, ayy = _sums(points, moments, first, last)
+    bx, by, bxx, bxy, byy = _sums(points, moments, other_first, other_last)
     n = last - first + 1 + other_last - other_first + 1
     x0, y0 = moments[first, 5], moments[first, 6]
     return line_of_sums(x0, y0, n, ax + bx, ay + by, axx + bxx, axy + bxy, ayy + byy)
 
 
 @helper
-def fill_tolerances(rho, count, noise, epsilon, sigmas, slack, slope):
-    """Prepare how far each point may lie from its line: ``slack + slope |d|``.
+def longest_run(points, free, first, last, line, margin, max_misses):
+    """Find the run of free points near a line n · p = d that has the most of them.
 
-    The noise of a range moves a point by σ_r cos ψ = σ_r |d|/ρ off a line at distance d; `sigmas`
-    times that, as much of the bearing's, and the unevenness `epsilon` [m] are allowed.
+    A run ends at a point that is not free, or where more than `max_misses` points in a row are
+    farther from the line than their tolerance and `margin` allow.
+
+    Returns
+    -------
+    near, begin, end : int
+        Number of near points, and the first and last of them (0, -1, -1 where there are none).
     """
-    for i in range(count):
-        slack[i] = epsilon + sigmas * noise[2] * rho[i]
-        slope[i] = sigmas * math.sqrt(range_variance(rho[i], noise)) / rho[i]
+    x, y, slack, slope = points[at.X], points[at.Y], points[at.SLACK], points[at.SLOPE]
+    nx, ny, d = line
+    best, best_begin, best_end = np.int64(0), np.int64(-1), np.int64(-1)
+    near, begin, end, distance = np.int64(0), first, first, abs(d)
+    for i in range(first, last + 1):
+        if not free[i] or (near > 0 and i - end > max_misses + 1):
+            near = np.int64(0)
+        if free[i] and abs(nx * x[i] + ny * y[i] - d) <= slack[i] + slope[i] * distance + margin:
+            begin = i if near == 0 else begin
+            near, end = near + 1, i
+            if near > best:
+                best, best_begin, best_end = near, begin, end
+    return best, best_begin, best_end
+
+
+@helper
+def refined_run(work, moments, first, last, line, margin, max_misses, passes):
+    """Find the longest run near a line; fit a line to it, and find that line's, again and again.
+
+    `margin` is for the first line only, which may be a coarse one. Returns as `longest_run`.
+    """
+    points, free = work.points, work.marks[at.FREE]
+    near, a, b = longest_run(points, free, first, last, line, margin, max_misses)
+    for _ in range(passes):
+        if near < 3:
+            break
+        nx, ny, d, _ = stretch_line(points, moments, a, b)
+        near, a, b = longest_run(points, free, first, last, (nx, ny, d), 0.0, max_misses)
+    return near, a, b
+
+
+@helper
+def is_piece(points, near, first, last, min_points, min_length):
+    """Whether a run has enough near points, and is long enough."""
+    dx, dy = points[at.X, last] - points[at.X, first], points[at.Y, last] - points[at.Y, first]
+    return near >= min_points and math.hypot(dx, dy) >= min_length
+
+
+@helper
+def take_run(work, begin, end):
+    """Add a run to the pieces, which stay in beam order, and take its points."""
+    first, last, k = work.pieces[at.FIRST], work.pieces[at.LAST], work.counts[at.PIECES]
+    for i in range(begin, end + 1):
+        work.marks[at.FREE, i] = 0
+    while k > 0 and first[k - 1] > begin:
+        first[k], last[k] = first[k - 1], last[k - 1]
+        k -= 1
+    first[k], last[k] = begin, end
+    work.counts[at.PIECES] += 1

@@ -2,21 +2,11 @@
 
 import math
 
+import numpy as np
+
 from .. import helper, kernel
 from .assignment import assign
-from ...features.records import (
-    A_CENTER,
-    A_COVARIANCE,
-    A_RADIUS,
-    C_COVARIANCE,
-    C_POSITION,
-    S_ANGLE,
-    S_CENTROID,
-    S_COVARIANCE,
-    S_END,
-    S_MISFIT,
-    S_START,
-)
+from ...features import records as at
 
 #: Length over which a surface, or a sensor, is off by the same [m].
 _PATCH = 0.3
@@ -32,25 +22,26 @@ def move(segments, corners, arcs, x, y, theta):
     c, s = math.cos(theta), math.sin(theta)
     for k in range(len(segments)):
         row = segments[k]
-        for at in (S_START, S_END, S_CENTROID):
-            p, q = row[at], row[at + 1]
-            row[at], row[at + 1] = c * p - s * q + x, s * p + c * q + y
-        row[S_ANGLE] = turned(row[S_ANGLE] + theta)
+        for place in (at.S_START, at.S_END, at.S_CENTROID):
+            p, q = row[place], row[place + 1]
+            row[place], row[place + 1] = c * p - s * q + x, s * p + c * q + y
+        row[at.S_ANGLE] = turned(row[at.S_ANGLE] + theta)
     for k in range(len(corners)):
-        _move_point(corners[k], C_POSITION, C_COVARIANCE, 2, c, s, x, y)
+        _move_point(corners[k], at.C_POSITION, at.C_COVARIANCE, 2, c, s, x, y)
     for k in range(len(arcs)):
         row = arcs[k]
-        _move_point(row, A_CENTER, A_COVARIANCE, 3, c, s, x, y)
-        a, b = row[A_COVARIANCE + 2], row[A_COVARIANCE + 5]
-        row[A_COVARIANCE + 2], row[A_COVARIANCE + 5] = c * a - s * b, s * a + c * b
-        a, b = row[A_COVARIANCE + 6], row[A_COVARIANCE + 7]
-        row[A_COVARIANCE + 6], row[A_COVARIANCE + 7] = c * a - s * b, s * a + c * b
+        _move_point(row, at.A_CENTER, at.A_COVARIANCE, 3, c, s, x, y)
+        a, b = row[at.A_COVARIANCE + 2], row[at.A_COVARIANCE + 5]
+        row[at.A_COVARIANCE + 2], row[at.A_COVARIANCE + 5] = c * a - s * b, s * a + c * b
+        a, b = row[at.A_COVARIANCE + 6], row[at.A_COVARIANCE + 7]
+        row[at.A_COVARIANCE + 6], row[at.A_COVARIANCE + 7] = c * a - s * b, s * a + c * b
 
 
 @helper
-def _move_point(row, at, covariance, size, c, s, x, y):
-    """Move a point, and the first two lines and columns of its covariance, of so many lines."""
-    row[at], row[at + 1] = c * row[at] - s * row[at + 1] + x, s * row[at] + c * row[at + 1] + y
+def _move_point(row, place, covariance, size, c, s, x, y):
+    """Move a point, and the first two rows and columns of its covariance, of so many rows."""
+    p, q = row[place], row[place + 1]
+    row[place], row[place + 1] = c * p - s * q + x, s * p + c * q + y
     xx, xy = row[covariance], row[covariance + 1]
     yx, yy = row[covariance + size], row[covariance + size + 1]
     row[covariance], row[covariance + 1], row[covariance + size + 1] = rotated(xx, xy, yx, yy, c, s)
@@ -58,9 +49,7 @@ def _move_point(row, at, covariance, size, c, s, x, y):
 
 
 @kernel
-def associate(
-    before, now, sides, spread, origin, roughness, gates, cost, paths, prices, via, owners
-):
+def associate(before, now, sides, spread, origin, roughness, gates):
     """Find which features of two frames are the same.
 
     Parameters
@@ -77,82 +66,80 @@ def associate(
         How far surfaces are from straight and round [m].
     gates : (float, float)
         Largest squares e'S⁻¹e of two and of three components.
-    cost : float64 array, shape (m, n + m)
-        Scratch for the largest numbers m of later and n of earlier features of a kind.
-    paths, prices, via
-        Scratch of `assign` for as many.
-    owners : int64 array, shape (3, n + m + 1)
-        Written: for each earlier segment, corner and arc the later one, or -1.
+
+    Returns
+    -------
+    (segments, corners, arcs)
+        int64 arrays: for each earlier feature the later one, or -1.
     """
     a, b = before[0], now[0]
-    within = _fresh_cost(cost, len(b), len(a), gates[0])
+    cost = _fresh_cost(len(b), len(a), gates[0])
     for j in range(len(a)):
-        _compare_segment(a[j], b, j, spread, origin, roughness, gates[0], within)
-    assign(within, paths, prices, via, owners[0])
+        _compare_segment(a[j], b, j, spread, origin, roughness, gates[0], cost)
+    segments = assign(cost)[: len(a)]
     a, b = before[1], now[1]
-    within = _fresh_cost(cost, len(b), len(a), gates[0])
+    cost = _fresh_cost(len(b), len(a), gates[0])
     for i in range(len(b)):
-        x, y = b[i, C_POSITION], b[i, C_POSITION + 1]
+        x, y = b[i, at.C_POSITION], b[i, at.C_POSITION + 1]
         xx, xy, yy = _point_spread(x - origin[0], y - origin[1], spread, roughness)
         for j in range(len(a)):
             if sides[0][j] == sides[1][i]:
                 square = _square(
-                    x - a[j, C_POSITION],
-                    y - a[j, C_POSITION + 1],
-                    xx + a[j, C_COVARIANCE] + b[i, C_COVARIANCE],
-                    xy + a[j, C_COVARIANCE + 1] + b[i, C_COVARIANCE + 1],
-                    yy + a[j, C_COVARIANCE + 3] + b[i, C_COVARIANCE + 3],
+                    x - a[j, at.C_POSITION],
+                    y - a[j, at.C_POSITION + 1],
+                    xx + a[j, at.C_COVARIANCE] + b[i, at.C_COVARIANCE],
+                    xy + a[j, at.C_COVARIANCE + 1] + b[i, at.C_COVARIANCE + 1],
+                    yy + a[j, at.C_COVARIANCE + 3] + b[i, at.C_COVARIANCE + 3],
                 )
                 if square <= gates[0]:
-                    within[i, j] = square
-    assign(within, paths, prices, via, owners[1])
+                    cost[i, j] = square
+    corners = assign(cost)[: len(a)]
     a, b = before[2], now[2]
-    within = _fresh_cost(cost, len(b), len(a), gates[1])
+    cost = _fresh_cost(len(b), len(a), gates[1])
     for i in range(len(b)):
         for j in range(len(a)):
             square = _compare_arcs(a[j], b[i], spread, origin, roughness)
             if square <= gates[1]:
-                within[i, j] = square
-    assign(within, paths, prices, via, owners[2])
+                cost[i, j] = square
+    return segments, corners, assign(cost)[: len(a)]
 
 
 @helper
-def _fresh_cost(cost, rows, columns, gate):
-    """Costs where nothing is allowed but to stay alone: each row in a column of its own."""
-    within = cost[:rows, : columns + rows]
+def _fresh_cost(rows, columns, gate):
+    """Costs where nothing is allowed but to stay alone: each row in a column for itself."""
+    cost = np.full((rows, columns + rows), math.inf)
     for i in range(rows):
-        for j in range(columns + rows):
-            within[i, j] = 2.0 * gate if j == columns + i else math.inf
-    return within
+        cost[i, columns + i] = 2.0 * gate
+    return cost
 
 
 @helper
 def _compare_segment(a, now, j, spread, origin, roughness, gate, cost):
     """Fill the costs of the later segments with the j-th earlier one, where they are within."""
-    tx, ty = math.cos(a[S_ANGLE]), math.sin(a[S_ANGLE])
+    tx, ty = math.cos(a[at.S_ANGLE]), math.sin(a[at.S_ANGLE])
     length = segment_length(a)
     for i in range(len(now)):
         b = now[i]
-        turn = turned(b[S_ANGLE] - a[S_ANGLE])
+        turn = turned(b[at.S_ANGLE] - a[at.S_ANGLE])
         if not abs(turn) < 0.5 * math.pi:
             continue
-        first = (b[S_START] - a[S_START]) * tx + (b[S_START + 1] - a[S_START + 1]) * ty
-        last = (b[S_END] - a[S_START]) * tx + (b[S_END + 1] - a[S_START + 1]) * ty
+        first = (b[at.S_START] - a[at.S_START]) * tx + (b[at.S_START + 1] - a[at.S_START + 1]) * ty
+        last = (b[at.S_END] - a[at.S_START]) * tx + (b[at.S_END + 1] - a[at.S_START + 1]) * ty
         shared, union = side_by_side(length, first, last)
         shorter = min(length, segment_length(b))
-        px, py = b[S_CENTROID] - origin[0], b[S_CENTROID + 1] - origin[1]
+        px, py = b[at.S_CENTROID] - origin[0], b[at.S_CENTROID + 1] - origin[1]
         xx, xy, yy = _point_spread(px, py, spread, roughness)
         slack = 2.0 * math.sqrt(tx * tx * xx + 2.0 * tx * ty * xy + ty * ty * yy)
         if not shared + slack >= _OVERLAP * shorter:
             continue
-        ax, ay = b[S_CENTROID] - a[S_CENTROID], b[S_CENTROID + 1] - a[S_CENTROID + 1]
+        ax, ay = b[at.S_CENTROID] - a[at.S_CENTROID], b[at.S_CENTROID + 1] - a[at.S_CENTROID + 1]
         normal = (-ty, tx, tx * px + ty * py)
         of_offset, of_angle = rough_variances(shorter, roughness)
         oo, oa, aa = offset_spread(a, ax * tx + ay * ty)
-        bow = a[S_MISFIT] * a[S_MISFIT] + b[S_MISFIT] * b[S_MISFIT]
-        oo += b[S_COVARIANCE] + of_offset + bow
-        oa += b[S_COVARIANCE + 1]
-        aa += b[S_COVARIANCE + 3] + of_angle + 12.0 * bow / (shorter * shorter) + spread[2, 2]
+        bow = a[at.S_MISFIT] * a[at.S_MISFIT] + b[at.S_MISFIT] * b[at.S_MISFIT]
+        oo += b[at.S_COVARIANCE] + of_offset + bow
+        oa += b[at.S_COVARIANCE + 1]
+        aa += b[at.S_COVARIANCE + 3] + of_angle + 12.0 * bow / (shorter * shorter) + spread[2, 2]
         for k in range(3):
             oa += normal[k] * spread[k, 2]
             for m in range(3):
@@ -166,15 +153,15 @@ def _compare_segment(a, now, j, spread, origin, roughness, gate, cost):
 @helper
 def _compare_arcs(a, b, spread, origin, roughness):
     """Square e'S⁻¹e of the distance of two arcs in place and radius; NaN if S is not known."""
-    x, y = b[A_CENTER], b[A_CENTER + 1]
-    p, q, r = x - a[A_CENTER], y - a[A_CENTER + 1], b[A_RADIUS] - a[A_RADIUS]
+    x, y = b[at.A_CENTER], b[at.A_CENTER + 1]
+    p, q, r = x - a[at.A_CENTER], y - a[at.A_CENTER + 1], b[at.A_RADIUS] - a[at.A_RADIUS]
     xx, xy, yy = _point_spread(x - origin[0], y - origin[1], spread, roughness)
-    xx += a[A_COVARIANCE] + b[A_COVARIANCE]
-    xy += a[A_COVARIANCE + 1] + b[A_COVARIANCE + 1]
-    yy += a[A_COVARIANCE + 4] + b[A_COVARIANCE + 4]
-    xr = a[A_COVARIANCE + 2] + b[A_COVARIANCE + 2]
-    yr = a[A_COVARIANCE + 5] + b[A_COVARIANCE + 5]
-    rr = a[A_COVARIANCE + 8] + b[A_COVARIANCE + 8] + roughness * roughness
+    xx += a[at.A_COVARIANCE] + b[at.A_COVARIANCE]
+    xy += a[at.A_COVARIANCE + 1] + b[at.A_COVARIANCE + 1]
+    yy += a[at.A_COVARIANCE + 4] + b[at.A_COVARIANCE + 4]
+    xr = a[at.A_COVARIANCE + 2] + b[at.A_COVARIANCE + 2]
+    yr = a[at.A_COVARIANCE + 5] + b[at.A_COVARIANCE + 5]
+    rr = a[at.A_COVARIANCE + 8] + b[at.A_COVARIANCE + 8] + roughness * roughness
     # By Schur's complement of the radius.
     rest = _square(p - xr * r / rr, q - yr * r / rr, xx - xr * xr / rr, xy - xr * yr / rr,
                    yy - yr * yr / rr)  # fmt: skip
@@ -203,7 +190,7 @@ def rotated(xx, xy, yx, yy, c, s):
 @helper
 def segment_length(row):
     """Length of a segment [m], more than 0."""
-    length = math.hypot(row[S_END] - row[S_START], row[S_END + 1] - row[S_START + 1])
+    length = math.hypot(row[at.S_END] - row[at.S_START], row[at.S_END + 1] - row[at.S_START + 1])
     return max(length, _LEAST_LENGTH)
 
 
@@ -234,10 +221,10 @@ def offset_spread(row, along):
 
     The offset is the less known the farther it is from the centroid.
     """
-    both = row[S_COVARIANCE + 1] + row[S_COVARIANCE + 2]
-    angle = row[S_COVARIANCE + 3]
-    offset = row[S_COVARIANCE] + along * both + along * along * angle
-    return offset, row[S_COVARIANCE + 1] + along * angle, angle
+    both = row[at.S_COVARIANCE + 1] + row[at.S_COVARIANCE + 2]
+    angle = row[at.S_COVARIANCE + 3]
+    offset = row[at.S_COVARIANCE] + along * both + along * along * angle
+    return offset, row[at.S_COVARIANCE + 1] + along * angle, angle
 
 
 @helper

@@ -2,17 +2,17 @@
 
 import math
 
+import numpy as np
+
 from .. import helper, kernel
 from .association import turned
-from ...features.records import A_CENTER, C_POSITION, S_CENTROID
-from .residuals import ERROR, FEIGNED, INFORMATION, JACOBIAN, SQUARE, fill_residuals
+from ...features import records as at
+from .residuals import COLUMNS, ERROR, FEIGNED, INFORMATION, JACOBIAN, SQUARE, fill_residuals
 from .symmetric import diagonalise, invert
 
-#: Scratch of shape (3, 3) that `estimate_motion` takes.
-MATRICES = 6
 #: What it returns for a bad prior or bad pairs.
 NOT_POSITIVE, NOT_THERE = -1, -2
-#: A direction that the features tell with a larger deviation than this counts as unobserved [m].
+#: A direction that the features show with a larger deviation than this counts as unobserved [m].
 _KNOWN = 0.1
 #: What the errors of the walls' own directions feign is this many deviations at most.
 _FEIGNED = 3.0
@@ -20,21 +20,7 @@ _ROUNDS, _SMALL = 20, 1e-7
 
 
 @kernel
-def estimate_motion(
-    before,
-    now,
-    sides,
-    pairs,
-    prior,
-    spread,
-    roughness,
-    quantiles,
-    matched,
-    rows,
-    squares,
-    matrices,
-    found,
-):
+def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantiles, found):
     """Estimate a motion by Gauss-Newton.
 
     Parameters
@@ -53,16 +39,8 @@ def estimate_motion(
         How far surfaces are from straight and round [m].
     quantiles : (float, float)
         Of e'Σ⁻¹e: beyond the first, pairs count less; the second is the median.
-    matched : bool array, shape (number of later segments,)
-        Scratch.
-    rows : float64 array, shape (number of pairs, `residuals.COLUMNS`)
-        Scratch.
-    squares : float64 array, shape (number of pairs,)
-        Scratch.
-    matrices : float64 array, shape (MATRICES, 3, 3)
-        Scratch.
     found : float64 array, shape (3, 3, 3)
-        Written: the motion in the first line of all, its covariance, and by line the directions
+        Written: the motion in the first row of all, its covariance, and by row the directions
         that are not observed.
 
     Returns
@@ -71,10 +49,16 @@ def estimate_motion(
         The number of directions that are not observed; NOT_POSITIVE if `spread` is not positive
         definite, NOT_THERE if pairs name features that are not there.
     """
-    known, information, feigned = matrices[0], matrices[1], matrices[2]
-    total, kept, vectors = matrices[3], matrices[4], matrices[5]
+    matrices, vectors = np.empty((5, 3, 3)), np.empty((3, 3))
+    known, information, feigned, total, kept = matrices
+    scale, gradient, off = vectors
     state, covariance, directions = found[0, 0], found[1], found[2]
-    scale, gradient, off = vectors[0], vectors[1], vectors[2]
+    count = len(pairs[0]) + len(pairs[1]) + len(pairs[2])
+    rows, squares, matched = (
+        np.empty((count, COLUMNS)),
+        np.empty(count),
+        np.zeros(len(now[0]), np.bool_),
+    )
     if not invert(spread, known):
         return NOT_POSITIVE
     if not _mark(before, now, pairs, matched):
@@ -87,7 +71,7 @@ def estimate_motion(
         n = fill_residuals(before, now, sides, pairs, matched, state, roughness, rows)
         _add_up(rows, n, _limit(rows, n, squares, quantiles), information, gradient, feigned)
         lost = _unobserved(information, feigned, scale, total, kept, directions)
-        # Nothing is taken from the features in directions that they do not tell.
+        # Nothing is taken from the features in directions that they do not show.
         _project(directions, lost, scale, kept)
         for k in range(3):
             off[k] = state[k] - prior[k]
@@ -107,8 +91,6 @@ def _mark(before, now, pairs, matched):
             i, j = pairs[kind][k, 0], pairs[kind][k, 1]
             if not (0 <= i < len(before[kind]) and 0 <= j < len(now[kind])):
                 return False
-    for j in range(len(matched)):
-        matched[j] = False
     for k in range(len(pairs[0])):
         matched[pairs[0][k, 1]] = True
     return True
@@ -119,10 +101,10 @@ def _distance(now, pairs):
     """Root of the mean squared distance of what was matched, 1 m at least [m]."""
     total, count = 0.0, 0
     for kind in range(3):
-        table, place = now[kind], (S_CENTROID, C_POSITION, A_CENTER)[kind]
+        table, place = now[kind], (at.S_CENTROID, at.C_POSITION, at.A_CENTER)[kind]
         for k in range(len(pairs[kind])):
-            at = pairs[kind][k, 1]
-            total += table[at, place] ** 2 + table[at, place + 1] ** 2
+            row = table[pairs[kind][k, 1]]
+            total += row[place] ** 2 + row[place + 1] ** 2
             count += 1
     return max(1.0, math.sqrt(total / max(count, 1)))
 
@@ -171,7 +153,7 @@ def _add_up(rows, n, limit, information, gradient, feigned):
 
 @helper
 def _unobserved(information, feigned, scale, scaled, vectors, directions):
-    """List the directions of which the information tells nothing, in scaled units; their number.
+    """List the directions of which the information says nothing, in scaled units; their number.
 
     `scaled` and `vectors` are scratch, shape (3, 3).
     """

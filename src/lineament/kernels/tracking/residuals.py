@@ -11,31 +11,21 @@ from .association import (
     side_by_side,
     turned,
 )
-from ...features.records import (
-    A_CENTER,
-    A_COVARIANCE,
-    C_COVARIANCE,
-    C_POSITION,
-    S_ANGLE,
-    S_CENTROID,
-    S_END,
-    S_MISFIT,
-    S_START,
-)
+from ...features import records as at
 
-#: Where a line of the table of pairs has two errors e; their derivatives J by (x, y, theta) of the
+#: Where a row of the table of pairs has two errors e; their derivatives J by (x, y, theta) of the
 #: motion, shape (2, 3); their information Σ⁻¹ as (xx, xy, yy), singular where only a part of them
 #: counts; how many deviations of its offset a segment seems to change by, with each part of the
 #: motion, because its direction is off by one deviation (0 of corners and arcs); and e'Σ⁻¹e.
 ERROR, JACOBIAN, INFORMATION, FEIGNED, SQUARE = 0, 2, 8, 11, 14
 COLUMNS = 15
-#: Segments whose direction is known worse than this are too short to tell a motion [rad].
+#: Segments whose direction is known worse than this are too short to show a motion [rad].
 _DIRECTED = 0.1
 
 
 @helper
 def fill_residuals(before, now, sides, pairs, matched, motion, roughness, rows):
-    """Fill a line of `rows` for each pair, of segments first, then corners and arcs.
+    """Fill a row of `rows` for each pair, of segments first, then corners and arcs.
 
     `matched` says of each later segment whether it is in a pair, `sides` between which segments the
     later corners are. A pair whose covariance is not known does not count.
@@ -49,13 +39,13 @@ def fill_residuals(before, now, sides, pairs, matched, motion, roughness, rows):
     for k in range(len(pairs[1])):
         i, j = pairs[1][k, 0], pairs[1][k, 1]
         a, b = before[1][i], now[1][j]
-        _of_points(a, b, C_POSITION, C_COVARIANCE, 2, motion, c, s, roughness, rows[n])
-        _leave_told(now[0], sides, j, matched, motion[2], rows[n])
+        _of_points(a, b, at.C_POSITION, at.C_COVARIANCE, 2, motion, c, s, roughness, rows[n])
+        _leave_known(now[0], sides, j, matched, motion[2], rows[n])
         n += 1
     for k in range(len(pairs[2])):
         i, j = pairs[2][k, 0], pairs[2][k, 1]
         a, b = before[2][i], now[2][j]
-        _of_points(a, b, A_CENTER, A_COVARIANCE, 3, motion, c, s, roughness, rows[n])
+        _of_points(a, b, at.A_CENTER, at.A_COVARIANCE, 3, motion, c, s, roughness, rows[n])
         n += 1
     for k in range(n):
         p, q = rows[k, ERROR], rows[k, ERROR + 1]
@@ -71,15 +61,18 @@ def _of_segments(a, b, motion, c, s, roughness, row):
     The misfit of a wall is the same in both frames, so far as both saw the same of it: it counts by
     the part that one of them saw alone.
     """
-    tx, ty = math.cos(a[S_ANGLE]), math.sin(a[S_ANGLE])
-    px, py = c * b[S_CENTROID] - s * b[S_CENTROID + 1], s * b[S_CENTROID] + c * b[S_CENTROID + 1]
-    ax, ay = px + motion[0] - a[S_CENTROID], py + motion[1] - a[S_CENTROID + 1]
+    tx, ty = math.cos(a[at.S_ANGLE]), math.sin(a[at.S_ANGLE])
+    px, py = (
+        c * b[at.S_CENTROID] - s * b[at.S_CENTROID + 1],
+        s * b[at.S_CENTROID] + c * b[at.S_CENTROID + 1],
+    )
+    ax, ay = px + motion[0] - a[at.S_CENTROID], py + motion[1] - a[at.S_CENTROID + 1]
     length = segment_length(a)
     # Ends of the later segment along the earlier one.
     ux, uy = c * tx + s * ty, c * ty - s * tx
-    begin = (motion[0] - a[S_START]) * tx + (motion[1] - a[S_START + 1]) * ty
-    first = begin + ux * b[S_START] + uy * b[S_START + 1]
-    last = begin + ux * b[S_END] + uy * b[S_END + 1]
+    begin = (motion[0] - a[at.S_START]) * tx + (motion[1] - a[at.S_START + 1]) * ty
+    first = begin + ux * b[at.S_START] + uy * b[at.S_START + 1]
+    last = begin + ux * b[at.S_END] + uy * b[at.S_END + 1]
     shared, union = side_by_side(length, first, last)
     alone = 1.0 - max(shared / union, 0.0)
     # The offset of the earlier line is asked for where the later one has its centroid.
@@ -88,14 +81,17 @@ def _of_segments(a, b, motion, c, s, roughness, row):
     oo, oa, aa = oo + other_oo, oa + other_oa, aa + other_aa
     shorter = min(length, segment_length(b))
     of_offset, of_angle = rough_variances(shorter, roughness)
-    bow = alone * (a[S_MISFIT] * a[S_MISFIT] + b[S_MISFIT] * b[S_MISFIT])
+    bow = alone * (a[at.S_MISFIT] * a[at.S_MISFIT] + b[at.S_MISFIT] * b[at.S_MISFIT])
     oo, aa = oo + of_offset + bow, aa + of_angle + 12.0 * bow / (shorter * shorter)
     for k in range(COLUMNS):
         row[k] = 0.0
     determinant = oo * aa - oa * oa
     if aa > _DIRECTED * _DIRECTED or not determinant > 0.0:
         return
-    row[ERROR], row[ERROR + 1] = ay * tx - ax * ty, turned(b[S_ANGLE] + motion[2] - a[S_ANGLE])
+    row[ERROR], row[ERROR + 1] = (
+        ay * tx - ax * ty,
+        turned(b[at.S_ANGLE] + motion[2] - a[at.S_ANGLE]),
+    )
     row[JACOBIAN], row[JACOBIAN + 1], row[JACOBIAN + 2] = -ty, tx, tx * px + ty * py
     row[JACOBIAN + 5] = 1.0
     row[INFORMATION] = aa / determinant
@@ -108,7 +104,7 @@ def _of_segments(a, b, motion, c, s, roughness, row):
 
 @helper
 def _of_points(a, b, place, covariance, size, motion, c, s, roughness, row):
-    """Distance of two points, whose covariances are the first of so many lines and columns."""
+    """Distance of two points, whose covariances are the first of so many rows and columns."""
     px, py = c * b[place] - s * b[place + 1], s * b[place] + c * b[place + 1]
     below, last = covariance + size, covariance + size + 1
     xx, xy, yy = rotated(b[covariance], b[covariance + 1], b[below], b[last], c, s)
@@ -128,22 +124,22 @@ def _of_points(a, b, place, covariance, size, motion, c, s, roughness, row):
 
 
 @helper
-def _leave_told(segments, sides, j, matched, turn, row):
-    """Leave out of a corner what its matched segments tell: it is where they meet."""
-    told, angle = 0, 0.0
+def _leave_known(segments, sides, j, matched, turn, row):
+    """Leave out of a corner what its matched segments say: it is where they meet."""
+    matches, angle = 0, 0.0
     for side in range(2):
         segment = sides[j, side]
         if 0 <= segment < len(matched) and matched[segment]:
-            told += 1
-            if told == 1:
-                angle = segments[segment, S_ANGLE] + turn
-    if told == 0:
+            matches += 1
+            if matches == 1:
+                angle = segments[segment, at.S_ANGLE] + turn
+    if matches == 0:
         return
     # What remains is the place along the one of them, if it is one: u u' / u'Σu.
     x, y = math.cos(angle), math.sin(angle)
     xx, xy, yy = row[INFORMATION], row[INFORMATION + 1], row[INFORMATION + 2]
     determinant = xx * yy - xy * xy
     along = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / determinant
-    known = 1.0 / along if told == 1 and determinant > 0.0 else 0.0
+    known = 1.0 / along if matches == 1 and determinant > 0.0 else 0.0
     row[INFORMATION], row[INFORMATION + 1] = known * x * x, known * x * y
     row[INFORMATION + 2] = known * y * y

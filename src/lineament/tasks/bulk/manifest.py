@@ -1,21 +1,22 @@
-"""The manifest of a data set: what became of each log, one line of JSON a log."""
+"""The manifest of a data set: the name of each log and what became of it, one line of JSON each."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from ...files import naming_errors, write_text
 from ...logs.lines import reading
+from ...logs.sources import is_address
 
-__all__ = ["MANIFEST", "Manifest", "Row"]
-
-#: Its name in the folder. What begins with "_" is no data for Arrow, Hive and Spark.
+#: File name in the folder: Arrow, Hive and Spark skip what begins with "_".
 MANIFEST = "_manifest.jsonl"
 
 
@@ -26,39 +27,23 @@ class Row:
     Attributes
     ----------
     log : str
-        Its full path, or its address.
+        Full path, or address.
     name : str
-        What it is called in the data set: the value of the column ``log``.
+        Name in the data set: the value of the column ``log``.
     outcome : str
-        ``pending`` (not reached, or stopped in), ``done`` or ``failed``.
+        ``pending`` (not reached, or interrupted), ``done`` or ``failed``.
     error : str
         Why it failed.
     output : str
-        Its file, seen from the folder of the data set.
-    bytes : int
-        Size of that file.
-    topics : list of str
-        The topics of the scans.
-    scans : int
-        Scans that were read.
-    features : dict of str to int
-        Features of each kind.
-    invalid : float
-        Share of the beams that are invalid.
-    skipped : int
-        Faults of the log that were left out.
-    faults : list of str
-        What the first of them were.
-    seconds : float
-        Wall time that it took.
+        Its file, relative to the folder of the data set, of size `bytes`.
+    topics, scans, features, invalid, skipped, faults, seconds
+        As in `Extraction`.
     log_bytes : int or None
-        Size of the log; None where it is not known.
+        Size of the log; None if unknown.
     log_state : str
-        What changes when the log does: the time of its last change, or what its store tells.
-    version : str
-        The version of lineament.
-    configuration : dict
-        The method, its parameters, the noise, and how the log is read.
+        Time of the last change of the log, or what its store reports.
+    version, configuration
+        Version of lineament; method, parameters, noise, and how the log is read.
 
     Examples
     --------
@@ -94,7 +79,7 @@ _NAMES = ("log", "name", "outcome", "output")
 
 
 def _row_of(line: bytes) -> Row | None:
-    """Read a row; None for a line that a crash has torn."""
+    """Return the row of a line; None if a crash has torn it."""
     try:
         record = json.loads(line)
     except (ValueError, RecursionError):
@@ -110,8 +95,8 @@ class Manifest:
     Parameters
     ----------
     folder : path-like
-        The folder of the data set. A manifest that is there is read; where it has several rows of
-        a log the last one counts, and a line that a crash has torn is left out.
+        The data set. An existing manifest is read: of several rows of a log the last counts, and
+        torn lines are skipped.
 
     Raises
     ------
@@ -139,10 +124,10 @@ class Manifest:
 
     @contextmanager
     def recording(self) -> Iterator[Callable[[Row], None]]:
-        """Give a function that records a row, which is on the disk when it returns.
+        """Yield a function that appends a row and flushes it to disk.
 
-        Before and after, also when an exception ends the block, the file is written anew with one
-        row a log, sorted by name.
+        Before and after, also after an exception, the file is rewritten with one row a log, sorted
+        by name.
 
         Raises
         ------
@@ -169,3 +154,81 @@ class Manifest:
     def _save(self) -> None:
         rows = sorted(self.rows.values(), key=lambda row: (row.name, row.log))
         write_text(self.path, "".join(row.to_json() for row in rows))
+
+
+def full_path(log: str) -> str:
+    """Return the path or address under which every process finds a log.
+
+    Examples
+    --------
+    >>> full_path("s3://robots/a.bag")
+    's3://robots/a.bag'
+    """
+    return log if is_address(log) else os.path.abspath(log)  # noqa: PTH100 (keeps links)
+
+
+def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
+    """Name logs: as before, else by the shortest end of the path that is unique.
+
+    Parameters
+    ----------
+    logs : iterable of str
+        Full paths or addresses.
+    known : mapping of str to str
+        Names that logs have already; no other log gets them.
+
+    Returns
+    -------
+    dict of str to str
+        The name of each log. No two differ in case alone.
+
+    Examples
+    --------
+    >>> names = names_of(["/mon/a.bag", "/tue/a.bag", "/tue/b.bag"], {})
+    >>> list(names.values())
+    ['mon/a.bag', 'tue/a.bag', 'b.bag']
+    >>> names_of(["/wed/b.bag"], names | {"/tue/b.bag": "b.bag"})
+    {'/wed/b.bag': 'wed/b.bag'}
+    """
+    logs = list(dict.fromkeys(logs))
+    names = {log: known[log] for log in logs if log in known}
+    taken = {name.casefold() for name in known.values()}
+    left = {log: _parts(log) for log in logs if log not in names}
+    depth = 1
+    while left:
+        deepest = depth > max(map(len, left.values()))
+        ends = {log: "/".join(parts[-depth:]) for log, parts in left.items()}
+        counts = Counter(end.casefold() for end in ends.values())
+        for log, end in ends.items():
+            if deepest:
+                end = _numbered(end, taken)
+            elif counts[end.casefold()] > 1 or end.casefold() in taken:
+                continue
+            names[log] = end
+            taken.add(end.casefold())
+            del left[log]
+        depth += 1
+    return {log: names[log] for log in logs}
+
+
+def _parts(log: str) -> list[str]:
+    return [part for part in log.replace(os.sep, "/").split("/") if part]
+
+
+def _numbered(name: str, taken: set[str]) -> str:
+    """Return a numbered name for one that differs from another in case alone."""
+    number = 1
+    while (numbered := f"{name}~{number}").casefold() in taken:
+        number += 1
+    return numbered
+
+
+def part_path(name: str, ending: str) -> str:
+    """Return where the file of a log is in a data set, partitioned as Hive does.
+
+    Examples
+    --------
+    >>> part_path("mon/a.bag", ".parquet")
+    'log=mon%2Fa.bag/part-0.parquet'
+    """
+    return f"log={quote(name, safe=' ', errors='surrogateescape')}/part-0{ending}"

@@ -13,15 +13,13 @@ from typing import Any
 from ...errors import LineamentError
 from ...extractor import Extractor
 from ...files import made_folder
-from ...logs.remote import is_address
+from ...logs.sources import is_address
 from ...methods import Method
 from ...scan import RangeNoise
 from ..extract import extract_log
 from .manifest import Row
 
-__all__ = ["Report", "Task", "extract_part", "failed", "log_state"]
-
-#: ``report(scans, total)`` tells how far a log is.
+#: Called as ``report(scans, total)``.
 Report = Callable[[int, int], None]
 
 #: Seconds between two reports.
@@ -30,53 +28,24 @@ _PERIOD = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """All that a worker needs to know, wherever it runs.
-
-    Parameters
-    ----------
-    row : Row
-        The log, its name, its output, and the configuration.
-    folder : str
-        Full path of the data set.
-    method : Method
-        The method.
-    noise : RangeNoise or None
-        The noise, unless it is estimated.
-    reading : dict
-        How the log is read, as `open_log` takes it.
-    """
+    """All that a worker needs, wherever it runs."""
 
     row: Row
-    folder: str
+    folder: str  # full path of the data set
     method: Method
     noise: RangeNoise | None
-    reading: dict[str, Any]
+    reading: dict[str, Any]  # as for `open_log`
 
 
-def _unreported(scans: int, total: int) -> None:
-    """Report to nobody."""
+def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:  # noqa: ARG005
+    """Extract the features of one log into its file; return the completed row.
 
-
-def extract_part(task: Task, report: Report = _unreported) -> Row:
-    """Extract the features of one log into its file.
-
-    Whatever is wrong with the log is told by the row, and stops no other log.
-
-    Parameters
-    ----------
-    task : Task
-        The log.
-    report : callable
-        ``report(scans, total)`` is called several times a second. What it raises ends the work.
-
-    Returns
-    -------
-    Row
-        The row of the task, completed.
+    A fault of the log is in the row. `report` is called several times a second; what it raises ends
+    the work.
     """
     started = time.perf_counter()
     part = Path(task.folder, task.row.output)
-    # Before it is read: a log that grows meanwhile is not what its row says, and is done again.
+    # Taken before it is read: a log that grows meanwhile is done again.
     size, state = log_state(task.row.log)
     row = replace(task.row, log_bytes=size, log_state=state)
     try:
@@ -113,12 +82,12 @@ def extract_part(task: Task, report: Report = _unreported) -> Row:
 
 
 def failed(row: Row, error: str) -> Row:
-    """Complete the row of a log that failed."""
+    """Return the row of a log that failed."""
     return replace(row, outcome="failed", error=" ".join(error.split()))
 
 
 def _clear(folder: Path) -> None:
-    """Remove what a worker that was killed has left of its file."""
+    """Remove what a killed worker left of its file."""
     for left in folder.glob(".part-0.*.part"):
         with suppress(OSError):
             left.unlink()
@@ -126,11 +95,11 @@ def _clear(folder: Path) -> None:
 
 def _reporting(report: Report) -> Callable[[Any, str, int], Iterable[Any]]:
     def track(items: Iterable[Any], about: str, total: int) -> Iterator[Any]:  # noqa: ARG001
-        told = -_PERIOD
+        last = -_PERIOD
         for done, item in enumerate(items):
             now = time.monotonic()
-            if now - told >= _PERIOD:
-                told = now
+            if now - last >= _PERIOD:
+                last = now
                 report(done, total)
             yield item
 
@@ -138,23 +107,13 @@ def _reporting(report: Report) -> Callable[[Any, str, int], Iterable[Any]]:
 
 
 def log_state(log: str) -> tuple[int | None, str]:
-    """Tell the size of a log, and what changes when the log does.
+    """Return the size of a log [bytes], and what changes when the log does; (None, '') if unknown.
 
-    Returns
-    -------
-    size : int or None
-        Bytes; of the whole archive for a log in one. None if it is not known.
-    state : str
-        The time of the last change [ns], or what the store of an address tells; empty if unknown.
-
-    Examples
-    --------
-    >>> log_state("/none.bag")
-    (None, '')
+    Of a log in an archive they are those of the archive; of an address, what its store reports.
     """
     try:
         return _remote_state(log) if is_address(log) else _local_state(Path(log))
-    except Exception:  # whatever a driver raises: opening the log tells what is wrong
+    except Exception:  # whatever a driver raises: opening the log reports it
         return None, ""
 
 

@@ -20,14 +20,11 @@ from ...features import COUNTED
 from ...files import made_folder
 from ...logs import find_logs, open_log
 from ...logs.base import ReadOptions
+from ...logs.sources import is_address
 from ...output import open_writer
-from .manifest import Manifest, Row
-from .naming import full_path, names_of, part_path
+from .manifest import Manifest, Row, full_path, names_of, part_path
 from .parts import Task, extract_part, failed, log_state
-from .progress import Progress
 from .workers import Threads
-
-__all__ = ["Bulk", "extract_logs"]
 
 #: Seconds between two looks at the progress.
 _PERIOD = 0.5
@@ -35,26 +32,16 @@ _PERIOD = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Bulk:
-    """What came of many logs.
+    """Result of a run over many logs.
 
     Attributes
     ----------
-    folder : str
-        The data set.
-    manifest : str
-        Its manifest.
-    logs : int
-        Logs that were asked for.
-    whole : int
-        Those that were whole before, and left.
-    failed : int
-        Those that failed.
-    scans : int
-        Scans that were read.
-    features : dict of str to int
-        Features of each kind.
-    seconds : float
-        Wall time.
+    folder, manifest : str
+        The data set and its manifest.
+    logs, whole, failed : int
+        Logs asked for; those that were complete before and skipped; those that failed.
+    scans, features, seconds
+        As in `Extraction`, over the logs of this run.
     """
 
     folder: str
@@ -88,43 +75,36 @@ def extract_logs(
     executor: Executor | None = None,
     ending: str = ".parquet",
     resume: bool = False,
-    tell: Callable[[str], None] = lambda about: None,  # noqa: ARG005
+    show: Callable[[str], None] = lambda text: None,  # noqa: ARG005
     **reading: Any,
 ) -> Bulk:
     """Extract the features of many logs into a partitioned data set, one file a log.
 
-    The file of a log lies at ``log=NAME/part-0.parquet``: Arrow, DuckDB and Spark read the folder
-    as one table with a column ``log``. Logs that were extracted into the folder before stay in it.
-    What becomes of each log stands in the manifest from the moment it is known; a log that fails
-    stops no other. Tables depend neither on the executor nor on the order of the logs.
+    The file of a log is ``log=NAME/part-0.parquet``: Arrow, DuckDB and Spark read the folder as one
+    table with a column ``log``. Logs extracted into the folder before stay in it. The manifest
+    records each log as soon as it ends; a log that fails stops no other. Tables depend neither on
+    the executor nor on the order of the logs.
 
     Parameters
     ----------
     logs : path-like, or iterable of them
-        What `find_logs` takes: files, folders, patterns, archives, addresses.
+        As for `find_logs`: files, folders, patterns, archives, addresses.
     folder : path-like
-        The data set; made if it is not there. One run at a time may write to it.
+        The data set; created if missing. One run at a time may write to it.
     extractor : Extractor
-        The method and the noise. Each worker has its own extractor of them.
+        Method and noise; each worker makes an extractor from them.
     executor : concurrent.futures.Executor, optional
-        Where the logs are worked on: `Threads` (one a processor, if not given), `Processes`, that
-        of `dask_executor`, or any other. Those of this package tell how far each log is, and end
-        promptly when they are interrupted.
+        `Threads` (default, one a processor), `Processes`, that of `dask_executor`, or any other.
+        Those of this package report progress within a log, and end promptly when interrupted.
     ending : str
-        Of the files: any that `open_writer` knows.
+        Ending of the files, any that `open_writer` knows.
     resume : bool
-        Leave the logs that are whole: done by this version with this configuration, their files of
-        the size that the manifest tells, and the logs unchanged.
-    tell : callable
-        ``tell(about)`` is told, in a few words, how far the run is.
+        Skip logs that are complete: done by this version with this configuration, the file of the
+        size in the manifest, and the log unchanged.
+    show : callable
+        ``show(text)`` is called twice a second with the progress.
     **reading
-        How logs are read: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``, as for
-        `open_log`.
-
-    Returns
-    -------
-    Bulk
-        Sums over the logs of this run.
+        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``.
 
     Raises
     ------
@@ -148,7 +128,7 @@ def extract_logs(
     """
     started = time.perf_counter()
     settings = _settings(reading)
-    open_writer(f"part-0{ending}")  # refuses what is no ending, before anything is computed
+    open_writer(f"part-0{ending}")  # refuses an unknown ending before anything is computed
     found = [full_path(log) for log in find_logs(logs)]
     manifest = Manifest(made_folder(folder))
     names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
@@ -169,9 +149,9 @@ def extract_logs(
     manifest.rows |= {row.log: row for row in todo}
     if executor is None:
         with Threads() as threads:
-            _run(tasks, threads, manifest, tell)
+            _run(tasks, threads, manifest, show)
     else:
-        _run(tasks, executor, manifest, tell)
+        _run(tasks, executor, manifest, show)
     done = [manifest.rows[row.log] for row in todo]
     return Bulk(
         folder=str(folder),
@@ -185,11 +165,61 @@ def extract_logs(
     )
 
 
+class _Progress:
+    """How far a run over these logs is, from what the workers report."""
+
+    def __init__(self, logs: Iterable[str]) -> None:
+        # Many stores take long to report sizes.
+        sizes = {log: None if is_address(log) else log_state(log)[0] for log in logs}
+        known = [size for size in sizes.values() if size]
+        typical = sum(known) / len(known) if known else 1.0
+        # A log weighs its size, or that of a typical one, in the time left.
+        self._weights = {log: size or typical for log, size in sizes.items()}
+        self._started = time.monotonic()
+        self._under_way: dict[str, tuple[int, int]] = {}
+        self._done, self._failed, self._scans, self._weight_done = 0, 0, 0, 0.0
+
+    def report(self, log: str, scans: int, total: int) -> None:
+        """Note how far a log is, from any thread."""
+        self._under_way[log] = scans, total
+
+    def finish(self, row: Row) -> None:
+        """Note that a log is done or has failed."""
+        self._under_way.pop(row.log, None)
+        self._done += 1
+        self._failed += row.outcome != "done"
+        self._scans += row.scans
+        self._weight_done += self._weights[row.log]
+
+    def __str__(self) -> str:
+        seconds = max(time.monotonic() - self._started, 1e-9)
+        under_way = list(self._under_way.items())
+        scans = self._scans + sum(done for _, (done, _) in under_way)
+        weight = self._weight_done + sum(
+            self._weights[log] * done / max(total, 1) for log, (done, total) in under_way
+        )
+        share = weight / sum(self._weights.values())
+        parts = [f"{self._done}/{len(self._weights)} logs"]
+        if self._failed:
+            parts.append(f"{self._failed} failed")
+        parts.append(f"{scans / seconds:.0f} scans/s")
+        if share > 0:
+            parts.append(f"{_duration(seconds * max(1 / share - 1, 0.0))} left")
+        return ", ".join(parts)
+
+
+def _duration(seconds: float) -> str:
+    """Format a duration: 75.4 as 1:15, 3600 as 1:00:00."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
 def _run(
-    tasks: list[Task], executor: Executor, manifest: Manifest, tell: Callable[[str], None]
+    tasks: list[Task], executor: Executor, manifest: Manifest, show: Callable[[str], None]
 ) -> None:
     """Work on all tasks, and record each as it ends."""
-    progress = Progress(task.row.log for task in tasks)
+    progress = _Progress(task.row.log for task in tasks)
     ended: SimpleQueue[Future[Row]] = SimpleQueue()
     rows: dict[Future[Row], Row] = {}
     with manifest.recording() as record:
@@ -207,7 +237,7 @@ def _run(
                     row = _result(future, rows.pop(future))
                     progress.finish(row)
                     record(row)
-                tell(str(progress))
+                show(str(progress))
         except BaseException:
             _stop(executor, rows)
             for future in rows:
@@ -216,14 +246,14 @@ def _run(
             raise
 
 
-def _begin(task: Task, executor: Executor, progress: Progress) -> Future[Row]:
+def _begin(task: Task, executor: Executor, progress: _Progress) -> Future[Row]:
     if isinstance(executor, Threads):
         return executor.begin(task, partial(progress.report, task.row.log))
     return executor.submit(extract_part, task)
 
 
 def _result(future: Future[Row], row: Row) -> Row:
-    """Return the row of a task that ended; a worker that was lost is told as a failure."""
+    """Return the row of a task that ended; a lost worker is a failure."""
     try:
         return future.result()
     except (Exception, CancelledError) as error:
@@ -238,7 +268,7 @@ def _stop(executor: Executor, futures: Iterable[Future[Row]]) -> None:
 
 
 def _settings(reading: dict[str, Any]) -> dict[str, Any]:
-    """Return how logs are read, the defaults too."""
+    """Return the options of reading, with defaults."""
     parameters = inspect.signature(open_log).parameters.values()
     defaults = {p.name: p.default for p in parameters if p.default is not p.empty}
     for name in reading:
@@ -250,26 +280,26 @@ def _settings(reading: dict[str, Any]) -> dict[str, Any]:
 
 
 def _configuration(extractor: Extractor, settings: dict[str, Any]) -> dict[str, Any]:
-    """Describe all that a table depends on besides its log, as JSON has it."""
+    """Return all that a table depends on besides its log, as JSON."""
     method = cast(Any, extractor.method)
-    told = {
+    configuration = {
         "method": method.name,
         "parameters": asdict(method),
         "noise": None if extractor.noise is None else asdict(extractor.noise),
         "reading": settings,
     }
-    return cast(dict[str, Any], json.loads(json.dumps(told)))
+    return cast(dict[str, Any], json.loads(json.dumps(configuration)))
 
 
 def _unfinished(rows: list[Row], manifest: Manifest) -> list[Row]:
-    # Many at a time, as logs at addresses take a while to tell their state.
+    # In parallel: stores take a while to answer.
     with ThreadPoolExecutor(16) as pool:
         whole = pool.map(lambda row: _is_whole(row, manifest), rows)
         return [row for row, is_whole in zip(rows, whole, strict=True) if not is_whole]
 
 
 def _is_whole(row: Row, manifest: Manifest) -> bool:
-    """Whether the manifest has this row as done, and neither its file nor its log has changed."""
+    """Whether the manifest has this row as done, its file and its log unchanged."""
     before = manifest.rows.get(row.log)
     if before is None or before.outcome != "done":
         return False

@@ -12,15 +12,13 @@ from multiprocessing.connection import Connection
 from threading import Event
 from typing import Any
 
-from ...errors import LineamentError
+from ...errors import LineamentError, needed_by
 from .manifest import Row
 from .parts import Report, Task, extract_part, failed
 
-__all__ = ["Processes", "Threads", "cores", "dask_executor"]
-
-#: Seconds after which a worker looks whether it is to stop, and after which it has to have ended.
+#: Seconds between two looks at whether to stop, and until a process is killed.
 _PERIOD, _PATIENCE = 0.2, 3.0
-#: Seconds within which a Dask scheduler has to answer.
+#: Seconds to wait for a Dask scheduler.
 _ANSWER = 10.0
 
 
@@ -32,19 +30,7 @@ def cores() -> int:
 
 
 class Threads(ThreadPoolExecutor):
-    """Threads of this process. They share its memory, and wait for each other's Python.
-
-    Parameters
-    ----------
-    count : int, optional
-        How many; one a processor if not given.
-
-    Examples
-    --------
-    >>> with Threads(2) as executor:
-    ...     executor.submit(max, 1, 2).result()
-    2
-    """
+    """Threads of this process, one a processor unless `count` is given."""
 
     def __init__(self, count: int | None = None) -> None:
         super().__init__(count or cores())
@@ -55,32 +41,23 @@ class Threads(ThreadPoolExecutor):
         return self.submit(extract_part, task, self._stoppable(report))
 
     def stop(self) -> None:
-        """End all work promptly, and wait for that; half files go."""
+        """End all work promptly and wait; partial files are removed."""
         self._stopping.set()
         self.shutdown(cancel_futures=True)
 
     def _stoppable(self, report: Report) -> Report:
-        def told(scans: int, total: int) -> None:
+        def stoppable(scans: int, total: int) -> None:
             if self._stopping.is_set():
                 raise KeyboardInterrupt
             report(scans, total)
 
-        return told
+        return stoppable
 
 
 class Processes(Threads):
-    """Threads that each hand their task to a process of its own.
+    """Threads that each run their tasks in a child process.
 
-    So it is known in which log a process has died, and the others go on. A task whose process dies
-    is tried once more.
-
-    Parameters
-    ----------
-    count : int, optional
-        How many; one a processor if not given.
-
-    Notes
-    -----
+    A process that dies is known by its log, and the others go on; its task is tried once more.
     Processes are spawned: a script that uses them needs ``if __name__ == "__main__":``.
     """
 
@@ -106,8 +83,7 @@ class Processes(Threads):
             else:
                 self._idle.append(worker)
                 return row
-        told = f"{task.row.log}: its process died twice ({', '.join(deaths)})"
-        return failed(task.row, told)
+        return failed(task.row, f"{task.row.log}: its process died twice ({', '.join(deaths)})")
 
     def _free_worker(self) -> _Worker:
         try:
@@ -146,17 +122,17 @@ class _Worker:
             report(scans, total)
 
     def end(self) -> str:
-        """End the process, and tell how it ended."""
-        # By a signal; if that is lost, its next report finds nobody; if it makes none, by force.
+        """End the process; return how it ended."""
+        # By a signal; if that is lost, its next report fails; if it makes none, by force.
         for end in (self._process.terminate, self._pipe.close, self._process.kill):
             if self._process.exitcode is None:
                 end()
                 self._process.join(_PATIENCE)
         self._pipe.close()
-        return _told(self._process.exitcode)
+        return _ending_of(self._process.exitcode)
 
 
-def _told(status: int | None) -> str:
+def _ending_of(status: int | None) -> str:
     if status is None or status >= 0:
         return f"exit status {status}"
     with suppress(ValueError):
@@ -165,8 +141,8 @@ def _told(status: int | None) -> str:
 
 
 def _serve(pipe: Connection) -> None:
-    """Do what comes through the pipe, until its other end is gone: with it the run is."""
-    # Ctrl-C reaches all processes of a terminal: the one that was started ends the others.
+    """Run the tasks from the pipe until its other end closes."""
+    # Ctrl-C reaches all processes of a terminal: the parent ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
     with suppress(EOFError, OSError):
@@ -176,14 +152,14 @@ def _serve(pipe: Connection) -> None:
 
 
 def _leave(number: int, _frame: Any) -> None:
-    # As an exception, so that a half file goes; a second one would come in the middle of that.
+    # As an exception, so that a partial file is removed; a second signal would interrupt that.
     signal.signal(number, signal.SIG_IGN)
     raise SystemExit
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Keep Ctrl-C from a process that starts, and does not ignore it yet."""
+    """Keep Ctrl-C from a process that starts and does not ignore it yet."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -200,22 +176,20 @@ def _interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def dask_executor(address: str) -> Iterator[Executor]:
-    """Give the executor of a Dask cluster, whose workers see the same files under the same paths.
+    """Yield the executor of a Dask cluster whose workers see the same paths.
 
     Parameters
     ----------
     address : str
-        Of its scheduler, such as ``tcp://10.0.0.1:8786``.
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
 
     Raises
     ------
     LineamentError
         If `distributed` is not installed, or no scheduler answers.
     """
-    try:
+    with needed_by(f"{address}:"):
         from distributed import Client
-    except ModuleNotFoundError:
-        raise LineamentError(f"{address}: needs Dask: pip install lineament[dask]") from None
     try:
         client = Client(address, timeout=_ANSWER)
     except (OSError, ValueError) as error:

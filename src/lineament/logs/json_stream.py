@@ -1,7 +1,5 @@
 """Streams of JSON objects, one after the other, in bounded memory."""
 
-from __future__ import annotations
-
 import codecs
 import json
 import os
@@ -12,9 +10,7 @@ from typing import Any
 from ..errors import LogError
 from .lines import chunks
 
-__all__ = ["MAX_OBJECT", "json_objects"]
-
-#: Length of an object from which it is no scan any more [characters].
+#: Longest object that is read [characters].
 MAX_OBJECT = 1 << 22
 #: What is broken may be read several times, up to so many characters beside 16 times the whole.
 SPARE = 1 << 24
@@ -34,20 +30,8 @@ def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogE
     goes on at the next line that begins with a brace; in a file that is broken all over, where that
     would take much longer than to read it, it ends.
 
-    Parameters
-    ----------
-    path : path-like
-        The file. Memory holds one object and one piece of it.
-
-    Yields
-    ------
-    dict or LogError
-        An object; or a fault, with the line on which what is broken begins.
-
-    Raises
-    ------
-    LogError
-        If the file cannot be opened.
+    Memory holds one object and one piece of the file. A fault has the line on which what is broken
+    begins; LogError if the file cannot be opened.
 
     Examples
     --------
@@ -68,10 +52,8 @@ def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogE
                 yield LogError(path, str(error), line=line)
             text.skip_to_object()
         else:
-            if isinstance(found, dict):
-                yield found
-            else:
-                yield LogError(path, "is no JSON object", line=line)
+            is_object = isinstance(found, dict)
+            yield found if is_object else LogError(path, "is no JSON object", line=line)
     if text.broken is not None:
         yield LogError(path, text.broken.problem, line=text.line)
 
@@ -80,14 +62,14 @@ class _Text:
     """A text that is read as far as it is needed, and how far that is."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._pieces = chunks(path)
+        self._path, self._pieces = path, chunks(path)
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
         self._text, self._at = "", 0
+        self._passed = self._wasted = 0
         #: Number of the line that was reached, from 1.
         self.line = 1
         #: What ended the stream too early.
         self.broken: LogError | None = None
-        self._path, self._passed, self._wasted = path, 0, 0
 
     def skip_space(self) -> bool:
         """Go to the next value; False if there is none."""
@@ -99,7 +81,7 @@ class _Text:
             if not self._grow():
                 return False
 
-    def read_value(self) -> object:
+    def read_value(self) -> Any:
         """Return the value that begins here, and go behind it; ValueError if it is broken."""
         while True:
             try:
@@ -108,14 +90,17 @@ class _Text:
                 self._waste(len(self._text) - self._at)
                 raise ValueError("JSON is nested too deep, expected a scan") from None
             except ValueError as error:
-                if len(self._text) - self._at >= MAX_OBJECT:
-                    self._waste(_place(error, self._text) - self._at)
-                    raise ValueError(
-                        f"JSON object is broken or longer than {MAX_OBJECT >> 20} MiB"
-                    ) from None
-                if not self._grow():
-                    self._waste(_place(error, self._text) - self._at)
-                    raise ValueError(f"JSON is broken: {_reason(error)}") from None
+                is_long = len(self._text) - self._at >= MAX_OBJECT
+                if not is_long and self._grow():
+                    continue
+                # Of a number with too many digits there is no place.
+                where = error.pos if isinstance(error, json.JSONDecodeError) else len(self._text)
+                self._waste(where - self._at)
+                if is_long:
+                    limit = f"{MAX_OBJECT >> 20} MiB"
+                    raise ValueError(f"JSON object is broken or longer than {limit}") from None
+                reason = error.msg if isinstance(error, json.JSONDecodeError) else error
+                raise ValueError(f"JSON is broken: {reason}") from None
             else:
                 self._go(end)
                 return found
@@ -147,31 +132,15 @@ class _Text:
 
     def _grow(self) -> bool:
         """Have at least twice as much ahead, which bounds the work; False at the end."""
-        self._text, self._at = self._text[self._at :], 0
-        before = len(self._text)
-        more = [self._text]
-        while sum(map(len, more)) <= 2 * before:
-            piece = self._next_piece()
-            if piece is None:
-                break
-            more.append(piece)
-        self._text = "".join(more)
-        return len(self._text) > before
-
-    def _next_piece(self) -> str | None:
+        more, self._at = [self._text[self._at :]], 0
+        before = size = len(more[0])
         try:
-            return self._decoder.decode(next(self._pieces))
+            while size <= 2 * before:
+                more.append(self._decoder.decode(next(self._pieces)))
+                size += len(more[-1])
         except StopIteration:
-            return None
+            pass
         except LogError as error:
             self.broken = error.fresh()
-            return None
-
-
-def _place(error: ValueError, text: str) -> int:
-    """Where reading failed; of a number with too many digits that is not told."""
-    return error.pos if isinstance(error, json.JSONDecodeError) else len(text)
-
-
-def _reason(error: ValueError) -> str:
-    return error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+        self._text = "".join(more)
+        return size > before

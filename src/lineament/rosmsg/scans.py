@@ -1,7 +1,5 @@
 """Scans from serialised ROS messages: LaserScan, MultiEchoLaserScan, a ring of a PointCloud2."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -11,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import LaserScan
-from .wire import Buffer, Wire
-
-__all__ = ["CLOUD", "Decoder", "decoders", "laser_scan", "multi_echo_scan", "ring_scan"]
+from .wire import Buffer, WireReader
 
 CLOUD = "sensor_msgs/PointCloud2"
+#: Types of ``PointField``: those of numpy, by their number from 1.
+POINT_TYPES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
+_POINT_FIELDS = ("x", "y", "ring", "intensity")
 
 Array = NDArray[Any]
 Decoder = Callable[[Buffer, str], LaserScan]
 
 
 def decoders(echo: str, ring: int | None) -> dict[str, Decoder]:
-    """How to read each type of message that carries scans; clouds only where `ring` is given."""
+    """Return how to decode each type that carries scans; clouds only if `ring` is given."""
     known: dict[str, Decoder] = {
         "sensor_msgs/LaserScan": laser_scan,
         "sensor_msgs/MultiEchoLaserScan": partial(multi_echo_scan, echo=echo),
@@ -31,18 +30,18 @@ def decoders(echo: str, ring: int | None) -> dict[str, Decoder]:
 
 
 def laser_scan(data: Buffer, encoding: str) -> LaserScan:
-    r"""Read a ``sensor_msgs/LaserScan``.
+    r"""Decode a ``sensor_msgs/LaserScan``.
 
-    A scanner that turns clockwise (a negative increment) has its beams reversed, so that bearings
-    increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
+    The beams of a scanner that turns clockwise (a negative increment) are reversed, so that
+    bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
     `time_increment`.
 
     Parameters
     ----------
     data : bytes-like
         The message.
-    encoding : str
-        ``ros1`` or ``cdr``.
+    encoding : {"ros1", "cdr"}
+        How it is serialised.
 
     Raises
     ------
@@ -58,17 +57,17 @@ def laser_scan(data: Buffer, encoding: str) -> LaserScan:
     >>> scan.ranges.tolist(), scan.stamp, scan.frame_id
     ([1.0, 2.0], 7.5, 'l')
     """
-    wire = Wire(data, encoding)
-    stamp, frame_id = wire.header()
-    *geometry, n = wire.numbers("7fI")
-    ranges = wire.floats(n)
-    intensities = wire.floats(wire.count())
-    wire.end()
+    reader = WireReader(data, encoding)
+    stamp, frame_id = reader.header()
+    *geometry, n = reader.numbers("7fI")
+    ranges = reader.floats(n)
+    intensities = reader.floats(reader.count())
+    reader.end()
     return _scan(stamp, frame_id, geometry, ranges, intensities if len(intensities) else None)
 
 
 def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserScan:
-    """Read one echo of each beam of a ``sensor_msgs/MultiEchoLaserScan``.
+    """Decode one echo of each beam of a ``sensor_msgs/MultiEchoLaserScan``.
 
     Parameters
     ----------
@@ -83,12 +82,12 @@ def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserSc
     ValueError
         As for :func:`laser_scan`, or if ranges and intensities have different echoes.
     """
-    wire = Wire(data, encoding)
-    stamp, frame_id = wire.header()
-    *geometry, n = wire.numbers("7fI")
-    echoes, starts, counts = _echoes(wire, n)
-    strengths, _, strength_counts = _echoes(wire, wire.count())
-    wire.end()
+    reader = WireReader(data, encoding)
+    stamp, frame_id = reader.header()
+    *geometry, n = reader.numbers("7fI")
+    echoes, starts, counts = _echoes(reader, n)
+    strengths, _, strength_counts = _echoes(reader, reader.count())
+    reader.end()
     has_strengths = len(strength_counts) > 0
     if has_strengths and not np.array_equal(counts, strength_counts):
         raise ValueError("intensities have other numbers of echoes than ranges, expected the same")
@@ -96,7 +95,9 @@ def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserSc
     if echo == "last":
         chosen = starts + counts - 1
     elif echo == "strongest" and has_strengths:
-        chosen = _strongest(strengths, starts, counts)
+        values = np.where(np.isnan(strengths), -np.inf, strengths).tolist()
+        beams = map(range, starts, starts + counts)
+        chosen = np.array([max(beam, key=values.__getitem__, default=0) for beam in beams], int)
     seen = counts > 0
     ranges, intensities = np.full((2, len(counts)), np.nan)
     ranges[seen] = echoes[chosen[seen]]
@@ -105,15 +106,15 @@ def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserSc
     return _scan(stamp, frame_id, geometry, ranges, intensities if has_strengths else None)
 
 
-# Clouds hold what they like: infinities are left out below, and a signalling NaN is a NaN.
+# Clouds may hold anything: infinities are left out below, and a signalling NaN is a NaN.
 @np.errstate(over="ignore", invalid="ignore")
 def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
-    """Read one ring of a ``sensor_msgs/PointCloud2`` as a scan with irregular bearings.
+    """Decode one ring of a ``sensor_msgs/PointCloud2`` as a scan with irregular bearings.
 
-    The ring is made of the points whose field `ring` is that number or, in an organised cloud
-    without that field, of that row. A point (x, y, z) becomes a beam with its bearing and
+    The ring is the points whose field `ring` has that number or, in an organised cloud without
+    that field, the points of that row. A point (x, y, z) becomes a beam with its bearing and
     horizontal distance; z is left out. Beams are sorted by bearing; of points with the same
-    bearing the nearest stays; points that are not finite go.
+    bearing the nearest stays; points that are not finite are left out.
 
     Parameters
     ----------
@@ -127,29 +128,31 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     ValueError
         If the message is malformed, has no fields x and y, no rings, or no such ring.
     """
-    wire = Wire(data, encoding)
-    stamp, frame_id = wire.header()
-    points, height = _points(wire)
-    if "ring" in points:
-        chosen = points["ring"] == ring
-    elif height > 1:
-        chosen = np.repeat(np.arange(height), len(points["x"]) // height) == ring
+    reader = WireReader(data, encoding)
+    stamp, frame_id = reader.header()
+    points = _points(reader)
+    names = points.dtype.names or ()
+    numbers = points["ring"] if "ring" in names else None
+    if numbers is not None:
+        points = points[numbers == ring]
+    elif len(points) > 1:
+        points = points[ring : ring + 1].ravel()
     else:
         raise ValueError("has no field ring and a single row, expected a cloud with rings")
-    x, y = (points[name][chosen].astype(np.float64) for name in ("x", "y"))
+    x, y = (points[name].astype(np.float64) for name in ("x", "y"))
     angles, ranges = np.arctan2(y, x), np.hypot(x, y)
     order = np.lexsort((ranges, angles))
     order = order[np.isfinite(ranges[order])]
     order = order[np.diff(angles[order], prepend=-math.inf) > 0]
     if not len(order):
-        raise ValueError(f"has no points in ring {ring}{_rings_text(points)}")
-    intensities = points["intensity"][chosen][order] if "intensity" in points else None
+        rings = "" if numbers is None else f", its rings are {numbers.min()} to {numbers.max()}"
+        raise ValueError(f"has no points in ring {ring}{rings}")
     return LaserScan(
         ranges[order],
         angles=angles[order],
         stamp=stamp,
         frame_id=frame_id,
-        intensities=intensities,
+        intensities=points["intensity"][order] if "intensity" in names else None,
     )
 
 
@@ -184,11 +187,10 @@ def _scan(
     )
 
 
-def _echoes(wire: Wire, n: int) -> tuple[Array, Array, Array]:
+def _echoes(reader: WireReader, n: int) -> tuple[Array, Array, Array]:
     """Take `n` of ``LaserEcho``: all words, where each beam's begin, and how many."""
     # Each beam is the number of its echoes and then they: a chain to be walked.
-    lengths = wire.words()
-    words = lengths.tolist()
+    words = reader.words().tolist()
     if n > len(words):
         raise ValueError(f"ends early: {n} beams expected in {4 * len(words)} bytes")
     starts: list[int] = []
@@ -200,42 +202,24 @@ def _echoes(wire: Wire, n: int) -> tuple[Array, Array, Array]:
         counts.append(words[at])
         starts.append(at + 1)
         at += 1 + words[at]
-    echoes = wire.floats(at)
-    return echoes, np.array(starts, dtype=np.int64), np.array(counts, dtype=np.int64)
+    return reader.floats(at), np.array(starts, np.int64), np.array(counts, np.int64)
 
 
-def _strongest(strengths: Array, starts: Array, counts: Array) -> Array:
-    """Where the strongest echo of each beam is; anywhere for a beam without."""
-    is_echo = np.ones(len(strengths), dtype=np.bool_)
-    is_echo[starts - 1] = False
-    places = np.flatnonzero(is_echo)
-    beams = np.repeat(np.arange(len(counts)), counts)
-    ordered = places[np.lexsort((places, -strengths[places], beams))]
-    chosen, seen = starts.copy(), counts > 0
-    chosen[seen] = ordered[(np.cumsum(counts) - counts)[seen]]
-    return chosen
-
-
-#: Types of ``PointField``: letters of numpy by their number, from 1.
-_FIELD_TYPES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
-_FIELDS = ("x", "y", "ring", "intensity")
-
-
-def _points(wire: Wire) -> tuple[dict[str, Array], int]:
-    """Take the rest of a ``PointCloud2``: the columns that matter here, and its height."""
-    height, width = wire.numbers("II")
-    layout: dict[str, tuple[int, int]] = {}
-    for _ in range(wire.count()):
-        name = wire.text()
-        offset, (kind,) = wire.count(), wire.numbers("B")
-        wire.count()
-        if name in _FIELDS:
-            layout[name] = offset, kind
-    order = ">" if wire.numbers("B")[0] else "<"
-    point_step, row_step = wire.numbers("II")
-    data = wire.raw(wire.count())
-    if not {"x", "y"} <= layout.keys():
-        raise ValueError(f"has fields {', '.join(layout) or 'other'}, expected x and y")
+def _points(reader: WireReader) -> NDArray[np.void]:
+    """Take the rest of a ``PointCloud2``: the fields that matter here, shape (height, width)."""
+    height, width = reader.numbers("II")
+    fields: dict[str, tuple[int, int]] = {}
+    for _ in range(reader.count()):
+        name = reader.text()
+        offset, (kind,) = reader.count(), reader.numbers("B")
+        reader.count()
+        if name in _POINT_FIELDS:
+            fields[name] = offset, kind
+    order = ">" if reader.numbers("B")[0] else "<"
+    point_step, row_step = reader.numbers("II")
+    data = reader.raw(reader.count())
+    if not {"x", "y"} <= fields.keys():
+        raise ValueError(f"has fields {', '.join(fields) or 'other'}, expected x and y")
     if height == 1:  # Some drivers leave it unset.
         row_step = width * point_step
     if row_step < width * point_step or height * row_step > len(data) or not height * width:
@@ -243,31 +227,17 @@ def _points(wire: Wire) -> tuple[dict[str, Array], int]:
             f"has {len(data)} bytes in {height} rows of {row_step}, expected {width} points of "
             f"{point_step} in each"
         )
-    return {
-        name: _column(data, name, order, field, (height, width), (row_step, point_step))
-        for name, field in layout.items()
-    }, height
-
-
-def _column(
-    data: Buffer,
-    name: str,
-    order: str,
-    field: tuple[int, int],
-    shape: tuple[int, int],
-    strides: tuple[int, int],
-) -> Array:
-    offset, kind = field
-    if not 1 <= kind <= len(_FIELD_TYPES):
-        raise ValueError(f"field {name} has type {kind}, expected 1 to {len(_FIELD_TYPES)}")
-    dtype = np.dtype(order + _FIELD_TYPES[kind - 1])
-    if offset + dtype.itemsize > strides[1]:
-        raise ValueError(f"field {name} reaches past the {strides[1]} bytes of a point")
-    return np.ndarray(shape, dtype, data, offset, strides).ravel()
-
-
-def _rings_text(points: dict[str, Array]) -> str:
-    if "ring" not in points:
-        return ""
-    rings = points["ring"]
-    return f", its rings are {rings.min()} to {rings.max()}"
+    formats = []
+    for name, (offset, kind) in fields.items():
+        if not 1 <= kind <= len(POINT_TYPES):
+            raise ValueError(f"field {name} has type {kind}, expected 1 to {len(POINT_TYPES)}")
+        formats.append(np.dtype(order + POINT_TYPES[kind - 1]))
+        if offset + formats[-1].itemsize > point_step:
+            raise ValueError(f"field {name} reaches past the {point_step} bytes of a point")
+    layout: Any = {
+        "names": list(fields),
+        "formats": formats,
+        "offsets": [offset for offset, _ in fields.values()],
+        "itemsize": point_step,
+    }
+    return np.ndarray((height, width), np.dtype(layout), data, strides=(row_step, point_step))

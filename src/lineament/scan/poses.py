@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..scan import Array, Pose
+from .fields import Array, Pose
 
 __all__ = ["Twist", "compose", "inverse", "poses_along", "relative", "twist_between"]
 

@@ -1,0 +1,250 @@
+"""Where logs are: the beginnings of files, members of zip archives, addresses, temporary copies.
+
+Nothing is ever written under a name that an archive or an address gives.
+"""
+
+import os
+import shutil
+import stat
+import tempfile
+import weakref
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+
+from ..errors import LogError, needs
+from .base import Head
+from .lines import BOM, GZIP, chunks, decompressed, opened, reading
+
+#: How a zip archive begins.
+ZIP = b"PK\x03\x04"
+#: How much of a file is looked at to find its format [bytes].
+HEAD_SIZE = 1 << 16
+#: Members of an archive that are looked at.
+MAX_MEMBERS = 10_000
+#: Largest temporary copy [bytes].
+MAX_COPY = 1 << 34
+#: What grows by more than so, and beyond `SMALL_COPY` bytes, when it is unpacked is no log.
+MAX_RATIO = 300
+SMALL_COPY = 1 << 28
+
+_PIECE = 1 << 20
+
+
+def read_head(path: str | os.PathLike[str]) -> Head:
+    """Return the beginning of a file; LogError if there is none, as in pipes and devices."""
+    try:
+        where = Path(path)
+    except TypeError:
+        raise LogError(path, "is no path, expected the path of a log") from None
+    with reading(path):
+        mode = where.stat().st_mode
+        if stat.S_ISDIR(mode):
+            return Head(where, b"", is_directory=True)
+        # Pipes and devices cannot be read twice, and may never answer.
+        if not stat.S_ISREG(mode):
+            raise LogError(path, "is no regular file, expected a log")
+    with opened(path) as read:
+        return _head_of(where, path, read)
+
+
+def _head_of(where: Path, name: object, read: Callable[[int], bytes]) -> Head:
+    data, first = b"", read(HEAD_SIZE)
+    is_gzip = first.startswith(GZIP)
+    try:
+        for piece in decompressed(name, read, first):
+            data += piece
+            if len(data) >= HEAD_SIZE:
+                break
+    except LogError:
+        # A broken stream is reported when the log is read, with how far that went.
+        if not data:
+            raise
+    if not data:
+        raise LogError(name, f"is empty{' once decompressed' * is_gzip}, expected a log")
+    return Head(where, data[:HEAD_SIZE].removeprefix(BOM), is_gzip=is_gzip)
+
+
+class LocalCopy(os.PathLike[str]):
+    """A temporary file under the name that a person knows it by; it goes when this object does.
+
+    ``str`` gives the name, ``os.fspath`` the path. `packed` is the size before it was unpacked.
+    LogError if it grows too large, or cannot be written.
+    """
+
+    def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
+        self._name = name
+        # A folder of its own: what a reader looks for beside its log is not there.
+        folder = tempfile.mkdtemp(prefix="lineament-")
+        self._path = str(Path(folder, "log"))
+        self.remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        try:
+            self._write(pieces, packed)
+        except BaseException:
+            self.remove()
+            raise
+
+    def __fspath__(self) -> str:
+        return self._path
+
+    def __str__(self) -> str:
+        return self._name
+
+    def _write(self, pieces: Iterable[bytes], packed: int | None) -> None:
+        size = 0
+        with Path(self._path).open("wb") as file:
+            for piece in pieces:
+                size += len(piece)
+                if size > MAX_COPY:
+                    raise LogError(self._name, f"is larger than {MAX_COPY >> 30} GiB unpacked")
+                if packed is not None:
+                    check_growth(self._name, size, packed)
+                try:
+                    file.write(piece)
+                except OSError as error:
+                    problem = f"cannot be copied to {self._path}: {error.strerror or error}"
+                    raise LogError(self._name, problem) from None
+
+
+def check_growth(name: object, size: int, packed: int) -> None:
+    """Refuse with a LogError what is no log but a bomb, by its size after and before.
+
+    Examples
+    --------
+    >>> check_growth("a.zip", 1 << 40, 1 << 20)
+    Traceback (most recent call last):
+    lineament.errors.LogError: a.zip: unpacks to more than 300 times its size, expected a log
+    """
+    if size > max(SMALL_COPY, MAX_RATIO * packed):
+        raise LogError(name, f"unpacks to more than {MAX_RATIO} times its size, expected a log")
+
+
+def unzip(path: str | os.PathLike[str], *, keep_going: bool = False) -> LocalCopy:
+    """Copy what a gzip file holds: up to a break in it, if asked to keep going, else LogError."""
+
+    def pieces() -> Iterator[bytes]:
+        try:
+            yield from chunks(path)
+        except LogError:
+            if not keep_going:  # Else the reader of the copy reports that it ends early.
+                raise
+
+    with reading(path):
+        packed = Path(path).stat().st_size
+    return LocalCopy(str(path), pieces(), packed)
+
+
+# Zip archives
+
+
+def member_heads(path: str | os.PathLike[str]) -> Iterator[tuple[str, Head]]:
+    """Yield the name and the beginning of each file in an archive, sorted by name.
+
+    Files that systems hide there are left out, as are those that cannot be read. LogError if the
+    archive is broken or has too many files.
+    """
+    with _archive(path) as archive:
+        names = sorted(info.filename for info in archive.infolist() if not info.is_dir())
+        if len(names) > MAX_MEMBERS:
+            raise LogError(path, f"holds {len(names)} files, expected at most {MAX_MEMBERS}")
+        for name in filter(_is_shown, names):
+            try:
+                with archive.open(name) as file:
+                    head = _head_of(Path(name), name, file.read)
+            except Exception:
+                continue
+            yield name, head
+
+
+def _is_shown(name: str) -> bool:
+    # Names that lead out of the archive, /a and ../a, are hidden too.
+    parts = name.split("/")
+    return name.isprintable() and all(
+        part and not part.startswith((".", "__MACOSX")) for part in parts
+    )
+
+
+def unzipped_member(path: str | os.PathLike[str], member: str) -> LocalCopy:
+    """Copy a member of a zip archive; LogError if it is missing, broken or encrypted."""
+    name = f"{path}/{member}"
+    with _archive(path) as archive:
+        try:
+            info = archive.getinfo(member)
+        except KeyError:
+            raise LogError(name, "there is no such file in the archive") from None
+        with archive.open(info) as file:
+            return LocalCopy(name, iter(partial(file.read, _PIECE), b""), info.compress_size)
+
+
+@contextmanager
+def _archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
+    with reading(path):
+        try:
+            with zipfile.ZipFile(path) as archive:
+                yield archive
+        except LogError:
+            raise
+        # At what is damaged, encrypted or packed in a rare way the errors are those of zipfile,
+        # struct and four decompressors.
+        except Exception as error:
+            reason = str(error) or "it ends early"
+            raise LogError(path, f"is no whole zip archive: {reason}") from None
+
+
+# Addresses
+
+
+def is_address(path: str | os.PathLike[str]) -> bool:
+    """Whether it is an address such as ``s3://bucket/key``, and no path.
+
+    Examples
+    --------
+    >>> is_address("memory://a.log"), is_address("a.log")
+    (True, False)
+    """
+    return isinstance(path, str) and "://" in path
+
+
+def fetched(address: str) -> LocalCopy:
+    """Copy what is at an address; LogError if it, fsspec or a driver of fsspec is missing."""
+    with _fsspec(address) as fsspec, fsspec.open(address, "rb") as file:
+        return LocalCopy(address, iter(partial(file.read, _PIECE), b""))
+
+
+def listed(address: str) -> list[str]:
+    """Return the files in the folder at an address, or those that match its pattern.
+
+    An address that is neither is returned alone, whether or not there is a file.
+    """
+    with _fsspec(address) as fsspec:
+        system, root = fsspec.core.url_to_fs(address)
+        if any(sign in root for sign in "*?["):
+            names = system.glob(root)
+        elif system.isdir(root):
+            names = system.find(root)
+        else:
+            return [address]
+        return sorted(system.unstrip_protocol(name) for name in names)
+
+
+@contextmanager
+def _fsspec(address: str) -> Iterator[ModuleType]:
+    """Give fsspec, and turn whatever its many drivers raise into one line."""
+    try:
+        import fsspec
+
+        yield fsspec
+    except LogError:
+        raise
+    except ImportError as error:
+        if error.name == "fsspec":
+            raise LogError(address, needs("fsspec")) from None
+        raise LogError(address, f"needs a driver of fsspec: {error}") from None
+    except FileNotFoundError:
+        raise LogError(address, "there is no such file, expected a log") from None
+    except Exception as error:
+        problem = " ".join(f"{type(error).__name__}: {error}".split())
+        raise LogError(address, f"cannot be fetched: {problem}") from None

@@ -1,0 +1,85 @@
+"""Parameters of methods, each declared once: its default, bounds, unit and meaning."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection
+from dataclasses import dataclass, field, fields
+from inspect import cleandoc
+from numbers import Integral, Real
+from textwrap import wrap
+from typing import Any, TypeVar
+
+__all__ = ["Bounds", "bounds_of", "documented", "parameter"]
+
+T = TypeVar("T")
+
+_NUMBERS = {int: ("a whole number", Integral), float: ("a number", Real)}
+_INFINITE = sys.float_info.max
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What a value must be: of a kind (bool, int, float or str), and within bounds or choices."""
+
+    kind: type
+    low: float = -_INFINITE
+    above: float = -_INFINITE
+    below: float = _INFINITE
+    choices: Collection[str] = ()
+
+    def __str__(self) -> str:
+        if self.choices:
+            return f"one of: {', '.join(self.choices)}"
+        if self.kind is bool:
+            return "True or False"
+        limits = (("≥", self.low), (">", self.above), ("<", self.below))
+        parts = [f"{sign} {limit:.12g}" for sign, limit in limits if abs(limit) < _INFINITE]
+        return f"{_NUMBERS[self.kind][0]} {' and '.join(parts)}"
+
+    def holds(self, value: Any) -> bool:
+        """Whether a value is within the bounds."""
+        if self.choices:
+            return value in tuple(self.choices)
+        if self.kind is bool or isinstance(value, bool):
+            return self.kind is type(value)
+        if not isinstance(value, _NUMBERS[self.kind][1]):
+            return False
+        number = int(value) if isinstance(value, Integral) else float(value)
+        return self.low <= number and self.above < number < self.below
+
+    def check(self, name: str, value: Any) -> None:
+        """Refuse a value out of bounds, with the name of the parameter."""
+        if not self.holds(value):
+            raise ValueError(f"{name} is {value!r}, expected {self}")
+
+
+def parameter(default: bool | int | float | str, meaning: str, **bounds: Any) -> Any:
+    """Declare a parameter of a method; its type is that of its default.
+
+    `bounds` are those of `Bounds`.
+    """
+    declared = {"meaning": meaning, "bounds": Bounds(type(default), **bounds)}
+    return field(default=default, metadata=declared)
+
+
+def bounds_of(cls: Any, name: str) -> Bounds:
+    """Return the bounds of a parameter of a method."""
+    (found,) = [one.metadata["bounds"] for one in fields(cls) if one.name == name]
+    return found  # type: ignore[no-any-return]
+
+
+def documented(cls: type[T]) -> type[T]:
+    """List the parameters of a method, which is a dataclass, in its docstring."""
+    lines = ["Parameters", "----------"]
+    for one in fields(cls):  # type: ignore[arg-type]
+        bounds, meaning = one.metadata["bounds"], one.metadata["meaning"]
+        lines += [f"{one.name} : {bounds.kind.__name__}, default {one.default!r}"]
+        text = meaning if meaning[1] in " ," else meaning[0].upper() + meaning[1:]
+        lines += wrap(f"{text}; {bounds}.", 96, initial_indent="    ", subsequent_indent="    ")
+    lines += ["", "Raises", "------", "ValueError", "    If a parameter is out of bounds."]
+    text = cleandoc(cls.__doc__ or "")
+    ends = [text.find(f"{name}\n---") for name in ("References", "Examples")]
+    end = min((at for at in ends if at >= 0), default=len(text))
+    cls.__doc__ = "\n".join([text[:end].rstrip(), "", *lines, "", text[end:]])
+    return cls

@@ -1,0 +1,109 @@
+"""Poses in the plane from serialised ROS messages: odometry, stamped poses, transforms."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from ..scan import Pose
+from ..scan.poses import Twist
+from .wire import Buffer, WireReader
+
+#: Types of messages that hold one pose, and whether the name of a frame comes before it.
+POSE_TYPES = {
+    "geometry_msgs/PoseStamped": False,
+    "geometry_msgs/PoseWithCovarianceStamped": False,
+    "geometry_msgs/TransformStamped": True,
+    "nav_msgs/Odometry": True,
+}
+#: Types of messages that hold many, each of a frame in another one.
+TRANSFORMS = ("tf2_msgs/TFMessage", "tf/tfMessage")
+#: Bytes of a covariance of six numbers.
+_COVARIANCE_SIZE = 36 * 8
+
+
+class StampedPose(NamedTuple):
+    """The pose of a frame, or of what the message is about (""), in another at a time [s]."""
+
+    stamp: float
+    frame: str
+    child_frame: str
+    pose: Pose
+
+
+class Odometry(NamedTuple):
+    """A ``nav_msgs/Odometry`` in the plane, without covariances.
+
+    Attributes
+    ----------
+    stamp : float
+        Its time [s].
+    twist : (v_x, v_y, omega)
+        Velocity in the frame of what moves [m/s, m/s, rad/s].
+    pose : (x, y, theta)
+        Pose of what moves [m, m, rad].
+    frame, child_frame : str
+        Names of the frames of the pose and of what moves.
+    """
+
+    stamp: float
+    twist: Twist
+    pose: Pose
+    frame: str
+    child_frame: str
+
+
+def stamped_poses(data: Buffer, encoding: str, kind: str) -> Iterator[StampedPose]:
+    """Decode the poses in a message of one of the `POSE_TYPES` or `TRANSFORMS`.
+
+    Raises
+    ------
+    ValueError
+        If the message is malformed.
+    """
+    reader = WireReader(data, encoding)
+    for _ in range(reader.count() if kind in TRANSFORMS else 1):
+        yield _stamped_pose(reader, POSE_TYPES.get(kind, True))
+
+
+def odometry(data: Buffer, encoding: str) -> Odometry:
+    r"""Decode a ``nav_msgs/Odometry``.
+
+    Parameters
+    ----------
+    data : bytes-like
+        The message.
+    encoding : {"ros1", "cdr"}
+        How it is serialised.
+
+    Raises
+    ------
+    ValueError
+        If the message is malformed, or its pose or twist is not finite.
+
+    Examples
+    --------
+    >>> import struct
+    >>> names = struct.pack("<4I4sI4s", 0, 7, 500_000_000, 4, b"odom", 4, b"base")
+    >>> pose = struct.pack("<7d", 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0) + bytes(288)
+    >>> twist = struct.pack("<6d", 0.5, 0.0, 0.0, 0.0, 0.0, 0.25) + bytes(288)
+    >>> odometry(names + pose + twist, "ros1")
+    Odometry(stamp=7.5, twist=(0.5, 0.0, 0.25), pose=(1.0, 2.0, 0.0),
+             frame='odom', child_frame='base')
+    """
+    reader = WireReader(data, encoding)
+    stamp, frame, child_frame, pose = _stamped_pose(reader, True)
+    reader.raw(_COVARIANCE_SIZE)
+    vx, vy, _, _, _, wz = reader.numbers("6d")
+    reader.raw(_COVARIANCE_SIZE)
+    reader.end()
+    if not all(map(math.isfinite, (*pose, vx, vy, wz))):
+        raise ValueError(f"has pose {pose} and twist {(vx, vy, wz)}, expected finite numbers")
+    return Odometry(stamp, (vx, vy, wz), pose, frame, child_frame)
+
+
+def _stamped_pose(reader: WireReader, has_child: bool) -> StampedPose:
+    stamp, frame = reader.header()
+    child_frame = reader.text() if has_child else ""
+    x, y, _, qx, qy, qz, qw = reader.numbers("7d")
+    theta = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+    return StampedPose(stamp, frame, child_frame, (x, y, theta))

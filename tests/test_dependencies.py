@@ -1,0 +1,88 @@
+"""What is installed beside the package: little by default, and errors name what else is needed."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from lineament import LineamentError
+from lineament.errors import EXTRAS, needed_by
+from lineament.output import open_writer
+
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+#: Packages whose name on the index is not that of the module.
+MODULES = {"foxglove-sdk": "foxglove", "rerun-sdk": "rerun"}
+
+
+def packages(requirements):
+    names = [re.match(r"[\w-]+", requirement)[0] for requirement in requirements]
+    return {MODULES.get(name, name) for name in names}
+
+
+def test_errors_know_the_extras_of_the_project_and_checks_install_them_all():
+    extras = PROJECT["project"]["optional-dependencies"]
+    listed = {package: name for name, needed in extras.items() for package in packages(needed)}
+    assert listed == EXTRAS
+    assert set(EXTRAS) <= packages(PROJECT["dependency-groups"]["dev"])
+    assert not set(EXTRAS) & packages(PROJECT["project"]["dependencies"])
+
+
+@pytest.mark.parametrize("package", EXTRAS)
+def test_missing_package_is_named_with_what_installs_it(package, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    line = rf"^it needs {package}, which .*: pip install 'lineament\[{EXTRAS[package]}\]'$"
+    with pytest.raises(LineamentError, match=line), needed_by("it"):
+        __import__(package)
+    with pytest.raises(ModuleNotFoundError), needed_by("it"):
+        raise ModuleNotFoundError(name="numba")
+
+
+@pytest.mark.parametrize(
+    ("ending", "package"), [("rrd", "rerun"), ("mcap", "foxglove"), ("dxf", "ezdxf")]
+)
+def test_format_whose_package_is_missing(ending, package, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    for module in ("rrd", "foxglove", "dxf"):
+        monkeypatch.delitem(sys.modules, f"lineament.output.{module}", raising=False)
+    with pytest.raises(LineamentError, match=rf"a\.{ending}: needs {package}, .*pip install"):
+        open_writer(tmp_path / f"a.{ending}")
+
+
+def test_commands_work_without_any_extra(tmp_path):
+    script = """
+import sys
+from importlib.metadata import distribution
+from lineament.cli import run
+from lineament.errors import EXTRAS
+for package in (*EXTRAS, "rosbags"):
+    sys.modules[package] = None
+log = "log.npz"
+assert run(["simulate", "room", "-o", log, "--scans", "3", "-q"]) == 0
+for ending in ("parquet", "csv", "jsonl", "svg"):
+    assert run(["extract", log, "-o", f"a.{ending}", "-q"]) == 0, ending
+assert run(["info", log, "-q"]) == 0
+assert run(["plot", log, "-o", "a.png"]) == 0
+assert run(["plot", log, "-o", "b.png", "--trace", "-m", "liu"]) == 0
+assert run(["demo", log, "-o", "demo", "-q"]) == 0
+assert run(["live", "--from", log, "--ros", "0", "--rate", "0", "-q"]) == 0
+import lineament.view
+assert run(["extract", log, "-o", "a.dxf", "-q"]) == 1
+assert run(["reproduce", "-o", "report", "-q"]) == 1
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    assert [line for line in lines if "lineament[" in line] == lines
+    assert [re.search(r"lineament\[\w+\]", line)[0] for line in lines] == [
+        "lineament[cad]",
+        "lineament[evaluation]",
+    ]
+    assert not (tmp_path / "a.dxf").exists()
+    assert (tmp_path / "demo" / "index.html").exists()
