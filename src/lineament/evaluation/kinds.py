@@ -203,7 +203,7 @@ def arc_scores(found: Features, truth: Features) -> FeatureScores:
     spread = _deviations(truth.arcs)
     apart = distances(one[:, :2], other[:, :2])
     near = apart <= np.maximum(GATE, np.hypot(spread[:, 0], spread[:, 1]))
-    near &= abs(one[:, np.newaxis, 2] - other[:, 2]) <= np.maximum(GATE, spread[:, 1])
+    near &= abs(one[:, np.newaxis, 2] - other[:, 2]) <= np.maximum(GATE, spread[:, 2])
     pairs, counts, *_ = _matched(found, truth, "arcs", near)
     errors = one[pairs[0]] - other[pairs[1]]
     return FeatureScores(
