@@ -1,7 +1,5 @@
 """Logs of JSON, CSM and RPLIDAR: known values, faults, what is broken or without end."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

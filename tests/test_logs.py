@@ -1,7 +1,5 @@
 """open_log: formats by content, one clear line for what is wrong, bounded memory, recordings."""
 
-from __future__ import annotations
-
 import gc
 import gzip
 import json

@@ -1,7 +1,5 @@
 """Scans saved as npz and CARMEN logs, and npz logs read: round trips, keys, shapes, damage."""
 
-from __future__ import annotations
-
 import contextlib
 import gzip
 import math

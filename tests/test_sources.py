@@ -1,7 +1,5 @@
 """Where logs are: folders, patterns, addresses, archives and what hostile ones must not do."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os

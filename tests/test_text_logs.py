@@ -1,7 +1,5 @@
 """Logs of text lines, CARMEN, graphs, DP-SLAM, tinySLAM and CSV: known values and faults."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small logs of text, written by hand, that several test files share."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -188,7 +188,7 @@ def _plain_float(word: bytes) -> float:
 def numbers(
     what: str, words: list[bytes], number: Callable[[bytes], float] = _plain_float
 ) -> NDArray[np.float64]:
-    """Return words as numbers; ValueError, which names the first that is none, if not.
+    """Return words as numbers; ValueError names the first that is not one.
 
     Examples
     --------
@@ -205,7 +205,7 @@ def numbers(
 
 
 def scalar(what: str, word: bytes, number: Callable[[bytes], float] = _plain_float) -> float:
-    """Return a word as a number; ValueError if it is none."""
+    """Return a word as a number; ValueError if it is not one."""
     try:
         return number(word)
     except ValueError:

@@ -85,7 +85,7 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring` or `pose_topic` is none of these.
+        If `echo`, `ring` or `pose_topic` is not a value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, or has no such
         topic. While the log is iterated: if a scan in it is faulty, unless `keep_going`.
