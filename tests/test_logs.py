@@ -39,6 +39,7 @@ def at_most(megabytes):
     [
         ("carmen", 12, ["FLASER"]),
         ("graph", 9, ["ROBOTLASER1"]),
+        ("player", 9, ["laser 1:1"]),
         ("dpslam", 12, ["Laser"]),
         ("csm", 9, ["scan"]),
         ("rplidar", 4, ["dev0", "dev1", "dev2", "dev3"]),

@@ -19,6 +19,7 @@ READERS = (
     ("npz", "NpzLog"),
     ("graph", "GraphLog"),
     ("carmen", "CarmenLog"),
+    ("player", "PlayerLog"),
     ("dpslam", "DpslamLog"),
     ("csm", "CsmLog"),
     ("rplidar", "RplidarLog"),
