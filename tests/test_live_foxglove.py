@@ -7,8 +7,8 @@ import struct
 import time
 
 import pytest
+from foxglove_client import FoxgloveClient
 from protobuf import decode, messages_of
-from websocket import FoxgloveClient
 
 import lineament as ln
 from lineament import LineamentError
