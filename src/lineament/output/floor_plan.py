@@ -35,9 +35,7 @@ CORNER_RADIUS, ARC_RADIUS = 0.15, 0.1
 
 
 class FloorPlan:
-    """Walls, corners and arcs that the scans of a log have in common, merged as they come.
-
-    Memory grows with what the plan shows, not with the number of scans, and is bounded.
+    """Walls, corners and arcs that the scans of a log have in common, in bounded memory.
 
     Examples
     --------
@@ -151,14 +149,6 @@ class Averages:
     """Means of the points that lie near each other.
 
     A point joins the nearest mean within a radius [m], or begins a new one.
-
-    Examples
-    --------
-    >>> means = Averages(2, radius=0.1)
-    >>> means.add(np.array([[0.0, 0.0], [1.0, 0.0]]))
-    >>> means.add(np.array([[0.0, 0.05]]))
-    >>> means.seen(2).tolist()
-    [[0.0, 0.025]]
     """
 
     def __init__(self, dimensions: int, radius: float) -> None:
