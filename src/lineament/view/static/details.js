@@ -17,13 +17,12 @@ export function describe({ kind, index, feature }, scan) {
 
 const WORDS = {
   segment(s) {
-    const length = Math.hypot(s.end[0] - s.start[0], s.end[1] - s.start[1]);
     const offset = root(s.covariance[0][0]), turn = degrees(root(s.covariance[1][1]));
     return {
       rows: [
         ["start", `${place(s.start)} m`],
         ["end", `${place(s.end)} m`],
-        ["length", `${fixed(length, 3)} m`],
+        ["length", `${fixed(s.length, 3)} m`],
         ["angle", `${fixed(degrees(s.angle), 2)}° ± ${fixed(turn, 2)}°`],
         ["offset", `± ${millimetres(offset)} mm at ${place(s.centroid)} m`],
         ["beams", `${s.first_beam} to ${s.last_beam}, ${s.n_points} readings`],
@@ -32,7 +31,7 @@ const WORDS = {
         ["cluster", s.cluster],
       ],
       cells: [
-        place(s.centroid), fixed(length, 3), `${fixed(degrees(s.angle), 2)} ±\u00a0${fixed(turn, 2)}`,
+        place(s.centroid), fixed(s.length, 3), `${fixed(degrees(s.angle), 2)} ±\u00a0${fixed(turn, 2)}`,
         millimetres(offset), millimetres(s.rms),
       ],
     };
