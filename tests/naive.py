@@ -6,10 +6,10 @@ They take scans and the parameters of a method, by its attributes, and know no k
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from dataclasses import dataclass, field
 from naive_fit import (
     along,
     breakpoints,
