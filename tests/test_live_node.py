@@ -27,7 +27,7 @@ from lineament.live import (
 )
 from lineament.live.counters import Counters
 from lineament.live.pipeline import MOST_BEAMS, check_beams, time_of, twist_of_laser
-from lineament.live.received import received_odometry, received_scan
+from lineament.live.received import Inbox, received_odometry, received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message, Moment
@@ -53,6 +53,23 @@ def moving(*twist: float, stamp: float = 1.0) -> Odometry:
 
 def heard(odometry: Odometry) -> Received:
     return Received("o", lambda: odometry, 0.0, is_odometry=True)
+
+
+class Clock:
+    """The time of a node, which passes only when it is changed."""
+
+    now = 0.0
+    time_ns = staticmethod(time.time_ns)
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("lineament.live.node.time", clock)
+    return clock
 
 
 class Given:
@@ -166,14 +183,12 @@ def test_what_was_skipped_in_a_log_is_written_at_its_end(tmp_path):
     assert lines[0].startswith(f"skipped: {path}:1: FLASER")
 
 
-def test_publishers_problems_and_reports_second_by_second(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+def test_publishers_problems_and_reports_second_by_second(clock):
     source, sink, lines, shown = Given(), Kept(), [], []
 
     def after(publishers: int, *problems: str, seconds: float = 1.0):
         def batch() -> list[Received]:
-            now[0] += seconds
+            clock.now += seconds
             source.publishers, source.lines = publishers, list(problems)
             return []
 
@@ -200,14 +215,12 @@ def test_publishers_problems_and_reports_second_by_second(monkeypatch):
     assert {report.level for report in shown} == {3}
 
 
-def test_a_publisher_that_comes_again_may_be_reported_again(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
     bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
 
     def batch(publishers: int) -> list[Received]:
-        now[0] += 3.0
+        clock.now += 3.0
         source.publishers = publishers
         return [bad]
 
@@ -505,3 +518,16 @@ def test_a_message_is_read_when_it_is_processed():
     assert len(scan.read()) == 5
     with pytest.raises(ValueError, match="type of scans is 'Image', expected one of sensor_msgs/"):
         received_scan("a", b"", "cdr", "Image")
+
+
+def test_an_inbox_keeps_the_newest_of_each_publisher():
+    inbox = Inbox(depth=2)
+    for arrived, name in enumerate("aabaa"):
+        inbox.put(Received(name, list, float(arrived), is_odometry=False), missing=arrived == 2)
+    for arrived in (0.5, 3.5, 9.0):
+        inbox.put(Received("a", list, arrived, is_odometry=True))
+    assert [one.arrived for one in inbox.take(0)] == [2.0, 3.0, 3.5, 4.0, 9.0]
+    assert (inbox.lost, inbox.take(0)) == (3, [])
+    for number in range(100):
+        inbox.put(Received(f"{number}", list, 0.0))
+    assert (len(inbox.take(0)), inbox.lost) == (64, 39)
