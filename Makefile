@@ -59,6 +59,7 @@ wheel: .venv/ready
 	$(PYTHON) -m venv build/empty
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
 	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
+	build/empty/bin/python benchmarks/installed.py
 	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
 
 # Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.

@@ -24,13 +24,17 @@ from lineament.evaluation import (
     standing_scores,
 )
 from lineament.logs import find_logs
-from lineament.reproduce.arena import load_arena
-from lineament.reproduce.frames import Frame, scene_numbers, simulated_frames
+from lineament.reproduce.arena import ARENAS, load_arena
 from lineament.reproduce.real import LOGS
-from lineament.reproduce.recorded_aims import ARENAS
-from lineament.reproduce.recordings import spread_scans
-from lineament.reproduce.repeatability import scan_pairs
-from lineament.reproduce.standing_still import STANDING, still_pairs
+from lineament.reproduce.scans import (
+    STANDING,
+    Frame,
+    scan_pairs,
+    scene_numbers,
+    simulated_frames,
+    spread_scans,
+    still_pairs,
+)
 from lineament.simulation import SENSORS
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))

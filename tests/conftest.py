@@ -70,9 +70,11 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Write a text as a log, packed by a function of its bytes."""
 
-    def write_log(text: str, name: str = "a.txt", pack: Callable[[bytes], bytes] = bytes) -> Path:
+    def write_log(
+        text: str | bytes, name: str = "a.txt", pack: Callable[[bytes], bytes] = bytes
+    ) -> Path:
         path = tmp_path / name
-        path.write_bytes(pack(text.encode()))
+        path.write_bytes(pack(text.encode() if isinstance(text, str) else text))
         return path
 
     return write_log
@@ -120,3 +122,8 @@ def started(tmp_path: Path, domain: int) -> Iterator[Callable[..., Any]]:
             return node
 
         yield start
+
+
+def pytest_make_parametrize_id(val):
+    """Name bytes by their number: what gzip makes holds the time, and workers compare names."""
+    return f"{len(val)} bytes" if isinstance(val, bytes) else None

@@ -9,7 +9,6 @@ import lineament as ln
 from lineament import LineamentError, LogError
 from lineament.logs import save_npz
 from lineament.reproduce.compare import compare_log, compare_scan, write_comparison
-from lineament.reproduce.contenders import region_lines
 from lineament.simulation import SENSORS, room
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -50,14 +49,15 @@ def test_similarity_errors_are_those_of_each_beam():
     segments["centroid"][0, 0] += 0.5
     far_off = replace(features, segments=segments)
     comparison = compare_scan(step_scan(), {"off": lambda scan: far_off})  # noqa: ARG005
-    errors = comparison.results["off"].errors
-    np.testing.assert_allclose(errors[:5], 0.5, atol=1e-6)
-    np.testing.assert_allclose(errors[5:], 0.0, atol=1e-6)
+    table = comparison.table()
+    (row,) = table.rows
+    assert dict(zip(table.columns, row, strict=True))["mean error [mm]"] == pytest.approx(250)
+    assert dict(zip(table.columns, row, strict=True))["largest [mm]"] == pytest.approx(500)
     assert comparison.table(times=False).columns[-1] == "largest [mm]"
 
 
 def test_log_is_compared_by_all_methods_in_the_order_asked_for(log):
-    assert list(compare_log(log, 1, ["iepf", "liu"]).results) == ["iepf", "liu"]
+    assert list(compare_log(log, 1, ["iepf", "liu"]).features) == ["iepf", "liu"]
     with pytest.raises(LogError, match="expected 0 to 2"):
         compare_log(log, 7, ["liu"])
     with pytest.raises(ValueError, match="method 'lui' is unknown"):
@@ -69,7 +69,7 @@ def test_default_is_every_method(log):
     from lineament.methods import METHODS
 
     comparison = compare_log(log)
-    assert list(comparison.results) == list(METHODS)
+    assert list(comparison.features) == list(METHODS)
     assert comparison.timed == 3
 
 
@@ -98,22 +98,3 @@ def test_empty_scan_is_compared():
     comparison = compare_scan(scan, {"pdbs": ln.Extractor("pdbs")})
     assert comparison.table().rows[0][1:5] == (0, 0, 0, 0)
     comparison.figure()
-
-
-def test_region_lines_fit_each_cluster():
-    features = region_lines(step_scan(), ln.extract(step_scan(), method="pdbs"))
-    assert features.segments["first_beam"].tolist() == [0, 5]
-    assert features.segments["last_beam"].tolist() == [4, 9]
-    np.testing.assert_allclose(features.segments["centroid"][:, 0], [2.0, 4.0])
-    np.testing.assert_allclose(np.abs(np.sin(features.segments["angle"])), 1.0)
-
-
-def test_region_over_the_seam_is_one_line():
-    bearings = np.radians(np.arange(0, 360, 2.0))
-    ranges = np.full(180, np.nan)
-    seen = np.r_[170:180, 0:10]
-    ranges[seen] = 2.0 / np.cos(bearings[seen])
-    scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=np.radians(2.0))
-    (line,) = region_lines(scan, ln.extract(scan, method="pdbs")).segments
-    assert (line["first_beam"], line["last_beam"], line["n_points"]) == (170, 9, 20)
-    assert line["centroid"][0] == pytest.approx(2.0)

@@ -1,6 +1,4 @@
-"""Covariances tell the errors that there are, and lines are as good as the bound (Monte Carlo)."""
-
-from __future__ import annotations
+"""Covariances are those of the errors, and lines are as good as the bound (Monte Carlo)."""
 
 import math
 
@@ -35,14 +33,21 @@ def line_errors(segments, distance, normal_deg):
     return np.column_stack((segments["centroid"] @ left + distance, turn))
 
 
-def mean_nees(errors, covariances):
-    return np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors).mean()
+def nees(errors, covariances):
+    return np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors)
 
 
 def assert_consistent(errors, covariances):
     """The mean of n squares of k normal errors lies within k ± 1.96 √(2k/n)."""
     n, k = errors.shape
-    assert mean_nees(errors, covariances) == pytest.approx(k, abs=1.96 * math.sqrt(2 * k / n))
+    assert nees(errors, covariances).mean() == pytest.approx(k, abs=1.96 * math.sqrt(2 * k / n))
+
+
+def the_corners(batch, least):
+    """Corners of the scans that show two segments and one corner, of which so many must be."""
+    one = [f.corners for f in batch if len(f.segments) == 2 and len(f.corners) == 1]
+    assert len(one) > least
+    return np.concatenate(one)
 
 
 @pytest.mark.slow
@@ -68,41 +73,36 @@ def bound(angles, distance, normal_deg):
     return 1 / math.sqrt(w.sum()), 1 / math.sqrt(w @ centred**2)
 
 
+def rmse_of_lines(name, runs, seed, fit):
+    angles, distance, normal = WALLS[name]
+    batch = features_of(wall(angles, distance, normal), angles, runs, seed, fit=fit)
+    return np.sqrt((line_errors(batch.segments, distance, normal) ** 2).mean(axis=0))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WALLS)
 def test_weighted_lines_reach_the_bound(name):
-    angles, distance, normal = WALLS[name]
-    batch = features_of(wall(angles, distance, normal), angles, 4000, 6, fit="weighted")
-    errors = line_errors(batch.segments, distance, normal)
-    rmse = np.sqrt((errors**2).mean(axis=0))
-    np.testing.assert_allclose(rmse, bound(angles, distance, normal), rtol=0.05)
+    found = rmse_of_lines(name, 4000, 6, "weighted")
+    np.testing.assert_allclose(found, bound(*WALLS[name]), rtol=0.05)
 
 
 @pytest.mark.slow
 def test_plain_lines_do_not_reach_it_at_grazing_incidence():
     """Else the test before could not fail."""
-    angles, distance, normal = WALLS["grazing"]
-    limit = bound(angles, distance, normal)[1]
-    rmse = {}
-    for fit in ("weighted", "total", "y_of_x"):
-        batch = features_of(wall(angles, distance, normal), angles, 2000, 7, fit=fit)
-        errors = line_errors(batch.segments, distance, normal)
-        rmse[fit] = math.sqrt((errors[:, 1] ** 2).mean())
-    assert rmse["total"] > 1.05 * limit
-    assert rmse["weighted"] < rmse["total"]
-    assert rmse["weighted"] < rmse["y_of_x"]
+    fits = ("weighted", "total", "y_of_x")
+    weighted, total, y_of_x = (rmse_of_lines("grazing", 2000, 7, fit)[1] for fit in fits)
+    assert total > 1.05 * bound(*WALLS["grazing"])[1]
+    assert weighted < min(total, y_of_x)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fit", ["weighted", "total"])
 @pytest.mark.parametrize("convex", [True, False])
 def test_covariance_of_a_corner(fit, convex):
-    """The vertex lies on a beam: a reading shared by both walls pulls at them otherwise."""
+    """The vertex lies on a beam: a measurement shared by both walls pulls at them otherwise."""
     angles = fan(25)
     batch = features_of(vertex(angles, 2.83, 90, convex=convex), angles, 3000, 8, fit=fit)
-    one = [f for f in batch if len(f.segments) == 2 and len(f.corners) == 1]
-    assert len(one) > 2900
-    corners = np.concatenate([f.corners for f in one])
+    corners = the_corners(batch, 2900)
     assert (corners["convex"] == convex).all()
     errors = corners["position"] - (2.83, 0.0)
     assert_consistent(errors, corners["covariance"])
@@ -113,18 +113,16 @@ def test_covariance_of_a_corner(fit, convex):
 @pytest.mark.parametrize("fit", ["weighted", "total"])
 @pytest.mark.parametrize("distances", [(2.0, 2.2), (2.0, 2.5), (2.83, 2.7)])
 def test_covariance_of_a_corner_between_beams(fit, distances):
-    """The filter moves the cut; the readings next to it must not pull at the lines."""
+    """The filter moves the cut; the measurements next to it must not pull at the lines."""
     angles, normals = fan(25), (40.0, -50.0)
     walls = list(zip(distances, normals, strict=True))
     batch = features_of(room(angles, walls), angles, 1500, 9, fit=fit)
-    one = [f for f in batch if len(f.segments) == 2 and len(f.corners) == 1]
-    assert len(one) > 1400
-    corners = np.concatenate([f.corners for f in one])
+    corners = the_corners(batch, 1400)
     directions = np.radians(normals)
     across = np.column_stack((np.cos(directions), np.sin(directions)))
     errors = corners["position"] - np.linalg.solve(across, distances)
-    nees = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(corners["covariance"]), errors)
+    squares = nees(errors, corners["covariance"])
     # The median of χ² with 2 degrees of freedom. The mean is a little above 2: now and then the
-    # cut is further off than the readings that are left out.
-    assert np.median(nees) == pytest.approx(2 * math.log(2), abs=0.15)
-    assert 1.7 < nees.mean() < 2.8
+    # cut is further off than the measurements that are left out.
+    assert np.median(squares) == pytest.approx(2 * math.log(2), abs=0.15)
+    assert 1.7 < squares.mean() < 2.8

@@ -19,8 +19,12 @@ from lineament.evaluation.beams import (
     with_neighbours,
 )
 from lineament.evaluation.consistency import largest_variance, tolerance, usable_covariances
-from lineament.evaluation.counts import optional
+from lineament.evaluation.icp import icp
 from lineament.evaluation.matching import distances_from_segments
+from lineament.evaluation.ple import score_map
+
+SCAN = LaserScan([2.0] * 9, 0.0, 0.01)
+WALL = features(segments=[segment((2, -1), (2, 1), 10, 49)])
 
 
 def best_by_trying_all(cost, allowed):
@@ -64,14 +68,20 @@ def test_match_refuses():
         match(np.array([[np.nan]]), np.array([[True]]))
 
 
-def test_without_scipy_one_line_names_the_extra(monkeypatch):
-    wall = features(segments=[segment((2, -1), (2, 1), 10, 49)])
-    for module in ("scipy", "scipy.optimize", "scipy.special"):
+@pytest.mark.parametrize(
+    ("package", "compute"),
+    [
+        ("scipy", lambda: evaluate(WALL, WALL)),
+        ("scipy", lambda: evaluate(features(), features()).summary()),
+        ("scipy", lambda: icp(SCAN, SCAN)),
+        ("shapely", lambda: score_map([], SCAN, np.ones((3, 2)))),
+    ],
+)
+def test_without_an_optional_package_one_line_names_the_extra(package, compute, monkeypatch):
+    for module in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(LineamentError, match=r"^evaluation needs scipy: pip install 'lineament\["):
-        evaluate(wall, wall)
-    with pytest.raises(LineamentError, match=r"needs no_such: pip install 'lineament\[extra\]'$"):
-        optional("no_such.module", "extra")
+    with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[evaluation\]'$"):
+        compute()
 
 
 def test_counts_by_hand():

@@ -1,7 +1,5 @@
 """Scatter of the features of a sensor that stands: cases worked by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,27 +12,28 @@ from lineament.evaluation import StandingScores, standing_scores
 MEDIAN = 2 * math.log(2)
 
 
-def wall(first, last):
+def wall(first, last, n_points=None):
     """Return a segment along x, with 1 cm and 10 mrad of deviation."""
-    return segment((0, 0), (2, 0), first, last)
+    return segment((0, 0), (2, 0), first, last, n_points=n_points)
 
 
 def segment_bins(*scans):
     return standing_scores(features(segments=rows) for rows in scans).segments.bins()
 
 
-def corner_bins(*scans, counts=(30, 40)):
-    sides = [wall(0, 29), wall(30, 69)]
-    for side, count in zip(sides, counts, strict=True):
-        side["n_points"] = count
-    both = [features(segments=sides, corners=rows) for rows in scans]
+def corner_bins(*scans, arms=((30, 40), (30, 40))):
+    """Return the bins of corners between two walls of so many measurements, in either scan."""
+    sides = [[wall(0, 29, one), wall(30, 69, other)] for one, other in arms]
+    both = [features(segments=s, corners=c) for s, c in zip(sides, scans, strict=True)]
     return standing_scores(both).corners.bins()
 
 
-def at(x, y, sigma=0.01, kind="corner"):
-    row = corner(x, y, segments=(0, 1), sigma=sigma)
-    row["kind"] = kind
-    return row
+def at(x, y=0, sigma=0.01, kind="corner", segments=(0, 1)):
+    return corner(x, y, segments=segments, sigma=sigma, kind=kind)
+
+
+def pairs(bins):
+    return {name: figures["pairs"] for name, figures in bins.items() if figures["pairs"]}
 
 
 def test_difference_of_lines_with_its_lever_arm():
@@ -42,20 +41,17 @@ def test_difference_of_lines_with_its_lever_arm():
 
     The angle of the first moves its line there by 1 m times its deviation: the covariances are
     [[2, 1], [1, 1]] + [[1, 0], [0, 1]] = [[3, 1], [1, 2]] cm², whose inverse is [[2, -1], [-1, 3]]
-    / 5; of (3, 2) that makes (18 - 12 + 12)/5 = 3.6.
+    / 5; of (3, 2) that makes (18 - 12 + 12)/5 = 3.6. All of it may be turned.
     """
     second = wall(0, 11)
     second["centroid"], second["angle"] = (2.0, 0.03), 0.02
-    scores = standing_scores([features(segments=[wall(0, 9)]), features(segments=[second])])
-    assert scores.segments.differences.squares == pytest.approx([3.6])
-    figures = scores.segments.bins()["10-29"]
-    assert figures["nees_median"] == pytest.approx(3.6 / MEDIAN)
-    assert figures | {"nees_median": 0} == {
-        "pairs": 1,
-        "nees_median": 0,
-        "in_95_ellipse": 1.0,
-        "found_again": 1.0,
-    }
+    scans = [features(segments=[row]) for row in (wall(0, 9), second)]
+    for turn in (0.0, 2.0):
+        scores = standing_scores(scan.transform(0, 0, turn) for scan in scans)
+        assert scores.segments.differences.squares == pytest.approx([3.6])
+    assert scores.segments.bins()["10-29"] == pytest.approx(
+        {"pairs": 1, "nees_median": 3.6 / MEDIAN, "in_95_ellipse": 1.0, "found_again": 1.0}
+    )
 
 
 @pytest.mark.parametrize(
@@ -65,34 +61,34 @@ def test_difference_of_lines_with_its_lever_arm():
         *((30, "30-99"), (99, "30-99"), (100, "100-")),
     ],
 )
-def test_bins_are_of_the_shorter_arm(count, name):
-    few, many = wall(0, 49), wall(0, 49)
-    few["n_points"], many["n_points"] = count, 200
+def test_bins_are_of_the_shorter_arm_in_either_scan(count, name):
+    few, many = wall(0, 49, count), wall(0, 49, 200)
     for scans in ([few], [many]), ([many], [few]):
-        bins = segment_bins(*scans)
-        assert {key: of["pairs"] for key, of in bins.items() if of["pairs"]} == {name: 1}
+        assert pairs(segment_bins(*scans)) == {name: 1}
+    for first in ((count, 200), (200, count)):
+        for arms in ((first, (200, 200)), ((200, 200), first)):
+            assert pairs(corner_bins([at(1)], [at(1)], arms=arms)) == {name: 1}
 
 
-def test_each_scan_is_compared_with_the_next():
-    """The second wall is there in two of three scans, and looked for in the third alone."""
-    other = wall(50, 59)
-    bins = segment_bins([wall(0, 9)], [wall(0, 9), other], [wall(0, 9)])["10-29"]
-    assert (bins["pairs"], bins["found_again"], bins["nees_median"]) == (2, 2 / 3, 0.0)
+def test_what_is_looked_for_is_in_the_bin_of_the_first_scan():
+    bins = segment_bins([wall(0, 8), wall(20, 27), wall(40, 45)], [wall(0, 8)])
+    assert bins["5-9"]["found_again"] == pytest.approx(1 / 3)
+    assert math.isnan(bins["3-4"]["found_again"])
 
 
-@pytest.mark.parametrize(("shift", "pairs"), [(3, 1), (4, 0)])
-def test_segments_share_half_of_their_beams(shift, pairs):
+@pytest.mark.parametrize(("shift", "found"), [(3, 1), (4, 0)])
+def test_segments_share_half_of_their_beams(shift, found):
     """Of ten beams seven of thirteen are common, or six of fourteen."""
     bins = segment_bins([wall(0, 9)], [wall(shift, 9 + shift)])["10-29"]
-    assert (bins["pairs"], bins["found_again"]) == (pairs, pairs)
+    assert (bins["pairs"], bins["found_again"]) == (found, found)
 
 
-def test_difference_of_corners():
-    """2 cm, where both have 1 cm: 4/(1 + 1) = 2; at 4 cm it is 8, out of the ellipse, 5.99."""
-    bins = corner_bins([at(1, 0)], [at(1.02, 0)])["30-99"]
-    assert bins["nees_median"] == pytest.approx(2 / MEDIAN)
-    assert (bins["pairs"], bins["in_95_ellipse"]) == (1, 1.0)
-    assert corner_bins([at(1, 0)], [at(1.04, 0)])["30-99"]["in_95_ellipse"] == 0.0
+@pytest.mark.parametrize(("distance", "share"), [(0.024, 1.0), (0.025, 0.0)])
+def test_difference_of_corners(distance, share):
+    """Both have 1 cm: of (d, d) the square is 2 d²/(1 + 1), 5.76 and 6.25 beside 5.99."""
+    bins = corner_bins([at(1)], [at(1 + distance, distance)])["30-99"]
+    assert bins["nees_median"] == pytest.approx((distance / 0.01) ** 2 / MEDIAN)
+    assert (bins["pairs"], bins["in_95_ellipse"]) == (1, share)
 
 
 @pytest.mark.parametrize(
@@ -105,52 +101,32 @@ def test_corners_are_found_within_the_gate_or_five_deviations(distance, sigma, a
     assert (bins["pairs"], bins["found_again"]) == (again, again)
 
 
-def test_arm_of_a_corner_is_its_shorter_segment_in_either_scan():
-    assert corner_bins([at(1, 0)], [at(1, 0)], counts=(8, 40))["5-9"]["pairs"] == 1
-    assert corner_bins([at(1, 0)], [at(1, 0)], counts=(40, 3))["3-4"]["pairs"] == 1
-
-
-def test_arm_is_the_shorter_one_of_both_scans():
-    scans = []
-    for count in (40, 7):
-        sides = [wall(0, 29), wall(30, 69)]
-        sides[1]["n_points"] = count
-        scans.append(features(segments=sides, corners=[at(1, 0)]))
-    for pair in (scans, scans[::-1]):
-        bins = standing_scores(pair).corners.bins()
-        assert {name: of["pairs"] for name, of in bins.items() if of["pairs"]} == {"5-9": 1}
-
-
-def test_without_two_segments_a_corner_is_in_no_bin():
-    lonely = at(1, 0)
-    lonely["segments"] = (0, -1)
-    assert not any(of["pairs"] for of in corner_bins([lonely], [at(1, 0)]).values())
-
-
-def test_edges_are_left_out():
-    bins = corner_bins([at(1, 0), at(0, 1, kind="edge")], [at(1, 0, kind="edge"), at(0, 1)])
-    assert (bins["30-99"]["pairs"], bins["30-99"]["found_again"]) == (0, 0.0)
-
-
-def test_without_a_covariance_it_is_found_again_but_not_compared():
-    vague = at(1, 0, math.nan)
-    bins = corner_bins([vague], [at(1, 0)])["30-99"]
-    assert (bins["pairs"], bins["found_again"]) == (0, 1.0)
+@pytest.mark.parametrize(
+    ("first", "second", "found", "again"),
+    [
+        ([at(1, segments=(0, -1))], [at(1)], {}, math.nan),  # without two segments in no bin
+        ([at(1), at(0, 1, kind="edge")], [at(1, kind="edge"), at(0, 1)], {}, 0.0),
+        ([at(1, sigma=math.nan)], [at(1)], {}, 1.0),  # found again, but not compared
+        ([at(1, kind="slit")], [at(1)], {"30-99": 1}, 1.0),
+    ],
+)
+def test_which_corners_are_compared(first, second, found, again):
+    bins = corner_bins(first, second)
+    assert pairs(bins) == found
+    np.testing.assert_equal(bins["30-99"]["found_again"], again)
 
 
 def test_nothing_to_compare():
-    for scans in [], [features(segments=[wall(0, 9)])]:
+    for scans in [], [features(segments=[wall(0, 9)])], [features(), features()]:
         scores = standing_scores(scans)
-        assert scores == StandingScores() or len(scores.segments.seen) == 0
+        assert [len(scores.segments.seen), len(scores.corners.seen)] == [0, 0]
         assert math.isnan(scores.segments.bins()["3-4"]["nees_median"])
-    empty = standing_scores([features(), features()])
-    assert [len(empty.segments.seen), len(empty.corners.seen)] == [0, 0]
     with pytest.raises(ValueError, match="two scans have 9 and 8 beams, expected the same number"):
         standing_scores([features(n=9), features(n=8)])
 
 
 def test_scores_add_up():
-    one = standing_scores([features(segments=[wall(0, 9)])] * 2)
+    one = standing_scores([features(segments=[wall(0, 9)])] * 3)
+    assert pairs(one.segments.bins()) == {"10-29": 2}
     total = StandingScores.total([one, one])
-    assert total.segments.bins()["10-29"]["pairs"] == 2
-    assert np.array_equal(total.segments.arms, [10, 10])
+    assert total.segments.arms.tolist() == [10] * 4

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from handmade import corner, features, segment
 
-from lineament import Features, LaserScan
+from lineament import LaserScan
 from lineament.errors import LogError
 from lineament.evaluation.ple import (
     Benchmark,
@@ -23,7 +24,6 @@ from lineament.evaluation.ple import (
     score_map,
     sparing_map,
 )
-from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT
 
 #: Scans and budgets where two points are equally far but for the authors' rounding, which took the
 #: later one.
@@ -45,50 +45,39 @@ def authors_iepf(benchmark, score):
 
 
 @pytest.mark.slow
-def test_the_authors_iepf_comes_out_to_the_last_digit_on_real_scans(real):
+def test_the_authors_iepf_comes_out_to_the_last_digit(real, simulated):
+    pytest.importorskip("shapely")
     told = []
 
     def track(scans, about, total):
         told.append((len(scans), about, total))
         return scans
 
-    result = run_benchmark(real, iepf_map, track=track)
+    result, on_simulated = (
+        run_benchmark(real, iepf_map, track=track),
+        run_benchmark(simulated, iepf_map),
+    )
     assert told == [(140, "iepf_map", 140)]
     for score in ("rmse", "f", "fnr"):
-        close = np.isclose(
-            result.scores[score], authors_iepf(real, score), rtol=0, atol=1e-12, equal_nan=True
-        )
+        given = authors_iepf(real, score)
+        close = np.isclose(result.scores[score], given, rtol=0, atol=1e-12, equal_nan=True)
         off = {(int(i), real.max_vertices[j]) for i, j in np.argwhere(~close)}
         assert off == (set(TIED) if score == "rmse" else set())
-    assert np.round(result.means()["rmse"], 4).tolist() == [1.3572, 0.6577, 0.387, 0.2475, 0.153]
-    assert np.round(real.means()["rmse"]["ple+"], 4).tolist() == [
-        0.0811,
-        0.0635,
-        0.0471,
-        0.0352,
-        0.0254,
-    ]
-
-
-@pytest.mark.slow
-def test_the_authors_iepf_comes_out_to_the_last_digit_on_simulated_scans(simulated):
-    pytest.importorskip("shapely")
-    result = run_benchmark(simulated, iepf_map)
     for score in ("rmse", "f", "area_error"):
-        np.testing.assert_allclose(
-            result.scores[score], authors_iepf(simulated, score), rtol=0, atol=1e-12
-        )
-    assert np.isnan(result.scores["fnr"]).all()
-    assert (result.scores["vertices"] == simulated.max_vertices).all()
-    assert np.round(result.means()["area_error"], 5).tolist() == [
-        0.03513,
-        0.01448,
-        0.01188,
-        0.01104,
-        0.01048,
-    ]
+        given = authors_iepf(simulated, score)
+        np.testing.assert_allclose(on_simulated.scores[score], given, rtol=0, atol=1e-12)
+    assert np.isnan(on_simulated.scores["fnr"]).all()
+    assert (on_simulated.scores["vertices"] == simulated.max_vertices).all()
     # A ∪ B = A + B - A ∩ B, so that the one score bounds the other.
-    assert (result.scores["iou"] <= 1 - result.scores["area_error"] / 2 + 1e-12).all()
+    scores = on_simulated.scores
+    assert (scores["iou"] <= 1 - scores["area_error"] / 2 + 1e-12).all()
+    published = [
+        (result.means()["rmse"], [1.3572, 0.6577, 0.387, 0.2475, 0.153]),
+        (real.means()["rmse"]["ple+"], [0.0811, 0.0635, 0.0471, 0.0352, 0.0254]),
+        (on_simulated.means()["area_error"], [0.0351, 0.0145, 0.0119, 0.0110, 0.0105]),
+    ]
+    for found, given in published:
+        np.testing.assert_allclose(found, given, atol=5.1e-5)
 
 
 def odd(benchmark):
@@ -133,24 +122,22 @@ def test_iepf_by_hand():
     assert benchmark_iepf(points, 99).tolist() == points.tolist()
 
 
-@pytest.mark.parametrize("n", [0, 1, 2])
-def test_iepf_of_hardly_any_points(n):
-    assert len(benchmark_iepf(np.ones((n, 2)), 5)) == n
-
-
-def test_iepf_of_one_point_many_times():
+def test_iepf_of_hardly_any_points_or_one_many_times():
+    assert [len(benchmark_iepf(np.ones((n, 2)), 5)) for n in (0, 1, 2)] == [0, 1, 2]
     assert benchmark_iepf(np.ones((6, 2)), 4).tolist() == [[1.0, 1.0]] * 4
 
 
-@pytest.mark.parametrize(("points", "budget"), [(np.ones(4), 3), (np.ones((4, 3)), 3)])
-def test_iepf_refuses_other_shapes(points, budget):
-    with pytest.raises(ValueError, match=r"points has shape \(4,.*expected \(n, 2\)"):
+@pytest.mark.parametrize(
+    ("points", "budget", "message"),
+    [
+        (np.ones(4), 3, r"points has shape \(4,\), expected \(n, 2\)"),
+        (np.ones((4, 3)), 3, r"points has shape \(4, 3\), expected \(n, 2\)"),
+        (np.ones((4, 2)), 1, "max_vertices is 1, expected a whole number ≥ 2"),
+    ],
+)
+def test_iepf_refuses(points, budget, message):
+    with pytest.raises(ValueError, match=message):
         benchmark_iepf(points, budget)
-
-
-def test_iepf_refuses_a_budget_without_a_line():
-    with pytest.raises(ValueError, match="max_vertices is 1, expected a whole number ≥ 2"):
-        benchmark_iepf(np.ones((4, 2)), 1)
 
 
 def test_scores_by_hand():
@@ -167,22 +154,23 @@ def test_scores_by_hand():
     assert math.isnan(score.area_error)
 
 
-def test_of_several_walls_the_last_counts():
-    near, far = np.array([[1.0, -1.0], [1.0, 1.0]]), np.array([[3.0, -1.0], [3.0, 1.0]])
-    assert cast_map([near, far], np.zeros(1)).tolist() == [3.0]
-    assert cast_map([far, near], np.zeros(1)).tolist() == [1.0]
-    assert cast_map([np.concatenate((far, near[::-1]))], np.zeros(1)).tolist() == [1.0]
+NEAR, FAR = (np.array([[x, -1.0], [x, 1.0]]) for x in (1.0, 3.0))
 
 
-def test_a_ray_may_pass_an_end_by_a_milliradian():
-    wall = np.array([[2.0, 0.0], [2.0, 1.0]])
-    mapped = cast_map([wall], np.array([-0.9e-3, -1.1e-3]))
-    assert mapped[0] == pytest.approx(2.0, abs=1e-5)
-    assert math.isnan(mapped[1])
-
-
-def test_a_wall_along_the_ray_is_met_nowhere():
-    assert np.isnan(cast_map([np.array([[1.0, 0.0], [2.0, 0.0]])], np.zeros(1))).all()
+@pytest.mark.parametrize(
+    ("polylines", "bearing", "expected"),
+    [
+        ([NEAR, FAR], 0.0, 3.0),  # of several the last
+        ([FAR, NEAR], 0.0, 1.0),
+        ([np.concatenate((FAR, NEAR[::-1]))], 0.0, 1.0),
+        ([np.array([[2.0, 0.0], [2.0, 1.0]])], -0.9e-3, 2.0),  # by a milliradian past its end
+        ([np.array([[2.0, 0.0], [2.0, 1.0]])], -1.1e-3, math.nan),
+        ([np.array([[1.0, 0.0], [2.0, 0.0]])], 0.0, math.nan),  # along the ray
+    ],
+)
+def test_where_a_ray_meets_a_map(polylines, bearing, expected):
+    found = cast_map(polylines, np.array([bearing]))
+    np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
 @pytest.mark.parametrize("polylines", [[], [np.empty((0, 2))], [np.ones((1, 2))]])
@@ -206,22 +194,21 @@ def test_areas_by_hand():
     assert score.iou == pytest.approx(12 / 20)
 
 
-def test_a_map_of_points_in_space_is_refused():
+def test_maps_are_refused():
     with pytest.raises(ValueError, match=r"polylines\[0\] has shape \(2, 3\), expected \(k, 2\)"):
         cast_map([np.ones((2, 3))], np.zeros(1))
+    with pytest.raises(ValueError, match="chord made a map of 3 vertices of scan 0, expected at m"):
+        run_benchmark(wall_benchmark(), lambda scan, _: [scan.points[:3]], name="chord")
+    with pytest.raises(ValueError, match="method 'lui' is unknown"):
+        run_benchmark(wall_benchmark(), "lui")
 
 
 def features_of(walls, corners, beams=4):
     """Make features of walls (start, end, first beam, last beam) and corners (a, b) at beams."""
-    segments, joints = np.zeros(len(walls), SEGMENT), np.zeros(len(corners), CORNER)
-    for segment, (start, end, first, last) in zip(segments, walls, strict=True):
-        segment["start"], segment["end"] = start, end
-        segment["centroid"] = (np.array(start) + end) / 2
-        segment["angle"] = math.atan2(end[1] - start[1], end[0] - start[0])
-        segment["first_beam"], segment["last_beam"] = first, last
-    joints["segments"], joints["beam"] = np.reshape(corners, (-1, 2)), beams
-    nothing = np.empty(0, np.int32)
-    return Features(segments, joints, np.empty(0, ARC), nothing, np.empty(0, BREAKPOINT))
+    joints = [corner(0, 0, segments=sides) for sides in corners]
+    found = features(0, segments=[segment(*wall) for wall in walls], corners=joints)
+    found.corners["beam"] = beams
+    return found
 
 
 FAN = LaserScan(np.ones(9), angle_min=-0.4, angle_increment=0.1)
@@ -229,33 +216,34 @@ FAN = LaserScan(np.ones(9), angle_min=-0.4, angle_increment=0.1)
 
 def test_segments_joined_at_a_corner_share_its_vertex():
     walls = [((2.0, -0.5), (2.0, 0.0), 2, 4), ((2.0, 0.0), (3.0, 0.5), 4, 6)]
-    joined = polylines_of(features_of(walls, [(0, 1)]), FAN)
-    assert [len(polyline) for polyline in joined] == [3]
-    np.testing.assert_allclose(joined[0][1], [2.0, 0.0])
+    (joined,) = polylines_of(features_of(walls, [(0, 1)]), FAN)
     # The ends go on to the rays at ∓0.2 rad.
-    np.testing.assert_allclose(joined[0][0], [2.0, -2.0 * math.tan(0.2)])
+    end = 2.0 / (1 - 2 * math.tan(0.2))
+    expected = [[2.0, -2.0 * math.tan(0.2)], [2.0, 0.0], [end, end * math.tan(0.2)]]
+    np.testing.assert_allclose(joined, expected)
     apart = polylines_of(features_of(walls, [(-1, 1)]), FAN)
     assert [len(polyline) for polyline in apart] == [2, 2]
+    assert polylines_of(features_of([], []), FAN) == []
 
 
-def test_lines_that_miss_each_other_meet_midway():
-    walls = [((2.0, -0.5), (2.0, 0.0), 2, 4), ((2.2, 0.0), (3.0, 0.5), 4, 6)]
+@pytest.mark.parametrize(
+    ("ends", "x"),
+    [
+        (((2.0, 0.0), (2.2, 0.0)), 2.1),  # lines that miss each other meet midway
+        # x = 2 goes on to y = 4, at 63° and beyond the fan: midway on the ray of the bend.
+        (((2.0, 4.0), (2.0, 4.0)), (2.0 + 22.0 / 7.0) / 2),
+    ],
+)
+def test_where_lines_that_do_not_share_a_vertex_meet(ends, x):
+    walls = [((2.0, -0.5), ends[0], 2, 4), (ends[1], (3.0, 0.5), 4, 6)]
     (polyline,) = polylines_of(features_of(walls, [(0, 1)]), FAN)
-    np.testing.assert_allclose(polyline[1], [2.1, 0.0])
-
-
-def test_lines_that_meet_behind_their_beams_meet_at_the_bend():
-    # They meet where x = 2 is continued to y = 4, at 63° and beyond the fan.
-    walls = [((2.0, -0.5), (2.0, 4.0), 2, 4), ((2.0, 4.0), (3.0, 0.5), 4, 6)]
-    (polyline,) = polylines_of(features_of(walls, [(0, 1)]), FAN)
-    np.testing.assert_allclose(polyline[1], [(2.0 + 22.0 / 7.0) / 2, 0.0])
+    np.testing.assert_allclose(polyline[1], [x, 0.0])
 
 
 def test_a_wall_along_the_rays_keeps_its_ends():
     walls = [((2.0, 0.001), (3.0, 0.002), 4, 5)]
-    np.testing.assert_allclose(
-        polylines_of(features_of(walls, []), FAN), [[[2.0, 0.001], [3.0, 0.002]]]
-    )
+    (polyline,) = polylines_of(features_of(walls, []), FAN)
+    np.testing.assert_allclose(polyline, [[2.0, 0.001], [3.0, 0.002]])
 
 
 def test_a_closed_outline_ends_where_it_begins():
@@ -265,14 +253,10 @@ def test_a_closed_outline_ends_where_it_begins():
     walls = [(ends[k], ends[k + 1], 2 * k, (2 * k + 2) % 8) for k in range(4)]
     lone = ((4.0, 0.0), (4.0, 4.0), 1, 2)
     corners = [(3, 0), (0, 1), (1, 2), (2, 3)]
-    features = features_of([*walls, lone], corners, beams=[0, 2, 4, 6])
-    alone, outline = polylines_of(features, around)
+    found = features_of([*walls, lone], corners, beams=[0, 2, 4, 6])
+    alone, outline = polylines_of(found, around)
     np.testing.assert_allclose(alone, [[4.0, 0.0], [4.0, 4.0]], atol=1e-12)
     np.testing.assert_allclose(outline, [*vertices, vertices[0]])
-
-
-def test_no_segments_no_polylines():
-    assert polylines_of(features_of([], []), FAN) == []
 
 
 def wall_benchmark(scans=2):
@@ -301,16 +285,6 @@ def test_results_stand_beside_the_authors():
         "area_error": None,
         "iou": None,
     }
-
-
-def test_a_map_beyond_the_budget_is_refused():
-    with pytest.raises(ValueError, match="chord made a map of 3 vertices of scan 0, expected at m"):
-        run_benchmark(wall_benchmark(), lambda scan, _: [scan.points[:3]], name="chord")
-
-
-def test_unknown_methods_are_refused():
-    with pytest.raises(ValueError, match="method 'lui' is unknown"):
-        run_benchmark(wall_benchmark(), "lui")
 
 
 def test_a_method_of_the_registry():

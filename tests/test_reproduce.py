@@ -1,4 +1,4 @@
-"""The report of experiments: what they are called, what is written, and that it comes out again."""
+"""The report of experiments: names, what is written, and that it can be repeated."""
 
 import json
 from html.parser import HTMLParser
@@ -6,31 +6,22 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from lineament import LaserScan, LineamentError
-from lineament import reproduce as experiments
+from lineament import LineamentError
 from lineament.evaluation.counts import plain
 from lineament.evaluation.ple import Benchmark, BenchmarkResult
 from lineament.evaluation.ple import benchmark as ple
-from lineament.logs import save_npz
 from lineament.output.canvas import figure_bytes, new_figure
 from lineament.reproduce import (
-    ALIASES,
     EXPERIMENTS,
     Figure,
     Findings,
     Setting,
     Table,
     experiment_names,
-    recordings,
-    scenes,
+    run_experiments,
 )
-from lineament.reproduce.findings import cell_text
-from lineament.reproduce.noise_points import _near
+from lineament.reproduce.findings import cell_text, dot_chart
 from lineament.reproduce.report import benchmark_tables, reproduce, write_report
-
-
-def quiet(about):
-    del about
 
 
 def findings():
@@ -63,7 +54,9 @@ def test_names_are_those_of_the_experiments_and_of_the_paper():
     assert experiment_names(["fig12", "noise", "fig2"]) == ["noise", "similarity"]
     with pytest.raises(ValueError, match="experiment 'fig1' is unknown, expected one of: noise, "):
         experiment_names(["fig1"])
-    assert not set(ALIASES) & set(EXPERIMENTS)
+    assert experiment_names(["repeatability"]) == ["real"]
+    others = [other for names in EXPERIMENTS.values() for other in names]
+    assert len({*EXPERIMENTS, *others}) == len(EXPERIMENTS) + len(others)
 
 
 def test_report_is_one_page_and_one_file_of_numbers(tmp_path):
@@ -86,8 +79,8 @@ def test_cells():
     shown = [cell_text(c) for c in (None, "liu", 3, 0.5, np.float64(12.345), 12345.6, 1e-5, 0.0)]
     assert shown == ["–", "liu", "3", "0.5", "12.3", "12346", "1.00e-05", "0"]
     assert plain((np.bool_(True), {1: np.nan})) == [True, {"1": None}]
-    with pytest.raises(ValueError, match="row of 1 cells, expected 2"):
-        Table("A", ("b", "c"), (("d",),))
+    table = Table.of_numbers("A", {"x": {"n": 2}}, {"n [mm]": ("n", 1e3), "m": ("m", 1)}, "", "b")
+    assert (table.columns, table.rows) == (("b", "n [mm]", "m"), (("x", 2000.0, None),))
     with pytest.raises(ValueError, match=r"has columns .*'b'.*, then .*'c'"):
         Table.of_records("A", [{"b": 1}, {"c": 1}])
 
@@ -98,11 +91,23 @@ def test_setting_is_checked(field):
         Setting(**field)
 
 
-def test_recordings_that_are_not_there_are_left_out(tmp_path):
-    assert Setting().recording("a.log") is None
-    assert Setting(data=tmp_path).recording("a.log") is None
+def test_recordings_that_are_missing_are_left_out(tmp_path):
+    files = {"A": "a.log", "B": "b.log"}
+    assert Setting().recordings(files) == Setting(data=tmp_path).recordings(files) == {}
     (tmp_path / "a.log").touch()
-    assert Setting(data=tmp_path).recording("a.log") == tmp_path / "a.log"
+    assert Setting(data=tmp_path).recordings(files) == {"A": tmp_path / "a.log"}
+
+
+def test_chart_draws_what_is_finite(monkeypatch):
+    shown = []
+    monkeypatch.setattr("lineament.reproduce.findings.canvas.figure_bytes", shown.append)
+    numbers = {"one": {"a": {"f1": 1.0}, "b": {"f1": np.nan, "t": 3}}, "other": {"b": {"f1": 2}}}
+    dot_chart(numbers, {"F1 [%]": ("f1", 100), "time": ("t", 1)}, ["time"])
+    f1, time = shown[0].axes
+    assert [tick.get_text() for tick in f1.get_yticklabels()] == ["b", "a"]
+    drawn = [np.asarray(line.get_xdata(), float) for line in f1.lines]
+    np.testing.assert_array_equal(drawn, [[np.nan, 100.0], [200.0, np.nan]])
+    assert (f1.get_xscale(), time.get_xscale()) == ("linear", "log")
 
 
 def test_nothing_is_run_for_a_folder_that_cannot_be(tmp_path):
@@ -112,11 +117,6 @@ def test_nothing_is_run_for_a_folder_that_cannot_be(tmp_path):
     with pytest.raises(ValueError, match="unknown"):
         reproduce(tmp_path / "folder", ["fig1"])
     assert not (tmp_path / "folder").exists()
-
-
-def test_near_marks_beams_around():
-    marks = np.array([0, 0, 0, 1, 0, 0, 0], dtype=bool)
-    assert np.flatnonzero(_near(marks, 1, 2)).tolist() == [2, 3, 4, 5]
 
 
 def test_benchmark_table_tells_the_authors_method_of_the_same_name():
@@ -139,14 +139,13 @@ def test_benchmark_table_tells_the_authors_method_of_the_same_name():
 
 
 @pytest.mark.slow
-def test_noise_comes_out_again_and_says_what_the_filter_does():
-    told = []
+def test_noise_can_be_repeated_and_shows_what_the_filter_does():
+    reports = []
     first, again = (
-        experiments.run_experiments(["fig3"], Setting(frames=1), told.append)["noise"]
-        for _ in range(2)
+        run_experiments(["fig3"], Setting(frames=1), reports.append)["noise"] for _ in range(2)
     )
     assert json.dumps(first.to_dict(), allow_nan=False) == json.dumps(again.to_dict())
-    assert told[0] == "noise (1/1): starting"
+    assert reports[0] == "noise (1/1): starting"
     ranges = first.numbers["ranges"]
     assert ranges["planes"]["raw"] == pytest.approx(0.01, rel=0.1)
     assert ranges["planes"]["filtered"] < 0.6 * ranges["planes"]["raw"]
@@ -155,40 +154,11 @@ def test_noise_comes_out_again_and_says_what_the_filter_does():
 
 
 @pytest.mark.slow
-def test_perfect_lines_have_the_noise_as_similarity_error():
-    found = experiments.run_experiments(["fig12"], Setting(frames=1), quiet)["similarity"]
+def test_true_lines_have_the_noise_as_similarity_error():
+    found = run_experiments(["fig12"], Setting(frames=1), lambda _: None)["similarity"]
     (scores,) = found.numbers.values()
     true, pdbs = scores["the true lines"], scores["pdbs, fitted"]
     # The distance to the line is the error of the range, shortened by the incidence.
     assert 0.004 < true["similarity_mean"] < 0.01 * np.sqrt(2 / np.pi)
     assert true["similarity_maximum"] < 0.06
     assert pdbs["similarity_mean"] > scores["iepf"]["similarity_mean"]
-    assert found.tables[0].columns[1] == "largest, paper"
-
-
-@pytest.mark.slow
-def test_scenes_draw_recordings_where_they_are(data_dir, monkeypatch):
-    monkeypatch.setattr(scenes, "KINDS", ("corridor",))
-    monkeypatch.setattr(recordings, "LOGS", dict([*recordings.LOGS.items()][:1]))
-    found = scenes.run(Setting(frames=1, data=data_dir), quiet)
-    assert [figure.name for figure in found.figures] == ["fig11-corridor", "fig11-intel-lab"]
-    for table in found.tables:
-        assert [row[0] for row in table.rows][:2] == [
-            "liu, paper’s numbers",
-            "liu, best of Figure 9",
-        ]
-
-
-def test_recorded_scans_are_spread_over_the_log(tmp_path, monkeypatch):
-    scans = [LaserScan([1.0, 1.0], 0.0, 0.1, stamp=float(i)) for i in range(10)]
-    save_npz(tmp_path / "a.npz", scans)
-    monkeypatch.setattr(recordings, "LOGS", {"A": "a.npz", "B": "b.npz"})
-    setting = Setting(data=tmp_path)
-    chosen = {
-        count: [scan.stamp for scan in dict(recordings.recorded_scans(setting, count))["A"]]
-        for count in (1, 2, 3, 20)
-    }
-    assert chosen[1] == [5.0]
-    assert chosen[2] == [2.0, 7.0]
-    assert chosen[3] == [1.0, 4.0, 7.0]
-    assert chosen[20] == [float(i) for i in range(10)]

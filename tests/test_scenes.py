@@ -6,9 +6,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from lineament.simulation import SCENES, World, cast_rays, room, scene, truth
-from lineament.simulation.placing import Floor, clearance, is_free, rectangle
-from lineament.simulation.sensor import Sensor
+from lineament.simulation import SCENES, Sensor, World, cast_rays, room, scene, truth
+from lineament.simulation.placing import Floor, clearance, is_free
+from lineament.simulation.worlds import rectangle
 
 SEEDS = range(12)
 EVERY = [(kind, seed) for kind in SCENES for seed in SEEDS]
@@ -56,30 +56,23 @@ def test_walls_meet_at_their_ends_alone(kind, seed):
         assert is_free(others, [(x, y)])[0]
 
 
-@pytest.mark.parametrize(("kind", "seed"), EVERY[::3])
-def test_the_same_seed_gives_the_same_scene(kind, seed):
-    (world, pose), (again, pose_again) = scene(kind, seed), scene(kind, seed)
+@pytest.mark.parametrize("kind", SCENES)
+def test_the_same_seed_gives_the_same_scene(kind):
+    (world, pose), (again, pose_again) = scene(kind, 3), scene(kind, 3)
     np.testing.assert_array_equal(world.segments, again.segments)
     np.testing.assert_array_equal(world.circles, again.circles)
     assert pose == pose_again
-    assert pose != scene(kind, seed + 1)[1]
+    assert pose != scene(kind, 4)[1]
 
 
 def test_each_kind_holds_what_it_is_for():
-    found = {}
-    for kind in SCENES:
+    for kind, name, least in (
+        *(("room", "corners", 5), ("star", "corners", 5), ("corridor", "breakpoints", 3)),
+        *(("hall", "arcs", 2), ("hall", "corners", 4), ("layers", "breakpoints", 10)),
+        ("grazing", "segments", 10),
+    ):
         scans = [truth(*scene(kind, seed), RING) for seed in SEEDS]
-        found[kind] = {
-            name: np.mean([len(getattr(scan, name)) for scan in scans])
-            for name in ("segments", "corners", "arcs", "breakpoints")
-        }
-    assert found["room"]["corners"] > 5
-    assert found["star"]["corners"] > 5
-    assert found["corridor"]["breakpoints"] > 3
-    assert found["hall"]["arcs"] > 2
-    assert found["hall"]["corners"] > 4
-    assert found["layers"]["breakpoints"] > 10
-    assert found["grazing"]["segments"] > 10
+        assert np.mean([len(getattr(scan, name)) for scan in scans]) > least
 
 
 def test_thin_walls_are_met_at_grazing_incidence():

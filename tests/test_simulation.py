@@ -1,8 +1,6 @@
 """Worlds, ray casting, sensors: against hand-worked cases, a slow twin, statistics."""
 
 import math
-import subprocess
-import sys
 from collections import Counter
 from dataclasses import replace
 
@@ -26,8 +24,7 @@ def test_world_keeps_read_only_copies():
     walls[:] = 9
     assert world.segments.tolist() == [[0, 0, 1, 0]]
     assert world.circles.shape == (0, 3)
-    with pytest.raises(ValueError, match="read-only"):
-        world.segments[0, 0] = 1
+    assert not world.segments.flags.writeable
     with pytest.raises(AttributeError):
         world.segments = walls
 
@@ -53,17 +50,14 @@ def test_polygons_are_open_or_closed():
     triangle = [(0, 0), (1, 0), (0, 1), (0, 0)]
     world = World.of_polygons([triangle, [(5, 5), (6, 5)]], circles=[[9, 9, 1]])
     assert world.segments.tolist() == [[0, 0, 1, 0], [1, 0, 0, 1], [0, 1, 0, 0], [5, 5, 6, 5]]
-    assert world.n_surfaces == 5
-    assert World.of_polygons([]).n_surfaces == 0
-
-
-@pytest.mark.parametrize(
-    ("polygon", "message"),
-    [([(0, 0)], "1 vertices"), ([(0, 0), (0, 0)], "no length"), ([(0, 0, 0)], "shape")],
-)
-def test_polygons_refused(polygon, message):
-    with pytest.raises(ValueError, match=message):
-        World.of_polygons([polygon])
+    assert (world.n_surfaces, World.of_polygons([]).n_surfaces) == (5, 0)
+    for polygon, problem in (
+        ([(0, 0)], "1 vert"),
+        ([(0, 0)] * 2, "no leng"),
+        ([(0,) * 3], "shape"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            World.of_polygons([polygon])
 
 
 @pytest.mark.parametrize("world", [room(), building()[0]], ids=["room", "building"])
@@ -73,19 +67,18 @@ def test_walls_meet_only_at_their_ends(world):
     for i, wall in enumerate(world.segments):
         others = World(np.delete(world.segments, i, axis=0), world.circles)
         dx, dy = wall[2:] - wall[:2]
-        length = math.hypot(dx, dy)
         hit, _ = cast_rays(others, (wall[0], wall[1], math.atan2(dy, dx)), [0.0])
-        assert hit[0] >= length - 1e-9
-    assert (distance_to_walls(World(world.segments), world.circles[:, :2])
-            > world.circles[:, 2]).all()  # fmt: skip
+        assert hit[0] >= math.hypot(dx, dy) - 1e-9
+    to_walls = distance_to_walls(World(world.segments), world.circles[:, :2])
+    assert (to_walls > world.circles[:, 2]).all()
 
 
 def test_building_encloses_its_way():
     world, waypoints = building()
     for x, y in waypoints:
-        ranges, surface = cast_rays(world, (x, y, 0), np.linspace(-3.1, 3.1, 400))
+        ranges, _ = cast_rays(world, (x, y, 0), np.linspace(-3.1, 3.1, 400))
         assert np.isfinite(ranges).all()
-        assert (surface >= 0).all()
+    assert distance_to_walls(world, waypoints).min() > 0.3
 
 
 # Ray casting
@@ -161,12 +154,8 @@ def test_nothing_slips_through_a_corner():
 @pytest.mark.parametrize(
     ("pose", "angles"),
     [
-        ((0, 0), [0]),
-        ((0, 0, INF), [0]),
-        ((0, 0, 0), [[0]]),
-        ((0, 0, 0), [INF]),
-        (np.zeros((2, 3)), [0]),
-        (np.zeros((2, 3)), [0, 0, 0]),
+        *(((0, 0), [0]), ((0, 0, INF), [0]), ((0, 0, 0), [[0]]), ((0, 0, 0), [INF])),
+        *((np.zeros((2, 3)), [0] * n) for n in (1, 3)),
     ],
 )
 def test_cast_refuses(pose, angles):
@@ -182,14 +171,16 @@ def test_each_beam_may_have_its_own_pose():
     for i in range(0, 1500, 7):
         (alone,), (met,) = cast_rays(world, tuple(poses[i]), angles[[i]])
         assert (ranges[i], surface[i]) == (alone, met)
-
-
-def test_no_beams():
-    ranges, surface = cast_rays(WALL, (0, 0, 0), [])
-    assert ranges.shape == surface.shape == (0,)
+    assert [len(of_none) for of_none in cast_rays(WALL, (0, 0, 0), [])] == [0, 0]
 
 
 # Sensors
+
+
+def ranges_in_drum(radius, **settings):
+    """Twenty scans of a round room."""
+    sensor, rng = ring_sensor(**settings), np.random.default_rng(11)
+    return np.concatenate([sensor.scan(drum(radius), (0, 0, 0), rng).ranges for _ in range(20)])
 
 
 @pytest.mark.parametrize(
@@ -202,12 +193,11 @@ def test_no_beams():
     ],
 )
 def test_noise_is_as_stated(noise, radius):
-    sensor, rng = ring_sensor(noise=noise), np.random.default_rng(11)
-    readings = np.concatenate([sensor.scan(drum(radius), (0, 0, 0), rng).ranges for _ in range(20)])
+    ranges = ranges_in_drum(radius, noise=noise)
     expected = math.sqrt(noise.range_variance(radius))
-    n = len(readings)
-    assert abs(readings.mean() - radius) <= SIGMAS * expected / math.sqrt(n) + 1e-12
-    assert abs(readings.std() - expected) <= SIGMAS * expected / math.sqrt(2 * n) + 1e-12
+    n = len(ranges)
+    assert abs(ranges.mean() - radius) <= SIGMAS * expected / math.sqrt(n) + 1e-12
+    assert abs(ranges.std() - expected) <= SIGMAS * expected / math.sqrt(2 * n) + 1e-12
 
 
 def test_bearing_noise_shows_on_an_oblique_wall():
@@ -230,14 +220,12 @@ def test_quantised_ranges_lie_on_the_lattice(quantum):
 
 
 def test_share_of_dropouts():
-    sensor, rng = ring_sensor(dropout=0.03), np.random.default_rng(2)
-    lost = np.concatenate([~sensor.scan(drum(2), (0, 0, 0), rng).valid for _ in range(20)])
+    lost = ~np.isfinite(ranges_in_drum(2, dropout=0.03))
     assert abs(lost.mean() - 0.03) < SIGMAS * math.sqrt(0.03 * 0.97 / len(lost))
 
 
 def test_outliers_are_short_and_uniform():
-    sensor, rng = ring_sensor(outlier=0.1, range_min=1.0), np.random.default_rng(2)
-    ranges = np.concatenate([sensor.scan(drum(3), (0, 0, 0), rng).ranges for _ in range(20)])
+    ranges = ranges_in_drum(3, outlier=0.1, range_min=1.0)
     false = ranges[ranges < 3 - 1e-9]
     assert abs(len(false) / len(ranges) - 0.1) < SIGMAS * math.sqrt(0.1 * 0.9 / len(ranges))
     assert false.min() >= 1.0
@@ -279,7 +267,7 @@ def test_mixed_pixels_only_across_occlusion_edges():
     assert across.sum() >= 4
     assert moved.any(axis=0)[across].all()
     assert not moved[:, ~across].any()
-    # About half of the readings across an edge are blends, and they lie between its depths.
+    # About half of the ranges across an edge are blends, and they lie between its depths.
     n = 40 * across.sum()
     assert abs(moved[:, across].mean() - 0.5) < SIGMAS * 0.5 / math.sqrt(n)
     for edge in off_edge.T:
@@ -343,28 +331,16 @@ def test_presets(name, n_beams, first, last, full):
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("name", "refused", "accepted"),
     [
-        {"n_beams": 0},
-        {"n_beams": 482 * 3},
-        {"angle_min": math.nan},
-        {"angle_increment": 0.0},
-        {"range_min": -1.0},
-        {"range_max": 0.0},
-        {"dropout": 1.1},
-        {"outlier": -0.1},
-        {"mixed_pixel": -1e-3},
-        {"rate": 0.0},
+        *(("n_beams", 0, 1), ("n_beams", 1081, 1080), ("angle_min", math.nan, -9.0)),
+        *(("angle_increment", 0.0, 1e-9), ("range_min", -1e-9, 0.0), ("range_max", 0.0, 1e-9)),
+        *(("dropout", 1.1, 1.0), ("dropout", -0.1, 0.0), ("outlier", 1.1, 1.0)),
+        *(("outlier", -0.1, 0.0), ("mixed_pixel", -1e-3, 0.0), ("rate", 0.0, 1e-9)),
     ],
 )
-def test_sensor_refuses(change):
-    with pytest.raises(ValueError, match=rf"Sensor\.{next(iter(change))} is "):
-        replace(SENSORS["paper"], **change)
-
-
-def test_import_is_light():
-    code = (
-        "import sys, lineament.simulation; "
-        "sys.exit(any(m in sys.modules for m in ('numba', 'pyarrow', 'matplotlib')))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+def test_sensor_refuses(name, refused, accepted):
+    sensor = replace(SENSORS["paper"], **{name: accepted})
+    assert getattr(sensor, name) == accepted
+    with pytest.raises(ValueError, match=rf"Sensor\.{name} is "):
+        replace(sensor, **{name: refused})

@@ -61,18 +61,8 @@ def free_space_scores(scan: LaserScan, features: Features) -> FreeSpaceScores:
     nearest and its two neighbours, all went on by more than 0.2 m, or all ended more than 0.2 m
     before. A beam without a valid range proves nothing, so that a sample beside one is not
     phantom. A measurement is covered within 5 cm and 1 % of its range of a segment, or of an arc
-    beside one of its beams.
-
-    Parameters
-    ----------
-    scan : LaserScan
-    features : Features
-        Features found in it, in its frame.
-
-    Raises
-    ------
-    ValueError
-        If the features are of a scan with another number of beams.
+    beside one of its beams. The features are in the frame of the scan; ValueError if they are of
+    another number of beams.
 
     Examples
     --------
@@ -84,8 +74,7 @@ def free_space_scores(scan: LaserScan, features: Features) -> FreeSpaceScores:
     >>> wall = ln.extract(scan)
     >>> free_space_scores(scan, wall).summary()
     {'phantom_in_100m': 0.0, 'longest_phantom': 0.0, 'phantom_scans': 0.0, 'covered': 1.0}
-    >>> moved = wall.transform(0.5, 0.0, 0.0)
-    >>> free_space_scores(scan, moved).summary()["phantom_in_100m"]
+    >>> free_space_scores(scan, wall.transform(0.5, 0.0, 0.0)).summary()["phantom_in_100m"]
     100.0
     """
     check_beams(scan, features)

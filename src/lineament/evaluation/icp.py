@@ -24,17 +24,8 @@ def icp(before: LaserScan, now: LaserScan, start: Pose = (0.0, 0.0, 0.0)) -> Pos
     line between neighbouring points of the earlier one, and the motion with the least sum of
     squared distances is taken; pairs farther apart than a limit are left out.
 
-    Parameters
-    ----------
-    before, now : LaserScan
-    start : (x, y, theta)
-        Where the search begins [m, m, rad].
-
-    Returns
-    -------
-    (x, y, theta)
-        Pose of the later sensor in the frame of the earlier one; the start if too few points
-        can be paired.
+    Returns the pose (x, y, theta) of the later sensor in the frame of the earlier one [m, m, rad],
+    by a search from `start`; the start if too few points can be paired.
 
     Examples
     --------

@@ -4,12 +4,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import Features
+from ..features import TABLES, Features
 from ..scan import Array
 from .beams import (
     MIN_BEAMS,
@@ -43,29 +42,6 @@ _FIGURES: dict[str, tuple[str, Callable[[Array], float]]] = {
 }
 
 
-class _Kind(NamedTuple):
-    """Keys of `FeatureScores`; components of the errors by the bound, and by the covariance."""
-
-    gates: tuple[float, ...]
-    pieces: tuple[str, ...]
-    errors: tuple[str, ...]
-    over_bound: dict[str, int]
-    components: int
-
-
-_KINDS = {
-    "corners": _Kind(CORNER_GATES, (), ("position",), {"": 2}, 2),
-    "segments": _Kind(
-        (GATE,),
-        ("fragmentation", "merging"),
-        ("offset", "angle", "end"),
-        {"offset_": 1, "angle_": 1},
-        2,
-    ),
-    "arcs": _Kind((GATE,), (), ("center", "radius"), {"": 3}, 3),
-}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FeatureScores(Summable):
     """Scores of the features of one kind in some scans.
@@ -94,16 +70,12 @@ class FeatureScores(Summable):
     consistency: NormalisedErrors
 
     @classmethod
-    def none(cls, kind: str) -> Self:
+    def none(cls, kind: str) -> "FeatureScores":
         """Return those of no scan, of "corners", "segments" or "arcs"."""
-        keys = _KINDS[kind]
-        return cls(
-            {gate: Counts() for gate in keys.gates},
-            dict.fromkeys(keys.pieces, 0),
-            {name: np.empty(0) for name in keys.errors},
-            {name: NormalisedErrors.none(k) for name, k in keys.over_bound.items()},
-            NormalisedErrors.none(keys.components),
-        )
+        score = {"corners": corner_scores, "segments": segment_scores, "arcs": arc_scores}[kind]
+        segments, corners, arcs, breakpoints = (np.empty(0, dtype) for dtype in TABLES.values())
+        nothing = Features(segments, corners, arcs, np.empty(0, np.int32), breakpoints)
+        return score(nothing, nothing)
 
     @property
     def counts(self) -> Counts:

@@ -26,13 +26,6 @@ TURNS, LEAST_TURN = 24, math.radians(11.25)
 class Repeats(Summable):
     """Features of one view that are found again in another.
 
-    Attributes
-    ----------
-    expected : int
-        Features of the one view that are in sight of the other.
-    distances : ndarray, shape (m,)
-        Of those that are found again: distance between both [m].
-
     Examples
     --------
     >>> repeats = Repeats(4, np.array([0.03, 0.04, 0.0]))
@@ -82,11 +75,8 @@ class RankedRepeats(Summable):
 
     Examples
     --------
-    Of the two best both are found again, of the others one:
-
-    >>> ranked = RankedRepeats(
-    ...     np.array([0.2, 0.9, 0.8, 0.1]), np.array([False, True, True, True]), np.zeros(4)
-    ... )
+    >>> repeated = np.array([False, True, True, True])
+    >>> ranked = RankedRepeats(np.array([0.2, 0.9, 0.8, 0.1]), repeated, np.zeros(4))
     >>> ranked.count_at(0.8), ranked.rate, ranked.auc
     (2.0, 0.75, 0.6666666666666666)
     """
@@ -171,10 +161,9 @@ def repeatability(
     --------
     >>> import lineament as ln
     >>> from lineament.simulation import SENSORS, room
-    >>> rng, extract = np.random.default_rng(1), ln.Extractor("liu:scale_free")
-    >>> here = SENSORS["paper"].scan(room(), (0, 0, 0), rng)
-    >>> there = SENSORS["paper"].scan(room(), (0.3, 0.2, 0.1), rng)
-    >>> found = repeatability(here, extract(here), there, extract(there))
+    >>> rng, poses = np.random.default_rng(1), ((0, 0, 0), (0.3, 0.2, 0.1))
+    >>> here, there = (SENSORS["paper"].scan(room(), pose, rng) for pose in poses)
+    >>> found = repeatability(here, ln.extract(here), there, ln.extract(there))
     >>> found.corners.rate, found.segments.rate
     (1.0, 1.0)
     """

@@ -53,25 +53,11 @@ class SimilarityScores(Summable):
 
 
 def similarity_errors(scan: LaserScan, features: Features) -> Array:
-    """Distance of each beam's point from its fitted line or circle.
+    """Distance of each beam's point from its fitted line or circle [m], shape (n,).
 
-    Parameters
-    ----------
-    scan : LaserScan
-        The scan, as it was measured.
-    features : Features
-        Features found in it, in its frame.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Distances [m]: to the segment or arc whose beams, `first_beam` to `last_beam`, contain
-        the beam, the nearest of several; NaN if there is none or the beam is not valid.
-
-    Raises
-    ------
-    ValueError
-        If the features are of a scan with another number of beams.
+    That is the segment or arc whose beams, `first_beam` to `last_beam`, contain the beam, the
+    nearest of several; NaN if there is none or the beam is not valid. The features are in the
+    frame of the scan; ValueError if they are of another number of beams.
 
     Examples
     --------
@@ -94,15 +80,6 @@ def similarity_errors(scan: LaserScan, features: Features) -> Array:
 
 
 def similarity_scores(scan: LaserScan, features: Features) -> SimilarityScores:
-    """Collect the similarity errors of one scan; parameters are those of `similarity_errors`.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 4 + [9.0], angle_min=-0.1, angle_increment=0.1)
-    >>> scores = similarity_scores(scan, ln.extract(scan))
-    >>> round(scores.mean, 4), round(scores.maximum, 4), scores.explained
-    (0.01, 0.0101, 0.8)
-    """
+    """Collect the `similarity_errors` of one scan."""
     errors = similarity_errors(scan, features)
     return SimilarityScores(errors[~np.isnan(errors)], int(scan.valid.sum()))

@@ -1,6 +1,5 @@
 """How well features are followed, and the motion between frames: against known poses."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -30,12 +29,6 @@ class MotionErrors(Summable):
         Length of the error of the way [m].
     turns : ndarray, shape (m,)
         Error of the turn, without its sign [rad].
-
-    Examples
-    --------
-    >>> errors = MotionErrors(np.array([0.03, 0.04]), np.array([0.0, 0.02]))
-    >>> round(errors.summary()["way_rmse"], 4)
-    0.0354
     """
 
     ways: Array = field(default_factory=lambda: np.empty(0))
@@ -59,19 +52,9 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
     motions : sequence of (x, y, theta)
         Pose of each frame, from the second on, in the frame before [m, m, rad].
     poses : sequence of (x, y, theta)
-        True pose of every frame: one more.
+        True pose of every frame: one more, else ValueError.
     step : int
         Over how many frames: 1 is from frame to frame.
-
-    Returns
-    -------
-    MotionErrors
-        One error for each frame that has another so many frames on.
-
-    Raises
-    ------
-    ValueError
-        If the numbers of motions and poses do not fit.
 
     Examples
     --------
@@ -114,21 +97,21 @@ class TrackScores(Summable):
     lost: int = 0
     lengths: Array = field(default_factory=lambda: np.empty(0))
 
-    def summary(self, prefix: str = "") -> dict[str, float]:
+    def summary(self) -> dict[str, float]:
         """List the figures by name."""
         return {
-            f"{prefix}pairs": self.pairs,
-            f"{prefix}kept": ratio(self.pairs - self.switched - self.lost, self.pairs),
-            f"{prefix}switches": self.switched,
-            f"{prefix}length_mean": float(self.lengths.mean()) if len(self.lengths) else math.nan,
-            f"{prefix}length_p90": quantile(self.lengths, 0.9),
+            "pairs": self.pairs,
+            "kept": ratio(self.pairs - self.switched - self.lost, self.pairs),
+            "switches": self.switched,
+            "length_mean": ratio(float(self.lengths.sum()), len(self.lengths)),
+            "length_p90": quantile(self.lengths, 0.9),
         }
 
 
 def track_scores(
     frames: Sequence[Features], tracks: Sequence[Tracks], poses: Sequence[Pose]
 ) -> dict[str, TrackScores]:
-    """Count how often the numbers of segments and corners change that are the same by the poses.
+    """Score the tracks of "segments" and "corners" by how often their numbers change.
 
     The features of a frame are moved by the known poses into the frame before. Corners are the
     same within 0.10 m; segments if the centroids of both are within 0.10 m of the other's line,
@@ -143,11 +126,6 @@ def track_scores(
         Those of each frame.
     poses : sequence of (x, y, theta)
         Known pose of each frame [m, m, rad].
-
-    Returns
-    -------
-    dict of str to TrackScores
-        By kind: "segments", "corners".
     """
     scores = {}
     for kind, same in (("segments", _same_segments), ("corners", _same_corners)):

@@ -1,6 +1,4 @@
-"""The experiments of Liu et al. 2023 and further ones, each one module with a function `run`."""
-
-from __future__ import annotations
+"""The experiments of Liu et al. 2023 and further ones: one module each, with a function `run`."""
 
 from collections.abc import Iterable
 from importlib import import_module
@@ -19,47 +17,23 @@ __all__ = [
     "run_experiments",
 ]
 
-#: Module of each experiment, in the order of the report. A new one is its file and a line here.
-EXPERIMENTS: dict[str, str] = {
-    "noise": "noise_points",
-    "layers": "layered",
-    "repetition": "repetition",
-    "scenes": "scenes",
-    "similarity": "similarity",
-    "two_corners": "two_corners",
-    "success": "success",
-    "all_methods": "all_methods",
-    "repeatability": "repeatability",
-    "tracking": "tracking",
-    "real": "real",
-    "aims": "optimal_aims",
-}
-
-#: The paper's names of figures and tables, and the experiment that each is part of.
-ALIASES = {
-    "fig2": "noise",
-    "fig3": "noise",
-    "fig5": "layers",
-    "fig9": "repetition",
-    "fig9a": "repetition",
-    "fig9b": "repetition",
-    "fig10": "layers",
-    "fig11": "scenes",
-    "fig12": "similarity",
-    "fig13": "two_corners",
-    "table2": "two_corners",
-    "table3": "success",
-    "methods": "all_methods",
+#: Module of each experiment, in the order of the report, and the paper's names of its results.
+EXPERIMENTS: dict[str, tuple[str, ...]] = {
+    "noise": ("fig2", "fig3"),
+    "layers": ("fig5", "fig10"),
+    "repetition": ("fig9", "fig9a", "fig9b"),
+    "scenes": ("fig11",),
+    "similarity": ("fig12",),
+    "two_corners": ("fig13", "table2"),
+    "success": ("table3",),
+    "all_methods": ("methods",),
+    "tracking": (),
+    "real": ("repeatability",),
 }
 
 
 def experiment_names(names: Iterable[str]) -> list[str]:
-    """Tell the experiments that are asked for, by their own names or the paper's, in order.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names of `EXPERIMENTS` or of `ALIASES`; none asks for all.
+    """Return the experiments with these names, or the paper's names, in order; no name: all.
 
     Raises
     ------
@@ -71,13 +45,13 @@ def experiment_names(names: Iterable[str]) -> list[str]:
     >>> experiment_names(["fig5", "fig2", "fig3"])
     ['noise', 'layers']
     """
-    chosen = set()
-    for name in names:
-        experiment = ALIASES.get(name, name)
-        if experiment not in EXPERIMENTS:
-            known = [*EXPERIMENTS, *(a for a, e in ALIASES.items() if e in EXPERIMENTS)]
+    of = {other: name for name, others in EXPERIMENTS.items() for other in (name, *others)}
+    asked = list(names)
+    for name in asked:
+        if name not in of:
+            known = [*EXPERIMENTS, *(other for other in of if other not in EXPERIMENTS)]
             raise ValueError(f"experiment {name!r} is unknown, expected one of: {', '.join(known)}")
-        chosen.add(experiment)
+    chosen = {of[name] for name in asked}
     return [name for name in EXPERIMENTS if name in chosen or not chosen]
 
 
@@ -89,9 +63,8 @@ def run_experiments(
     Parameters
     ----------
     names : iterable of str
-        As for `experiment_names`; none asks for all.
+        As for `experiment_names`.
     setting : Setting
-        Number of frames, seed, and where the recordings are.
     progress : callable
         Called every second or two with a few words on what is being done.
 
@@ -110,11 +83,11 @@ def run_experiments(
         import_module("scipy")
     findings = {}
     for k, name in enumerate(chosen, 1):
-        module = import_module(f".{EXPERIMENTS[name]}", __name__)
+        module = import_module(f".{name}", __name__)
 
-        def tell(about: str, where: str = f"{name} ({k}/{len(chosen)})") -> None:
+        def report(about: str, where: str = f"{name} ({k}/{len(chosen)})") -> None:
             progress(f"{where}: {about}")
 
-        tell("starting")
-        findings[name] = module.run(setting, tell)
+        report("starting")
+        findings[name] = module.run(setting, report)
     return findings

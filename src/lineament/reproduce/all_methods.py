@@ -1,22 +1,13 @@
-"""All methods on all sensors: what they find, how well, whether their covariances tell it, time."""
-
-from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass
+"""All methods with all sensors: what they find, how exactly, their covariances, and their time."""
 
 import numpy as np
 
 from ..evaluation.scores import Scores, evaluate
 from ..simulation import SCENES, SENSORS
-from .charts import dot_chart
 from .contenders import LIU_NOTE, PARTITION_ONLY, every_method
-from .findings import Figure, Findings, Progress, Setting, Table
-from .frames import batch_of, frame_times, scene_numbers, simulated_frames
+from .findings import Figure, Findings, Numbers, Progress, Setting, Table, dot_chart, each
+from .scans import batch_of, frame_times, scene_numbers, simulated_frames
 
-__all__ = ["run"]
-
-#: Names of the columns, the figures of `_Result.summary` that they show, times what.
 _COLUMNS = {
     "corner F1": ("corner_f1_0.10", 1),
     "precision": ("corner_precision_0.10", 1),
@@ -36,136 +27,88 @@ _COLUMNS = {
     "partition": ("partition_success", 1),
     "time [µs]": ("time", 1e6),
 }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Result:
-    """Scores of a method with a sensor, and the median time per scan [s]."""
-
-    scores: Scores
-    time: float
-
-    def summary(self, method: str) -> dict[str, float]:
-        """List all figures by name; without those of features that the method does not give."""
-        figures = self.scores.summary() | {"time": self.time}
-        missing = ("corner_", "segment_", "arc_") if method in PARTITION_ONLY else ()
-        return {name: value for name, value in figures.items() if not name.startswith(missing)}
-
-
-#: By method.
-Results = Mapping[str, _Result]
+_PANELS = {
+    "corner F1": ("corner_f1_0.10", 1),
+    "segment F1": ("segment_f1", 1),
+    "corner error ÷ bound (median)": ("corner_over_bound_median", 1),
+    "time per scan [µs]": ("time", 1e6),
+}
 
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Score all methods on frames of all kinds of scenes, for each sensor."""
     methods = every_method(setting, progress)
-    numbers = scene_numbers(len(SCENES) * setting.frames, setting.seed)
-    results: dict[str, dict[str, _Result]] = {}
+    scenes = scene_numbers(len(SCENES) * setting.frames, setting.seed)
+    numbers: dict[str, dict[str, dict[str, float]]] = {}
     for name, sensor in SENSORS.items():
         progress(f"{name}: simulating")
-        frames = list(simulated_frames(sensor, SCENES, numbers))
+        frames = list(simulated_frames(sensor, SCENES, scenes))
         scans = [frame.scan for frame in frames]
-        results[name] = {}
-        for method, extractor in methods.items():
-            progress(f"{name}: {method}")
-            found = batch_of(extractor, scans)
-            scores = map(evaluate, found, (frame.truth for frame in frames))
-            time = float(np.median(frame_times(extractor, scans[: len(SCENES)])))
-            results[name][method] = _Result(Scores.total(scores), time)
+        numbers[name] = {}
+        for method, extractor in each(methods, progress, name):
+            scores = map(evaluate, batch_of(extractor, scans), (frame.truth for frame in frames))
+            of = Scores.total(scores).summary()
+            if method == PARTITION_ONLY:
+                of = {k: v for k, v in of.items() if not k.startswith(("corner", "segment", "arc"))}
+            of["time"] = float(np.median(frame_times(extractor, scans[: len(SCENES)])))
+            numbers[name][method] = of
     progress("drawing")
+    shown = {
+        sensor: {method: of for method, of in found.items() if method != PARTITION_ONLY}
+        for sensor, found in numbers.items()
+    }
+    logarithmic = [label for label in _PANELS if "÷" in label or "time" in label]
     return Findings(
         "All methods, by sensor",
-        _text(results),
-        tuple(_table(name, found) for name, found in results.items()),
-        (_figure(results),),
-        {name: {m: r.summary(m) for m, r in found.items()} for name, found in results.items()},
+        (_ABOUT, _consistency(numbers), LIU_NOTE, _arcs(numbers)),
+        tuple(
+            Table.of_numbers(
+                f"{name}: {SENSORS[name].n_beams} beams, {len(scenes)} scans",
+                found,
+                _COLUMNS,
+                "A dash: nothing found, or nothing that defines the number.",
+            )
+            for name, found in numbers.items()
+        ),
+        (
+            Figure(
+                "methods",
+                "All methods that find corners and segments (rows), with all sensors (colours).",
+                dot_chart(shown, _PANELS, logarithmic),
+            ),
+        ),
+        numbers,
     )
 
 
-def _text(results: Mapping[str, Results]) -> tuple[str, ...]:
-    about = (
-        "Simulated frames of all kinds of scenes, the same scenes for each sensor. The paper has "
-        "no such table. Corners are right within 0.1 m; segments within 0.1 m, 10° and with half "
-        "of their beams in common. Errors are those of what is right. ‘÷ bound’ is the median "
-        "error over that of an estimate that reaches the Cramér-Rao bound; ‘RMS’ is the root of "
-        "the mean square, which one gross error within the 0.1 m can rule. NEES is the median of "
-        "the squared errors over the method’s own covariance, divided by what it should be: 1 is "
-        "right, more is a method that trusts itself too much; ‘mean’ is their mean, likewise. "
-        "Every method estimates the noise from the scan."
-    )
-    return about, _consistency(results), LIU_NOTE, _arcs(results)
+_ABOUT = (
+    "Simulated frames of all kinds of scenes, the same scenes for each sensor. The paper has no "
+    "such table. Corners are right within 0.1 m; segments within 0.1 m, 10° and with half of their "
+    "beams in common. Errors are those of correct features. ‘÷ bound’ is the median error over "
+    "that of an estimate that reaches the Cramér–Rao bound; ‘RMS’ is the root mean square, which "
+    "one gross error can dominate. NEES is the median squared error over the method’s own "
+    "covariance, divided by its expected value: 1 is right, more is overconfident; ‘mean’ is the "
+    "mean, likewise. Every method estimates the noise from the scan."
+)
 
 
-def _consistency(results: Mapping[str, Results]) -> str:
-    """Tell the 95 % intervals of the mean NEES, and how many rows of the tables lie in theirs."""
-    rows = [r.summary(method) for found in results.values() for method, r in found.items()]
-    told = ["Where covariances are right, the mean NEES lies in an interval with 95 % probability."]
+def _consistency(numbers: Numbers) -> str:
+    """Report how many methods have a mean NEES within its 95 % interval."""
+    parts = []
     for kind in ("corner", "segment"):
         keys = (f"{kind}_nees_low", f"{kind}_nees", f"{kind}_nees_high")
-        means = [tuple(row[key] for key in keys) for row in rows if keys[1] in row]
-        if not means:
-            continue
-        means.sort(key=lambda mean: mean[2] - mean[0])
-        (low, _, high), (lowest, _, highest) = means[0], means[-1]
-        within = sum(below <= mean <= above for below, mean, above in means)
-        told.append(
-            f"For {kind}s this is {low:.2f} to {high:.2f} where most are right, {lowest:.2f} to "
-            f"{highest:.2f} where fewest are; {within} of the {len(means)} rows lie in theirs."
-        )
-    return " ".join(told)
+        rows = [of for found in numbers.values() for of in found.values() if keys[1] in of]
+        within = sum(of[keys[0]] <= of[keys[1]] <= of[keys[2]] for of in rows)
+        if rows:
+            parts.append(f"{within} of {len(rows)} rows for {kind}s")
+    return f"The mean NEES lies within its 95 % interval in {' and in '.join(parts) or 'no row'}."
 
 
-def _arcs(results: Mapping[str, Results]) -> str:
-    """Tell which methods find arcs, and what the others make of round columns."""
-    giving = [
-        method
-        for method in next(iter(results.values()))
-        if any(found[method].scores.arcs.counts.found for found in results.values())
-    ]
+def _arcs(numbers: Numbers) -> str:
+    """Name the methods that find arcs."""
+    rows = [row for found in numbers.values() for row in found.items()]
+    giving = dict.fromkeys(method for method, of in rows if "arc_precision" in of)
     return (
         f"Arcs are found by {', '.join(giving) or 'none of the methods'}. Without arcs, round "
         "columns become polygons with false corners."
-    )
-
-
-def _table(sensor: str, results: Results) -> Table:
-    rows = []
-    for method, result in results.items():
-        figures = result.summary(method)
-        cells: dict[str, object] = {
-            column: factor * figures[key] if key in figures else None
-            for column, (key, factor) in _COLUMNS.items()
-        }
-        rows.append({"method": method, **cells})
-    scans = next(iter(results.values())).scores.scans
-    return Table.of_records(
-        f"{sensor}: {SENSORS[sensor].n_beams} beams, {scans} scans",
-        rows,
-        "A dash: nothing found, or nothing that defines the figure.",
-    )
-
-
-def _figure(results: Mapping[str, Results]) -> Figure:
-    shown = {
-        "corner F1": ("corner_f1_0.10", 1.0),
-        "segment F1": ("segment_f1", 1.0),
-        "corner error ÷ bound (median)": ("corner_over_bound_median", 1.0),
-        "time per scan [µs]": ("time", 1e6),
-    }
-    panels = {
-        label: {
-            sensor: {
-                method: factor * result.summary(method).get(key, np.nan)
-                for method, result in found.items()
-                if method not in PARTITION_ONLY
-            }
-            for sensor, found in results.items()
-        }
-        for label, (key, factor) in shown.items()
-    }
-    logarithmic = frozenset(label for label in shown if "÷" in label or "time" in label)
-    return Figure(
-        "methods",
-        "All methods that find corners and segments (rows), with all sensors (colours).",
-        dot_chart(panels, log_axes=logarithmic),
     )

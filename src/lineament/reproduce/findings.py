@@ -1,18 +1,24 @@
-"""What an experiment is given, and what it hands back: text, tables, figures, numbers."""
+"""What an experiment gets and returns: a setting; text, tables, figures and numbers."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from ..evaluation.counts import plain
+from ..output import canvas
 
-__all__ = ["Figure", "Findings", "Progress", "Setting", "Table"]
+T = TypeVar("T")
 
-#: Told every second or two, in a few words, what is being done.
+#: Called every second or two with a few words on what is being done.
 Progress = Callable[[str], None]
+#: Numbers of an experiment: by log, sensor or group of scans, then by method, then by name.
+Numbers = Mapping[str, Mapping[str, Mapping[str, Any]]]
+#: Columns of a table or panels of a chart: label to the name of a number, and its factor.
+Columns = Mapping[str, tuple[str, float]]
+
+NO_RECORDINGS = "The recordings are missing: nothing is measured."
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,23 +28,12 @@ class Table:
     Attributes
     ----------
     title : str
-        What it shows, in a few words.
     columns : tuple of str
         Names of the columns, with units.
     rows : tuple of tuples
         A cell for each column: text, a number, or None where there is no value.
     note : str
         A sentence below the table.
-
-    Raises
-    ------
-    ValueError
-        If a row has another number of cells than there are columns.
-
-    Examples
-    --------
-    >>> Table("Corners", ("method", "F1"), (("liu", 0.91234),)).to_dict()["rows"]
-    [['liu', 0.91234]]
     """
 
     title: str
@@ -46,31 +41,11 @@ class Table:
     rows: tuple[tuple[object, ...], ...]
     note: str = ""
 
-    def __post_init__(self) -> None:
-        for row in self.rows:
-            if len(row) != len(self.columns):
-                raise ValueError(
-                    f"table {self.title!r} has a row of {len(row)} cells, "
-                    f"expected {len(self.columns)}: {row!r}"
-                )
-
     @classmethod
     def of_records(
         cls, title: str, records: Iterable[Mapping[str, object]], note: str = ""
     ) -> Self:
-        """Make a table of rows that name their cells, each with the same columns.
-
-        Parameters
-        ----------
-        title : str
-        records : iterable of mapping of str to object
-            The cells of a row by the name of the column; at least one.
-        note : str
-
-        Raises
-        ------
-        ValueError
-            If a row has other columns than the first.
+        """Make a table of at least one row; each row names its cells, all the same way.
 
         Examples
         --------
@@ -84,6 +59,29 @@ class Table:
                 raise ValueError(f"table {title!r} has columns {columns!r}, then {tuple(row)!r}")
         return cls(title, columns, tuple(tuple(row.values()) for row in rows), note)
 
+    @classmethod
+    def of_numbers(
+        cls,
+        title: str,
+        numbers: Mapping[str, Mapping[str, Any]],
+        columns: Columns,
+        note: str = "",
+        first: str = "method",
+    ) -> Self:
+        """Make a table of named numbers: a row for each name, empty where a number is missing.
+
+        Examples
+        --------
+        >>> found = {"liu": {"rmse": 0.004}, "pdbs": {}}
+        >>> Table.of_numbers("Errors", found, {"RMSE [mm]": ("rmse", 1e3)}).rows
+        (('liu', 4.0), ('pdbs', None))
+        """
+        rows = (
+            (name, *(factor * of[key] if key in of else None for key, factor in columns.values()))
+            for name, of in numbers.items()
+        )
+        return cls(title, (first, *columns), tuple(rows), note)
+
     def __str__(self) -> str:
         """Write the table as plain text, in columns.
 
@@ -96,66 +94,39 @@ class Table:
         lines = [self.columns, *(tuple(map(cell_text, row)) for row in self.rows)]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(
-            "  ".join(
-                cell.rjust(width) if i else cell.ljust(width)
-                for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-            )
-            for line in lines
+            "  ".join([cells[0].ljust(widths[0]), *map(str.rjust, cells[1:], widths[1:])])
+            for cells in lines
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the table as JSON takes it: what is not a finite number is null."""
+        """Return the table for JSON; what is not finite is null."""
         return {
             "title": self.title,
             "columns": list(self.columns),
-            "rows": [[plain(cell) for cell in row] for row in self.rows],
+            "rows": plain(self.rows),
             "note": self.note,
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A picture of a report.
-
-    Attributes
-    ----------
-    name : str
-        Short name, as of a file: "fig9a".
-    caption : str
-        What is to be seen.
-    png : bytes
-        The picture, as of `lineament.output.canvas.figure_bytes`.
-    """
+class Figure(NamedTuple):
+    """A picture of a report: its short name ("fig9a"), its caption, and the PNG."""
 
     name: str
     caption: str
-    png: bytes = field(repr=False)
+    png: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What an experiment found.
-
-    Attributes
-    ----------
-    title : str
-        Title of its part of the report.
-    text : tuple of str
-        Paragraphs of plain sentences.
-    tables : tuple of Table
-    figures : tuple of Figure
-    numbers : dict
-        All figures by name, as JSON takes them or as NumPy's numbers and arrays.
-    """
+class Findings(NamedTuple):
+    """What an experiment returns: title, paragraphs, tables, figures, and all numbers by name."""
 
     title: str
     text: tuple[str, ...]
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
-    numbers: dict[str, object] = field(default_factory=dict)
+    numbers: Mapping[str, object] = {}
 
     def to_dict(self) -> dict[str, Any]:
-        """Give all but the pictures as JSON takes it."""
+        """Return all but the pictures, for JSON."""
         return {
             "title": self.title,
             "text": list(self.text),
@@ -167,7 +138,7 @@ class Findings:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What an experiment is made with. The same setting gives the same numbers, but for times.
+    """How much an experiment measures. The same setting gives the same numbers, but for times.
 
     Attributes
     ----------
@@ -176,17 +147,7 @@ class Setting:
     seed : int
         Seed of all worlds and all noise, not negative.
     data : Path or None
-        Folder of the recordings; without it the experiments are simulated ones alone.
-
-    Raises
-    ------
-    ValueError
-        If there are no frames or the seed is negative.
-
-    Examples
-    --------
-    >>> Setting(frames=2).seed
-    0
+        Folder of the recordings; without it the experiments only simulate.
     """
 
     frames: int = 10
@@ -199,14 +160,21 @@ class Setting:
         if self.seed < 0:
             raise ValueError(f"seed is {self.seed}, expected a number ≥ 0")
 
-    def recording(self, name: str) -> Path | None:
-        """Tell the path of a recording; None where it is not there."""
-        path = None if self.data is None else self.data / name
-        return path if path is not None and path.exists() else None
+    def recordings(self, files: Mapping[str, str]) -> dict[str, Path]:
+        """Return the paths of those recordings that exist, by their names."""
+        paths = {} if self.data is None else {name: self.data / f for name, f in files.items()}
+        return {name: path for name, path in paths.items() if path.exists()}
+
+
+def each(items: Mapping[str, T], progress: Progress, what: str) -> Iterator[tuple[str, T]]:
+    """Iterate over methods or logs by name, and report each: "what: name"."""
+    for name, item in items.items():
+        progress(f"{what}: {name}")
+        yield name, item
 
 
 def cell_text(cell: object) -> str:
-    """Write a cell of a table: numbers that are not whole by three digits.
+    """Write a cell of a table: fractions with three digits.
 
     Examples
     --------
@@ -214,10 +182,52 @@ def cell_text(cell: object) -> str:
     ('0.0123', '1234', '12', '–')
     """
     value = plain(cell)
-    if value is None:
-        return "–"
     if not isinstance(value, float):
-        return str(value)
+        return "–" if value is None else str(value)
     if abs(value) >= 1000:
         return f"{value:.0f}"
     return f"{value:.3g}" if value == 0 or abs(value) >= 1e-4 else f"{value:.2e}"
+
+
+def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -> bytes:
+    """Draw numbers as dots, as PNG: rows are methods, colours are sensors or logs.
+
+    Parameters
+    ----------
+    numbers : mapping
+        By sensor or log, then by method, then by name; only finite ones are drawn.
+    panels : mapping of str to (str, float)
+        Label of each panel's axis to the name of its number, and a factor.
+    log_axes : iterable of str
+        Labels of the logarithmic axes.
+
+    Examples
+    --------
+    >>> dot_chart({"lms181": {"iepf": {"f1": 0.9}, "pdbs": {}}}, {"F1": ("f1", 1)})[1:4]
+    b'PNG'
+    """
+    rows = list(next(iter(numbers.values())))[::-1]
+    figure = canvas.new_figure(1.8 + 3.4 * len(panels), 1.1 + 0.32 * len(rows))
+    all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axes, (label, (key, factor)) in zip(all_axes, panels.items(), strict=True):
+        canvas.style(axes, "")
+        for color, (name, methods) in zip(canvas.PALETTE, numbers.items(), strict=False):
+            values = [factor * methods.get(row, {}).get(key, math.nan) for row in rows]
+            dots = {"color": color, "markersize": 6, "alpha": 0.85, "label": name}
+            axes.plot(values, range(len(rows)), "o", **dots)
+        if label in log_axes:
+            axes.set_xscale("log")
+        axes.set_xlabel(label, fontsize=9)
+        axes.set_yticks(range(len(rows)), rows, fontsize=9)
+    legend_below(figure, axes)
+    return canvas.figure_bytes(figure)
+
+
+def legend_below(figure: Any, *panels: Any) -> None:
+    """Write one legend of all panels below a figure."""
+    handles: dict[str, Any] = {}
+    for axes in panels:
+        of_axes, labels = axes.get_legend_handles_labels()
+        handles |= dict(zip(labels, of_axes, strict=True))
+    given = {"loc": "outside lower center", "ncols": 8, "fontsize": 9, "frameon": False}
+    figure.legend(list(handles.values()), list(handles), **given)

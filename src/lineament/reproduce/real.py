@@ -1,84 +1,168 @@
 """All methods on all recordings, by measures that need no truth; the corners of an arena."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeVar
 
 from ..errors import LogError
+from ..evaluation.counts import Summable
 from ..evaluation.free_space import FreeSpaceScores, free_space_scores
 from ..evaluation.kinds import vertices
-from ..evaluation.repeatability import RankedRepeats, ranked_repeats
+from ..evaluation.repeatability import (
+    RankedRepeats,
+    Repeatability,
+    ranked_repeats,
+    repeatability,
+)
+from ..evaluation.standing import StandingScores, standing_scores
 from ..extractor import Extractor
 from ..features import Features
 from ..logs import find_logs
 from ..scan import LaserScan
-from .arena import ArenaScores, arena_scores, load_arena
-from .contact_sheet import contact_sheet, sheet_scans
+from .arena import ARENAS, arena_figure, arena_scores, load_arena
 from .contenders import feature_methods
-from .findings import Findings, Progress, Setting, Table
-from .recorded_aims import ARENAS
-from .recordings import spread_scans
-from .repeatability import scan_pairs
-from .standing_still import standing_still, standing_tables
+from .findings import NO_RECORDINGS, Columns, Findings, Progress, Setting, Table, each
+from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
-__all__ = ["run"]
-
-#: Method of the contact sheet, and of the tables by recording.
-DRAWN = "optimal"
-#: Logs with corrected poses, in which corners are looked for again, by name.
+#: Method of the tables by recording.
+SHOWN = "optimal"
+#: Logs with corrected poses, in which corners are looked for again.
 LOGS = {
     "Intel lab": "truth/intel_graph.npz",
     "fr079": "truth/fr079_graph.npz",
     "MIT CSAIL": "carmen/csail-corrected.log.gz",
     "ACES": "carmen/aces-corrected.log.gz",
 }
-#: For each frame of the setting: scans of each recording, pairs of scans of a log from different
-#: places, scans of each arena.
-SCANS_A_FRAME, PAIRS_A_FRAME, ARENA_A_FRAME = 3, 12, 10
+#: For each frame of the setting: scans of each recording, pairs of successive scans of a sensor
+#: that stands, pairs of scans from different places, scans of each arena.
+SCANS_A_FRAME, STILL_A_FRAME, PAIRS_A_FRAME, ARENA_A_FRAME = 3, 10, 12, 10
 #: Share of the corners that must be repeated, and the bounds of the bins of quality.
-RATE, _QUALITIES = 0.8, (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+RATE, QUALITIES = 0.8, (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
-#: Titles of the tables of free space, the figures that they show, and what makes them larger.
-_FREE_SPACE = {
-    "Phantom metres in 100 m of segments": ("phantom_in_100m", 1.0),
-    "Longest phantom stretch [m]": ("longest_phantom", 1.0),
-    "Scans with a phantom stretch of more than 0.3 m [%]": ("phantom_scans", 100.0),
-    "Covered measurements [%]": ("covered", 100.0),
+#: Titles of the tables of free space, and the numbers that they show.
+FREE_SPACE: Columns = {
+    "Phantom metres in 100 m of segments": ("phantom_in_100m", 1),
+    "Longest phantom stretch [m]": ("longest_phantom", 1),
+    "Scans with a phantom stretch of more than 0.3 m [%]": ("phantom_scans", 100),
+    "Covered measurements [%]": ("covered", 100),
+}
+_STANDING: Columns = {
+    "NEES": ("nees_median", 1),
+    "in 95 % ellipse [%]": ("in_95_ellipse", 100),
+    "found again [%]": ("found_again", 100),
+    "pairs": ("pairs", 1),
+}
+_AT = f"repeated at {100 * RATE:.0f} %"
+_REPEATS: Columns = {
+    "corners expected": ("expected", 1),
+    "repeated [%]": ("rate", 100),
+    "by chance [%]": ("chance", 100),
+    "AUC of quality": ("auc", 1),
+    _AT: ("count", 1),
+    "without edges: AUC": ("auc_without_edges", 1),
+    f"without edges: {_AT}": ("count_without_edges", 1),
+}
+_REPEATABILITY: Columns = {
+    "corners a scan": ("corners_per_scan", 1),
+    "corners expected": ("corners_expected", 1),
+    "corners repeated [%]": ("corner_rate", 100),
+    "distance of corners, RMS [mm]": ("corner_rmse", 1e3),
+    "segments expected": ("segments_expected", 1),
+    "segments repeated [%]": ("segment_rate", 100),
+    "distance of segments, RMS [mm]": ("segment_rmse", 1e3),
+}
+_ARENA: Columns = {
+    "recall": ("recall", 1),
+    "median error [mm]": ("median_error", 1e3),
+    "at no real corner, of those found": ("false", 1),
+    "corners a scan": ("corners_per_scan", 1),
 }
 
-Methods = Mapping[str, Extractor]
+S = TypeVar("S", bound=Summable)
+#: Scores by recording and method.
+Scored = dict[str, dict[str, S]]
 
 
 def run(setting: Setting, progress: Progress) -> Findings:
-    """Measure every method on all recordings that are there."""
-    title = "Real scans"
-    logs = _logs(setting)
+    """Measure every method on all recordings."""
+    title, logs = "Real scans", _logs(setting)
     if not logs:
-        return Findings(title, ("The recordings are not there: nothing was measured.",))
-    methods = feature_methods(setting, progress)
-    free, unread = _free_space(logs, methods, setting, progress)
-    standing = standing_still(logs, methods, setting, progress)
-    repeats = _repeats(methods, setting, progress)
-    arenas = _arenas(methods, setting, progress)
-    progress("drawing")
-    sheet = sheet_scans(setting)
-    text = (*_TEXT, f"Left out, as they hold no scans: {', '.join(unread)}.") if unread else _TEXT
+        return Findings(title, (NO_RECORDINGS,))
+    methods, frames = feature_methods(setting, progress), setting.frames
+    unread: list[str] = []
+
+    def scored(
+        what: str,
+        kind: type[S],
+        read: Callable[[str, Path], Sequence[Any]],
+        measure: Callable[[Any, Extractor], S],
+    ) -> Scored[S]:
+        """Score all methods on what is read of each log."""
+        found: Scored[S] = {}
+        for log, path in logs.items():
+            try:
+                items = [] if log in unread else read(log, path)
+            except LogError:
+                unread.append(log)
+                continue
+            for method, extract in each(methods, progress, f"{what}, {log}") if items else ():
+                total = kind.total(measure(item, extract) for item in items)
+                found.setdefault(log, {})[method] = total
+        return found
+
+    free = scored(
+        *("free space", FreeSpaceScores),
+        lambda _, path: spread_scans(path, SCANS_A_FRAME * frames),
+        lambda scan, extract: free_space_scores(scan, extract(scan)),
+    )
+    standing = scored(
+        *("standing still", StandingScores),
+        lambda log, path: still_pairs(path, STILL_A_FRAME * frames, standing=log in STANDING),
+        lambda pair, extract: standing_scores(map(extract, pair)),
+    )
+    repeats: dict[str, dict[str, dict[str, float]]] = {}
+    ranked: dict[str, RankedRepeats] = {}
+    for log, path in setting.recordings(LOGS).items():
+        pairs = scan_pairs(path, PAIRS_A_FRAME * frames)
+        for method, extract in each(methods, progress, f"repeated corners, {log}") if pairs else ():
+            every, numbers = _repeats(pairs, extract)
+            repeats.setdefault(log, {})[method] = numbers
+            if method == SHOWN:
+                ranked[log] = every
+    arenas, arena_tables, figures = {}, [], []
+    for name, path in setting.recordings(ARENAS).items():
+        arena = load_arena(path, ARENA_A_FRAME * frames)
+        scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
+        arenas[name] = {method: of for method, (of, _) in scores.items()}
+        about = f"Corners of the {name}: {len(arena.scans)} scans"
+        arena_tables.append(Table.of_numbers(about, arenas[name], _ARENA))
+        figures.append(arena_figure(name, arena, scores))
     return Findings(
         title,
-        text,
+        (*_TEXT, *([f"Left out, as they hold no scans: {', '.join(unread)}."] if unread else [])),
         (
             *_free_space_tables(free),
-            *standing_tables(standing, DRAWN),
-            *(_repeats_table(name, found) for name, found in repeats.items()),
-            *([_quality_table(repeats, DRAWN)] if repeats else []),
-            *_arena_tables(arenas),
+            *_standing_tables(standing),
+            *(
+                Table.of_numbers(f"{log}: {about}", found, columns)
+                for log, found in repeats.items()
+                for about, columns in (
+                    ("repeated corners, ranked by quality", _REPEATS),
+                    ("features but edges found again", _REPEATABILITY),
+                )
+            ),
+            *_quality_table(ranked),
+            *arena_tables,
         ),
-        (contact_sheet(sheet, Extractor(DRAWN)),) if sheet else (),
+        tuple(figures),
         {
-            "free_space": {log: _summaries(found) for log, found in free.items()},
+            "free_space": {
+                log: {method: of.summary() for method, of in found.items()}
+                for log, found in free.items()
+            },
             "standing": {
                 log: {
                     method: {"segments": of.segments.bins(), "corners": of.corners.bins()}
@@ -86,31 +170,32 @@ def run(setting: Setting, progress: Progress) -> Findings:
                 }
                 for log, found in standing.items()
             },
-            "repeats": {
-                log: {method: _repeats_figures(ranked) for method, ranked in found.items()}
-                for log, found in repeats.items()
-            },
-            "arena": {name: _summaries(found) for name, found in arenas.items()},
+            "repeats": repeats,
+            "arena": arenas,
         },
     )
 
 
 _TEXT = (
-    "Free space: segments are sampled every 2 cm; a sample is phantom where the three beams about "
-    "it all went on by more than 0.2 m, or all ended as much before. A measurement is covered "
-    "within 5 cm and 1 % of its range of a segment or an arc.",
-    "Standing still: the same feature in two scans in a row, by the sum of their covariances. "
-    "NEES is the median, 1 is right, and the 95 % ellipse should hold 95 %. Bins are of the "
-    "measurements of the feature, of a corner of its shorter arm.",
-    "Repeated corners: those of one scan in another from elsewhere, within 0.1 m, ranked by "
-    "quality, with what chance repeats taken off. Counted is how many are repeated among the best "
-    f"of which {100 * RATE:.0f} % are. AUC is the probability that a repeated one has the higher "
-    "quality.",
+    "Free space: segments are sampled every 2 cm. A sample is phantom if the three beams around it "
+    "all continued by more than 0.2 m, or all ended more than 0.2 m before. A measurement is "
+    "covered within 5 cm and 1 % of its range of a segment or an arc.",
+    "Standing still: the same feature in two successive scans, normalised by the sum of their "
+    "covariances. NEES is the median, 1 is right; the 95 % ellipse should hold 95 %. Bins are the "
+    "number of measurements of the feature, or of the shorter arm of a corner.",
+    "Repeated corners: those of one scan found in another from elsewhere within 0.1 m, ranked by "
+    "quality, chance subtracted. The count is how many are repeated among the best of which "
+    f"{100 * RATE:.0f} % are. AUC: probability that a repeated corner has the higher quality. The "
+    "errors of the corrected poses, some 2 to 5 cm, are part of the distances. A method that finds "
+    "a corner at every other point repeats many by chance: see the corners per scan.",
+    "Arena: corners of which a scan shows both walls, found within 0.1 m. Walls and poses are "
+    "known to about 1 cm, and the walls bow by 13 to 23 mm rms: smaller errors mean nothing, and "
+    "where a wall bends there may be a corner that is not listed.",
 )
 
 
 def _logs(setting: Setting) -> dict[str, Path]:
-    """All logs of the folder of recordings, by their names in it."""
+    """Find all logs of the folder of recordings, by their names in it."""
     if setting.data is None:
         return {}
     try:
@@ -120,75 +205,80 @@ def _logs(setting: Setting) -> dict[str, Path]:
     return {path.relative_to(setting.data).as_posix(): path for path in paths}
 
 
-def _summaries(
-    scores: Mapping[str, FreeSpaceScores] | Mapping[str, ArenaScores],
-) -> dict[str, dict[str, float]]:
-    return {method: of.summary() for method, of in scores.items()}
+def _totals(scored: Scored[S], kind: type[S]) -> dict[str, S]:
+    methods = next(iter(scored.values()), {})
+    return {m: kind.total(found[m] for found in scored.values()) for m in methods}
 
 
-def _free_space(
-    logs: Mapping[str, Path], methods: Methods, setting: Setting, progress: Progress
-) -> tuple[dict[str, dict[str, FreeSpaceScores]], list[str]]:
-    """Scores by recording and method, and the names of those that hold no scans."""
-    scores: dict[str, dict[str, FreeSpaceScores]] = {}
-    unread = []
-    for name, path in logs.items():
-        try:
-            scans = spread_scans(path, SCANS_A_FRAME * setting.frames)
-        except LogError:
-            unread.append(name)
-            continue
-        scores[name] = {}
-        for method, extractor in methods.items():
-            progress(f"free space, {name}: {method}")
-            parts = [free_space_scores(scan, extractor(scan)) for scan in scans]
-            scores[name][method] = FreeSpaceScores.total(parts)
-    return scores, unread
+def _free_space_tables(scored: Scored[FreeSpaceScores]) -> list[Table]:
+    """Make one table for each number: a row for each recording, and one for all of them."""
+    rows = {**scored, "all": _totals(scored, FreeSpaceScores)}
+    methods, tables = list(rows["all"]), []
+    for title, (key, factor) in FREE_SPACE.items():
+        records = [
+            {"recording": log}
+            | {m: factor * found[m].summary().get(key, math.nan) for m in methods}
+            | {"scans": len(found[methods[0]].longest)}
+            for log, found in rows.items()
+            if methods
+        ]
+        tables += [Table.of_records(title, records)] if records else []
+    return tables
 
 
-def _free_space_tables(scores: Mapping[str, Mapping[str, FreeSpaceScores]]) -> list[Table]:
-    """One table a figure, a row for each recording, and one for all of them."""
-    methods = list(next(iter(scores.values()), {}))
-    together = {m: FreeSpaceScores.total(found[m] for found in scores.values()) for m in methods}
-    rows = {**scores, "all": together}
-    figures = {name: _summaries(found) for name, found in rows.items()}
-    return [
-        Table.of_records(
-            title,
-            [
-                {"recording": name}
-                | {m: _scaled(of[m].get(key), factor) for m in methods}
-                | {"scans": len(rows[name][methods[0]].longest)}
-                for name, of in figures.items()
-            ],
-        )
-        for title, (key, factor) in _FREE_SPACE.items()
-        if scores
-    ]
-
-
-def _scaled(value: float | None, factor: float) -> float | None:
-    return None if value is None else factor * value
+def _standing_tables(scored: Scored[StandingScores]) -> list[Table]:
+    """Make tables of all methods on all recordings, and of one method by recording."""
+    together = _totals(scored, StandingScores)
+    mine = {log: found[SHOWN] for log, found in scored.items() if SHOWN in found}
+    few = {label: _STANDING[label] for label in ("NEES", "pairs")}
+    tables = []
+    for title, rows, first, shown in (
+        ("{}, by measurements", together, "method", _STANDING),
+        (f"{{}} of {SHOWN}, by recording", mine, "recording", few),
+    ):
+        for kind in ("segments", "corners") if rows else ():
+            records = [
+                {first: name}
+                | {
+                    f"{bin_}: {label}": factor * of[key]
+                    for bin_, of in getattr(scores, kind).bins().items()
+                    for label, (key, factor) in shown.items()
+                }
+                for name, scores in rows.items()
+            ]
+            tables.append(Table.of_records(f"Standing still: {title.format(kind)}", records))
+    return tables
 
 
 def _repeats(
-    methods: Methods, setting: Setting, progress: Progress
-) -> dict[str, dict[str, tuple[RankedRepeats, RankedRepeats]]]:
-    """Ranked corners by log and method: all of them, and those without edges."""
-    repeats: dict[str, dict[str, tuple[RankedRepeats, RankedRepeats]]] = {}
-    for name, file in LOGS.items():
-        path = setting.recording(file)
-        if path is None:
-            continue
-        progress(f"repeated corners, {name}: reading")
-        pairs = scan_pairs(path, PAIRS_A_FRAME * setting.frames)
-        repeats[name] = {}
-        for method, extractor in methods.items() if pairs else ():
-            progress(f"repeated corners, {name}: {method}")
-            found = [(a, extractor(a), b, extractor(b)) for a, b in pairs]
-            alone = [(a, _vertices(fa), b, _vertices(fb)) for a, fa, b, fb in found]
-            repeats[name][method] = _both_ways(found), _both_ways(alone)
-    return {name: found for name, found in repeats.items() if found}
+    pairs: Sequence[tuple[LaserScan, LaserScan]], extract: Extractor
+) -> tuple[RankedRepeats, dict[str, float]]:
+    """Return the ranked corners of all pairs both ways, and their numbers."""
+    found = [(a, extract(a), b, extract(b)) for a, b in pairs]
+    every = _both_ways(found)
+    alone = _both_ways([(a, _vertices(fa), b, _vertices(fb)) for a, fa, b, fb in found])
+    again = Repeatability.total(
+        part
+        for a, fa, b, fb in found
+        for part in (repeatability(a, fa, b, fb), repeatability(b, fb, a, fa))
+    )
+    return every, {
+        "expected": len(every.scores),
+        "rate": every.rate,
+        "auc": every.auc,
+        "count": every.count_at(RATE),
+        "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
+        "count_without_edges": alone.count_at(RATE),
+        "auc_without_edges": alone.auc,
+        "corners_per_scan": sum(len(vertices(features)) for _, features, _, _ in found)
+        / len(found),
+        "corners_expected": again.corners.expected,
+        "corner_rate": again.corners.rate,
+        "corner_rmse": again.corners.rmse,
+        "segments_expected": again.segments.expected,
+        "segment_rate": again.segments.rate,
+        "segment_rmse": again.segments.rmse,
+    }
 
 
 def _vertices(features: Features) -> Features:
@@ -205,83 +295,12 @@ def _both_ways(
     return RankedRepeats.total(parts)
 
 
-def _repeats_figures(ranked: tuple[RankedRepeats, RankedRepeats]) -> dict[str, float]:
-    every, alone = ranked
-    return {
-        "expected": len(every.scores),
-        "rate": every.rate,
-        "auc": every.auc,
-        "count": every.count_at(RATE),
-        "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
-        "count_without_edges": alone.count_at(RATE),
-        "auc_without_edges": alone.auc,
-    }
-
-
-def _repeats_table(log: str, repeats: Mapping[str, tuple[RankedRepeats, RankedRepeats]]) -> Table:
-    at = f"repeated at {100 * RATE:.0f} %"
-    records = []
-    for method, ranked in repeats.items():
-        figures = _repeats_figures(ranked)
-        records.append(
-            {
-                "method": method,
-                "corners expected": figures["expected"],
-                "repeated [%]": 100 * figures["rate"],
-                "by chance [%]": 100 * figures["chance"],
-                "AUC of quality": figures["auc"],
-                at: figures["count"],
-                "without edges: AUC": figures["auc_without_edges"],
-                f"without edges: {at}": figures["count_without_edges"],
-            }
-        )
-    return Table.of_records(f"{log}: repeated corners, ranked by quality", records)
-
-
-def _quality_table(
-    repeats: Mapping[str, Mapping[str, tuple[RankedRepeats, RankedRepeats]]], method: str
-) -> Table:
+def _quality_table(ranked: Mapping[str, RankedRepeats]) -> list[Table]:
     """Compare the share that is found again with what the quality promises."""
-    records = []
-    for log, found in repeats.items():
-        every, _ = found[method]
-        rates = {
-            f"{a:.1f}–{b:.1f}": 100 * every.rate_between(a, b) for a, b in pairwise(_QUALITIES)
-        }
-        records.append({"log": log, **rates})
-    return Table.of_records(f"Corners of {method} found again [%], by their quality", records)
-
-
-def _arenas(
-    methods: Methods, setting: Setting, progress: Progress
-) -> dict[str, dict[str, ArenaScores]]:
-    scores: dict[str, dict[str, ArenaScores]] = {}
-    for name, file in ARENAS.items():
-        path = setting.recording(file)
-        if path is None:
-            continue
-        arena = load_arena(path, ARENA_A_FRAME * setting.frames)
-        scores[name] = {}
-        for method, extractor in methods.items():
-            progress(f"{name}: {method}")
-            scores[name][method] = arena_scores(arena, extractor)
-    return scores
-
-
-def _arena_tables(scores: Mapping[str, Mapping[str, ArenaScores]]) -> list[Table]:
-    if not scores:
-        return []
-    figures = {name: _summaries(found) for name, found in scores.items()}
-    records = []
-    for method in next(iter(figures.values())):
-        record: dict[str, object] = {"method": method}
-        for name, found in figures.items():
-            record[f"{name}: recall"] = found[method]["recall"]
-            record[f"{name}: median error [mm]"] = 1e3 * found[method]["median_error"]
-        records.append(record)
-    demanded = ", ".join(
-        f"{next(iter(found.values())).corners.counts.true} ({name})"
-        for name, found in scores.items()
-    )
-    note = f"Corners of which both walls show: {demanded}. They are found within 0.1 m."
-    return [Table.of_records("Corners of the arena", records, note)]
+    records = [
+        {"log": log}
+        | {f"{a:.1f}–{b:.1f}": 100 * every.rate_between(a, b) for a, b in pairwise(QUALITIES)}
+        for log, every in ranked.items()
+    ]
+    title = f"Corners of {SHOWN} found again [%], by their quality"
+    return [Table.of_records(title, records)] if records else []

@@ -1,14 +1,11 @@
-"""The report of experiments: one page to read, and one file of all figures to compare with."""
-
-from __future__ import annotations
+"""The report of experiments: one page, and one file with all numbers."""
 
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from ..evaluation.counts import plain
 from ..evaluation.ple import BenchmarkResult
@@ -22,17 +19,14 @@ from ..output.page import (
     text_parts,
     write_parts,
 )
-from . import Findings, Setting, Table, experiment_names, run_experiments
-from .findings import cell_text
-
-__all__ = ["benchmark_tables", "findings_parts", "machine", "reproduce", "write_report"]
+from . import experiment_names, run_experiments
+from .findings import Findings, Progress, Setting, Table, cell_text
 
 _INTRODUCTION = (
-    "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, made again, and "
-    "further ones. The values of its tables and of its Figure 12 were not available: where one "
-    "stands only there, the column “paper” says “lost”. Its recording, ten frames of the Deutsches "
-    "Museum, is not used here: the methods are compared on simulated scans, of which all is known, "
-    "and on other recordings where they are at hand.",
+    "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
+    "The values of its tables and of its Figure 12 are not available: where one stands only there, "
+    "the column “paper” says “lost”. Its recording, ten frames of the Deutsches Museum, is not "
+    "used: the methods are compared on simulated scans and on other recordings if present.",
 )
 
 
@@ -40,18 +34,17 @@ def reproduce(
     folder: str | os.PathLike[str],
     names: Iterable[str] = (),
     setting: Setting | None = None,
-    progress: Callable[[str], None] = lambda about: None,  # noqa: ARG005
+    progress: Progress = lambda about: None,  # noqa: ARG005
 ) -> Path:
-    """Run experiments and write their report.
+    """Run experiments and write their report: ``index.html`` and ``figures.json``.
 
     Parameters
     ----------
     folder : path-like
-        Where ``index.html`` and ``figures.json`` go; made if it does not exist.
+        Made if it does not exist.
     names : iterable of str
-        Experiments or the paper's names of figures and tables; none asks for all.
+        Experiments, or the paper's names of figures and tables; none: all.
     setting : Setting, optional
-        Number of frames, seed, and where the recordings are.
     progress : callable
         Called with a few words on what is being done.
 
@@ -73,8 +66,8 @@ def reproduce(
 
 
 def write_report(folder: Path, findings: Mapping[str, Findings], setting: Setting) -> Path:
-    """Write ``index.html`` and ``figures.json`` of some findings; give the path of the page."""
-    about = {
+    """Write page and numbers of some findings; return the path of the page."""
+    about: dict[str, object] = {
         "lineament": version("lineament"),
         "machine": machine(),
         "frames": setting.frames,
@@ -84,8 +77,8 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     experiments = {name: found.to_dict() for name, found in findings.items()}
     text = json.dumps({**about, "experiments": experiments}, indent=1, ensure_ascii=False)
     write_text(folder / "figures.json", text + "\n")
-    facts = [(name, _fact(value)) for name, value in about.items()]
-    parts = [list_part(facts), *text_parts(_INTRODUCTION)]
+    about["recordings"] = "none" if setting.data is None else "yes"
+    parts = [list_part((k, str(v)) for k, v in about.items()), *text_parts(_INTRODUCTION)]
     parts.append(contents_part([(name, found.title) for name, found in findings.items()]))
     for name, found in findings.items():
         parts += [heading_part(name, found.title), *findings_parts(found)]
@@ -95,12 +88,15 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
 
 
 def findings_parts(findings: Findings) -> list[str]:
-    """Text, tables and figures as parts of a page."""
+    """Return text, tables and figures as parts of a page."""
     tables = [
         table_part(
             table.title,
             table.columns,
-            [[(cell_text(cell), _is_number(cell)) for cell in row] for row in table.rows],
+            [
+                [(cell_text(cell), isinstance(plain(cell), int | float)) for cell in row]
+                for row in table.rows
+            ],
             table.note,
         )
         for table in findings.tables
@@ -110,13 +106,7 @@ def findings_parts(findings: Findings) -> list[str]:
 
 
 def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:
-    """Make a table for each score of the public benchmark: methods, then its authors' methods.
-
-    Parameters
-    ----------
-    results : sequence of BenchmarkResult
-        At least one, all on the same benchmark.
-    """
+    """Make a table for each score of the public benchmark: methods, then its authors' methods."""
     benchmark = results[0].benchmark
     columns = ("method", *(f"J = {budget}" for budget in benchmark.max_vertices))
     means, authors = {r.method: r.means() for r in results}, benchmark.means()
@@ -129,7 +119,7 @@ def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:
 
 
 def machine() -> str:
-    """Tell the processor, the system and Python, in a line.
+    """Return processor, cores, system and Python, in a line.
 
     Examples
     --------
@@ -144,11 +134,3 @@ def machine() -> str:
     return (
         f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
     )
-
-
-def _is_number(cell: object) -> bool:
-    return isinstance(plain(cell), int | float)
-
-
-def _fact(value: Any) -> str:
-    return {True: "yes", False: "none"}[value] if isinstance(value, bool) else str(value)

@@ -17,24 +17,15 @@ _COVERING = 12
 
 
 class Floor:
-    """A closed outline with a scanner in it, and obstacles that are put where there is room.
+    """A closed outline (V, 2) [m], a scanner, and obstacles that are put where there is room.
 
-    An obstacle is covered by circles; there is room where no surface lies within a gap of them.
-
-    Parameters
-    ----------
-    outline : array_like, shape (V, 2)
-        Vertices of the outline [m], not repeating the first.
-    pose : (x, y, theta)
-        Pose of the scanner [m, m, rad].
+    An obstacle is covered by circles; there is room if no surface lies within a gap of them.
 
     Examples
     --------
     >>> floor = Floor(rectangle((0, 0), 6, 4), (1.0, 0.0, 0.0))
     >>> floor.put_column((-1, 0), 0.4), floor.put_column((-0.5, 0.2), 0.2)
     (True, False)
-    >>> floor.world
-    World(4 segments, 1 circles)
     """
 
     def __init__(self, outline: ArrayLike, pose: Pose) -> None:

@@ -19,13 +19,16 @@ def cast_rays(
     """Distance along each beam to the nearest surface, and which surface that is.
 
     A beam leaves the sensor o in the direction u = (cos(θ + φ), sin(θ + φ)). With
-    a × b = a_x b_y - a_y b_x, it meets the wall from p to q where o + ρ u lies between them:
+    a × b = a_x b_y - a_y b_x, it meets the wall from p to q if o + ρ u lies between them:
 
         ρ = (p - o) × (q - p) / (u × (q - p)),   u × (p - o) and u × (q - o) of opposite signs
 
     and the circle of centre c and radius r, with b = u · (c - o) and h = u × (c - o), at
 
         ρ = b ∓ sqrt(r² - h²),   |h| ≤ r
+
+    A ray through the common end of two walls meets one of them: both compare it with that end
+    by the same number. A wall seen exactly edge-on or touched by the sensor is not met.
 
     Parameters
     ----------
@@ -38,22 +41,14 @@ def cast_rays(
     Returns
     -------
     ranges : ndarray, shape (n,)
-        Distance to the nearest surface ahead [m]; inf where there is none.
+        Distance to the nearest surface ahead [m]; inf if there is none.
     surface : ndarray of int32, shape (n,)
-        Number of that surface in `world` (the lowest of several at the same distance); -1 where
-        there is none.
+        Number of that surface in `world` (the lowest of several at the same distance), or -1.
 
     Raises
     ------
     ValueError
-        If a pose is not three finite numbers, there is not one of them or one a beam, or the
-        bearings are no finite vector.
-
-    Notes
-    -----
-    A ray through the common end of two walls meets one of them: both compare it with that end
-    by the same number. A wall seen exactly edge-on has no width, and one that the sensor touches
-    hides nothing: neither is met.
+        If the poses are not 1 or n times three finite numbers, or the bearings no finite vector.
 
     Examples
     --------

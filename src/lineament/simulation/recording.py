@@ -45,7 +45,7 @@ def simulate_log(
         seed, in which the scanner stands still.
     sensor : Sensor
     scans : int, optional
-        Number of scans; the whole drive where None, 100 where the scanner stands.
+        Number of scans; the whole drive if None, 100 if the scanner stands.
     speed, rate, seed, moving
         As for `drive`; the seed is of the scene, too.
     track : callable
@@ -63,7 +63,6 @@ def simulate_log(
     --------
     >>> import tempfile, pathlib
     >>> from lineament.logs import open_log
-    >>> from lineament.simulation import SENSORS
     >>> path = pathlib.Path(tempfile.mkdtemp(), "hall.npz")
     >>> simulate_log(path, "hall", SENSORS["lms181"], scans=3, seed=5)
     >>> len(open_log(path)), len({scan.pose for scan in open_log(path)})

@@ -130,13 +130,6 @@ def _extent(ends: Array) -> Array:
 class View:
     """What the beams of a scanner at rest meet, without noise, in its own frame.
 
-    Parameters
-    ----------
-    world : World
-    pose : (x, y, theta)
-        Pose of the sensor in the world frame [m, m, rad].
-    sensor : Sensor
-
     Attributes
     ----------
     bearings, ranges : ndarray, shape (n,)

@@ -34,34 +34,24 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
     pose : (x, y, theta)
         Pose of the sensor, at rest, in the world frame [m, m, rad].
     sensor : Sensor
-        Its beams, range limits and noise. A beam stands for the surface that its axis meets,
-        whatever a mixed pixel, an outlier or a drop-out makes of its measurement.
+        A beam stands for the surface that its axis meets, whatever a mixed pixel, an outlier or
+        a drop-out makes of its measurement.
 
     Returns
     -------
     Features
-        In the frame of the sensor. `noise` is the sensor's.
+        In the frame of the sensor, with its `noise`. The covariances are bounds (see
+        `lineament.bounds`), NaN for an arc of 2 beams and for a corner with a side of one, whose
+        `segments` has -1 there.
 
-        `segments` are runs of neighbouring beams, 2 or more, on one wall. `start` and `end` are
-        its visible extent: a vertex if there is a corner; else the end of the wall, if the
-        next beam passes it by; else half-way to the next beam, which an occluder took. They end
-        at the last beam if the scan ends. `covariance` is the bound, `centroid` that of the
-        information of the measurements, `rms` and `misfit` 0.
+        `segments` and `arcs` are runs of neighbouring beams, 2 or more, on one wall or circle.
+        A segment goes to a vertex if there is a corner; else to the end of the wall, if the next
+        beam passes it by; else half-way to the next beam, which an occluder took; or to the last
+        beam of the scan. Its `centroid` is that of the information of its measurements.
 
         `corners` are the vertices between two neighbouring beams that meet its two walls.
-        `segments` has -1 for a side of one beam, and `covariance` is then NaN. `response`
-        is 0, `quality` 1, `kind` "corner".
-
-        `arcs` are runs of neighbouring beams, 2 or more, on one circle; the covariance of 2 is
-        NaN.
-
-        `clusters` are neighbouring beams on surfaces that are connected: on the same one, or
-        across a corner; fewer than 3 are no cluster, -1. `breakpoints` lie between neighbouring
-        clusters and at the ends of the scan.
-
-    See Also
-    --------
-    lineament.bounds : the bounds.
+        `clusters` are neighbouring beams on surfaces that are connected, 3 or more; `breakpoints`
+        lie between neighbouring clusters and at the ends of the scan.
 
     Examples
     --------

@@ -65,19 +65,10 @@ class World:
 
     @classmethod
     def of_polygons(cls, polygons: Iterable[ArrayLike], circles: ArrayLike = ()) -> Self:
-        """Make a world of polylines: a wall between every two successive vertices.
+        """Make a world of polylines (V, 2) [m], with a wall between every two successive vertices.
 
-        Parameters
-        ----------
-        polygons : iterable of array_like, each of shape (V, 2)
-            Vertices [m]. A polyline is closed where its last vertex repeats its first.
-        circles : array_like, shape (C, 3), optional
-            Round columns ``x y r`` [m].
-
-        Raises
-        ------
-        ValueError
-            If a polyline has fewer than two vertices, or repeats one in succession.
+        A polyline is closed if its last vertex repeats its first. Raises ValueError if one has
+        fewer than two vertices, or repeats one in succession.
 
         Examples
         --------
@@ -109,27 +100,19 @@ def room() -> World:
 
 
 def building() -> tuple[World, Array]:
-    """Return a storey of 15 m x 10 m, and a way through it.
+    """Return a storey of 15 m x 10 m [m], x along the corridor, and a way (17, 2) through it [m].
 
     Five rooms open on a corridor with recessed doors; one room has an alcove, two have a wall
     that is not at right angles, one has two doorways. Desks, cupboards and round columns stand
-    in them. Walls meet only at their ends: every corner is an end of exactly two walls.
-
-    Returns
-    -------
-    world : World
-        The storey, in metres, x along the corridor.
-    waypoints : ndarray, shape (17, 2)
-        A way [m] that keeps clear of every surface: down the corridor, into four rooms and out
-        again, and into the fifth.
+    in them. Walls meet only at their ends: every corner is an end of exactly two walls. The way
+    keeps clear of every surface: down the corridor, into four rooms and out again, and into the
+    fifth.
 
     Examples
     --------
     >>> world, waypoints = building()
     >>> world
     World(116 segments, 8 circles)
-    >>> float(np.hypot(*np.diff(waypoints, axis=0).T).sum().round(1))
-    37.6
     """
     world = World.of_polygons([closed(_OUTLINE), closed(_PIER), *_FURNITURE], _COLUMNS)
     waypoints = np.array(_WAY)

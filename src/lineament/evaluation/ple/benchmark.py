@@ -121,13 +121,10 @@ def run_benchmark(
 
     Examples
     --------
-    >>> from lineament import LaserScan
     >>> from lineament.evaluation.ple import iepf_map
     >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> none = np.empty((1, 0, 1))
-    >>> benchmark = Benchmark("wall", (scan,), (2,), (), {"rmse": none, "f": none, "fnr": none})
-    >>> run_benchmark(benchmark, iepf_map).scores["vertices"].tolist()
-    [[2]]
+    >>> run_benchmark(Benchmark("wall", (scan,), (2,), (), {}), iepf_map).means()["vertices"]
+    [2.0]
     """
     make = method_map(method) if isinstance(method, str) else method
     if name is None:

@@ -1,27 +1,21 @@
-"""Many recorded scans on one sheet, with what a method finds in each: to be looked at."""
+"""Many recorded scans on one sheet, with what a method finds in each: to be looked at.
 
-from __future__ import annotations
+Run: python benchmarks/contact_sheet.py [-m METHOD] -o SHEET.png, with LINEAMENT_DATA.
+"""
 
+import argparse
 import math
-from collections.abc import Sequence
+import os
 from itertools import islice
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
 
-from ..features import Features
-from ..logs import open_log
-from ..output import canvas, drawing
-from ..scan import LaserScan
-from .contenders import Extract
-from .findings import Figure, Setting
+from lineament import Extractor, Features, LaserScan, open_log
+from lineament.output import canvas, drawing
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-__all__ = ["SHEET", "contact_sheet", "sheet_scans"]
-
+DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: Scans that are drawn, by the number that `lineament plot --scan` takes: first those at which
 #: faults were seen, then one of each further recording.
 SHEET = (
@@ -61,48 +55,27 @@ _MARKERS = {
 _LINE_COLOR, _POINT_COLOR = "#0a5fb4", "#8b949e"
 
 
-def sheet_scans(setting: Setting) -> list[tuple[str, LaserScan]]:
-    """Read the scans of the sheet whose recordings are there, each with its title."""
-    scans = []
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("-m", "--method", default="optimal")
+    given = parser.parse_args()
+    extract, scans = Extractor(given.method), []
     for file, number in SHEET:
-        path = setting.recording(file)
-        if path is not None:
-            log = open_log(path, keep_going=True)
-            found = next(islice(log, number, None), None)
-            if found is not None:
-                scans.append((f"{file.rpartition('/')[2]} · {number}", found))
-    return scans
-
-
-def contact_sheet(scans: Sequence[tuple[str, LaserScan]], extract: Extract) -> Figure:
-    """Draw what is found in each of some scans, one panel each, over the measurements.
-
-    Parameters
-    ----------
-    scans : sequence of (str, LaserScan)
-        At least one, each with its title.
-    extract : callable
-        Features of a scan.
-    """
-    columns = min(_COLUMNS, len(scans))
-    rows = -(-len(scans) // columns)
-    figure = canvas.new_figure(_SIDE * columns, _SIDE * rows)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        if (DATA / file).exists():
+            scan = next(islice(open_log(DATA / file, keep_going=True), number, None))
+            scans.append((f"{file.rpartition('/')[2]} · {number}", scan))
+    rows = -(-len(scans) // _COLUMNS)
+    figure = canvas.new_figure(_SIDE * _COLUMNS, _SIDE * rows)
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
     for axes in panels[len(scans) :]:
         axes.remove()
     for axes, (title, scan) in zip(panels, scans, strict=False):
-        _draw(axes, title, scan, extract(scan))
-    return Figure(
-        "contact-sheet",
-        "Recorded scans: measurements (grey), segments (blue, with a mark across each end), arcs "
-        "(violet), corners (red), corners across a slit (orange squares), edges at jumps (green "
-        "triangles). Title: recording and number of the scan. A panel shows "
-        f"{100 * _SHOWN:.0f} % of the measurements along each axis.",
-        canvas.figure_bytes(figure, dpi=100),
-    )
+        draw(axes, title, scan, extract(scan))
+    given.output.write_bytes(canvas.figure_bytes(figure, dpi=100))
 
 
-def _draw(axes: Axes, title: str, scan: LaserScan, features: Features) -> None:
+def draw(axes: Axes, title: str, scan: LaserScan, features: Features) -> None:
     canvas.style(axes, "")
     axes.set_title(title, fontsize=9, color=canvas.INK).set_parse_math(False)
     points = scan.points[scan.valid]
@@ -117,10 +90,10 @@ def _draw(axes: Axes, title: str, scan: LaserScan, features: Features) -> None:
         positions = features.corners["position"][features.corners["kind"] == kind]
         axes.plot(*positions.T, marker, markersize=size, mfc="none", mec=color, mew=1.2, zorder=5)
     axes.plot(0, 0, "+", color=canvas.INK, markersize=7, zorder=3)
-    _frame(axes, points)
+    frame(axes, points)
 
 
-def _frame(axes: Axes, points: NDArray[np.float64]) -> None:
+def frame(axes: Axes, points: np.ndarray) -> None:
     """Show most of the points and the scanner, in a square."""
     rest = 0.5 * (1.0 - _SHOWN)
     ends = np.quantile(points, (rest, 1.0 - rest), axis=0) if len(points) else np.zeros((2, 2))
@@ -129,3 +102,7 @@ def _frame(axes: Axes, points: NDArray[np.float64]) -> None:
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_aspect("equal")
+
+
+if __name__ == "__main__":
+    main()

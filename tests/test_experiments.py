@@ -1,0 +1,587 @@
+"""The experiments: each from end to end on little, and its parts by hand."""
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from handmade import corner, features
+
+import lineament as ln
+from lineament.evaluation import Counts, FeatureScores, Scores, SimilarityScores, evaluate
+from lineament.evaluation.consistency import NormalisedErrors
+from lineament.evaluation.tracking import motion_errors, track_scores
+from lineament.logs import save_npz
+from lineament.methods import METHODS
+from lineament.motion import Tracker
+from lineament.output import canvas, drawing
+from lineament.reproduce import (
+    EXPERIMENTS,
+    Setting,
+    all_methods,
+    contenders,
+    grid,
+    layers,
+    noise,
+    real,
+    repetition,
+    run_experiments,
+    scans,
+    scenes,
+    similarity,
+    success,
+    tracking,
+    two_corners,
+)
+from lineament.reproduce.grid import Parameters
+from lineament.reproduce.two_corners import DISTANCE, POSES, WORLD, A, B
+from lineament.scan.poses import relative
+from lineament.simulation import SENSORS, drive, room, truth
+
+PAPER = SENSORS["paper"]
+#: Found on a small grid elsewhere; here it is only to be quick.
+CHOSEN = Parameters("relative", 6, 0.25)
+
+
+def silent(about):
+    assert about
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Few methods, sensors, kinds and parameters, and times of single calls."""
+    few = {"METHODS": ("liu", "pdbs", "iepf"), "best_parameters": lambda *_: CHOSEN}
+    for module, changes in (
+        (contenders, few),
+        (noise, {"best_parameters": lambda *_: CHOSEN}),
+        (scans, {"_COPIES": 1, "_BATCHES": 1}),
+        (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),
+        (all_methods, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES": ("room", "hall")}),
+        (success, {"MORE": 2}),
+        (two_corners, {"SCANS_A_FRAME": 2}),
+        (scenes, {"INDOORS": ("room",)}),
+        (similarity, {"INDOORS": ("room",)}),
+        (layers, {"RULES": ("fixed", "dietmayer")}),
+        (real, {"SHOWN": "iepf"}),
+    ):
+        for name, value in changes.items():
+            monkeypatch.setattr(module, name, value)
+
+
+@pytest.fixture
+def data(tmp_path, monkeypatch):
+    """A folder of recordings: a simulated room from some places, as a log and as an arena."""
+    poses = np.array([(-1.0, 0.0, 0.0), (-0.6, 0.0, 0.3), (-0.2, 0.1, -0.2)])
+    rng, sensor = np.random.default_rng(0), SENSORS["lms181"]
+    found = [sensor.scan(room(), tuple(pose), rng) for pose in poses]
+    save_npz(tmp_path / "room.npz", found)
+    np.savez(
+        tmp_path / "arena.npz",
+        ranges=[scan.ranges for scan in found],
+        poses_refined=poses,
+        angle_min=sensor.angle_min,
+        angle_increment=sensor.angle_increment,
+        range_max=sensor.range_max,
+        gt_segments=room().segments,
+        gt_corners=room().segments[:, :2],
+    )
+    for module, name, value in (
+        (scans, "LOGS", {"Office": "room.npz"}),
+        (tracking, "LOGS", {"Office": ("room.npz", 0.0), "none": ("no.npz", 0.0)}),
+        (real, "ARENAS", {"arena": "arena.npz"}),
+        (real, "LOGS", {"Office": "room.npz", "none": "no.npz"}),
+        (real, "STANDING", ("room.npz",)),
+    ):
+        monkeypatch.setattr(module, name, value)
+    return tmp_path
+
+
+#: Some numbers of each experiment, in the small setting, as they are: what changes them is to be
+#: explained. Paths are into `Findings.numbers`.
+PINNED: dict[str, dict[str, float]] = {
+    "noise": {
+        "ranges/planes/beams": 1046,
+        "ranges/planes/raw": 0.0099247,
+        "ranges/planes/filtered": 0.0049152,
+        "ranges/edges/filtered": 0.049823,
+        "ranges/corners/beams": 11,
+        "ranges/more than 1.2 m/labelled": 1.0,
+        "features/paper’s numbers, not filtered/corner_recall_0.10": 0.6,
+        "features/best of Figure 9, filtered/segment_offset_rmse": 0.005089,
+    },
+    "layers": {
+        "paper/liu/success": 1.0,
+        "utm30lx/liu/success": 0.83019,
+        "utm30lx/pdbs, dietmayer/breakpoint_f1": 0.92473,
+    },
+    "repetition": {
+        "grid/0/of_actual": 0.22778,
+        "grid/3/among_found": 1.0,
+        "best/threshold": 0.25,
+        "choices/7/f1": 0.0,
+        "choices/7/corners_per_view": 0.0,
+        "threshold_0/precision": 0.0096774,
+    },
+    "scenes": {
+        "One scan of a simulated room/1/1": 1,
+        "One scan of a simulated room/1/2": 0,
+        "One scan of a simulated room/3/6": 1.0,
+        "Office, one scan/0/1": 6,
+    },
+    "similarity": {
+        "simulated rooms, corridors and halls/the true lines/similarity_mean": 0.0069737,
+        "simulated rooms, corridors and halls/liu:paper, filtered points/similarity_mean": 0.19317,
+        "simulated rooms, corridors and halls/pdbs, fitted/similarity_maximum": 0.50955,
+        "Office/iepf/similarity_explained": 1.0,
+    },
+    "two_corners": {
+        "bound/0": 0.0042308,
+        "places/iepf/0/mean": 2.3025,
+        "places/iepf/4/standard_deviation": 0.0018932,
+        "places/liu, best of Figure 9/2/found": 0.0,
+    },
+    "success": {
+        "liu, no corners/many/partition_success": 1.0,
+        "iepf/many/corner_f1_0.10": 1.0,
+        "iepf:paper/few/corner_f1_0.10": 1.0,
+    },
+    "all_methods": {
+        "lms181/iepf/corner_f1_0.10": 0.75,
+        "lms181/liu, paper’s numbers/segment_f1": 0.43478,
+        "lms181/pdbs/partition_success": 0.9,
+    },
+    "tracking": {
+        "Office/motion/features/way_median": 0.0016062,
+        "Office/motion/ICP/way_rmse": 0.0016927,
+        "Office/tracks/features/segments/kept": 1.0,
+    },
+    "real": {
+        "free_space/room.npz/iepf/covered": 0.99815,
+        "standing/room.npz/iepf/segments/30-99/pairs": 4,
+        "repeats/Office/iepf/expected": 11,
+        "repeats/Office/iepf/segment_rmse": 0.0079746,
+        "arena/arena/iepf/recall": 1.0,
+        "arena/arena/iepf/median_error": 0.0023415,
+    },
+}
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
+    reports = []
+    found = run_experiments([name], Setting(frames=1, data=data), reports.append)
+    assert list(found) == [name]
+    assert reports[0] == f"{name} (1/1): starting"
+    assert len(reports) > 1
+    findings = found[name]
+    assert findings.text
+    for table in findings.tables:
+        assert table.rows
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+    assert all(figure.png.startswith(b"\x89PNG") for figure in findings.figures)
+    names = {figure.name for figure in findings.figures}
+    assert len(names) == len(findings.figures) > (-1 if name == "success" else 0)
+    numbers = json.loads(json.dumps(findings.to_dict(), allow_nan=False))["numbers"]
+    for path, value in PINNED[name].items():
+        at = numbers
+        for key in path.split("/"):
+            at = at[int(key) if isinstance(at, list) else key]
+        assert at == pytest.approx(value, rel=1e-3), path
+
+
+@pytest.mark.parametrize("name", ["tracking", "real"])
+def test_without_recordings_nothing_is_measured(name, tmp_path):
+    for setting in (Setting(), Setting(1, 0, tmp_path)):
+        findings = run_experiments([name], setting, silent)[name]
+        assert findings.text == ("The recordings are missing: nothing is measured.",)
+        assert findings.tables == findings.figures == ()
+
+
+class TestMethods:
+    def test_every_method_takes_part_and_liu_twice_each(self, monkeypatch):
+        monkeypatch.setattr(contenders, "best_parameters", lambda *_: CHOSEN)
+        names = list(contenders.every_method(Setting(), silent))
+        assert names[4:] == [name for name in METHODS if name != "liu"]
+        assert [n.split(",")[0] for n in names[:4]] == ["liu:paper", "liu:paper", "liu", "liu"]
+        features = list(contenders.feature_methods(Setting(), silent))
+        assert features == [name for name in names if name != "pdbs"]
+        drawn = list(contenders.drawn_methods(Setting(), silent))
+        assert drawn == ["pdbs, fitted" if name == "pdbs" else name for name in names[2:]]
+
+    def test_each_cluster_has_a_line(self):
+        bearings = 0.02 * np.arange(10)
+        ranges = np.where(bearings < 0.1, 2.0, 4.0) / np.cos(bearings)
+        scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=0.02)
+        lines = contenders.region_lines(scan, ln.extract(scan, method="pdbs")).segments
+        assert lines["first_beam"].tolist() == [0, 5]
+        assert lines["last_beam"].tolist() == [4, 9]
+        assert lines["cluster"].tolist() == [0, 1]
+        np.testing.assert_allclose(lines["centroid"][:, 0], [2.0, 4.0])
+        np.testing.assert_allclose(np.abs(np.sin(lines["angle"])), 1.0)
+
+    def test_a_cluster_over_the_seam_is_one_line(self):
+        bearings = np.radians(np.arange(0, 360, 2.0))
+        ranges = np.full(180, np.nan)
+        seen = np.r_[170:180, 0:10]
+        ranges[seen] = 2.0 / np.cos(bearings[seen])
+        scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=np.radians(2.0))
+        (line,) = contenders.region_lines(scan, ln.extract(scan, method="pdbs")).segments
+        assert (line["first_beam"], line["last_beam"], line["n_points"]) == (170, 9, 20)
+        assert line["centroid"][0] == pytest.approx(2.0)
+
+
+class TestNoise:
+    def test_beams_around_a_mark(self):
+        marks = np.array([0, 0, 0, 1, 0, 0, 0], dtype=bool)
+        assert np.flatnonzero(noise._near(marks, 1, 2)).tolist() == [2, 3, 4, 5]
+
+    def test_errors_are_of_the_beams_of_each_place(self):
+        """Ranges of two flat frames that are off by known amounts."""
+        angles = {"angle_min": -0.1, "angle_increment": 0.01}
+        true = 2.0 / np.cos(-0.1 + 0.01 * np.arange(21))
+        off = np.zeros(21)
+        off[4], off[12] = 0.02, 1.5
+        scan = ln.LaserScan(true + off, **angles)
+        places = {"small": off == 0.02, "large": off == 1.5, "none": off > 9}
+        found = noise._ranges([noise._Frame(scan, features(21), true, places)] * 2)
+        assert (found["small"]["beams"], found["large"]["beams"]) == (2, 2)
+        assert found["small"]["raw"] == pytest.approx(0.02)
+        assert found["small"]["filtered"] < 0.01
+        assert found["large"]["raw"] == pytest.approx(1.5)
+        assert (found["small"]["off_after"], found["large"]["off_after"]) == (0.0, 1.0)
+        assert (found["small"]["labelled"], found["large"]["labelled"]) == (0.0, 1.0)
+        assert math.isnan(found["none"]["raw"])
+
+    def test_places_of_a_frame(self):
+        """A wall, a nearer one, and noise points: what is an edge, a corner, a plane."""
+        frame = noise._frame(room(), (0.0, 0.0, 0.3), 5)
+        errors = abs(frame.scan.ranges - frame.true)
+        sizes = [frame.places[noise._size(*size)] for size in noise.SIZES]
+        for (low, high), place in zip(noise.SIZES, sizes, strict=True):
+            assert ((errors[place] > low) & (errors[place] <= high)).all()
+        noisy = np.logical_or.reduce(sizes)
+        assert (noisy == (frame.scan.valid & (errors > noise.OFF))).all()
+        assert not (frame.places["planes"] & noisy).any()
+        corners = truth(room(), (0.0, 0.0, 0.3), noise.SENSOR).corners["beam"]
+        assert set(np.flatnonzero(frame.places["corners"])) <= set(corners.tolist())
+        near = np.abs(np.flatnonzero(frame.places["planes"])[:, np.newaxis] - corners)
+        assert near.min() >= noise.HALF_WIDTH - 1
+
+
+class TestRepetition:
+    @pytest.fixture
+    def made(self):
+        """Every form at three radii and three thresholds; the tangent as the paper has it."""
+        ar = {("tangent", 6, 0.66): 0.9, ("product", 8, 0.66): 0.7, ("product", 6, 0.5): 0.6}
+        other = {"f1": 0.5}
+        return {
+            p: other | {"of_actual": ar.get(p, 0.1 * (p[0] != "relative")), "among_found": 1 - p[2]}
+            for form in grid.FORMS
+            for radius in (5, 6, 8)
+            for threshold in (0.5, 0.66, 0.8)
+            for p in [Parameters(form, radius, threshold)]
+        }
+
+    def test_largest_is_among_those_asked_for(self, made):
+        assert grid.largest(made, "of_actual") == ("tangent", 6, 0.66)
+        assert grid.largest(made, "of_actual", response="product") == ("product", 8, 0.66)
+        fixed = {"response": "product", "support_radius": 6}
+        assert grid.largest(made, "of_actual", **fixed) == ("product", 6, 0.5)
+        assert grid.largest(made, "among_found", threshold=0.8).threshold == 0.8
+        assert grid.largest(made, "among_found").threshold == 0.5
+
+    def test_page_says_whether_the_figure_is_reproduced(self, made):
+        assert repetition._verdict(made) == "Reproduced by the form tangent."
+        made[Parameters("tangent", 8, 0.66)]["of_actual"] = 0.95
+        assert repetition._verdict(made).startswith("Not reproduced")
+
+    def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(self, made):
+        table = repetition._peaks(made)
+        assert table.columns[2:] == ("paper", "here, tangent", "here, product", "here, relative")
+        assert table.rows[0][2:] == (6, 6, 8, None)
+        assert table.rows[1][2:] == ("lost", 0.9, 0.7, 0.0)
+        assert table.rows[2][2:] == (0.66, 0.66, 0.5, 0.5)
+
+    def test_average_repetition_by_hand(self):
+        turn = 0.002
+        before = features(corners=[corner(*p) for p in ((1, 0), (2, 0), (3, 0), (0, 4))])
+        after = features(corners=[corner(*p) for p in ((1, 0.03), (2.04, 0), (7, 7))])
+        turned = after.transform(0, 0, -turn)
+        assert grid.average_repetition(before, turned, turn) == (2 / 4 + 2 / 3) / 2
+        assert grid.average_repetition(before, before, 0.06) == 0.25  # One of four is near enough.
+        assert grid.average_repetition(before, features(), 0.0) == 0.0
+        assert math.isnan(grid.average_repetition(features(), features(), 0.0))
+
+    def test_everything_a_corner_repeats_well_and_is_wrong(self):
+        everywhere = grid.repetition(Parameters("tangent", 6, 0.0), range(1))
+        assert everywhere["among_found"] > 0.9
+        assert everywhere["precision"] < 0.1
+        assert everywhere["corners_per_view"] > 100
+        nothing = grid.repetition(Parameters("relative", 6, 5.0), range(1))
+        assert [nothing[name] for name in (*grid.CRITERIA, "corners_per_view")] == [0.0] * 3
+
+    def test_parameters_are_chosen_on_scenes_that_are_not_reported(self):
+        setting = Setting(frames=50, seed=3)
+        chosen_on, reported = (grid.repetition_scenes(setting, reported=r) for r in (False, True))
+        assert len(chosen_on) == len(reported) == 100
+        assert not set(chosen_on) & set(reported)
+        later = grid.repetition_scenes(Setting(frames=50, seed=4), reported=False)
+        assert not set(reported) & set(later)
+
+
+class TestTwoCorners:
+    def test_both_corners_are_seen_well_from_all_five_places(self):
+        assert math.dist(A, B) == pytest.approx(2.302, abs=1e-12)
+        for pose in POSES:
+            seen = truth(WORLD, pose, PAPER).transform(*pose)
+            for vertex, convex in ((A, True), (B, False)):
+                is_it = np.hypot(*(seen.corners["position"] - vertex).T) < 1e-9
+                assert is_it.sum() == 1
+                assert seen.corners["convex"][is_it][0] == convex
+                sides = seen.corners["segments"][is_it][0]
+                assert (seen.segments["n_points"][sides] >= 6).all()
+            # No wall is a side of both: their errors are independent.
+            assert len(set(seen.corners["segments"].ravel())) >= 4
+            found = two_corners.found_distances([truth(WORLD, pose, PAPER)], pose)
+            assert found == pytest.approx([DISTANCE], abs=1e-9)
+
+    def test_distance_is_of_the_nearest_corners_and_of_nothing_too_far(self):
+        along = (B - A) / DISTANCE
+        views = [
+            features(corners=[corner(*p) for p in positions])
+            for positions in (
+                (A - 0.01 * along, A + 0.2 * along, B),
+                (A,),
+                (A, B + 0.26 * along),
+                (A - 0.24 * along, B),
+                (),
+            )
+        ]
+        found = two_corners.found_distances(views, (0.0, 0.0, 0.0))
+        assert found == pytest.approx([DISTANCE + 0.01, DISTANCE + 0.24])
+
+    def test_bound_is_that_of_both_corners_along_their_line(self, monkeypatch):
+        """Variances of 4 and 9 mm² along the line from A to B add up, those across do not count."""
+        along = (B - A) / DISTANCE
+        across = np.array((-along[1], along[0]))
+        rows = [corner(*A), corner(*B)]
+        for row, variance in zip(rows, (4e-6, 9e-6), strict=True):
+            row["covariance"] = variance * np.outer(along, along) + 1e-2 * np.outer(across, across)
+        monkeypatch.setattr(two_corners, "truth", lambda *_: features(corners=rows))
+        assert two_corners.distance_bound((0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(13e-6))
+
+    def test_tables_by_hand(self):
+        found = {"liu": [np.array([DISTANCE - 0.0125] * 2), np.empty(0)], "iepf": [np.empty(0)] * 2}
+        overall = two_corners._overall(found, np.array([0.003, 0.004]), 4)
+        liu, iepf, bound = (dict(zip(overall.columns, row, strict=True)) for row in overall.rows)
+        assert liu["paper: mean [m]"] == "2.302"
+        assert liu["here: mean [m]"] == "2.2895"
+        assert liu["RMS error ÷ bound"] == pytest.approx(12.5 / math.sqrt(12.5))
+        assert liu["share of scans with both"] == pytest.approx(2 / 20)
+        assert iepf["here: mean [m]"] is iepf["paper: mean [m]"] is None
+        assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
+        by_place = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
+        assert by_place.rows[0][1:] == ("−12.5 ± 0.0 (50 %)", None)
+        assert by_place.rows[2][1:] == ("± 3.0", "± 4.0")
+
+    @pytest.mark.slow
+    def test_good_method_spreads_like_the_bound_and_none_spreads_less(self):
+        pose, rng = POSES[4], np.random.default_rng(2)
+        seen = [PAPER.scan(WORLD, pose, rng) for _ in range(200)]
+        extract = ln.Extractor("ransac", noise=PAPER.noise)
+        distances = two_corners.found_distances(scans.batch_of(extract, seen), pose)
+        assert len(distances) > 190
+        error = np.sqrt(np.mean((distances - DISTANCE) ** 2))
+        # 4 standard deviations of a standard deviation of 190 draws are 0.2 of it.
+        assert 0.8 < error / two_corners.distance_bound(pose) < 1.4
+
+
+class TestTexts:
+    """What the page says follows from its numbers."""
+
+    @pytest.mark.parametrize(("largest", "verdict"), [(0.009, "holds"), (0.5, "does not hold")])
+    def test_claim_of_figure_12(self, largest, verdict):
+        true, liu = (SimilarityScores(np.array([0.0, error]), 2) for error in (0.03, largest))
+        text = similarity._text(true, liu)
+        assert f"{largest:.2f} m: the claim {verdict} here" in text[-1]
+        assert "50 % of the points are more than 0.01 m" in text[1]
+
+    def test_claims_of_table_3(self):
+        frames = list(scans.simulated_frames(PAPER, ["room"], range(2)))
+        true = Scores.total(evaluate(frame.truth, frame.truth) for frame in frames)
+        none = Scores.total(evaluate(features(481), frame.truth) for frame in frames)
+        totals = {"liu:paper, no corners": true, "pdbs, fixed 0.3 m": none}
+        totals |= {contenders.LITERAL_BEST: none, "iepf:paper": true}
+        text = success._verdict(totals)
+        assert "better clusters than PDBS holds here: 1.00 against 0.00" in text
+        assert "more corners than IEPF does not hold" in text
+        assert "recall 0.00 against 1.00" in text
+
+    def test_mean_nees_is_compared_with_its_interval(self):
+        """Two corners, each off by one σ along x: the mean NEES of four components is a half."""
+        off = NormalisedErrors(np.array([[1.0, 0.0], [1.0, 0.0]]))
+        within = Scores(1, replace(FeatureScores.none("corners"), consistency=off)).summary()
+        beyond = within | {"corner_nees": within["corner_nees_high"] + 0.1}
+        text = all_methods._consistency({"lms181": {"liu": within, "iepf": beyond, "pdbs": {}}})
+        assert text == "The mean NEES lies within its 95 % interval in 1 of 2 rows for corners."
+
+    def test_methods_with_arcs_are_named(self):
+        sensors = {"lms181": {"liu": {}, "optimal": {}}, "ld19": {"liu": {}}}
+        assert all_methods._arcs(sensors).startswith("Arcs are found by none of the methods.")
+        sensors["ld19"]["optimal"] = {"arc_precision": 0.5}
+        assert all_methods._arcs(sensors).startswith("Arcs are found by optimal.")
+
+    def test_rows_of_table_3_have_the_papers_numbers(self):
+        counts = [Counts(1, 2, 4), Counts(3, 4, 6)]
+        row = success._row("iepf:paper", 2, counts, "corners")
+        assert row["paper: success"] == 0.7251
+        assert (row["here: success, 2 frames"], row["corners in 2"]) == (0.25, "1 of 4")
+        assert (row["precision in 20"], row["F1 in 20"]) == (0.75, 0.6)
+        times = success._times("liu, no corners", np.array([3e-6, 1e-6]), success.PAPER_PARTITION)
+        assert list(times.values()) == ["9.6 – 25.3", "1.0 – 3.0"]
+        assert success._row("hough", 2, counts, "corners")["paper: success"] is None
+
+    def test_paper_is_compared_with_its_literal_pipeline_too(self):
+        assert similarity.PAPER[similarity.FILTERED] == similarity.PAPER[contenders.LIU_PAPER]
+        assert layers.PAPER["liu:paper"] == layers.PAPER["liu"]
+
+
+@pytest.mark.parametrize("errors", [[0.0, 0.02, np.nan], [3.0, 0.1, 0.1], [np.nan] * 3])
+def test_axis_of_errors_is_the_same_for_all_methods(errors):
+    axes = canvas.new_figure(4, 3).subplots()
+    drawing.draw_errors(axes, ln.LaserScan([1.0, 1.0, 1.0], 0.0, 0.1), np.array(errors))
+    assert axes.get_ylim() == (1e-4, 10.0)
+    drawn = axes.lines[0].get_ydata()
+    np.testing.assert_array_equal(drawn, np.maximum(errors, drawing.LEAST_ERROR))
+
+
+class TestTracking:
+    def test_synthetic_odometry_has_the_errors_that_are_stated(self):
+        poses = [(0.5 * i, 0.0, 0.0) for i in range(2000)]
+        way = tracking.stand_in_odometry(poses, seed=1)
+        steps = np.array([relative(a, b) for a, b in pairwise(way)])
+        np.testing.assert_allclose(steps.mean(axis=0), (0.5, 0.0, 0.0), atol=0.006)
+        np.testing.assert_allclose(steps.std(axis=0), (0.07, 0.07, 0.01), rtol=0.06)
+        assert way == tracking.stand_in_odometry(poses, seed=1)
+
+    @pytest.mark.slow
+    def test_a_small_log(self, tmp_path):
+        path = tmp_path / "small.npz"
+        save_npz(path, list(drive(room(), [(-2, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)))
+        recording = tracking.load_recording(path, 12, 0.5)
+        every = tracking.load_recording(path, 99).scans
+        assert recording.scans[0].stamp == every[len(every) // 2].stamp
+        motions, tracks = tracking.measure("small", recording, 0, silent)
+        assert list(motions) == [
+            *("odometry, synthetic", "features", "ICP"),
+            *("features, no odometry", "ICP, no odometry"),
+        ]
+        for name in ("features", "ICP", "features, no odometry"):
+            assert motions[name]["way_median"] < 0.01
+        assert motions["features"]["unobserved"] == 0
+        assert tracks["features"]["segments"]["kept"] > 0.95
+
+    @pytest.mark.slow
+    def test_a_recorded_arena_is_followed(self, data_dir):
+        file, skipped = tracking.LOGS["arena, moving"]
+        recording = tracking.load_recording(data_dir / file, 40, skipped)
+        extract, tracker = ln.Extractor(), Tracker()
+        frames = [extract(scan) for scan in recording.scans]
+        tracks = [tracker(found) for found in frames]
+        errors = motion_errors([t.motion.pose for t in tracks[1:]], recording.poses)
+        assert np.median(errors.ways) < 0.01
+        assert track_scores(frames, tracks, recording.poses)["segments"].summary()["kept"] > 0.85
+
+
+class TestReal:
+    """A right angle 2 m ahead, six times from one place and twice from others; and no log."""
+
+    @pytest.fixture
+    def folder(self, tmp_path, monkeypatch):
+        poses = [(0.0, 0.0, 0.0)] * 6 + [(0.4, 0.0, 0.0), (0.4, 0.4, 0.0)]
+        bearings = np.radians(np.arange(-45, 46))
+        rng, found = np.random.default_rng(5), []
+        for k, (x, y, theta) in enumerate(poses):
+            directions = np.column_stack((np.cos(bearings), np.sin(bearings)))
+            # The walls x + y = 2 and x - y = 2 meet at (2, 0).
+            ranges = np.minimum(*((2.0 - x - s * y) / (directions @ (1.0, s)) for s in (1.0, -1.0)))
+            ranges += rng.normal(0.0, 0.003, len(ranges))
+            beams = {"angle_min": bearings[0], "angle_increment": math.radians(1)}
+            found.append(ln.LaserScan(ranges, **beams, pose=(x, y, theta), stamp=0.1 * k))
+        save_npz(tmp_path / "wedge.npz", found)
+        np.savez(tmp_path / "other.npz", azimuth=np.zeros(3))
+        methods = {name: ln.Extractor(name) for name in ("optimal", "iepf")}
+        monkeypatch.setattr(real, "feature_methods", lambda *_: methods)
+        monkeypatch.setattr(real, "LOGS", {"Wedge": "wedge.npz", "Missing": "missing.npz"})
+        for name, value in (("SCANS", 1), ("PAIRS", 4), ("ARENA", 3), ("STILL", 4)):
+            monkeypatch.setattr(real, f"{name}_A_FRAME", value)
+        return tmp_path
+
+    def test_numbers_of_a_tiny_recording(self, folder):
+        findings = real.run(Setting(2, 0, folder), silent)
+        assert findings.text[-1] == "Left out, as they hold no scans: other.npz."
+        free = findings.numbers["free_space"]
+        assert list(free) == ["wedge.npz"]
+        assert free["wedge.npz"]["optimal"] == {
+            "phantom_in_100m": 0.0,
+            "longest_phantom": 0.0,
+            "phantom_scans": 0.0,
+            "covered": 1.0,
+        }
+        # The first five pairs in a row are from one place: each has two walls and their corner.
+        standing = findings.numbers["standing"]["wedge.npz"]["optimal"]
+        for kind, pairs in (("segments", 10), ("corners", 5)):
+            counts = [bins["pairs"] for bins in standing[kind].values()]
+            assert counts == [0, 0, 0, pairs, 0]
+            assert standing[kind]["30-99"]["found_again"] == 1.0
+            assert 0.1 < standing[kind]["30-99"]["nees_median"] < 5.0
+        # The first six are each paired with the next, that with the last, both ways: one corner
+        # and two walls each.
+        (repeats,) = findings.numbers["repeats"].values()
+        found = repeats["optimal"]
+        assert [found[name] for name in ("expected", "rate", "count", "chance")] == [14, 1, 14, 0]
+        assert math.isnan(found["auc"])
+        assert (found["count_without_edges"], found["corners_expected"]) == (14, 14)
+        assert (found["corners_per_scan"], found["corner_rate"], found["segment_rate"]) == (1, 1, 1)
+        assert found["segments_expected"] == 28
+        assert found["corner_rmse"] < 0.02
+        assert findings.numbers["arena"] == {}
+        assert [table.title for table in findings.tables] == [
+            *real.FREE_SPACE,
+            "Standing still: segments, by measurements",
+            "Standing still: corners, by measurements",
+            "Standing still: segments of optimal, by recording",
+            "Standing still: corners of optimal, by recording",
+            "Wedge: repeated corners, ranked by quality",
+            "Wedge: features but edges found again",
+            "Corners of optimal found again [%], by their quality",
+        ]
+        covered = findings.tables[3]
+        assert covered.columns == ("recording", "optimal", "iepf", "scans")
+        assert [row[0] for row in covered.rows] == ["wedge.npz", "all"]
+        assert covered.rows[1][1::2] == (100.0, 2)
+        json.dumps(findings.to_dict(), allow_nan=False)
+
+    @pytest.mark.slow
+    @pytest.mark.usefixtures("folder")
+    def test_all_recordings(self, data_dir, monkeypatch):
+        logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
+        monkeypatch.setattr(real, "LOGS", logs)
+        findings = real.run(Setting(1, 0, data_dir), silent)
+        assert len(findings.numbers["free_space"]) >= 24
+        unread = set(findings.text[-1].rstrip(".").split(": ")[1].split(", "))
+        assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
+        assert set(scans.STANDING) < set(findings.numbers["standing"])
+        assert list(findings.numbers["repeats"]) == list(logs)
+        assert list(findings.numbers["arena"]) == list(real.ARENAS)
+        json.dumps(findings.to_dict(), allow_nan=False)
+
+
+def test_errors_of_ranges_do_not_depend_on_the_seed_of_another_frame():
+    """The same scene and number give the same frame."""
+    frames = [noise._frame(room(), (0.0, 0.0, 0.0), 3) for _ in range(2)]
+    assert np.array_equal(*(frame.scan.ranges for frame in frames))
+    assert replace(noise.SENSOR, outlier=0.0) == PAPER
