@@ -115,7 +115,7 @@ class RawReader(DataReader[Any]):
         samples = []
         for i in range(n):
             serialised, info = self._taken[i], self._infos[i]
-            if True:  # Otherwise it is the notice that a publisher has gone.
+            if info.valid_data:  # Otherwise it is the notice that a publisher has gone.
                 size = _size(serialised)
                 data = ctypes.create_string_buffer(size)
                 _copy(serialised, 0, size, data)
