@@ -151,6 +151,7 @@ def test_two_publishers_of_which_one_is_killed_and_comes_again(participant, peer
     assert names[1] != names[2]
     remote.close()
     eventually(lambda: source.publishers == 1)  # when its lease has ended
+    assert source.receive(0.0) == []
     with closing(Remote("dds_peer", domain)) as again:
         connected(again, source)
         again.write("/scan", scan_message(3))
@@ -210,16 +211,20 @@ def test_publisher_is_known_by_the_hash_of_its_type(participant, peer):
 
 def test_a_message_serialised_by_others_is_read_by_others(participant, peer):
     # What lineament itself makes of each type is read in test_live_command.
-    types, kind = store(2).types, "geometry_msgs/msg/PoseArray"
-    time = types["builtin_interfaces/msg/Time"](7, 5)
-    message = types[kind](types["std_msgs/msg/Header"](time, "läser"), [])
+    types, kind = store(2).types, "diagnostic_msgs/msg/DiagnosticArray"
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](7, 5), "läser")
+    pair = types["diagnostic_msgs/msg/KeyValue"]("rate", "9 Hz!")
+    status = types["diagnostic_msgs/msg/DiagnosticStatus"](1, "n", "m", "h", [pair])
+    data = bytes(store(2).serialize_cdr(types[kind](header, [status]), kind))
+    assert len(data) % 4 != 0
     publisher = DdsPublisher(participant)
     publisher.advertise("/made", kind)
-    peer.listen("/made", "PoseArray")
+    peer.listen("/made", "DiagnosticArray")
     eventually(lambda: publisher.listeners("/made") == 1)
-    publisher.publish(Message("/made", kind, bytes(store(2).serialize_cdr(message, kind))))
+    publisher.publish(Message("/made", kind, data))
     (came,) = eventually(lambda: peer.take("/made"))
     assert came["header"] == {"stamp": {"sec": 7, "nanosec": 5}, "frame_id": "läser"}
+    assert came["status"][0]["values"] == [{"key": "rate", "value": "9 Hz!"}]
     assert publisher.unsent == 0
     with pytest.raises(ValueError, match="message begins with '07070707', expected CDR"):
         publisher.publish(Message("/made", kind, b"\7\7\7\7"))
