@@ -2,7 +2,7 @@
 
 The stamp of the file has a hash of the code that is measured, kernels and methods without comments
 and docstrings: a test compares it, so that no table is older than the code. Recordings come from
-LINEAMENT_DATA; without them their tables stay empty.
+LINEAMENT_DATA.
 """
 
 import argparse
@@ -237,24 +237,19 @@ class Results:
 
     def maps(self) -> str:
         """The public benchmark of polylines."""
-        from lineament.evaluation.ple import load_benchmark, run_benchmark, sparing_map
+        from lineament.evaluation.ple import load_benchmark, run_benchmark
 
-        makers = {
-            "optimal": "optimal",
-            "optimal --sparing": sparing_map("optimal"),
-            "iepf": "iepf",
-            "line_tracking": "line_tracking",
-        }
-        rows: dict[str, list[object]] = {name: [name] for name in makers}
+        methods = "optimal", "iepf", "line_tracking"
+        rows: dict[str, list[object]] = {name: [name] for name in methods}
         authors = {"ple+": "*PLE+*", "ple": "*PLE*"}
         rows |= {name: [label] for name, label in authors.items()}
         columns = ["map"]
         for half, scores in (("real", ("rmse", "f")), ("sim", ("area_error",))):
             benchmark = load_benchmark(DATA / "benchmark" / f"ple_{half}.npz")
             given = benchmark.means()
-            for name, make in makers.items():
+            for name in methods:
                 print(f"benchmark {half}: {name}", file=sys.stderr, flush=True)
-                means = run_benchmark(benchmark, make, name=name).means()
+                means = run_benchmark(benchmark, name).means()
                 rows[name] += [means[s][k] for s in scores for k in (0, 2, 4)]
             for name in authors:
                 rows[name] += [given[s][name][k] for s in scores for k in (0, 2, 4)]
@@ -384,6 +379,8 @@ TABLES = (
     *("speed", "process", "maps", "tracking", "real", "arena"),
     *("simulation", "sensors", "optimal", "claims"),
 )
+#: Tables of recordings.
+RECORDED = ("maps", "tracking", "real", "arena")
 
 
 # The document ------------------------------------------------------------------------------------
@@ -403,7 +400,11 @@ def main() -> None:
     parser.add_argument("--print", nargs="+", metavar="TABLE", help="print these, write nothing")
     given = parser.parse_args()
     started, results = datetime.now(UTC), Results(given.frames)
-    tables = {name: getattr(results, name)() for name in given.print or TABLES}
+    missing = RECORDED if results.settings[0].data is None else ()
+    tables = {
+        name: "Not measured: no recordings." if name in missing else getattr(results, name)()
+        for name in given.print or TABLES
+    }
     if given.print:
         print("\n\n".join(tables.values()))
         return
