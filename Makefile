@@ -4,7 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test test-all lint house types tests coverage wheel bench mutants lines browser clean
+.PHONY: demo test test-all lint house types tests coverage wheel bench mutants lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -39,7 +39,13 @@ browser:
 	then apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver >/dev/null; \
 	else echo "no chromium: the tests of the page will be skipped"; fi
 
-tests: .venv/ready browser
+# The tests of ROS 1 run against Debian's own; without it they skip, and say so.
+ROS1 := rospy rosmaster sensor-msgs nav-msgs visualization-msgs diagnostic-msgs tf2-msgs
+ros1:
+	@command -v rosmaster >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -qq && \
+	apt-get install -y -qq --no-install-recommends $(ROS1:%=python3-%) >/dev/null; } || echo "no ROS 1: its tests will be skipped"
+
+tests: .venv/ready browser ros1
 	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
 
 coverage: .venv/ready
@@ -53,6 +59,7 @@ wheel: .venv/ready
 	$(PYTHON) -m venv build/empty
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
 	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
+	build/empty/bin/python benchmarks/installed.py
 	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
 
 # Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.

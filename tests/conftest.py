@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import random
@@ -18,7 +19,7 @@ from hypothesis import settings
 
 from lineament import LaserScan, open_log
 
-# A program of its own, for a Python that has ROS 1.
+# A program for a Python that has ROS 1.
 collect_ignore = ["ros1_peer.py"]
 
 # Numba caches a kernel by its own file, and does not see changes in those that it calls: a folder
@@ -69,33 +70,50 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Write a text as a log, packed by a function of its bytes."""
 
-    def write_log(text: str, name: str = "a.txt", pack: Callable[[bytes], bytes] = bytes) -> Path:
+    def write_log(
+        text: str | bytes, name: str = "a.txt", pack: Callable[[bytes], bytes] = bytes
+    ) -> Path:
         path = tmp_path / name
-        path.write_bytes(pack(text.encode()))
+        path.write_bytes(pack(text.encode() if isinstance(text, str) else text))
         return path
 
     return write_log
 
 
 @pytest.fixture
-def domain() -> int:
-    """Domain of DDS; those above have ports that the system lends to others."""
-    return random.SystemRandom().randint(1, 100)
-
-
-@pytest.fixture(scope="session")
-def compiled() -> None:
-    """Compile the kernels that processes load, of which none should wait for a compiler."""
-    from lineament.tasks.warmup import warm_up
-
-    warm_up(["iepf", "optimal"])
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Domain of DDS that no other test uses; ports of those above 100 are lent by the system."""
+    pytest.importorskip("cyclonedds", reason="no cyclonedds for this Python")
+    for name in ("CYCLONEDDS_URI", "ROS_DOMAIN_ID"):
+        monkeypatch.delenv(name, raising=False)
+    for number in random.SystemRandom().sample(range(1, 101), 100):
+        with Path(tempfile.gettempdir(), f"dds-domain-{number}.lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield number
+            return
+    pytest.fail("no domain of DDS is free")
 
 
 @pytest.fixture
-def started(tmp_path: Path, domain: int, compiled: None) -> Iterator[Callable[..., Any]]:  # noqa: ARG001
-    """Start `lineament live` with some arguments, in the domain, on this machine."""
+def peer(domain: int) -> Iterator[Any]:
+    """Another participant of the domain; it configures the domain for this process."""
+    from dds_peer import Peer
+
+    with closing(Peer(domain)) as peer:
+        yield peer
+
+
+@pytest.fixture
+def started(tmp_path: Path, domain: int) -> Iterator[Callable[..., Any]]:
+    """Start `lineament live` as a process, in the domain, on this machine."""
     from live_driving import LiveNode
 
+    from lineament.tasks.warmup import warm_up
+
+    warm_up(["optimal"])  # No process should wait for a compiler.
     with ExitStack() as stack:
 
         def start(*arguments: object) -> LiveNode:
@@ -106,16 +124,6 @@ def started(tmp_path: Path, domain: int, compiled: None) -> Iterator[Callable[..
         yield start
 
 
-@pytest.fixture
-def joined(domain: int) -> Iterator[Callable[..., Any]]:
-    """Start another program in the domain."""
-    from dds_driving import PeerProcess
-
-    with ExitStack() as stack:
-        yield lambda *given: stack.enter_context(closing(PeerProcess(domain, *given)))
-
-
-@pytest.fixture
-def peer(joined: Callable[..., Any]) -> Any:
-    """Another program in the domain, that is there from the beginning."""
-    return joined()
+def pytest_make_parametrize_id(val):
+    """Name bytes by their number: what gzip makes holds the time, and workers compare names."""
+    return f"{len(val)} bytes" if isinstance(val, bytes) else None

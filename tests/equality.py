@@ -8,6 +8,7 @@ import naive
 import numpy as np
 
 from lineament import Extractor
+from lineament.features import TABLES
 
 
 def assert_same_run(scan, extractor: Extractor) -> dict:
@@ -98,3 +99,47 @@ def assert_same_covariances(table, records):
         scale = np.sqrt(np.diag(record["covariance"]))
         unit = np.outer(scale, scale)
         np.testing.assert_allclose(own / unit, record["covariance"] / unit, atol=1e-6)
+
+
+def assert_sound(features, scan):
+    """Hold what is true of the features of any scan, by any method without edges and slits."""
+    for name in TABLES:
+        table = getattr(features, name)
+        for field in table.dtype.names:
+            assert table[field].dtype.kind == "U" or np.isfinite(table[field]).all(), (name, field)
+    segments, corners, n = features.segments, features.corners, len(scan)
+    for table in (segments, corners):
+        variances = table["covariance"].diagonal(axis1=1, axis2=2)
+        assert (variances > 0).all()
+        assert (np.linalg.det(table["covariance"]) > -1e-9 * variances.prod(axis=1)).all()
+    assert (segments["rms"] >= 0).all()
+    valid = np.flatnonzero(scan.valid)
+    for line in segments:
+        first, last = int(line["first_beam"]), int(line["last_beam"])
+        assert scan.valid[[first, last]].all()
+        beams = valid[(valid - first) % n <= (last - first) % n]
+        # On a ring, the measurement at which it was opened belongs to its first and its last line.
+        assert line["n_points"] in (len(beams), 1 + n * (first == last))
+        assert set(features.clusters[beams]) == {line["cluster"]}
+    for corner in corners:
+        before, after = corner["segments"]
+        assert 0 <= min(before, after) <= max(before, after) < len(segments)
+        assert segments["cluster"][before] == segments["cluster"][after]
+        assert corner["beam"] == segments["first_beam"][after]
+        assert 0 <= corner["opening"] <= math.pi
+        assert corner["kind"] == "corner"
+    for point in features.breakpoints:
+        known = point["beam"][point["beam"] >= 0]
+        assert scan.valid[known].all()
+        assert len(known) == (1 if point["kind"] == "scan_end" else 2)
+        assert (point["occluder"] in known) == (point["kind"] == "jump")
+    assert (features.clusters[~scan.valid] == -1).all()
+    # Clusters are runs of valid beams, numbered in their order; one may go over the seam.
+    labels = features.clusters[scan.valid]
+    runs = [
+        int(part[0]) for part in np.split(labels, np.flatnonzero(np.diff(labels)) + 1) if len(part)
+    ]
+    runs = [label for label in runs if label >= 0]
+    if scan.is_full_circle and len(runs) > 1 and runs[0] == runs[-1]:
+        runs = runs[:-1]
+    assert runs == list(range(len(runs)))

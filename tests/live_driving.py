@@ -1,109 +1,231 @@
-"""Driving `lineament live` as a process of its own, and reading what it tells."""
+"""Driving live nodes: as a process, as a thread of this one, and with peers in other processes."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import random
 import signal
+import struct
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from dds_driving import DEADLINE, PeerProcess, eventually
 
 import lineament as ln
+from lineament.live import LiveConfig, Pipeline, Report, run_live
 
-STAMP = {"sec": 1_700_000_000, "nanosec": 123_456_789}
+#: How long anything may take on a slow machine [s]; nothing waits so long if it goes well.
+DEADLINE = 120.0
+
+
+def eventually(condition: Callable[[], Any], pause: float = 0.01) -> Any:
+    """Wait until a condition holds; return its value."""
+    end = time.monotonic() + DEADLINE
+    while not (value := condition()):
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(pause)
+    return value
+
+
+class Remote:
+    """A `Peer` of a module, in another process: its methods are called there."""
+
+    def __init__(self, module: str, *arguments: Any) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._orders, there = context.Pipe()
+        self.process = context.Process(target=_obey, args=(there, module, arguments), daemon=True)
+        self.process.start()
+        there.close()
+        self._answer()
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            self._orders.send((name, arguments))
+            return self._answer()
+
+        return call
+
+    def _answer(self) -> Any:
+        assert self._orders.poll(DEADLINE), "the peer does not answer"
+        return self._orders.recv()
+
+    def signal(self, number: int) -> None:
+        os.kill(self.process.pid, number)
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.join(DEADLINE)
+
+
+def _obey(orders: Any, module: str, arguments: tuple[Any, ...]) -> None:
+    peer = import_module(module).Peer(*arguments)
+    orders.send("ready")
+    while True:
+        name, given = orders.recv()
+        orders.send(getattr(peer, name)(*given))
 
 
 class LiveNode:
-    """The command as it runs; what it says on standard error can be read meanwhile."""
+    """`lineament live` as a process; what it writes to standard error can be read meanwhile."""
 
     def __init__(self, folder: Path, *arguments: object) -> None:
-        self._said = folder / f"said-{random.getrandbits(32):x}"
+        self._errors = folder / f"errors-{random.getrandbits(32):x}"
         command = [sys.executable, "-m", "lineament", "live", *map(str, arguments)]
-        others = ("CYCLONEDDS_URI", "ROS_DOMAIN_ID")
-        clean = {name: value for name, value in os.environ.items() if name not in others}
-        with self._said.open("w") as said:
+        with self._errors.open("w") as errors:
             self.process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=said, text=True, env=clean
+                command, stdout=subprocess.PIPE, stderr=errors, text=True
             )
 
     @property
-    def said(self) -> list[str]:
+    def lines(self) -> list[str]:
         """Lines on standard error so far."""
-        return self._said.read_text().splitlines()
+        return self._errors.read_text().splitlines()
 
-    def until_it_says(self, text: str, times: int = 1) -> None:
-        """Wait until it has told a line with this text, so many times."""
+    def until_it_writes(self, text: str) -> None:
+        def has_written() -> bool:
+            assert self.process.poll() is None, f"it has ended: {self.lines}"
+            return any(text in line for line in self.lines)
 
-        def has_said() -> bool:
-            assert self.process.poll() is None, f"it has ended: {self.said}"
-            return sum(text in line for line in self.said) >= times
-
-        eventually(has_said)
+        eventually(has_written)
 
     @property
     def memory(self) -> float:
-        """Memory that it holds [MB]."""
+        """Resident memory [MB]."""
         pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
     def stop(self, number: int = signal.SIGTERM) -> str:
-        """Send a signal; what it says on standard output."""
+        """Send a signal, and wait until it ends well; return its standard output."""
         self.process.send_signal(number)
-        return self.end()
-
-    def end(self) -> str:
-        """Wait until it ends, well; what it says on standard output."""
         out, _ = self.process.communicate(timeout=DEADLINE)
-        assert (self.process.returncode, "Traceback" in self._said.read_text()) == (0, False), (
-            f"{self.process.returncode}, {out!r}, {self.said}"
+        assert (self.process.returncode, "Traceback" in self._errors.read_text()) == (0, False), (
+            f"{self.process.returncode}, {out!r}, {self.lines}"
         )
         return out
 
     def kill(self) -> None:
-        """Kill it, if it still runs."""
         self.process.kill()
         self.process.wait(DEADLINE)
         self.process.stdout.close()
 
 
+class Running:
+    """A node in a thread: what it wrote, and its report once it has ended."""
+
+    def __init__(self, config: LiveConfig) -> None:
+        self.lines: list[str] = []
+        self.reports: list[Report] = []
+        self._config, self._stopped = config, threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        stop = self._stopped.is_set
+        write, show = self.lines.append, self.reports.append
+        run_live(self._config, stop, write=write, show=show)
+
+    def stop(self) -> Report:
+        """Stop it; return its last report."""
+        self._stopped.set()
+        return self.end()
+
+    def end(self) -> Report:
+        """Wait until it ends; return its last report."""
+        self._thread.join(DEADLINE)
+        assert not self._thread.is_alive()
+        return self.reports[-1]
+
+
+@contextmanager
+def running(**options: Any) -> Iterator[Running]:
+    """Run a node with some options until the block ends."""
+    config = LiveConfig(**options)
+    pipeline = Pipeline(config)
+    for _ in range(2):  # Nothing that has a deadline should wait for a compiler.
+        pipeline("", scan_of(scan_message(0, scene(), time_increment=1e-6)))
+    node = Running(config)
+    try:
+        yield node
+    finally:
+        node._stopped.set()
+        node._thread.join(DEADLINE)
+
+
+def scan_message(stamp: int = 0, ranges: Any = (1.0, 2.0, 3.0), **fields: float) -> dict:
+    """A LaserScan as a peer writes it: 1.5 rad wide, in the frame ``laser``."""
+    ranges = [float(r) for r in ranges]
+    increment = 1.5 / max(len(ranges) - 1, 1)
+    numbers = {"angle_min": -0.75, "angle_max": 0.75, "angle_increment": increment}
+    numbers |= {"scan_time": 0.125, "range_min": 0.125, "range_max": 32.0, **fields}
+    header = {"stamp": {"sec": stamp, "nanosec": 500_000_001}, "frame_id": "laser"}
+    # As the message holds them: in single precision.
+    single = {name: float(np.float32(value)) for name, value in numbers.items()}
+    return {"header": header, **single, "ranges": ranges}
+
+
+def odometry_message(vx: float, stamp: int = 0) -> dict:
+    turned = {"z": float(np.sin(0.25)), "w": float(np.cos(0.25))}
+    return {
+        "header": {"stamp": {"sec": stamp, "nanosec": 500_000_000}, "frame_id": "odom"},
+        "child_frame_id": "base",
+        "pose": {"pose": {"position": {"x": 1.0, "y": 2.0}, "orientation": turned}},
+        "twist": {"twist": {"linear": {"x": vx, "y": -1.0}, "angular": {"z": 0.25}}},
+    }
+
+
+def cdr_scan(n: int = 3, order: str = "<", increment: float = 0.25) -> bytes:
+    """A LaserScan of `n` beams in CDR."""
+    geometry = (-0.5, 0.5, increment, 0.0, 0.1, 0.1, 30.0)
+    form = f"{order}3I8s7fI{n}fI"
+    return b"\0\1\0\0" + struct.pack(form, 7, 0, 6, b"laser", *geometry, n, *[1.0] * n, 0)
+
+
+def garbage() -> dict[str, bytes]:
+    """Messages in CDR that are no scan, by what is wrong with them."""
+    good = cdr_scan()
+    return {
+        "empty": b"\0\1\0\0" + bytes(4),
+        "noise": b"\0\1\0\0" + random.Random(0).randbytes(400),
+        "cut off": good[:-12],
+        "too long": good + bytes(40),
+        "big-endian": b"\0\1\0\0" + cdr_scan(order=">")[4:],
+        "XCDR2": b"\0\7\0\0" + good[4:],
+        "too many ranges": good[:52] + struct.pack("<I", 2**32 - 1) + good[56:],
+        "no beams": cdr_scan(2)[:52] + bytes(8),
+        "NaN": cdr_scan(increment=float("nan")),
+        "no increment": cdr_scan(increment=0.0),
+        "a million beams": cdr_scan(1_000_000, increment=1e-6),
+    }
+
+
 def scene(n: int = 541) -> np.ndarray:
-    """Ranges in a room of 5 m by 4 m with a pillar, as a message holds them."""
-    bearings = np.linspace(-2.25, 2.25, n)
+    """Ranges over 1.5 rad of a corner, 3 m ahead, and a pillar, as messages hold them."""
+    bearings = np.linspace(-0.75, 0.75, n)
     c, s = np.cos(bearings), np.sin(bearings)
-    walls = [distance / np.maximum(side, 1e-9) for side, distance in ((c, 3), (-c, 2))]
-    walls += [2 / np.maximum(np.abs(s), 1e-9)]
-    # The pillar has a radius of 30 cm; how far each beam passes by its centre (1.6, 0.4).
-    along, aside = 1.6 * c + 0.4 * s, 1.6 * s - 0.4 * c
+    walls = [3 / c, np.where(s > 0, 1.5 / np.maximum(s, 1e-9), np.inf)]
+    # The pillar has a radius of 30 cm; how far each beam passes by its centre (1.6, -0.4).
+    along, aside = 1.6 * c - 0.4 * s, 1.6 * s + 0.4 * c
     depth = 0.3**2 - aside**2
-    is_hit = (depth > 0) & (along > 0)
-    pillar = np.where(is_hit, along - np.sqrt(np.maximum(depth, 0)), np.inf)
+    pillar = np.where(depth > 0, along - np.sqrt(np.maximum(depth, 0)), np.inf)
     noise = np.random.default_rng(7).normal(0, 0.004, n)
     return (np.min([*walls, pillar], axis=0) + noise).astype(np.float32)
 
 
-def message_of(ranges: np.ndarray, number: int = 0, **fields: float) -> dict:
-    """A LaserScan as a peer takes it; its stamp is `number` seconds after `STAMP`."""
-    step = 4.5 / (len(ranges) - 1)
-    numbers = {"angle_min": -2.25, "angle_max": 2.25, "angle_increment": step}
-    numbers |= {"time_increment": 0.0, "scan_time": 0.0, "range_min": 0.125, "range_max": 30.0}
-    return {
-        "header": {"stamp": {**STAMP, "sec": STAMP["sec"] + number}, "frame_id": "laser_front"},
-        **{name: float(np.float32(value)) for name, value in (numbers | fields).items()},
-        "ranges": [float(r) for r in ranges],
-        "intensities": [],
-    }
-
-
 def scan_of(message: dict) -> ln.LaserScan:
-    """What the library makes of the same message; its features are compared without the stamp."""
-    names = ("angle_min", "angle_increment", "range_min", "range_max")
-    given = {name: message[name] for name in (*names, "scan_time", "time_increment")}
-    return ln.LaserScan(message["ranges"], **given)
+    """What the library makes of the same message."""
+    names = ("angle_min", "angle_increment", "range_min", "range_max", "scan_time")
+    given = {name: message[name] for name in names}
+    return ln.LaserScan(
+        message["ranges"], time_increment=message.get("time_increment", 0.0), **given
+    )
 
 
 def points_of(cloud: dict) -> np.ndarray:
@@ -114,24 +236,14 @@ def points_of(cloud: dict) -> np.ndarray:
     return np.frombuffer(bytes(cloud["data"]), fields)
 
 
-def heard(peer: PeerProcess, topic: str, publish: Callable[[], object] = lambda: None) -> dict:
-    """The newest message of a topic, once there is one; meanwhile publish again and again.
+def heard(peer: Any, topic: str, publish: Callable[[], object] = lambda: None) -> dict:
+    """Return the newest message of a topic, once there is one; meanwhile publish repeatedly.
 
     Nobody outside can wait until the node hears and is heard, and best effort may be lost.
     """
-    came: list[dict] = []
 
-    def has_come() -> bool:
+    def newest() -> list[dict]:
         publish()
-        came.extend(peer("take", topic))
-        return bool(came)
+        return peer.take(topic)[-1:]
 
-    eventually(has_come, pause=0.05)
-    return came[-1]
-
-
-def totals(peer: PeerProcess) -> dict[str, int]:
-    """What the next report of the node has counted since its start."""
-    (status,) = heard(peer, "rt/diagnostics")["status"]
-    ends = ((pair["key"], pair["value"]) for pair in status["values"])
-    return {key.removesuffix(" in all"): int(value) for key, value in ends if "in all" in key}
+    return eventually(newest, pause=0.02)[0]

@@ -1,6 +1,6 @@
 """Slow twins of the methods that find their lines one by one: growing, consensus, votes.
 
-They take the points of the classes of a scan, and find lines by eigenvectors and loops.
+They take the points of the clusters of a scan, and find lines by eigenvectors and loops.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from naive_fit import principal_line, range_variance
 
 from lineament.features import noise_row
-from lineament.kernels import layout
+from lineament.kernels import layout as at
 from lineament.methods.workspace import Block
 
 
 @dataclass
-class Classes:
-    """Points of a scan (m, 2), their ranges, and the first and last point of each class."""
+class Clusters:
+    """Points of a scan (m, 2), their ranges, and the first and last point of each cluster."""
 
     points: np.ndarray
     rho: np.ndarray
@@ -33,27 +33,25 @@ def assert_same_pieces(method, scan, find, noise=None) -> int:
     block = Block(scan, noise_row(noise), 1, method.own_arrays(len(scan)))
     block.load(scan.ranges)
     method.run(block)
-    classes = classes_of(block)
-    found = sorted(piece for span in find(classes, method) for piece in span)
-    expected = settle(classes, found, method)
-    n = block.counts[layout.PIECES]
-    lines = (layout.FIRST, layout.LAST, layout.BEFORE)
-    kernel = [tuple(int(block.ints[line, k]) for line in lines) for k in range(n)]
-    assert kernel == [(a, b, before) for a, b, before, _ in expected]
+    clusters = clusters_in(block)
+    found = sorted(piece for span in find(clusters, method) for piece in span)
+    expected = settle(clusters, found, method)
+    n = block.counts[at.PIECES]
+    pieces = block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], :n].T.tolist()
+    assert pieces == [[a, b, before] for a, b, before, _ in expected]
     sines = [sine for *_, sine in expected]
-    np.testing.assert_allclose(block.floats[layout.RESPONSE, :n], sines, rtol=1e-5)
+    np.testing.assert_allclose(block.work.response[:n], sines, rtol=1e-5)
     return n
 
 
-def classes_of(block) -> Classes:
-    """Take the classes out of a block."""
-    m = int(block.counts[layout.POINTS])
-    label = block.ints[layout.LABEL, :m].tolist()
+def clusters_in(block) -> Clusters:
+    """Take the clusters out of a block."""
+    m, points = int(block.counts[at.POINTS]), block.work.points
+    label = block.work.marks[at.LABEL, :m].tolist()
     edges = [0, *(i for i in range(1, m) if label[i] != label[i - 1]), m] if m else []
     spans = [(a, b - 1) for a, b in pairwise(edges) if label[a] >= 0]
-    points = block.floats[[layout.X, layout.Y], :m].T.copy()
-    closed = bool(block.counts[layout.CLOSED])
-    return Classes(points, block.floats[layout.RHO, :m], block.noises[0], spans, closed)
+    xy, closed = points[[at.X, at.Y], :m].T.copy(), bool(block.counts[at.CLOSED])
+    return Clusters(xy, points[at.RHO, :m], block.noises[0], spans, closed)
 
 
 def line(points):
@@ -63,37 +61,37 @@ def line(points):
     return normal, normal @ centroid, float((((points - centroid) @ normal) ** 2).sum())
 
 
-def tolerance(classes, i, d, method):
-    """How far a point may lie from its line: the noise of range and bearing, and unevenness."""
-    rho, noise = classes.rho[i], classes.noise
+def tolerance(clusters, i, d, method):
+    """How far a point may lie from its line: the noise of range and bearing, and misfit."""
+    rho, noise = clusters.rho[i], clusters.noise
     of_range = math.sqrt(range_variance(rho, noise)) * abs(d) / rho
     return method.epsilon + method.sigmas * (of_range + noise[2] * rho)
 
 
-def is_near(classes, i, normal, d, method, margin=0.0):
-    return abs(normal @ classes.points[i] - d) <= tolerance(classes, i, d, method) + margin
+def is_near(clusters, i, normal, d, method, margin=0.0):
+    return abs(normal @ clusters.points[i] - d) <= tolerance(clusters, i, d, method) + margin
 
 
-def long_enough(classes, a, b, least):
-    return np.linalg.norm(classes.points[b] - classes.points[a]) >= least
+def long_enough(clusters, a, b, least):
+    return np.linalg.norm(clusters.points[b] - clusters.points[a]) >= least
 
 
 # Finding
 
 
-def grow(classes, method):
-    """Regions of each class, which may overlap."""
+def grow(clusters, method):
+    """Regions of each cluster, which may overlap."""
 
     def fits(i, normal, d):
-        along = normal @ classes.points[i] / classes.rho[i]
-        to_predicted = abs(classes.rho[i] * along - d) / abs(along) if along else math.inf
-        noise = method.sigmas * math.sqrt(range_variance(classes.rho[i], classes.noise))
-        return is_near(classes, i, normal, d, method) and to_predicted <= method.delta + noise
+        along = normal @ clusters.points[i] / clusters.rho[i]
+        to_predicted = abs(clusters.rho[i] * along - d) / abs(along) if along else math.inf
+        noise = method.sigmas * math.sqrt(range_variance(clusters.rho[i], clusters.noise))
+        return is_near(clusters, i, normal, d, method) and to_predicted <= method.delta + noise
 
     def through(a, b):
-        return line(classes.points[a : b + 1])[:2]
+        return line(clusters.points[a : b + 1])[:2]
 
-    for start, stop in classes.spans:
+    for start, stop in clusters.spans:
         regions, i, floor = [], start, start
         while i + method.s_num - 1 <= stop:
             a, b = i, i + method.s_num - 1
@@ -104,37 +102,37 @@ def grow(classes, method):
                 b += 1
             while a > floor and fits(a - 1, *through(a, b)):
                 a -= 1
-            if b - a + 1 >= method.p_min and long_enough(classes, a, b, method.l_min):
+            if b - a + 1 >= method.p_min and long_enough(clusters, a, b, method.l_min):
                 regions.append((a, b))
                 floor = a + 2
             i = b + 1 - method.s_num // 2
         yield regions
 
 
-def longest_run(classes, free, span, normal, d, method, margin=0.0):
+def longest_run(clusters, free, span, normal, d, method, margin=0.0):
     """(number of near points, first, last) of the longest run; the first of equal ones."""
     runs: list[list[int]] = [[]]
     for i in range(span[0], span[1] + 1):
         run = runs[-1]
         if i not in free or (run and i - run[-1] > method.max_misses + 1):
             runs.append([])
-        if i in free and is_near(classes, i, normal, d, method, margin):
+        if i in free and is_near(clusters, i, normal, d, method, margin):
             runs[-1].append(i)
     best = max(runs, key=len)
     return (len(best), best[0], best[-1]) if best else (0, -1, -1)
 
 
-def refined_run(classes, free, span, normal, d, method, margin, passes):
-    near, a, b = longest_run(classes, free, span, normal, d, method, margin)
+def refined_run(clusters, free, span, normal, d, method, margin, passes):
+    near, a, b = longest_run(clusters, free, span, normal, d, method, margin)
     for _ in range(passes):
         if near >= 3:
-            normal, d, _ = line(classes.points[a : b + 1])
-            near, a, b = longest_run(classes, free, span, normal, d, method)
+            normal, d, _ = line(clusters.points[a : b + 1])
+            near, a, b = longest_run(clusters, free, span, normal, d, method)
     return near, a, b
 
 
-def sample(classes, method):
-    """Pieces of each class by consensus."""
+def sample(clusters, method):
+    """Pieces of each cluster by consensus."""
     state = method.seed
 
     def draw(n):
@@ -142,41 +140,41 @@ def sample(classes, method):
         state = 48271 * state % (2**31 - 1)
         return state % n
 
-    for span in classes.spans:
+    for span in clusters.spans:
         pieces, free = [], set(range(span[0], span[1] + 1))
         while len(free) >= 2:
             left, best = sorted(free), (0, None, None)
             for _ in range(method.trials):
                 k = draw(len(left) - 1)
                 i, j = left[k], left[k + 1 + draw(min(method.window, len(left) - 1 - k))]
-                u = classes.points[j] - classes.points[i]
+                u = clusters.points[j] - clusters.points[i]
                 if j - i > method.window or not u.any():
                     continue
                 normal = np.array([u[1], -u[0]]) / np.linalg.norm(u)
-                d = normal @ classes.points[i]
-                near, _, _ = longest_run(classes, free, span, normal, d, method)
+                d = normal @ clusters.points[i]
+                near, _, _ = longest_run(clusters, free, span, normal, d, method)
                 best = max(best, (near, normal, d), key=lambda one: one[0])
             if not best[0]:
                 break
-            near, a, b = refined_run(classes, free, span, *best[1:], method, 0.0, 3)
-            if near < method.min_points or not long_enough(classes, a, b, method.min_length):
+            near, a, b = refined_run(clusters, free, span, *best[1:], method, 0.0, 3)
+            if near < method.min_points or not long_enough(clusters, a, b, method.min_length):
                 break
             pieces.append((a, b))
             free -= set(range(a, b + 1))
         yield pieces
 
 
-def vote(classes, method):
-    """Pieces of each class by votes, which are counted anew for each peak."""
+def vote(clusters, method):
+    """Pieces of each cluster by votes, which are counted again for each peak."""
     alpha = math.pi / method.angles * np.arange(method.angles)
     normals = np.column_stack((np.cos(alpha), np.sin(alpha)))
-    for span in classes.spans:
-        points = classes.points[span[0] : span[1] + 1]
+    for span in clusters.spans:
+        points = clusters.points[span[0] : span[1] + 1]
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         radius = max(math.hypot(*(p - centre)) for p in points)
-        noise = math.sqrt(range_variance(classes.rho[span[0]], classes.noise))
+        noise = math.sqrt(range_variance(clusters.rho[span[0]], clusters.noise))
         width = max(method.resolution, 2 * noise, 2 * radius / (method.distances - 1))
-        dx, dy = (classes.points - centre).T
+        dx, dy = (clusters.points - centre).T
         c, s = normals.T[:, :, np.newaxis] / width
         cells = (c * dx + s * dy + radius / width).astype(int)
         pieces, free, spent = [], set(range(span[0], span[1] + 1)), set()
@@ -191,12 +189,12 @@ def vote(classes, method):
                 break
             normal = normals[cell[0]]
             d = normal @ centre + (cell[1] + 0.5) * width - radius
-            near, a, b = refined_run(classes, free, span, normal, d, method, width / 2, 4)
+            near, a, b = refined_run(clusters, free, span, normal, d, method, width / 2, 4)
             if near == 0:
                 spent.add(cell)
                 continue
             free -= set(range(a, b + 1))
-            if near >= method.min_points and long_enough(classes, a, b, method.min_length):
+            if near >= method.min_points and long_enough(clusters, a, b, method.min_length):
                 pieces.append((a, b))
         yield pieces
 
@@ -204,44 +202,44 @@ def vote(classes, method):
 # Settling
 
 
-def settle(classes, found, method):
+def settle(clusters, found, method):
     """(first, last, piece before a corner or -1, sine there) of the pieces that are left."""
-    pieces = merged(classes, found, method)
+    pieces = merged(clusters, found, method)
     for _ in range(2):
         for k in range(1, len(pieces)):
-            if are_neighbours(classes, *pieces[k - 1 : k + 1]):
-                pieces[k - 1 : k + 1] = cut_apart(classes.points, *pieces[k - 1 : k + 1])
-    pieces = merged(classes, pieces, method)
+            if are_neighbours(clusters, *pieces[k - 1 : k + 1]):
+                pieces[k - 1 : k + 1] = cut_apart(clusters.points, *pieces[k - 1 : k + 1])
+    pieces = merged(clusters, pieces, method)
     sines = [0.0] * len(pieces)
-    if classes.closed and len(pieces) > 1:
+    if clusters.closed and len(pieces) > 1:
         for _ in range(2):
-            pieces[-1], pieces[0] = left_opening(classes.points, pieces[-1], pieces[0])
-        if pieces[0][0] + len(classes.points) - 1 - pieces[-1][1] <= 4:
-            sines[0] = meet(classes.points, pieces[-1], pieces[0], method.reach)
+            pieces[-1], pieces[0] = left_opening(clusters.points, pieces[-1], pieces[0])
+        if pieces[0][0] + len(clusters.points) - 1 - pieces[-1][1] <= 4:
+            sines[0] = meet(clusters.points, pieces[-1], pieces[0], method.reach)
     for k in range(1, len(pieces)):
-        if are_neighbours(classes, *pieces[k - 1 : k + 1]):
-            sines[k] = meet(classes.points, *pieces[k - 1 : k + 1], method.reach)
+        if are_neighbours(clusters, *pieces[k - 1 : k + 1]):
+            sines[k] = meet(clusters.points, *pieces[k - 1 : k + 1], method.reach)
     return [
         (*piece, (k - 1) % len(pieces) if sine else -1, sine or math.nan)
         for k, (piece, sine) in enumerate(zip(pieces, sines, strict=True))
     ]
 
 
-def are_neighbours(classes, one, other):
-    (start, stop), *_ = (span for span in classes.spans if span[0] <= one[1] <= span[1])
+def are_neighbours(clusters, one, other):
+    (start, stop), *_ = (span for span in clusters.spans if span[0] <= one[1] <= span[1])
     return start <= other[0] <= stop and other[0] - one[1] <= 4
 
 
-def merged(classes, pieces, method):
+def merged(clusters, pieces, method):
     """Pieces of which no neighbours cost less than 36 variances more as one."""
     out = []
     for a, b in pieces:
-        if out and are_neighbours(classes, out[-1], (a, b)):
+        if out and are_neighbours(clusters, out[-1], (a, b)):
             one = list(range(out[-1][0], out[-1][1] + 1))
             other = list(range(max(a, one[-1] + 1), b + 1))
-            _, d, both = line(classes.points[one + other])
-            apart = sum(line(classes.points[some])[2] for some in (one, other))
-            rho, noise = classes.rho[one[-1]], classes.noise
+            _, d, both = line(clusters.points[one + other])
+            apart = sum(line(clusters.points[some])[2] for some in (one, other))
+            rho, noise = clusters.rho[one[-1]], clusters.noise
             square = min(max((d / rho) ** 2, 1e-6), 1.0)  # cos²ψ
             variance = range_variance(rho, noise) * square + (noise[2] * rho) ** 2 * (1 - square)
             if both - apart <= 36 * (variance + method.epsilon**2):

@@ -9,15 +9,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from mcap.writer import CompressionType, Writer
 from rosbags import rosbag1, rosbag2
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from lineament import LogError
+from lineament.logs import open_log
 
 #: Every kind of bag that `write_bag` writes, by container, compression and serialisation.
 KINDS = (
     *("rosbag1", "rosbag1-bz2", "rosbag1-lz4", "sqlite3", "sqlite3-zstd"),
     *("mcap", "mcap-lz4", "mcap-zstd", "mcap-plain", "mcap-bare", "mcap-ros1"),
 )
+every_kind = pytest.mark.parametrize("kind", KINDS)
 
 #: Size from which a chunk is written [bytes]; small, so that small bags have several.
 CHUNK = 4096
@@ -47,16 +53,28 @@ class Messages:
 
     def __init__(self, ros: int) -> None:
         self.ros = ros
-        self._types = store(ros).types
 
-    def _new(self, kind: str, *values: Any) -> Any:
-        package, name = kind.split("/")
-        return self._types[f"{package}/msg/{name}"](*values)
+    def new(self, kind: str, *values: Any) -> Any:
+        """Make a message of its fields; messages in it may be tuples of theirs."""
+        types = store(self.ros)
+        name = kind if "/msg/" in kind else kind.replace("/", "/msg/")
+
+        def field(form: tuple, value: Any) -> Any:
+            if form[0] == Nodetype.NAME and isinstance(value, tuple):
+                return self.new(form[1], *value)
+            if form[0] == Nodetype.SEQUENCE and isinstance(value, list):
+                return [field(form[1][0], each) for each in value]
+            return value
+
+        fields = types.get_msgdef(name).fields
+        return types.types[name](
+            *(field(form, value) for (_, form), value in zip(fields, values, strict=True))
+        )
 
     def header(self, stamp: float, frame: str = "laser") -> Any:
         seconds = math.floor(stamp)
-        time = self._new("builtin_interfaces/Time", seconds, round((stamp - seconds) * 1e9))
-        return self._new("std_msgs/Header", *((0,) if self.ros == 1 else ()), time, frame)
+        time = seconds, round((stamp - seconds) * 1e9)
+        return self.new("std_msgs/Header", *((0,) if self.ros == 1 else ()), time, frame)
 
     def _geometry(self, n: int, fields: dict[str, float]) -> list[float]:
         step = fields.get("angle_increment", 0.01)
@@ -75,13 +93,9 @@ class Messages:
         frame: str = "laser",
         **fields: float,
     ) -> Any:
-        return self._new(
-            "sensor_msgs/LaserScan",
-            self.header(stamp, frame),
-            *self._geometry(len(ranges), fields),
-            np.array(ranges, np.float32),
-            np.array(intensities, np.float32),
-        )
+        values = np.array(ranges, np.float32), np.array(intensities, np.float32)
+        geometry = self._geometry(len(ranges), fields)
+        return self.new("sensor_msgs/LaserScan", self.header(stamp, frame), *geometry, *values)
 
     def echoes(
         self,
@@ -90,68 +104,46 @@ class Messages:
         intensities: Sequence[Sequence[float]] = (),
         **fields: float,
     ) -> Any:
-        beams = [
-            [self._new("sensor_msgs/LaserEcho", np.array(beam, np.float32)) for beam in beams]
-            for beams in (ranges, intensities)
-        ]
+        beams = [[(np.array(beam, np.float32),) for beam in each] for each in (ranges, intensities)]
         geometry = self._geometry(len(ranges), fields)
-        return self._new("sensor_msgs/MultiEchoLaserScan", self.header(stamp), *geometry, *beams)
+        return self.new("sensor_msgs/MultiEchoLaserScan", self.header(stamp), *geometry, *beams)
 
     def cloud(self, stamp: float, points: np.ndarray, big_endian: bool = False) -> Any:
         """Make a cloud of a structured array of points, shape (height, width)."""
         kinds = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
         fields = [
-            self._new("sensor_msgs/PointField", name, offset, kinds[kind.str[1:]], 1)
+            (name, offset, kinds[kind.str[1:]], 1)
             for name, (kind, offset) in points.dtype.fields.items()
         ]
         height, width = points.shape
         step = points.dtype.itemsize
         data = np.frombuffer(points.tobytes(), np.uint8)
-        return self._new(
-            "sensor_msgs/PointCloud2",
-            *(self.header(stamp), height, width, fields, big_endian, step, step * width),
-            *(data, True),
-        )
+        layout = fields, big_endian, step, step * width, data, True
+        return self.new("sensor_msgs/PointCloud2", self.header(stamp), height, width, *layout)
 
-    def pose(self, x: float, y: float, theta: float) -> Any:
-        return self._new(
-            "geometry_msgs/Pose", self._new("geometry_msgs/Point", x, y, 0.3), self.turn(theta)
-        )
-
-    def turn(self, theta: float) -> Any:
-        half = (0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
-        return self._new("geometry_msgs/Quaternion", *half)
+    def _placed(self, x: float, y: float, theta: float) -> tuple:
+        """A position or translation, and a quaternion."""
+        return (x, y, 0.3), (0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
 
     def pose_stamped(self, stamp: float, *pose: float) -> Any:
-        return self._new("geometry_msgs/PoseStamped", self.header(stamp, "map"), self.pose(*pose))
+        return self.new("geometry_msgs/PoseStamped", self.header(stamp, "map"), self._placed(*pose))
 
     def pose_with_covariance(self, stamp: float, *pose: float) -> Any:
-        inner = self._new(
-            "geometry_msgs/PoseWithCovariance", self.pose(*pose), np.zeros(36, np.float64)
-        )
+        inner = self._placed(*pose), np.zeros(36)
         header = self.header(stamp, "map")
-        return self._new("geometry_msgs/PoseWithCovarianceStamped", header, inner)
+        return self.new("geometry_msgs/PoseWithCovarianceStamped", header, inner)
 
     def odometry(self, stamp: float, *pose: float) -> Any:
-        none = np.zeros(36, np.float64)
-        zero = self._new("geometry_msgs/Vector3", 0.0, 0.0, 0.0)
-        twist = self._new("geometry_msgs/Twist", zero, zero)
-        return self._new(
-            "nav_msgs/Odometry",
-            *(self.header(stamp, "odom"), "base_link"),
-            self._new("geometry_msgs/PoseWithCovariance", self.pose(*pose), none),
-            self._new("geometry_msgs/TwistWithCovariance", twist, none),
-        )
+        twist = ((1.5, -0.5, 7.0), (7.0, 7.0, 0.25)), np.zeros(36)
+        names = self.header(stamp, "odom"), "base_link"
+        return self.new("nav_msgs/Odometry", *names, (self._placed(*pose), np.zeros(36)), twist)
 
     def transform(self, stamp: float, parent: str, child: str, *pose: float) -> Any:
-        x, y, theta = pose
-        moved = self._new("geometry_msgs/Vector3", x, y, 0.3)
-        inner = self._new("geometry_msgs/Transform", moved, self.turn(theta))
         header = self.header(stamp, parent)
-        return self._new("geometry_msgs/TransformStamped", header, child, inner)
+        return self.new("geometry_msgs/TransformStamped", header, child, self._placed(*pose))
 
     def transforms(self, *each: Any) -> Any:
-        return self._new("tf2_msgs/TFMessage", list(each))
+        return self.new("tf2_msgs/TFMessage", list(each))
 
 
 def serialized(message: Any, ros: int) -> bytes:
@@ -181,6 +173,11 @@ def write_bag(path: Path, kind: str, items: Iterable[Item]) -> Path:
     else:
         _write_rosbags(path, container, codec, ros, packed)
     return path
+
+
+def write(folder: Path, kind: str, items: Iterable[Item], name: str = "log") -> Path:
+    """Write a bag into a folder, with the usual ending."""
+    return write_bag(folder / f"{name}{ending(kind)}", kind, items)
 
 
 def _write_rosbags(path: Path, container: str, codec: str, ros: int, items: Any) -> None:
@@ -215,13 +212,41 @@ def _write_mcap(path: Path, codec: str, ros: int, items: Any) -> None:
         channels: dict[str, int] = {}
         for topic, time, kind, data in items:
             if topic not in channels:
-                definition = store(ros).generate_msgdef(kind, ros_version=ros)[0]
-                schema = writer.register_schema(
-                    kind if ros == 2 else kind.replace("/msg/", "/"),
-                    f"ros{ros}msg",
-                    definition.encode(),
-                )
+                text = store(ros).generate_msgdef(kind, ros_version=ros)[0]
+                name = kind if ros == 2 else kind.replace("/msg/", "/")
+                schema = writer.register_schema(name, f"ros{ros}msg", text.encode())
                 encoding = "cdr" if ros == 2 else "ros1"
                 channels[topic] = writer.register_channel(topic, encoding, schema)
             writer.add_message(channels[topic], time, data, time)
         writer.finish()
+
+
+# Bags of scans that can be known again, and what is read of them
+
+
+def ranges_of(stamp: float) -> np.ndarray:
+    """Ranges of the scan with a stamp, in `bags_of_scans`."""
+    return (1.0 + stamp + 0.01 * np.arange(40)).astype(np.float32)
+
+
+def bags_of_scans(folder: Path, n: int) -> dict[str, Path]:
+    """Write a bag of each kind with n scans, as a file: of a folder its database."""
+    found = {}
+    for kind in KINDS:
+        make = Messages(ros_of(kind))
+        items = (("/scan", i, make.scan(i, ranges_of(i))) for i in range(n))
+        path = write(folder, kind, items, kind)
+        found[kind] = next(path.glob("*.db3")) if path.is_dir() else path
+    return found
+
+
+def read(path: Path, **options: Any) -> tuple[list, str | None]:
+    """Read scans up to the first error, which is one line: them, and what it says."""
+    scans, line = [], ""
+    try:
+        scans.extend(open_log(path, **options))
+    except LogError as error:  # Whoever keeps the error keeps the log, too.
+        line, problem = str(error), error.problem
+    assert line.isprintable()
+    assert line.startswith(str(path)) or not line
+    return scans, problem if line else None

@@ -1,4 +1,4 @@
-"""Bounds: by hand, against limits that are known, and reached by maximum likelihood."""
+"""Bounds: the inverse of the Fisher information by differences, limits that are known, by hand."""
 
 import math
 
@@ -17,77 +17,56 @@ from lineament.bounds import (
 
 NOISE = RangeNoise(sigma=0.01)
 STEP = math.radians(1 / 3)
-RUNS = 4000
-#: Statistics are held to this many standard deviations of their own.
-SIGMAS = 4.5
 
 
-# Estimators
-
-
-def line_ranges(parameters, bearings, point):
-    """Ranges of lines (offset at `point` along the left normal, angle)."""
-    offset, angle = np.moveaxis(parameters[..., np.newaxis], -2, 0)
-    distance = np.cos(angle) * point[1] - np.sin(angle) * point[0] + offset
+def line_ranges(line, bearings, point):
+    """Ranges of the line (offset at `point` along the left normal, angle)."""
+    offset, angle = line
+    distance = math.cos(angle) * point[1] - math.sin(angle) * point[0] + offset
     return distance / np.sin(bearings - angle)
 
 
-def circle_ranges(parameters, bearings, side):
-    """Ranges of circles (x, y, radius); `side` is -1 for the near side."""
-    x, y, radius = np.moveaxis(parameters[..., np.newaxis], -2, 0)
+def corner_ranges(corner, bearings):
+    """Ranges of the corner (x, y, angle before, angle after), of beams on either side."""
+    before, after = bearings[bearings < 0], bearings[bearings > 0]
+    vertex = corner[:2]
+    return np.concatenate(
+        [
+            line_ranges((0.0, angle), side + math.atan2(0.5, 2.0), vertex)
+            for angle, side in zip(corner[2:], (before, after), strict=True)
+        ]
+    )
+
+
+def circle_ranges(circle, bearings, side):
+    """Ranges of the circle (x, y, radius); `side` is -1 for the near side."""
+    x, y, radius = circle
     c, s = np.cos(bearings), np.sin(bearings)
-    return c * x + s * y + side * np.sqrt(np.maximum(radius**2 - (c * y - s * x) ** 2, 1e-9))
+    return c * x + s * y + side * np.sqrt(radius**2 - (c * y - s * x) ** 2)
 
 
-def readings(model, truth, bearings, noise, rng):
-    """Simulate RUNS scans of a surface."""
-    shape = (RUNS, len(bearings))
-    ranges = model(truth, bearings + noise.bearing * rng.normal(size=shape))
-    ranges += np.hypot(noise.sigma, noise.proportional * ranges) * rng.normal(size=shape)
-    return np.round(ranges / noise.quantum) * noise.quantum if noise.quantum else ranges
+def least_covariance(model, parameters, bearings, noise):
+    """Inverse of the Fisher information of ranges, whose bearings have an error too."""
+
+    def slope(f):
+        return (f(1e-6) - f(-1e-6)) / 2e-6
+
+    at = np.asarray(parameters, float)
+    steps = np.eye(len(at))
+    jacobian = np.column_stack([slope(lambda h, d=d: model(at + h * d, bearings)) for d in steps])
+    by_bearing = slope(lambda h: model(at, bearings + h))
+    variance = noise.range_variance(model(at, bearings)) + (by_bearing * noise.bearing) ** 2
+    return np.linalg.inv(jacobian.T @ (jacobian / variance[:, np.newaxis]))
 
 
-def slopes(model, at, bearings):
-    """Derivatives of ranges by the parameters, shape (..., n, k), by differences."""
-    steps = 1e-6 * np.eye(at.shape[-1])
-    columns = [(model(at + d, bearings) - model(at - d, bearings)) / 2e-6 for d in steps]
-    return np.stack(columns, axis=-1)
-
-
-def maximum_likelihood(model, truth, bearings, noise, ranges):
-    """Fit each scan by Gauss-Newton, from the truth."""
-    clean = model(truth, bearings)
-    per_bearing = (model(truth, bearings + 1e-6) - model(truth, bearings - 1e-6)) / 2e-6
-    weight = 1 / (noise.range_variance(clean) + (per_bearing * noise.bearing) ** 2)
-    estimate = np.tile(truth, (len(ranges), 1))
-    for _ in range(4):
-        jacobian = slopes(model, estimate, bearings)
-        weighted = np.swapaxes(jacobian, 1, 2) * weight
-        residual = ranges - model(estimate, bearings)
-        step = np.linalg.solve(weighted @ jacobian, weighted @ residual[..., np.newaxis])
-        estimate = estimate + step[..., 0]
-    return estimate - truth
-
-
-def assert_reached(errors, bound):
-    """Check that errors have the covariance `bound`: each variance, and all together."""
-    ratios = errors.var(axis=0) / np.diag(bound)
-    np.testing.assert_allclose(ratios, 1, atol=SIGMAS * math.sqrt(2 / len(errors)))
-    squares = np.einsum("ri,ij,rj->r", errors, np.linalg.inv(bound), errors)
-    k = len(bound)
-    assert squares.mean() == pytest.approx(k, abs=SIGMAS * math.sqrt(2 * k / len(errors)))
-
-
-def fitted_line(bearings, point, angle, noise, seed=0):
-    """Bound of a line and the errors of its estimates at its centroid."""
-    bound = line_bound(bearings, point, angle, noise)
-
-    def model(parameters, beams):
-        return line_ranges(parameters, beams, bound.centroid)
-
-    truth = np.array([0.0, angle])
-    scans = readings(model, truth, bearings, noise, np.random.default_rng(seed))
-    return bound, maximum_likelihood(model, truth, bearings, noise, scans)
+def assert_same(found, expected):
+    """Equal, but for what differences leave, in deviations of the parameters."""
+    deviations = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        found / np.outer(deviations, deviations),
+        expected / np.outer(deviations, deviations),
+        atol=1e-5,
+    )
 
 
 NOISES = {
@@ -106,40 +85,32 @@ LINES = {
 
 @pytest.mark.parametrize("line", LINES.values(), ids=LINES)
 @pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
-def test_maximum_likelihood_reaches_the_bound_of_a_line(line, noise):
-    bound, errors = fitted_line(*line, noise)
-    assert_reached(errors, bound.covariance)
-
-
-@pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
-def test_the_bound_elsewhere_on_the_line(noise):
-    bound, errors = fitted_line(*LINES["oblique"], noise, seed=1)
-    u = np.array([math.cos(bound.angle), math.sin(bound.angle)])
-    for along in (-0.7, 1.3):
-        # The line at angle α through the centroid + offset, met by the normal of the true one.
-        moved = errors.copy()
-        moved[:, 0] = errors[:, 0] / np.cos(errors[:, 1]) + along * np.tan(errors[:, 1])
-        assert_reached(moved, bound.at(bound.centroid + along * u))
+@pytest.mark.parametrize("along", [-0.7, 0.0, 1.3])
+def test_line(line, noise, along):
+    """At its centroid, where offset and angle are independent, and elsewhere."""
+    bearings, _, angle = line
+    bound = line_bound(*line, noise)
+    point = bound.centroid + along * np.array([math.cos(angle), math.sin(angle)])
+    expected = least_covariance(
+        lambda line, beams: line_ranges(line, beams, point), (0.0, angle), bearings, noise
+    )
+    assert_same(bound.at(point), expected)
+    if along == 0.0:
+        assert_same(bound.covariance, expected)
+        assert bound.covariance[0, 1] == 0.0
 
 
 @pytest.mark.parametrize("opening", [60, 90, 150])
-def test_maximum_likelihood_reaches_the_bound_of_a_corner(opening):
-    vertex, half = np.array([2.0, 0.5]), math.radians(opening / 2)
-    sight = math.atan2(vertex[1], vertex[0])
-    beams = STEP * np.arange(1, 80)
+def test_corner(opening):
+    vertex, half, sight = np.array([2.0, 0.5]), math.radians(opening / 2), math.atan2(0.5, 2.0)
+    beams = STEP * np.r_[-np.arange(1, 40 if opening < 90 else 80), np.arange(1, 30)]
+    angles = sight - half, sight + half
     sides = [
-        fitted_line(sight - beams[: 40 if opening < 90 else 80], vertex, sight - half, NOISE, 2),
-        fitted_line(sight + beams[:30], vertex, sight + half, NOISE, 3),
+        line_bound(sight + beams[side], vertex, angle, NOISE)
+        for side, angle in zip((beams < 0, beams > 0), angles, strict=True)
     ]
-    # Intersections of the estimated lines: offset(t) + t angle error, at the vertex.
-    normals, offsets = [], []
-    for bound, errors in sides:
-        angle = bound.angle + errors[:, 1]
-        normal = np.column_stack((-np.sin(angle), np.cos(angle)))
-        normals.append(normal)
-        offsets.append(normal @ bound.centroid + errors[:, 0])
-    corners = np.linalg.solve(np.stack(normals, axis=1), np.stack(offsets, axis=1)[..., None])
-    assert_reached(corners[..., 0] - vertex, corner_bound(sides[0][0], sides[1][0]))
+    expected = least_covariance(corner_ranges, (*vertex, *angles), beams, NOISE)
+    assert_same(corner_bound(*sides), expected[:2, :2])
 
 
 ARCS = {
@@ -152,19 +123,15 @@ ARCS = {
 
 @pytest.mark.parametrize("arc", ARCS.values(), ids=ARCS)
 @pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
-def test_maximum_likelihood_reaches_the_bound_of_an_arc(arc, noise):
+def test_arc(arc, noise):
     bearings, center, radius, side = arc
-    # Small enough for the circle to be as good as flat within the noise.
-    noise = RangeNoise(*(0.2 * np.array([noise.sigma, noise.proportional, noise.bearing,
-                                         noise.quantum])).tolist())  # fmt: skip
-
-    def model(parameters, beams):
-        return circle_ranges(parameters, beams, side)
-
-    truth = np.array([*center, radius])
-    scans = readings(model, truth, bearings, noise, np.random.default_rng(4))
-    errors = maximum_likelihood(model, truth, bearings, noise, scans)
-    assert_reached(errors, arc_bound(bearings, center, radius, noise))
+    expected = least_covariance(
+        lambda circle, beams: circle_ranges(circle, beams, side),
+        (*center, radius),
+        bearings,
+        noise,
+    )
+    assert_same(arc_bound(bearings, center, radius, noise), expected)
 
 
 def test_the_figures_of_the_literature():
@@ -179,51 +146,9 @@ def test_the_figures_of_the_literature():
         assert rms == pytest.approx(expected, rel=0.03)  # it depends on the phase of the beams
 
 
-def test_line_by_hand():
-    # Three frontal readings at -1, 0 and 1 m of a wall at 1 m; cos² ψ = ½, 1, ½.
-    bound = line_bound([-math.pi / 4, 0, math.pi / 4], (1, 7), math.pi / 2, NOISE)
-    np.testing.assert_allclose(bound.centroid, (1, 0), atol=1e-15)
-    # b = ½, 1, ½ of 1e-4: W = 5e4, S = 2 * 2e4.
-    np.testing.assert_allclose(bound.covariance, np.diag([1 / 5e4, 1 / 4e4]), rtol=1e-12)
-    np.testing.assert_allclose(bound.at((1, 2))[0, 0], 1 / 5e4 + 4 / 4e4, rtol=1e-12)
-    # With an error of bearing ρ² σ_φ² sin² ψ = 2 σ_φ² ½ is added to the outer ones.
-    noise = RangeNoise(sigma=0.01, bearing=0.01)
-    bound = line_bound([-math.pi / 4, 0, math.pi / 4], (1, 7), math.pi / 2, noise)
-    b = np.array([1.5e-4, 1e-4, 1.5e-4])
-    expected = np.diag([1 / (1 / b).sum(), 1 / (1 / b[[0, 2]]).sum()])
-    np.testing.assert_allclose(bound.covariance, expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("turn", [0.7, 2.0, -3.0])
-def test_bounds_turn_with_the_scanner(turn):
-    c, s = math.cos(turn), math.sin(turn)
-    rotation = np.array([[c, -s], [s, c]])
-    noise = RangeNoise(sigma=0.01, bearing=0.001)
-    beams = STEP * np.arange(20, 60)
-    point, other = np.array([2.0, 1.0]), np.array([0.3, 2.5])
-    lines = [line_bound(beams, point, 2.0, noise), line_bound(beams + 0.9, other, 3.0, noise)]
-    turned = [
-        line_bound(beams + turn, rotation @ point, 2.0 + turn, noise),
-        line_bound(beams + 0.9 + turn, rotation @ other, 3.0 + turn, noise),
-    ]
-    for line, moved in zip(lines, turned, strict=True):
-        np.testing.assert_allclose(moved.centroid, rotation @ line.centroid, rtol=1e-9)
-        np.testing.assert_allclose(moved.covariance, line.covariance, rtol=1e-9, atol=1e-18)
-    np.testing.assert_allclose(
-        corner_bound(*turned), rotation @ corner_bound(*lines) @ rotation.T, rtol=1e-9
-    )
-    arc = arc_bound(beams, (2.4, 0.56), 0.6, noise)
-    turned_arc = arc_bound(beams + turn, rotation @ (2.4, 0.56), 0.6, noise)
-    larger = np.eye(3)
-    larger[:2, :2] = rotation
-    np.testing.assert_allclose(turned_arc, larger @ arc @ larger.T, rtol=1e-6)
-
-
 def test_the_direction_of_a_line_does_not_matter():
     beams, point, angle = LINES["oblique"]
-    one, other = line_bound(beams, point, angle, NOISE), line_bound(
-        beams, point, angle + math.pi, NOISE
-    )  # fmt: skip
+    one, other = (line_bound(beams, point, a, NOISE) for a in (angle, angle + math.pi))
     np.testing.assert_allclose(one.centroid, other.centroid)
     np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-9, atol=1e-20)
 

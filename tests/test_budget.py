@@ -11,41 +11,31 @@ from worlds import random_scan
 
 import lineament as ln
 from lineament.evaluation.ple import polylines_of
-from lineament.kernels.budget import LINK, WORST, limit_pieces
-from lineament.kernels.layout import (
-    BEAM,
-    BEFORE,
-    COUNTS,
-    FIRST,
-    FLOATS,
-    INTS,
-    LAST,
-    PIECES,
-    RANGE,
-    RESPONSE,
-)
+from lineament.kernels import layout as at
+from lineament.kernels.budget import limit_pieces
 from lineament.methods.steps import budget_scratch
+
+LINK, WORST = 1.0, 0.25
 
 
 def simplified(ranges, angles, pieces, budget, link=LINK, worst=WORST):
     """Run the kernel on pieces (first, last, before) over beams; NaN ranges are no points."""
     ranges = np.asarray(ranges, float)
-    n = len(ranges)
-    floats, ints = np.zeros((FLOATS, n + 1)), np.zeros((INTS, n + 1), np.int64)
-    counts = np.zeros(COUNTS, np.int64)
-    floats[RANGE, :n] = ranges
+    memory = at.workspace(len(ranges))
+    work, n = at.named(*memory), len(pieces)
     points = np.flatnonzero(~np.isnan(ranges))
-    ints[BEAM, : len(points)] = points
-    for line, values in zip((FIRST, LAST, BEFORE), zip(*pieces, strict=True), strict=True):
-        ints[line, : len(pieces)] = values
-    floats[RESPONSE, : len(pieces)] = np.arange(len(pieces))
-    counts[PIECES] = len(pieces)
-    bearings = np.stack((np.cos(angles), np.sin(angles)))
-    tables = budget_scratch(n, budget)
-    limit_pieces(floats, ints, counts, bearings, budget, link, worst, *tables)
-    left = counts[PIECES]
-    found = [tuple(int(ints[line, k]) for line in (FIRST, LAST, BEFORE)) for k in range(left)]
-    return found, floats[RESPONSE, :left].tolist()
+    work.beams[at.RANGE, : len(ranges)] = ranges
+    work.marks[at.BEAM, : len(points)] = points
+    work.pieces[[at.FIRST, at.LAST, at.BEFORE], :n] = np.transpose(pieces)
+    work.response[:n], work.counts[at.PIECES] = np.arange(n), n
+    bearings, tables = (
+        np.stack((np.cos(angles), np.sin(angles))),
+        budget_scratch(len(ranges), budget),
+    )
+    limit_pieces(*memory, bearings, budget, link, worst, *tables)
+    left = work.counts[at.PIECES]
+    found = work.pieces[[at.FIRST, at.LAST, at.BEFORE], :left].T.tolist()
+    return list(map(tuple, found)), work.response[:left].tolist()
 
 
 def squares(ranges, angles, first, last):

@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from equality import assert_sound
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import BOX, NOISE, STEP, degenerate_scans, full_circle, random_scan, room, scan_of
+from worlds import BOX, NOISE, STEP, degenerate_scans, full_circle, random_scan, room
 
 import lineament as ln
 from lineament import Extractor, LaserScan
 from lineament.features import TABLES
+from lineament.methods import method_names
 
 DEGENERATE = degenerate_scans()
 PRESETS = ("liu", "liu:paper", "liu:scale_free")
@@ -67,15 +69,6 @@ def test_order_of_scans_and_reuse_do_not_matter():
         for a, b, c in zip(once, again, fresh, strict=True):
             assert same(a, b)
             assert same(a, c)
-
-
-def test_results_do_not_change_with_the_next_scan():
-    extractor = Extractor("liu")
-    first = extractor(random_scan(3))
-    before = first.segments.tobytes(), first.clusters.tobytes()
-    extractor(LaserScan(random_scan(3).ranges[::-1], angles=random_scan(3).angles))
-    extractor(random_scan(4))
-    assert (first.segments.tobytes(), first.clusters.tobytes()) == before
 
 
 def test_change_of_bearings_and_limits_is_noticed():
@@ -209,99 +202,45 @@ def test_missing_beams_at_the_ends_change_nothing_but_indices(seed):
     assert b.breakpoints["kind"].tolist() == a.breakpoints["kind"].tolist()
 
 
-def test_deterministic_bit_for_bit():
-    for seed in range(5):
-        scan = random_scan(seed)
-        assert same(Extractor("liu")(scan), Extractor("liu")(scan))
-    angles = full_circle()
-    scan = scan_of(room(angles, BOX), angles)
-    assert same(Extractor("liu")(scan), Extractor("liu")(scan))
-
-
 # Hostile scans
 
 NASTY = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1e-9, 0.05, 0.1, 30.0, 29.999, 1e9, 1e-300]
-reading = st.one_of(
+measurement = st.one_of(
     st.sampled_from(NASTY),
     st.floats(0.1, 40.0),
     st.sampled_from([2.0, 2.0, 2.01, 5.0]),
 )
 
 
-def assert_sound(features, scan, min_points):
-    n = len(scan)
-    for name, dtype in TABLES.items():
-        table = getattr(features, name)
-        for field in dtype.names:
-            if table[field].dtype.kind == "f":
-                assert np.isfinite(table[field]).all(), (name, field)
-    for table in (features.segments, features.corners):
-        assert (table["covariance"].diagonal(axis1=1, axis2=2) > 0).all()
-        determinant = np.linalg.det(table["covariance"])
-        size = table["covariance"].diagonal(axis1=1, axis2=2).prod(axis=1)
-        assert (determinant > -1e-9 * size).all()
-    segments, corners = features.segments, features.corners
-    for field in ("first_beam", "last_beam"):
-        assert ((segments[field] >= 0) & (segments[field] < n)).all()
-        assert scan.valid[segments[field]].all()
-    assert (segments["n_points"] >= min_points).all()
-    assert (segments["rms"] >= 0).all()
-    assert (features.clusters[segments["first_beam"]] == segments["cluster"]).all()
-    assert (features.clusters[segments["last_beam"]] == segments["cluster"]).all()
-    for corner in corners:
-        before, after = corner["segments"]
-        assert 0 <= before < len(segments)
-        assert 0 <= after < len(segments)
-        assert segments["last_beam"][before] == corner["beam"] == segments["first_beam"][after]
-        assert 0 <= corner["opening"] <= math.pi
-    for point in features.breakpoints:
-        known = point["beam"][point["beam"] >= 0]
-        assert scan.valid[known].all()
-        assert len(known) == (1 if point["kind"] == "scan_end" else 2)
-        assert (point["occluder"] in known) == (point["kind"] == "jump")
-    assert (features.clusters[~scan.valid] == -1).all()
-    assert_contiguous(features.clusters, scan)
+METHODS = [name for name in method_names() if not name.startswith(("optimal", "pdbs"))]
 
 
-def assert_contiguous(clusters, scan):
-    valid = clusters[scan.valid]
-    changes = np.flatnonzero(np.diff(valid)) + 1
-    runs = [int(part[0]) for part in np.split(valid, changes) if len(part)]
-    runs = [label for label in runs if label >= 0]
-    if scan.is_full_circle and len(runs) > 1 and runs[0] == runs[-1]:
-        runs = runs[:-1]  # Over the seam.
-    assert runs == list(range(len(runs)))
-
-
-@settings(max_examples=60)
+@settings(max_examples=150)
 @given(
-    ranges=st.lists(reading, max_size=60),
-    preset=st.sampled_from(PRESETS),
+    ranges=st.lists(measurement, max_size=60),
+    name=st.sampled_from(METHODS),
     full=st.booleans(),
     limited=st.booleans(),
     given=st.booleans(),
-    least=st.integers(2, 6),
-    fit=st.sampled_from(["total", "y_of_x", "weighted"]),
 )
-def test_hostile_scans_give_sound_features(ranges, preset, full, limited, given, least, fit):
+def test_hostile_scans_give_sound_features(ranges, name, full, limited, given):
     limits = {"range_min": 0.05, "range_max": 30.0} if limited else {}
     step = 2 * math.pi / max(len(ranges), 1) if full else 0.01
     scan = LaserScan(ranges, -math.pi, step, **limits)
-    noise = NOISE if given else None
-    features = Extractor(preset, noise=noise, min_points=least, fit=fit)(scan)
-    assert_sound(features, scan, least)
+    assert_sound(Extractor(name, noise=NOISE if given else None)(scan), scan)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("preset", PRESETS)
-def test_many_random_scans_give_sound_features(preset):
-    extractor = Extractor(preset, threshold=0.1)
-    for seed in range(1000, 1400):
+@pytest.mark.parametrize("name", METHODS)
+def test_many_random_scans_give_sound_features(name):
+    extractor = Extractor(name)
+    for seed in range(1000, 1150):
         scan = random_scan(seed)
-        assert_sound(extractor(scan), scan, 3)
+        assert_sound(extractor(scan), scan)
 
 
-@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
-@pytest.mark.parametrize("preset", PRESETS)
-def test_degenerate_scans_give_sound_features(preset, scan):
-    assert_sound(Extractor(preset)(scan), scan, 3)
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("noise", [None, NOISE])
+def test_degenerate_scans_give_sound_features(name, noise):
+    for scan in [*DEGENERATE.values(), *map(random_scan, range(12))]:
+        assert_sound(Extractor(name, noise=noise)(scan), scan)

@@ -7,19 +7,7 @@ import pytest
 
 import lineament as ln
 from lineament import LaserScan
-
-
-def test_trace_stays_a_function_when_its_module_is_imported():
-    scan = LaserScan([2.0, 2.0, 2.0], -0.01, 0.01)
-    for _ in range(2):
-        ln.extract(scan)
-        assert ln.trace(scan).clusters.tolist() == [0, 0, 0]
-
-
-def test_a_parameter_of_no_method_is_refused_whatever_its_name():
-    for name in ("name", "presets", "nonsense"):
-        with pytest.raises(ValueError, match=f"no parameter '{name}'"):
-            ln.Extractor("liu", **{name: 1})
+from lineament.methods.stages import estimate_noise
 
 
 def test_batches_are_equal_to_the_byte():
@@ -40,8 +28,6 @@ def test_huge_ranges_do_not_drown_their_neighbours():
 
 
 def test_a_jump_without_noise_is_no_lattice():
-    from lineament.methods.stages import estimate_noise
-
     scan = LaserScan([2.0] * 20 + [4.0] * 20, 0.0, 0.01)
     assert estimate_noise(scan).sigma == pytest.approx(1e-4)
     assert len(set(ln.extract(scan).clusters)) == 2

@@ -199,13 +199,16 @@ def test_scan_and_its_features(drawn):
 def test_beams_without_return_are_ticks_outside_what_was_seen(drawn):
     ranges = np.full(90, 2.0)
     ranges[45:] = 8.0
-    ranges[[10, 80]] = np.nan
+    ranges[[10, 36, 80]] = np.nan  # The second is a step of 8 degrees from what is far.
     scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=math.radians(1))
     axes = drawn(figures.plot_scan, scan, {"a": features_of(90)}).axes[0]
     ticks = np.array(by_label(axes)["no return"].get_segments())
-    np.testing.assert_allclose(np.linalg.norm(ticks, axis=2), [[2.4, 2.64], [8.4, 8.64]])
+    expected = [[2.4, 2.64], [8.4, 8.64], [8.4, 8.64]]
+    np.testing.assert_allclose(np.linalg.norm(ticks, axis=2), expected)
     angles = np.arctan2(ticks[..., 1], ticks[..., 0])
-    np.testing.assert_allclose(np.degrees(angles), [[10, 10], [80, 80]])
+    np.testing.assert_allclose(np.degrees(angles), [[10, 10], [36, 36], [80, 80]])
+    counts = "0 segments · 0 corners · 0 arcs · 0 breakpoints · 1 cluster"  # not: 0 edges
+    assert texts_of(axes) == {counts}
     (low, high) = np.transpose([axes.get_xlim(), axes.get_ylim()])
     for points in (ticks[:, 1], scan.points[scan.valid], [(0, 0)]):
         assert (points > low).all()
@@ -220,7 +223,7 @@ def test_ellipses_are_drawn_where_they_can_be_seen(size):
     assert len(axes.patches) == (size == 0.5)
 
 
-def test_numbers_lie_neither_on_each_other_nor_outside_nor_on_points(drawn):
+def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
     scan, features = room()
     features.corners = np.repeat(features.corners[:1], 8)
     features.corners["position"] += np.linspace(0, 0.1, 8)[:, None]
@@ -228,18 +231,43 @@ def test_numbers_lie_neither_on_each_other_nor_outside_nor_on_points(drawn):
     boxes = [t.get_window_extent() for t in axes.texts if t.get_text() == "12.5"]
     assert len(boxes) == 8
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    assert all(axes.get_window_extent().containsx(box.x0) for box in boxes)
-    pixels = axes.transData.transform(np.vstack([scan.points[scan.valid], [(2.05, 2.05)]]))
-    hidden = [sum(box.contains(*pixel) for pixel in pixels) for box in boxes]
-    assert max(hidden) <= 2
-    # Where there is room, the number stands beside its corner.
-    features.corners = features.corners[:1]
-    axes = drawn(figures.plot_scan, scan, {"a": features}).axes[0]
-    (box,) = [t.get_window_extent() for t in axes.texts if t.get_text() == "12.5"]
-    corner = axes.transData.transform((2, 2))
-    middle = np.array([(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2])
-    assert np.linalg.norm(middle - corner) < 2.2 * box.width
-    assert not any(box.contains(*pixel) for pixel in axes.transData.transform(scan.points))
+    panel = axes.get_window_extent()
+    assert all(panel.containsx(x) for box in boxes for x in (box.x0, box.x1))
+
+
+@pytest.mark.parametrize(
+    ("place", "hidden", "offset"),
+    [
+        # A text of four letters is 18.4 by 9 points, and the nearest place 6 points beside it.
+        ((0, 0), [], (15.2, 0)),
+        ((0, 0), [(15, 0), (15, 6)], (0, 10.5)),
+        # One point is hidden rather than gone far away; of a crowd the best is far away.
+        ((0, 0), [(30 * math.cos(t / 30), 30 * math.sin(t / 30)) for t in range(189)], (15.2, 0)),
+        ((0, 0), [(x, y) for x in range(-40, 9, 2) for y in range(-40, 41, 2)], None),
+        ((71, 0), [], (15.2 * math.cos(math.radians(150)), 5.25)),  # at the edge of the panel
+    ],
+)
+def test_number_stands_where_it_hides_least(place, hidden, offset):
+    figure = canvas.new_figure(4, 4)
+    axes = figure.add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))  # points
+    obstacles = np.reshape([*hidden, (np.nan, 0)], (-1, 2))
+    positions, values = np.array([place, (np.nan, 0)], dtype=float), np.array([12.25, 1.0])
+    drawing.label_points(axes, positions, values, obstacles)
+    (text,) = axes.texts
+    assert text.get_text() == "12.2"
+    if offset is None:
+        assert text.get_position()[0] > 9 + 9.2
+    else:
+        assert text.get_position() == pytest.approx(offset, abs=1e-9)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 40), (40, 1), (4, 3)])
+def test_figures_have_the_shape_of_the_scan_within_reason(width, height):
+    x, y = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]).T * [[width / 2], [height / 2]]
+    scan = ln.LaserScan(np.hypot(x, y), angles=np.arctan2(y, x))
+    figure = figures.scan_figure(scan, {"a": features_of(4)})
+    inches = figure.get_figheight() - 1.2  # without titles
+    assert inches == pytest.approx(5.6 * {40: 1.4, 1: 0.4, 3: 0.86 * 3.32 / 4.32}[height])
 
 
 @pytest.mark.parametrize("more", [0, 1])

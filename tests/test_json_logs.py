@@ -1,26 +1,27 @@
-"""Logs of JSON: known values, faults, what is broken or without end, recordings."""
+"""Logs of JSON, CSM and RPLIDAR: known values, faults, what is broken or without end."""
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 from text_logs import csm_scan
 
 from lineament import LogError
-from lineament.logs import json_stream as objects
-from lineament.logs import open_log
+from lineament.logs import json_stream, open_log
 
-UNITS = "rplidar_kitchenette"
-
+GOOD = json.dumps(csm_scan())
+DEEP = "[" * 10_000 + "]" * 10_000
 
 # CSM
 
 
 def test_csm_fields(write):
-    (scan,) = open_log(write(json.dumps(csm_scan())))
+    (scan,) = open_log(write(GOOD))
     np.testing.assert_array_equal(scan.ranges, [1.5, np.nan, 2.5])
     assert (scan.angle_min, scan.angle_increment) == (-math.pi / 2, math.pi / 2)
     assert (scan.stamp, scan.pose) == (7.25, (1, 2, 0.5))
@@ -41,10 +42,11 @@ def test_csm_poses(write, changes, pose):
 
 def test_csm_bearings(write):
     (scan,) = open_log(write(json.dumps(csm_scan(theta=[1.5, 0.7, 0.0]))))
-    assert scan.ranges[[0, 2]].tolist() == [2.5, 1.5]  # Turned round.
+    assert scan.ranges[[0, 2]].tolist() == [2.5, 1.5]  # Reversed.
     assert scan.angles.tolist() == [0.0, 0.7, 1.5]
-    (scan,) = open_log(write(json.dumps(csm_scan(theta=None))))
+    (scan,) = open_log(write(json.dumps(csm_scan(theta=None, timestamp=None))))
     assert scan.angles.tolist() == pytest.approx([-math.pi / 2, 0, math.pi / 2])
+    assert scan.stamp == 0
 
 
 @pytest.mark.parametrize(
@@ -70,34 +72,59 @@ def test_faulty_csm_scans(write, changes, problem):
     assert (log.skipped, len(log)) == (1, 3)
 
 
-def test_broken_json_between_scans(write):
-    good = json.dumps(csm_scan())
-    path = write(f'{good}\n{{"readings": [1, }}\n 5 {good} [1]\n{good}')
-    with pytest.raises(LogError, match=":2: JSON is broken: "):
+@pytest.mark.parametrize(
+    ("text", "problem", "scans", "skipped"),
+    [
+        # What stands on the line behind the broken one begins with no brace.
+        (f'{GOOD}\n{{"readings": [1, }}\n 5 {GOOD} [1]\n{GOOD}', ":2: JSON is broken: ", 2, 1),
+        (f"{GOOD} 5 {GOOD} [1]\n{GOOD}", ":1: is no JSON object", 3, 2),
+        (f'{GOOD}\n{{"readings": {DEEP}}}\n{GOOD}', ":2: JSON is nested too deep", 2, 1),
+        (f'{GOOD}\n{{"a": {"9" * 5000}}}\n{GOOD}', ":2: JSON is broken: ", 2, 1),
+    ],
+)
+def test_broken_json_between_scans(write, text, problem, scans, skipped):
+    path = write(text)
+    with pytest.raises(LogError, match=problem):
         list(open_log(path))
     log = open_log(path, keep_going=True)
-    # What stands on the line behind the broken one begins with no brace.
-    assert len(list(log)) == 2
-    assert log.skipped == 1
-    path = write(f"{good} 5 {good} [1]\n{good}")
+    assert (len(list(log)), log.skipped) == (scans, skipped)
+
+
+@pytest.mark.parametrize(
+    ("broken", "most"),
+    [
+        ('{"a":[' + "1," * 500 + "\n", 10),
+        ("{\n" * 1000, 2000),
+        ('{"a":[1,\n' + '{"a":[]},\n' * 99, 500),
+    ],
+)
+def test_json_that_is_broken_all_over_ends(write, monkeypatch, broken, most):
+    """Each place is read up to its fault, and these nest: without an end it would take hours."""
+    monkeypatch.setattr(json_stream, "SPARE", 1 << 20)
+    log = open_log(write(f"{GOOD}\n{broken * 300}", "a.csm"), keep_going=True)
+    assert len(list(log)) == 1
+    assert 1 < log.skipped < most
+
+
+def test_json_of_which_half_is_cut_off_is_read(write, monkeypatch):
+    monkeypatch.setattr(json_stream, "SPARE", 0)
+    good = json.dumps(csm_scan(readings=[1.0] * 300, valid=None, theta=None))
+    text = "".join(f"{good}\n{good[: 9 * i]}\n" for i in range(1, 100))
+    log = open_log(write(text, "a.csm"), keep_going=True)
+    assert len(list(log)) > 90
+    assert log.skipped > 90
+
+
+@pytest.mark.parametrize("junk", ["x" * 64 + "\n", "x" * 65])
+def test_what_is_no_json_is_passed_over_in_bounded_memory(write, junk):
+    path = write(f"{GOOD}\n{junk * (1 << 19)}\n{GOOD}", pack=gzip.compress)
     log = open_log(path, keep_going=True)
-    assert (len(list(log)), log.skipped) == (3, 2)
-    assert "is no JSON object" in log.faults[0]
-
-
-def test_json_that_is_nested_too_deep(write):
-    deep = '{"readings": ' + "[" * 10_000 + "]" * 10_000 + "}"
-    with pytest.raises(LogError, match=":1: JSON is nested too deep"):
-        open_log(write(deep, "a.json"))
-    path = write(json.dumps(csm_scan()) + "\n" + deep + "\n" + json.dumps(csm_scan()))
-    log = open_log(path, keep_going=True)
-    assert (len(list(log)), log.skipped) == (2, 1)
-
-
-def test_a_json_object_without_end_is_refused(write, monkeypatch):
-    monkeypatch.setattr(objects, "MAX_OBJECT", 1 << 12)
-    with pytest.raises(LogError, match="JSON object is broken or longer"):
-        open_log(write('{"readings": [' + "1, " * 9999, "a.json"))
+    tracemalloc.start()
+    try:
+        assert (len(list(log)), log.skipped) == (2, 1)
+        assert tracemalloc.get_traced_memory()[1] < 24 << 20
+    finally:
+        tracemalloc.stop()
 
 
 # RPLIDAR
@@ -107,13 +134,15 @@ def test_rplidar_pairs_and_points(write):
     units = {
         "polar": [[2.0, 0.0], [3.0, 1.0], [0.0, 2.0]],
         "degrees": [[2.0, 350.0], [3.0, 90.0], [4.0, 10.0]],
+        "backwards": [[2.0, 1.0], [3.0, 0.5], [3.5, 0.5]],
         "points": [[1.0, 0.0], [3.0, 4.0], [-1.0, 0.0], [0.0, -2.0]],
     }
-    polar, degrees, points = open_log(write(json.dumps(units)))
+    polar, degrees, backwards, points = open_log(write(json.dumps(units)))
     assert (polar.ranges.tolist(), polar.angles.tolist()) == ([2, 3, 0], [0, 1, 2])
     assert polar.valid.tolist() == [True, True, False]
     assert degrees.ranges.tolist() == [4, 3, 2]
     np.testing.assert_allclose(np.degrees(degrees.angles), [10, 90, 350])
+    assert (backwards.ranges.tolist(), backwards.angles.tolist()) == ([3, 2], [0.5, 1])
     assert points.ranges.tolist() == [2, 1, 5, 1]
     np.testing.assert_allclose(points.points, [[0, -2], [1, 0], [3, 4], [-1, 0]], atol=1e-12)
     assert [scan.frame_id for scan in (polar, points)] == ["polar", "points"]
@@ -126,6 +155,9 @@ def test_rplidar_poses(write):
     write(json.dumps({"b": {"a": turned}, "c": {"a": "no matrix"}}), "transforms.json")
     poses = [scan.pose for scan in open_log(path)]
     assert poses == [(0, 0, 0), pytest.approx((5, 6, math.pi / 2)), None]
+    for text in ("[" * 10_000, "[]", "{"):
+        write(text, "transforms.json")
+        assert [scan.pose for scan in open_log(path)] == [None] * 3
 
 
 def test_faulty_rplidar_units(write):
@@ -136,9 +168,31 @@ def test_faulty_rplidar_units(write):
     assert ([scan.frame_id for scan in log], log.skipped) == (["a"], 2)
 
 
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        ('{"a": [[1, 2]], "b": ' + DEEP + "}", "nested too deep"),
+        ('{"a": [[1, 2]], "b": ' + "[" * 100 + "]" * 100 + "}", "unit b: expected a list of pairs"),
+        # What is left of two faults, of the first object and of the checksum behind it.
+        (gzip.compress(b'{"a": [[1, 2],\n{}\n')[:-1] + b"?", "is no RPLIDAR JSON"),
+    ],
+)
+def test_json_that_is_broken_behind_a_good_beginning(write, data, problem):
+    with pytest.raises(LogError, match=problem):
+        list(open_log(write(data)))
+
+
+def test_names_of_units_stay_on_one_line(write):
+    path = write(json.dumps({"a\nb": [[1.0, 0.0]], "c": 5}))
+    assert open_log(path).topics == ["'a\\nb'", "c"]
+    with pytest.raises(LogError) as caught:
+        open_log(path, "d")
+    assert str(caught.value).isprintable()
+
+
 def test_recorded_units_see_the_same_circle(data_dir):
     """The circle that each unit saw lies in one place once their poses are applied."""
-    folder = data_dir / "text" / UNITS
+    folder = data_dir / "text" / "rplidar_kitchenette"
     circles = json.loads((folder / "circle1.json").read_text())
     places = []
     for unit, scan in open_log(folder / "scans_2025-09-04-16-43-09.json").items():
@@ -151,11 +205,3 @@ def test_recorded_units_see_the_same_circle(data_dir):
             places.append((a + cos * x - sin * y, b + sin * x + cos * y))
     assert len(places) == 4
     assert np.ptp(places, axis=0).max() < 0.05
-
-
-def test_names_of_units_stay_on_one_line(write):
-    path = write(json.dumps({"a\nb": [[1.0, 0.0]], "c": 5}))
-    assert open_log(path).topics == ["'a\\nb'", "c"]
-    with pytest.raises(LogError) as caught:
-        open_log(path, "d")
-    assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""What every method of lines must do, whatever its way: no fault of others is ours."""
+"""What every method of lines must do, whatever its way: scenes whose features are known."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import pytest
 from worlds import (
     BOX,
     NOISE,
-    degenerate_scans,
+    STEP,
     fan,
     full_circle,
-    random_scan,
     room,
     scan_of,
     vertex,
@@ -20,151 +19,177 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan
+from lineament.methods import get_method
 
-NAMES = ["iepf", "split_and_merge", "line_tracking"]
-EXTRACTORS = {name: Extractor(name, noise=NOISE) for name in NAMES}
-DEGENERATE = degenerate_scans()
-every_method = pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=EXTRACTORS)
+NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing"]
+#: Also the methods that have another way to part and to join.
+and_others = pytest.mark.parametrize(
+    "extractor", [*NAMES, "liu", "liu:paper", "optimal"], indirect=True
+)
+BOX_CORNERS = [(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)]
+
+
+@pytest.fixture(params=NAMES, scope="module")
+def extractor(request):
+    return Extractor(request.param, noise=NOISE)
 
 
 def noisy(ranges, seed=0):
     return ranges + NOISE.sigma * np.random.default_rng(seed).normal(size=len(ranges))
 
 
-def assert_sound(scan, features):
-    """Hold what is true of the features of any scan."""
-    segments, corners = features.segments, features.corners
-    for table in (segments, corners):
-        for name in set(table.dtype.names) - {"kind"}:
-            assert np.isfinite(table[name]).all(), name
-    assert (corners["kind"] == "corner").all()
-    for table in (segments["covariance"], corners["covariance"]):
-        assert (np.linalg.eigvalsh(table) > 0).all()
-    valid = np.flatnonzero(scan.valid)
-    for line in segments:
-        first, last = int(line["first_beam"]), int(line["last_beam"])
-        beams = valid[(valid - first) % len(scan) <= (last - first) % len(scan)]
-        # On a ring, the reading at which it was opened belongs to its first and its last line.
-        assert line["n_points"] in (len(beams), 1 + len(scan) * (first == last))
-        assert set(features.clusters[beams]) == {line["cluster"]}
-    for corner in corners:
-        before, after = corner["segments"]
-        assert segments["cluster"][before] == segments["cluster"][after]
-        assert corner["beam"] == segments["first_beam"][after]
-    assert (features.clusters[~scan.valid] == -1).all()
-
-
-@every_method
-def test_features_of_any_scan_are_sound(extractor):
-    for scan in [*DEGENERATE.values(), *map(random_scan, range(20))]:
-        for given in (extractor, Extractor(extractor.method)):
-            assert_sound(scan, given(scan))
-
-
-@every_method
+@and_others
 @pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
 def test_wall_has_its_ends_along_an_axis_too(extractor, normal):
     angles = math.radians(normal) + fan(30)
     scan = scan_of(wall(angles, 2.0, normal), angles)
     (line,) = extractor(scan).segments
-    np.testing.assert_allclose(line["start"], scan.points[0], atol=1e-9)
-    np.testing.assert_allclose(line["end"], scan.points[-1], atol=1e-9)
+    # On filtered ranges, whose ends are drawn inwards, a wall is not quite straight.
+    atol = 0.02 if extractor.method == get_method("liu:paper") else 1e-9
+    np.testing.assert_allclose(line["start"], scan.points[0], atol=atol)
+    np.testing.assert_allclose(line["end"], scan.points[-1], atol=atol)
+    assert np.isfinite(line["covariance"]).all()
+    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
     assert line["n_points"] == len(angles)
 
 
-@every_method
-@pytest.mark.parametrize("opening", [60, 90, 120])
+@pytest.mark.parametrize("sigma", [0.0, 0.01])
+@pytest.mark.parametrize("opening", [80, 90, 120])
 @pytest.mark.parametrize("convex", [True, False])
-def test_vertex_is_found_and_no_beam_lost(extractor, opening, convex):
-    angles = fan(15)
-    ranges = noisy(vertex(angles, 3.0, opening, convex=convex))
+def test_vertex_is_found_and_no_beam_lost(extractor, opening, convex, sigma):
+    angles = fan(20, STEP / 2)
+    ranges = vertex(angles, 3.0, opening, convex=convex)
+    ranges += sigma * np.random.default_rng(0).normal(size=len(angles))
     features = extractor(scan_of(ranges, angles))
     (corner,) = features.corners
-    np.testing.assert_allclose(corner["position"], (3.0, 0.0), atol=0.02)
-    assert corner["opening"] == pytest.approx(math.radians(opening), abs=0.05)
+    exact = sigma == 0.0
+    np.testing.assert_allclose(corner["position"], (3.0, 0.0), atol=1e-7 if exact else 0.02)
+    assert corner["opening"] == pytest.approx(math.radians(opening), abs=1e-6 if exact else 0.05)
+    sine = math.sin(math.radians(opening))
+    if extractor.method.name not in ("iepf", "split_and_merge"):
+        assert corner["response"] == pytest.approx(sine, abs=1e-6 if exact else 0.05)
     assert corner["convex"] == convex
+    assert corner["segments"].tolist() == [0, 1]
     first, second = features.segments
     assert first["end"].tolist() == second["start"].tolist() == corner["position"].tolist()
     assert (first["first_beam"], second["last_beam"]) == (0, len(angles) - 1)
-    assert second["first_beam"] - first["last_beam"] in (0, 1)
+    assert second["first_beam"] - first["last_beam"] == 1
+    assert first["n_points"] + second["n_points"] == len(angles)
+    assert abs(corner["beam"] - len(angles) // 2) <= (1 if exact else 4)
 
 
-@every_method
-@pytest.mark.parametrize("short", [2.0, 4.0, 8.0])
-def test_an_unequal_l_is_split(extractor, short):
-    """The point farthest from the line fitted to both arms is the end of the shorter one."""
-    angles = np.radians(np.arange(-30.0, short, 1 / 3))
-    scan = scan_of(noisy(vertex(angles, 3.0, 90, convex=False)), angles)
-    (corner,) = extractor(scan).corners
-    np.testing.assert_allclose(corner["position"], (3.0, 0.0), atol=0.06)
-
-
-@every_method
-def test_one_missing_or_false_beam_does_not_end_a_segment(extractor):
+@pytest.mark.parametrize("arm", [6, 12, 24])
+def test_an_unequal_l_is_split(extractor, arm):
+    """The point farthest from one line through all is the end of the shorter arm."""
     angles = fan(30)
-    for false in (np.nan, np.inf, 0.0, 2.1):
-        ranges = noisy(wall(angles, 2.0, 10.0))
-        ranges[60] = false
-        features = extractor(scan_of(ranges, angles))
-        (line,) = features.segments
-        assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
-        assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
+    angles = angles[: len(angles) // 2 + 1 + arm]
+    features = extractor(scan_of(vertex(angles, 3.0, 90, convex=False), angles))
+    assert len(features.segments) == 2
+    np.testing.assert_allclose(features.corners["position"], [(3.0, 0.0)], atol=1e-6)
 
 
-@every_method
-def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor):
+@pytest.mark.parametrize("false", [np.nan, np.inf, 0.0, 2.1])
+def test_one_missing_or_false_beam_does_not_end_a_segment(extractor, false):
+    angles = fan(30)
+    ranges = noisy(wall(angles, 2.0, 10.0))
+    ranges[60] = false
+    features = extractor(scan_of(ranges, angles))
+    (line,) = features.segments
+    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
+    assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
+    assert len(features.corners) == 0
+
+
+@pytest.mark.parametrize(("missing", "lines"), [(1, 1), (5, 1), (6, 2)])
+def test_a_segment_goes_over_as_many_missing_beams_as_it_may(extractor, missing, lines):
+    angles = fan(30)
+    ranges = wall(angles, 2.0, 10.0)
+    ranges[60 : 60 + missing] = np.nan
+    segments = extractor(scan_of(ranges, angles)).segments
+    assert len(segments) == lines
+    assert segments["n_points"].sum() == len(angles) - missing
+
+
+@and_others
+@pytest.mark.parametrize(("behind", "lines"), [(np.nan, 2), (np.inf, 2), (5.0, 3)])
+def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor, behind, lines):
     angles = fan(40)
     door = abs(angles) < math.radians(12)
-    for behind, pieces in ((np.inf, 2), (5.0, 3)):
-        ranges = noisy(np.where(door, wall(angles, behind, 0.0), wall(angles, 2.0, 0.0)))
-        features = extractor(scan_of(ranges, angles))
-        assert len(features.segments) == pieces
-        assert len(features.corners) == 0
-        for line in features.segments:
-            assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
+    ranges = noisy(np.where(door, wall(angles, behind, 0.0), wall(angles, 2.0, 0.0)))
+    features = extractor(scan_of(ranges, angles))
+    assert len(features.segments) == lines
+    assert (features.corners["kind"] == "edge").all()  # Of `optimal`, beside the jump.
+    for line in features.segments:
+        assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
 
 
-@every_method
-def test_closed_room_has_a_ring_of_corners(extractor):
-    angles = full_circle()
-    for turn in (0.0, 1.0, 2.5):
-        ranges = noisy(room(angles + turn, BOX))
-        features = extractor(scan_of(ranges, angles))
-        corners, segments = features.corners, features.segments
-        assert len(corners) == len(segments) == 4
-        assert len(features.breakpoints) == 0
-        c, s = math.cos(turn), math.sin(turn)
-        own = corners["position"] @ [[c, s], [-s, c]]
-        for vertex_at in ((2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)):
-            assert np.hypot(*(own - vertex_at).T).min() < 0.02
-        assert sorted(corners["segments"][:, 1]) == [0, 1, 2, 3]
+def test_parallel_walls_of_a_step_have_no_corner(extractor):
+    """A step of 6 cm, within a cluster: two walls that never meet."""
+    if extractor.method.name == "iepf":
+        extractor = Extractor("iepf", noise=NOISE, noise_factor=2.0)  # Else it is one wall.
+    angles = fan(30)
+    ranges = np.where(angles < 0, wall(angles, 2.0, 0.0), wall(angles, 2.06, 0.0))
+    features = extractor(scan_of(ranges, angles))
+    assert features.clusters.max() == 0
+    assert len(features.segments) == 2
+    assert len(features.corners) == 0
 
 
-@every_method
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.5])
+@pytest.mark.parametrize("n", [360, 361])
+def test_room_all_around_has_four_walls_and_four_corners(extractor, turn, n):
+    """Wherever the seam lies; with one beam more the first direction is not seen twice."""
+    ring = full_circle(n) + turn
+    features = extractor(scan_of(room(ring, BOX), ring))
+    segments, corners = features.segments, features.corners
+    assert len(segments) == len(corners) == 4
+    assert len(features.breakpoints) == 0
+    assert sorted(map(tuple, corners["position"].round(6).tolist())) == sorted(BOX_CORNERS)
+    # Each corner is the end of one wall and the start of the next.
+    assert sorted(corners["segments"].ravel().tolist()) == [0, 0, 1, 1, 2, 2, 3, 3]
+    for corner in corners:
+        before, after = segments[corner["segments"]]
+        assert before["end"].tolist() == after["start"].tolist() == corner["position"].tolist()
+
+
+@and_others
 def test_wall_over_the_seam_is_one(extractor):
     angles = full_circle()
     ranges = np.where(abs(angles) > 2.6, wall(angles, 2.0, 180.0), np.inf)
-    features = extractor(scan_of(noisy(ranges), angles))
-    (line,) = features.segments
+    (line,) = extractor(scan_of(noisy(ranges), angles)).segments
     assert line["first_beam"] > line["last_beam"]
     assert line["n_points"] == (abs(angles) > 2.6).sum()
 
 
-@every_method
-def test_tolerances_follow_the_noise(extractor):
-    """Three times the noise, estimated from the scan, and the same corners: nothing is retuned."""
-    angles = full_circle()
+@pytest.mark.parametrize("sigma", [0.003, 0.01, 0.03])
+def test_nothing_needs_tuning_when_the_noise_grows(extractor, sigma):
+    """Estimated from each scan: no wall falls apart, and hardly a corner is missed or false."""
     unaware = Extractor(extractor.method)
-    for sigma in (0.002, 0.01, 0.03):
-        ranges = room(angles, BOX) + sigma * np.random.default_rng(5).normal(size=len(angles))
-        assert len(unaware(scan_of(ranges, angles)).corners) == 4
+    rng = np.random.default_rng(2)
+    angles = fan(40)
+    rows = wall(angles, 3.0, 10.0) + sigma * rng.normal(size=(20, len(angles)))
+    walls = unaware.batch(rows, angle_min=angles[0], angle_increment=STEP)
+    assert np.diff(walls.offsets["segments"]).max() <= 1 + (extractor.method.name == "iepf")
+    ring = full_circle(720)
+    rows = room(ring, BOX) + sigma * rng.normal(size=(20, 720))
+    rows[rng.random(rows.shape) < 0.02] = np.inf
+    rooms = unaware.batch(rows, angle_min=ring[0], angle_increment=ring[1] - ring[0])
+    missed = false = 0
+    for features in rooms:
+        apart = np.linalg.norm(features.corners["position"][:, np.newaxis] - BOX_CORNERS, axis=2)
+        missed += int((apart.min(axis=0, initial=9.0) > 0.1).sum())
+        false += int((apart.min(axis=1, initial=9.0) > 0.1).sum())
+    assert max(missed, false) <= 4
 
 
 @pytest.mark.slow
-@every_method
-def test_covariances_of_corners_have_the_lever_arm(extractor):
-    """NEES of χ² with two degrees of freedom, its 95 % interval widened for cuts a beam off."""
-    angles = fan(25)
+@pytest.mark.parametrize("name", ["iepf", "split_and_merge", "line_tracking"])
+def test_covariances_of_corners_have_the_lever_arm(name):
+    """NEES of χ² with two degrees of freedom, its 95 % interval widened for cuts a beam off.
+
+    The others fit lines to measurements of the other wall as well, where the cut is a beam off.
+    """
+    extractor, angles = Extractor(name, noise=NOISE), fan(25)
     ideal = vertex(angles, 3.0, 90, convex=False)
     nees = []
     for seed in range(300):
@@ -175,14 +200,23 @@ def test_covariances_of_corners_have_the_lever_arm(extractor):
     assert 1.7 < np.mean(nees) < 2.6
 
 
-@every_method
 def test_batches_are_those_of_scans_alone(extractor):
+    """Also what a block held before, and the order of scans, change nothing."""
     rng = np.random.default_rng(1)
     rows = room(full_circle(360), BOX) + 0.02 * rng.normal(size=(12, 360))
     rows[rng.random(rows.shape) < 0.03] = np.nan
-    step = 2 * math.pi / 360
-    batch = extractor.batch(rows, angle_min=-math.pi, angle_increment=step, workers=2)
-    for features, row in zip(batch, rows, strict=True):
-        alone = Extractor(extractor.method, noise=NOISE)(LaserScan(row, -math.pi, step))
+    bearings = {"angle_min": -math.pi, "angle_increment": 2 * math.pi / 360}
+    batch = extractor.batch(rows, **bearings, workers=2)
+    backwards = extractor.batch(rows[::-1], **bearings)
+    for i, row in enumerate(rows):
+        alone = Extractor(extractor.method, noise=NOISE)(LaserScan(row, **bearings))
         for name in ("segments", "corners", "breakpoints", "clusters"):
-            np.testing.assert_array_equal(getattr(features, name), getattr(alone, name))
+            for other in (batch[i], backwards[11 - i]):
+                np.testing.assert_array_equal(getattr(other, name), getattr(alone, name))
+
+
+def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):
+    angles = fan(20)
+    for ranges in (np.full(len(angles), np.nan), 2.0 + np.arange(len(angles)) % 2):
+        features = extractor(scan_of(ranges, angles))
+        assert len(features.segments) == len(features.corners) == 0

@@ -19,7 +19,6 @@ from worlds import (
     room,
     scan_of,
     vertex,
-    wall,
 )
 
 from lineament import Extractor, LaserScan, RangeNoise, open_log
@@ -150,49 +149,6 @@ def test_vertex_is_found_with_its_side_and_opening(opening, convex):
     assert first["last_beam"] == second["first_beam"] == corner["beam"]
 
 
-@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
-@pytest.mark.parametrize("preset", ["liu", "liu:paper"])
-def test_wall_has_its_ends_and_no_nan(normal, preset):
-    angles = math.radians(normal) + fan(30)
-    ranges = wall(angles, 2.0, normal)
-    (line,) = Extractor(preset, noise=NOISE)(scan_of(ranges, angles)).segments
-    points = naive.polar(ranges, angles)
-    atol = 1e-9 if preset == "liu" else 0.02
-    np.testing.assert_allclose(line["start"], points[0], atol=atol)
-    np.testing.assert_allclose(line["end"], points[-1], atol=atol)
-    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
-    assert line["n_points"] == len(angles)
-    assert np.isfinite(line["covariance"]).all()
-
-
-def test_one_missing_beam_does_not_end_a_segment():
-    angles = fan(30)
-    ranges = wall(angles, 2.0, 10.0)
-    ranges[60] = np.nan
-    features = Extractor("liu", noise=NOISE)(scan_of(ranges, angles))
-    (line,) = features.segments
-    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
-    assert line["n_points"] == len(angles) - 1
-    assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
-
-
-def test_walls_on_either_side_of_a_doorway_are_not_bridged():
-    angles = fan(40)
-    ranges = wall(angles, 2.0, 0.0)
-    door = abs(angles) < math.radians(12)
-    for behind in (np.nan, np.inf, 5.0):
-        ranges[door] = behind
-        features = Extractor("liu", noise=NOISE)(scan_of(ranges, angles))
-        on_wall = [s for s in features.segments if abs(s["centroid"][0] - 2.0) < 0.1]
-        assert len(on_wall) == 2
-        for line in features.segments:
-            assert line["first_beam"] > np.flatnonzero(door)[0] - 1 or (
-                line["last_beam"] < np.flatnonzero(door)[0]
-            )
-        kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
-        assert features.breakpoints["kind"].tolist()[:-2] == kinds
-
-
 def test_breakpoints_tell_who_occludes():
     ranges = np.array([2.0] * 20 + [4.0] * 20 + [3.0] * 20)
     scan = LaserScan(ranges, 0.0, 0.01)
@@ -232,20 +188,3 @@ def test_closed_room_has_a_ring_of_corners():
         assert before["last_beam"] == after["first_beam"] == corner["beam"]
     assert sorted(corners["segments"][:, 1]) == [0, 1, 2, 3]
     assert (segments["first_beam"] > segments["last_beam"]).sum() == 1  # One over the seam.
-
-
-def test_class_over_the_seam_keeps_its_line_whole():
-    angles = full_circle(1440)
-    ranges = np.where(abs(angles) > 2.6, wall(angles, 2.0, 180.0), 6.0)
-    features = Extractor("liu", noise=NOISE, sigma_d=0.5)(scan_of(ranges, angles))
-    (line,) = [s for s in features.segments if abs(s["centroid"][0] + 2.0) < 0.01]
-    assert line["first_beam"] > line["last_beam"]
-    assert line["n_points"] == (abs(angles) > 2.6).sum()
-    assert len(features.breakpoints) == 2
-
-
-def test_ring_without_corners_has_no_straight_piece():
-    angles = full_circle()
-    features = Extractor("liu")(scan_of(np.full(len(angles), 2.0), angles))
-    assert (len(features.segments), len(features.corners), len(features.breakpoints)) == (0, 0, 0)
-    assert (features.clusters == 0).all()

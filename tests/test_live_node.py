@@ -1,106 +1,357 @@
-"""The loop of a node, over messages in memory: what is worked at, dropped, counted and told."""
+"""The loop of a node over messages in memory, its pipeline, and its counters."""
 
+from __future__ import annotations
+
+import math
 import struct
 import time
+from collections.abc import Callable
 from functools import partial
+from random import Random
 
 import numpy as np
 import pytest
+from live_driving import cdr_scan, garbage
+from mutations import damaged
 
 import lineament as ln
-from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, ReplaySource
+from lineament.live import (
+    FoxgloveSink,
+    LiveConfig,
+    Node,
+    Odometry,
+    Pipeline,
+    Received,
+    ReplaySource,
+    RosSink,
+)
 from lineament.live.counters import Counters
-from lineament.live.pipeline import MOST_BEAMS, time_of
-from lineament.logs import save_npz
-from lineament.rosmsg.scans import laser_scan
+from lineament.live.pipeline import MOST_BEAMS, check_beams, time_of, twist_of_laser
+from lineament.live.received import received_odometry, received_scan
+from lineament.live.sinks import Publisher
+from lineament.output.ros_messages import RosMessages
+from lineament.output.scene import Message, Moment
+from lineament.scan.poses import compose, poses_along, twist_between
+from lineament.simulation import SENSORS, drive, room
+
+BEARINGS = np.linspace(-0.5, 0.5, 101)
+WALL = 2.0 / np.cos(BEARINGS)
+
+
+def sweep(stamp: float = 1.0, **fields) -> ln.LaserScan:
+    return ln.LaserScan(WALL, -0.5, 0.01, stamp=stamp, **fields)
+
+
+def wall(publisher: str, stamp: float = 1.0, time=None, **fields) -> Received:
+    scan = sweep(stamp, **fields)
+    return Received(publisher, lambda: scan, 0.0, False, time)
+
+
+def moving(*twist: float, stamp: float = 1.0) -> Odometry:
+    return Odometry(stamp, twist, (0.0, 0.0, 0.0), "odom", "base")
+
+
+def heard(odometry: Odometry) -> Received:
+    return Received("o", lambda: odometry, 0.0, is_odometry=True)
 
 
 class Given:
-    """A source of given batches of messages; each is received at once."""
+    """A source of given batches of messages; a callable makes one when it is received."""
 
-    lost = 0
+    lost, publishers = 0, 1
 
-    def __init__(self, *batches, publishers=()):
-        self.batches, self.numbers = list(batches), list(publishers)
-        self.publishers = 1
-        self.said = []
+    def __init__(self, *batches: list[Received] | Callable[[], list[Received]]) -> None:
+        self.batches = list(batches)
+        self.lines: list[str] = []
 
     @property
-    def ended(self):
+    def ended(self) -> bool:
         return not self.batches
 
-    def receive(self, timeout):
-        assert timeout > 0
-        if self.numbers:
-            self.publishers = self.numbers.pop(0)
+    def receive(self, timeout: float) -> list[Received]:
+        assert 0 < timeout <= 0.1
         batch = self.batches.pop(0)
-        if callable(batch):
-            batch = batch()
-        return batch
+        return batch() if callable(batch) else batch
 
-    def problems(self):
-        return self.said
-
-    def close(self):
-        pass
+    def problems(self) -> list[str]:
+        return self.lines
 
 
 class Kept:
-    """A sink that keeps what it is told."""
+    """A sink that keeps what it is given."""
 
     unsent = 0
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.frames, self.reports = [], []
 
-    def tell(self, frame):
+    def publish(self, frame) -> None:
         self.frames.append(frame)
 
-    def diagnose(self, report, time):
+    def diagnose(self, report, time) -> None:
         self.reports.append((report, time))
 
-    def close(self):
-        pass
+
+def run(*batches, source=None, **options):
+    """Run a node to its end: its totals, its frames, and the lines that it wrote."""
+    sink, lines = Kept(), []
+    pipeline = Pipeline(LiveConfig(**options))
+    report = Node(source or Given(*batches), pipeline, [sink], write=lines.append).run()
+    return report.total, sink.frames, lines
 
 
-def message(stamp, ranges, increment=0.1, first=0.0, declared=None):
-    ranges = np.asarray(ranges, "<f4")
-    count = len(ranges) if declared is None else declared
-    text = struct.pack("<4sIII4s", b"\0\1\0\0", *divmod(round(stamp * 1e9), 10**9), 4, b"las\0")
-    fields = struct.pack("<7fI", first, 1.0, increment, 0.0, 0.1, 0.1, 30.0, count)
-    return text + fields + ranges.tobytes() + struct.pack("<I", 0)
+# The loop.
 
 
-def received(publisher, data, time=None):
-    return Received(publisher, partial(laser_scan, data, "cdr"), 0.0, False, time)
-
-
-def run(*batches, config=None, publishers=()):
-    source, sink, told = Given(*batches, publishers=publishers), Kept(), []
-    report = Node(source, Pipeline(config or LiveConfig()), [sink], tell=told.append).run()
-    return report, sink, told
-
-
-WALL = 2.0 / np.cos(np.linspace(-0.5, 0.5, 101))
-
-
-def wall(publisher, stamp):
-    return received(publisher, message(stamp, WALL, 0.01, -0.5))
-
-
-def test_only_the_newest_scan_of_each_publisher_is_worked_at():
-    report, sink, told = run(
-        [wall("a", 1.0), wall("b", 1.5), wall("a", 2.0), wall("a", 3.0)], [wall("b", 4.0)]
-    )
-    assert [frame.scan.stamp for frame in sink.frames] == [3.0, 1.5, 4.0]
-    assert (report.total_scans, report.total_dropped, report.total_malformed) == (3, 2, 0)
-    assert told == []
+def test_only_the_newest_scan_of_each_publisher_is_processed():
+    batch = [wall("a", 1.0), wall("b", 1.5), wall("a", 2.0), wall("a", 3.0)]
+    total, frames, lines = run(batch, [wall("b", 4.0)])
+    assert [frame.scan.stamp for frame in frames] == [3.0, 1.5, 4.0]
+    assert (total.scans, total.dropped, total.malformed, lines) == (3, 2, 0, [])
 
 
 def test_frames_have_the_stamp_of_the_message_exactly():
     exactly = (1_700_000_000, 123_456_789)
-    _, sink, _ = run([received("a", message(1.0, WALL, 0.01, -0.5), exactly)], [wall("a", 2.5)])
-    assert [frame.time for frame in sink.frames] == [exactly, (2, 500_000_000)]
+    _, frames, _ = run([wall("a", 1.0, exactly)], [wall("a", 2.5)])
+    assert [frame.time for frame in frames] == [exactly, (2, 500_000_000)]
+
+
+@pytest.mark.parametrize("name", garbage())
+def test_a_malformed_message_is_counted_written_once_and_survived(name):
+    bad = received_scan("bad", garbage()[name], "cdr", "sensor_msgs/LaserScan")
+    total, frames, lines = run([bad], [bad], [wall("good", 1.0)], [wall("bad", 2.0)])
+    assert (total.scans, total.malformed) == (2, 2)
+    assert [frame.scan.stamp for frame in frames] == [1.0, 2.0]
+    (line,) = lines
+    assert line.startswith("a scan of bad makes no sense: ")
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(("n", "is_refused"), [(1, False), (MOST_BEAMS, False), (65_537, True)])
+def test_most_beams(n, is_refused):
+    scan = ln.LaserScan(np.ones(n), 0.0, 1e-6)
+    if is_refused:
+        with pytest.raises(ValueError, match="has 65537 beams, expected 1 to 65536"):
+            check_beams(scan)
+    else:
+        check_beams(scan)
+
+
+def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
+    scan = wall("a", 1.1, time_increment=0.001)
+    total, (first, second), lines = run(
+        [heard(moving(np.nan, 0.0, 0.0)), scan],
+        [scan, heard(moving(9.0, 9.0, 9.0)), heard(moving(1.0, 0.0, 0.0))],
+        deskew="/odom",
+    )
+    assert (total.scans, total.dropped, total.malformed) == (2, 0, 1)
+    assert first.straight is first.scan
+    expected = ln.deskew(second.scan, (1.0, 0.0, 0.0))
+    np.testing.assert_array_equal(second.straight.ranges, expected.ranges)
+    assert lines[0].startswith("an odometry of o makes no sense: its twist is")
+
+
+def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
+    batch = [heard(moving(1.0, 0.0, 0.0)), wall("a", time_increment=1e20)]
+    total, _, lines = run(batch, [wall("a", time_increment=1e-3)], deskew="/odom")
+    assert (total.scans, total.malformed) == (1, 1)
+    assert lines[0].startswith("a scan of a makes no sense: twist (1.0, 0.0, 0.0) for 1e+22 s")
+
+
+def test_what_was_skipped_in_a_log_is_written_at_its_end(tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text("FLASER x\nFLASER 2 1 2 0 0 0 0 0 0 1 robot 1\n")
+    total, _, lines = run(source=ReplaySource(path, rate=0, keep_going=True))
+    assert total.scans == len(lines) == 1
+    assert lines[0].startswith(f"skipped: {path}:1: FLASER")
+
+
+def test_publishers_problems_and_reports_second_by_second(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    source, sink, lines, shown = Given(), Kept(), [], []
+
+    def after(publishers: int, *problems: str, seconds: float = 1.0):
+        def batch() -> list[Received]:
+            now[0] += seconds
+            source.publishers, source.lines = publishers, list(problems)
+            return []
+
+        return batch
+
+    source.batches = [
+        after(0),
+        after(0, seconds=0.9),  # not long enough for a report
+        after(0, "another type\nof messages"),
+        *(after(number, "another type\nof messages") for number in (0, 1, 1, 2, 0, 0)),
+        after(1, "the master has gone"),
+        [],
+    ]
+    node = Node(source, Pipeline(LiveConfig()), [sink], write=lines.append, show=shown.append)
+    node.run()
+    waiting = "no publisher of scans: waiting for one"
+    assert lines == [
+        *("another type\\nof messages", waiting, "1 publisher of scans", "2 publishers of scans"),
+        *(waiting, "the master has gone", "1 publisher of scans"),
+    ]
+    assert shown == [report for report, _ in sink.reports]
+    seconds = [1.0, 1.9, 1, 1, 1, 1, 1, 1, 1, 0.0]
+    assert [report.seconds for report in shown] == pytest.approx(seconds)
+    assert {report.level for report in shown} == {3}
+
+
+def test_a_publisher_that_comes_again_may_be_reported_again(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    source, lines = Given(), []
+    bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
+
+    def batch(publishers: int) -> list[Received]:
+        now[0] += 3.0
+        source.publishers = publishers
+        return [bad]
+
+    source.batches = [partial(batch, number) for number in (1, 0, 1, 1)]
+    Node(source, Pipeline(LiveConfig()), [], write=lines.append).run()
+    assert sum("makes no sense" in line for line in lines) == 2
+
+
+def test_a_stop_ends_it():
+    asked = iter([False, False, True])
+    source = Given(*[[wall("a", float(i))] for i in range(10)])
+    assert Node(source, Pipeline(LiveConfig()), []).run(lambda: next(asked)).total.scans == 2
+
+
+class Taken(Publisher):
+    """Takes messages as a transport does, and checks that they are bytes on an open topic."""
+
+    n = 0
+
+    def _open(self, topic: str, kind: str) -> str:
+        assert topic.startswith("/")
+        assert kind
+        return topic
+
+    def _send(self, topic: str, message: Message) -> None:
+        assert topic == message.topic
+        assert isinstance(message.data, bytes)
+        self.n += 1
+
+    def _count(self, topic: str) -> int:
+        return int(bool(topic))
+
+
+#: What the fields of a message may hold that no scanner means.
+NUMBERS = (0, -0.0, 1e-45, 1e-38, 1e-7, 0.1, 1, -1, 5, 6.2831855, 1e6, 1e15, -1e20, 1e30, 3.4e38)
+NUMBERS += (math.inf, -math.inf, math.nan)
+STAMPS = ((-1, 0), (2**31 - 1, 2**32 - 1), (-(2**31), 10**9), (5, 999_999_999), (5, 0))
+#: Where the geometry of a scan in the frame `laser` begins, and where its ranges do.
+GEOMETRY, RANGES = 24, 56
+
+
+def sound_messages() -> list[bytes]:
+    make, messages = RosMessages("cdr"), []
+    for i, scan in enumerate(drive(room(), [(-2, 0), (0, 0)], SENSORS["lms181"], speed=1, rate=10)):
+        geometry = (scan.ranges, scan.angle_min, scan.angle_increment)
+        increment = (0.0, 1e-4, -1e-4)[i % 3]
+        scan = ln.LaserScan(*geometry, range_max=30.0, time_increment=increment)
+        message = make.scan("/scan", Moment(5, 10**8 * (i % 10), "laser", "map"), scan)
+        assert struct.unpack_from("<I", message.data, RANGES - 4) == (len(scan),)
+        messages.append(message.data)
+    return messages
+
+
+def spoilt(data: bytes, other: bytes, chance: Random) -> bytes:
+    """Change the fields of a message to what no scanner means, or its bytes at random."""
+    changed, n = bytearray(data), (len(data) - RANGES - 4) // 4
+    way = chance.random()
+    if way < 0.3:
+        for at in chance.sample(range(GEOMETRY, RANGES - 4, 4), chance.choice((1, 1, 2))):
+            struct.pack_into("<f", changed, at, chance.choice(NUMBERS))
+    elif way < 0.6:
+        for i in chance.choices(range(n), k=chance.choice((1, 5, 50, n))):
+            number = chance.choice((*NUMBERS, chance.uniform(0, 40)))
+            struct.pack_into("<f", changed, RANGES + 4 * i, number)
+    elif way < 0.7:
+        changed[RANGES : RANGES + 4 * n] = n * struct.pack("<f", chance.choice(NUMBERS))
+    elif way < 0.8:
+        times = chance.choice((1e-5, 0.1, -1e-4, 1e20)), chance.choice((0.1, -0.1, 1e30))
+        struct.pack_into("<2f", changed, GEOMETRY + 12, *times)
+    else:
+        return damaged(data, chance, other)
+    if chance.random() < 0.2:
+        struct.pack_into("<iI", changed, 4, *chance.choice(STAMPS))
+    return bytes(changed)
+
+
+def odometry_message(chance: Random) -> bytes:
+    head = struct.pack("<iII8sI5s3x", 5, 0, 5, b"odom", 5, b"base")
+    pose = struct.pack("<7d", *[0.0] * 6, 1.0)
+    speeds = chance.choices((0.0, 1.0, -0.5, 30.0, 1e3, 1e300, math.nan), k=3)
+    twist = struct.pack("<6d", *speeds[:2], 0.0, 0.0, 0.0, speeds[2])
+    return b"\0\1\0\0" + head + pose + bytes(288) + twist + bytes(288)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"track": True, "deskew": "scans"},
+        {"deskew": "/odom", "laser_pose": (0.2, 0.1, 1.0)},
+        {"track": True, "method": "liu", "noise": 0.01},
+    ],
+    ids=["optimal", "scans", "odom", "liu"],
+)
+def test_no_message_ends_a_node(options):
+    chance, sound, n = Random(3), sound_messages(), 800
+
+    def batch() -> list[Received]:
+        data, other = chance.choices(sound, k=2)
+        if chance.random() < 0.8:
+            data = spoilt(data, other, chance)
+        scan = received_scan(chance.choice("ab"), data, "cdr", "sensor_msgs/LaserScan")
+        return [received_odometry("o", odometry_message(chance), "cdr"), scan]
+
+    taken, lines = Taken(), []
+    config = LiveConfig(log="played.npz")
+    sinks = [RosSink(taken, RosMessages("cdr"), config)]
+    try:
+        from lineament.output.foxglove import FoxgloveMessages
+    except ImportError:
+        pass
+    else:
+        sinks.append(FoxgloveSink(taken, FoxgloveMessages(), config))
+    pipeline = Pipeline(LiveConfig(**options))
+    total = Node(Given(*[batch] * n), pipeline, sinks, write=lines.append).run().total
+    assert n // 4 < total.scans <= n
+    assert total.malformed > n // 10
+    assert taken.n >= 3 * total.scans
+    faults = [line.partition(" makes no sense: ")[0] for line in lines if "sense" in line]
+    assert sorted(faults) == ["a scan of a", "a scan of b", "an odometry of o"]
+    assert not any("\n" in line for line in lines)
+
+
+def test_messages_that_have_no_listeners_are_not_made():
+    class Alone(Taken):
+        def _count(self, topic: str) -> int:
+            return int(topic in self.heard)
+
+        heard = ()
+
+    publisher = Alone()
+    sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log="a.npz"))
+    scan = sweep(pose=(1.0, 2.0, 0.5))
+    frame = Pipeline(LiveConfig())("a", scan)
+    sink.publish(frame)
+    assert publisher.n == 0
+    for n, below in enumerate(("/features", "/corners", "/markers", ""), 1):
+        publisher.heard = (f"/scan{below}",)
+        sink.publish(frame)
+        assert publisher.n == n
+
+
+# The pipeline.
 
 
 @pytest.mark.parametrize(
@@ -111,132 +362,14 @@ def test_stamps_that_no_message_holds_are_clipped(stamp, time):
     assert time_of(stamp) == time
 
 
-BROKEN = {
-    "empty": (b"", "begins with"),
-    "cut off": (message(1.0, WALL)[:60], "ends early"),
-    "too many ranges declared": (message(1.0, WALL, declared=2**31), "ends early"),
-    "nan increment": (message(1.0, WALL, increment=float("nan")), "angle_increment is nan"),
-    "zero increment": (message(1.0, WALL, increment=0.0), "angle_increment is 0"),
-    "no beams": (message(1.0, []), ""),
-    "a million beams": (
-        message(1.0, np.ones(1_000_000), increment=1e-6),
-        f"has 1000000 beams, expected 1 to {MOST_BEAMS}",
-    ),
-    "noise": (bytes(range(256)) * 4, ""),
-    "behind the end": (message(1.0, WALL) + bytes(40), "behind its last field"),
-}
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_message_that_makes_no_sense_is_counted_told_once_and_survived(name):
-    data, why = BROKEN[name]
-    report, sink, told = run(
-        [received("bad", data)], [received("bad", data)], [wall("good", 1.0)], [wall("bad", 2.0)]
-    )
-    assert (report.total_scans, report.total_malformed) == (2, 2)
-    assert [frame.scan.stamp for frame in sink.frames] == [1.0, 2.0]
-    (line,) = told
-    assert line.startswith("a scan of bad makes no sense: ")
-    assert why in line
-    assert "\n" not in line
-
-
-def test_odometry_is_heard_and_never_a_scan():
-    def odometry(twist):
-        heard = Odometry(1.0, twist, (0.0, 0.0, 0.0), "odom", "base")
-        return Received("o", lambda: heard, 0.0, is_odometry=True)
-
-    sweep = ln.LaserScan(WALL, -0.5, 0.01, stamp=1.1, time_increment=0.001)
-    scan = Received("a", lambda: sweep, 0.0)
-    report, sink, told = run(
-        [odometry((np.nan, 0.0, 0.0)), scan],
-        [odometry((9.0, 9.0, 9.0)), odometry((1.0, 0.0, 0.0)), scan],
-        config=LiveConfig(deskew="/odom"),
-    )
-    assert (report.total_scans, report.total_dropped, report.total_malformed) == (2, 0, 1)
-    first, second = sink.frames
-    assert first.straight is sweep
-    np.testing.assert_allclose(second.straight.ranges, ln.deskew(sweep, (1.0, 0, 0)).ranges)
-    assert told[0].startswith("an odometry of o makes no sense: its twist is")
-
-
-def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
-    def scan(seconds):
-        sweep = ln.LaserScan(WALL, -0.5, 0.01, stamp=1.1, time_increment=seconds)
-        return Received("a", lambda: sweep, 0.0)
-
-    heard = Odometry(1.0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), "odom", "base")
-    motion = Received("o", lambda: heard, 0.0, is_odometry=True)
-    report, _, told = run([motion, scan(1e20)], [scan(0.001)], config=LiveConfig(deskew="/odom"))
-    assert (report.total_scans, report.total_malformed) == (1, 1)
-    assert told[0].startswith("a scan of a makes no sense: twist (1.0, 0.0, 0.0) for 1e+22 s")
-
-
-def test_what_was_skipped_in_a_log_is_told_at_its_end(tmp_path):
-    (tmp_path / "a.log").write_text("FLASER x\nFLASER 2 1 2 0 0 0 0 0 0 1 robot 1\n")
-    source, told = ReplaySource(tmp_path / "a.log", rate=0, keep_going=True), []
-    Node(source, Pipeline(LiveConfig()), [], tell=told.append).run()
-    assert len(told) == 1
-    assert told[0].startswith(f"skipped: {tmp_path / 'a.log'}:1: FLASER")
-
-
-def test_publishers_that_come_and_go_are_told(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-
-    def after(seconds):
-        def batch():
-            now[0] += seconds
-            return []
-
-        return batch
-
-    publishers = [0, 0, 0, 1, 1, 2, 0, 0, 1]
-    steps = [after(1.0) for _ in publishers]
-    _, _, told = run(*steps, [], publishers=publishers)
-    waiting = "no publisher of scans: waiting for one"
-    assert told == [
-        waiting, "1 publisher of scans", "2 publishers of scans", waiting, "1 publisher of scans",
-    ]  # fmt: skip
-
-
-def test_problems_of_the_source_are_told_once(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    source, told = Given(), []
-
-    def batch():
-        now[0] += 1.0
-        source.said = ["a writer offers\nbest effort"]
-        return []
-
-    source.batches = [batch] * 4
-    Node(source, Pipeline(LiveConfig()), [], tell=told.append).run()
-    assert told == ["a writer offers\\nbest effort", "1 publisher of scans"]
-
-
-def test_a_stop_ends_it():
-    asked = iter([False, False, True])
-    source = Given(*[[wall("a", float(i))] for i in range(10)])
-    report = Node(source, Pipeline(LiveConfig()), []).run(lambda: next(asked))
-    assert report.total_scans == 2
-
-
-def test_tracks_are_kept_for_each_publisher():
-    _, sink, _ = run(
-        *[[wall("a", float(i)), wall("b", float(i))] for i in range(3)],
-        config=LiveConfig(track=True),
-    )
-    # The same wall of two scanners: each has numbers of its own, which last.
-    assert [frame.tracks.segments.tolist() for frame in sink.frames] == [[0]] * 6
-
-
-def test_many_publishers_do_not_fill_the_memory():
+def test_each_publisher_has_tracks_of_the_last_eight():
+    _, frames, _ = run(*[[wall("a", i), wall("b", i)] for i in range(3)], track=True)
+    # The same wall of two scanners: each has its own numbers, which last.
+    assert [frame.tracks.segments.tolist() for frame in frames] == [[0]] * 6
     pipeline = Pipeline(LiveConfig())
-    scan = ln.LaserScan(WALL, -0.5, 0.01)
     for i in range(100):
-        assert len(pipeline(f"publisher {i}", scan).features.segments) == 1
-    assert len(pipeline._lines) <= 8
+        assert len(pipeline(f"publisher {i}", sweep()).features.segments) == 1
+    assert len(pipeline._publishers) == 8
 
 
 def test_features_are_those_of_the_extractor(recorded_scans):
@@ -247,40 +380,128 @@ def test_features_are_those_of_the_extractor(recorded_scans):
         np.testing.assert_array_equal(frame.features.segments, extractor(scan).segments)
 
 
-def test_an_unknown_method_is_told_at_once():
+@pytest.mark.parametrize("options", [{"method": "houghton"}, {"parameters": {"houghton": 3}}])
+def test_an_unknown_method_or_parameter_is_an_error_at_once(options):
     with pytest.raises(ValueError, match="houghton"):
-        Pipeline(LiveConfig(method="houghton"))
-    with pytest.raises(ValueError, match="evidenz"):
-        Pipeline(LiveConfig(parameters={"evidenz": 3}))
+        Pipeline(LiveConfig(**options))
+
+
+@pytest.mark.parametrize(
+    ("twist", "laser_pose", "expected"),
+    [
+        ((1.0, 0.0, 0.0), (0.3, 0.1, 0.0), (1.0, 0.0, 0.0)),
+        ((0.0, 0.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.5, 1.0)),
+        ((0.0, 0.0, 1.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 1.0)),
+        ((1.0, 0.0, 0.0), (0.0, 0.0, math.pi), (-1.0, 0.0, 0.0)),
+    ],
+)
+def test_twist_of_a_mounted_scanner_worked_by_hand(twist, laser_pose, expected):
+    assert twist_of_laser(twist, laser_pose) == pytest.approx(expected, abs=1e-12)
+
+
+def test_twist_of_a_mounted_scanner_is_the_motion_of_its_pose():
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        twist = tuple(rng.normal(size=3))
+        laser = (*rng.normal(size=2), rng.uniform(-3, 3))
+        start, later = (compose(tuple(p), laser) for p in poses_along(twist, [0.0, 0.1]))
+        assert twist_of_laser(twist, laser) == pytest.approx(twist_between(start, later, 0.1))
+
+
+def deskewed(pipeline: Pipeline, scan: ln.LaserScan) -> bool:
+    return pipeline("one", scan).straight is not scan
+
+
+def test_odometry_holds_for_half_a_second():
+    pipeline = Pipeline(LiveConfig(deskew="/odom"))
+    scan = sweep(10.0, time_increment=1e-3)
+    assert not deskewed(pipeline, scan)
+    for stamp, holds in [(9.5, True), (9.49, False), (10.5, True), (10.51, False)]:
+        pipeline.hear(moving(1.0, 0.0, 0.0, stamp=stamp))
+        assert deskewed(pipeline, scan) == holds
+    with pytest.raises(ValueError, match="expected finite numbers"):
+        pipeline.hear(moving(0.0, math.inf, 0.0))
+
+
+def test_poses_give_the_motion_between_scans():
+    pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
+    poses = [
+        (1.0, (0.0, 0.0, 0.0), False),
+        (1.5, (0.5, 0.0, 0.0), True),
+        (9.0, (0.7, 0.0, 0.0), False),  # too long ago
+        (8.0, (0.9, 0.0, 0.0), False),  # time runs backwards
+        (8.1, None, False),
+        (8.2, (0.9, 0.0, 0.0), False),
+        (9.19, (1.0, 0.0, 0.0), True),
+    ]
+    for stamp, pose, moves in poses:
+        assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
+
+
+@pytest.mark.parametrize(("deskew", "most"), [("scans", 0.02), ("poses", 1e-6), ("/odom", 1e-9)])
+def test_moving_scans_are_deskewed(deskew, most):
+    walk = [(-2.0, 0.0), (-1.0, 0.0)]
+    scans = list(drive(room(), walk, SENSORS["lms361"], speed=1.0, rate=10))
+    pipeline = Pipeline(LiveConfig(deskew=deskew, log="a.log" if deskew == "poses" else None))
+    for scan in scans[:6]:
+        pipeline.hear(moving(1.0, 0.0, 0.0, stamp=scan.stamp))
+        frame = pipeline("one", scan)
+        assert frame.scan is scan
+        assert frame.tracks is None
+    expected = ln.deskew(scan, (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(frame.straight.ranges, expected.ranges, atol=most)
+    assert np.nanmax(np.abs(frame.straight.ranges - scan.ranges)) > 0.005
+
+
+# Counters.
 
 
 def test_reports_worked_by_hand():
     counters = Counters(10.0)
     scan = ln.LaserScan([2.0, 2.0, np.nan, 2.0], 0.0, 0.01)
-    features = ln.extract(ln.LaserScan(WALL, -0.5, 0.01))
+    features = ln.extract(sweep())
     for latency in (0.001, 0.003, 0.002):
         counters.add(scan, features, latency)
-    counters.dropped = 2
-    report = counters.report(11.5, publishers=1, lost=4)
-    assert (report.scans, report.rate, report.dropped, report.lost, report.level) == (3, 2, 2, 4, 1)
+    counters.dropped, counters.malformed = 2, 1
+    report = counters.report(11.5, publishers=1, lost=4, unsent=5)
+    assert (report.since, report.rate, report.level) == ((3, 2, 4, 1, 5), 2, 1)
     assert report.latency == pytest.approx((0.002, 0.00298))
     assert report.invalid == 0.25
     assert report.features["segments"] == 1
-    assert report.values["latency p50 [ms]"] == "2.000"
+    assert report.values == {
+        "rate [1/s]": "2.00",
+        "latency p50 [ms]": "2.000",
+        "latency p99 [ms]": "2.980",
+        "dropped": "2",
+        "lost": "4",
+        "malformed": "1",
+        "unsent": "5",
+        "invalid beams [%]": "25.0",
+        **{f"{name} per scan": f"{n:.1f}" for name, n in features.counts().items()},
+        "publishers": "1",
+        "scans in all": "3",
+        "dropped in all": "2",
+        "lost in all": "4",
+        "malformed in all": "1",
+    }
+    assert str(report).startswith(
+        "2.0 scans/s, latency 2.00 ms (p99 2.98), 2 dropped, 4 lost, 1 malformed, "
+        "25.0 % of beams invalid, per scan: 1.0 segments, 0.0 corners"
+    )
     counters.add(scan, features, 0.001)
-    report = counters.report(12.5, publishers=1, lost=4)
-    assert (report.scans, report.dropped, report.lost, report.level) == (1, 0, 0, 0)
-    assert (report.total_scans, report.total_dropped, report.total_lost) == (4, 2, 4)
-    assert report.totals == "4 scans, 2 dropped, 4 lost, 0 malformed messages"
-    report = counters.report(13.5, publishers=0, lost=4)
+    report = counters.report(12.5, publishers=1, lost=4, unsent=5)
+    assert (report.since, report.level) == ((1, 0, 0, 0, 0), 0)
+    assert report.total == (4, 2, 4, 1, 5)
+    assert report.totals == "4 scans, 2 dropped, 4 lost, 1 malformed messages"
+    report = counters.report(13.5, publishers=0, lost=4, unsent=5)
     assert (report.level, str(report)) == (3, "no scans, 0 publishers")
     assert np.isnan(report.invalid)
+    assert counters.report(13.5, publishers=1).rate == 0.0
 
 
-def test_a_recorded_drive_is_played_whole(tmp_path, recorded_scans):
-    save_npz(tmp_path / "log.npz", recorded_scans[:8])
-    sink = Kept()
-    source = ReplaySource(tmp_path / "log.npz", rate=0)
-    report = Node(source, Pipeline(LiveConfig()), [sink]).run()
-    assert report.total_scans == len(sink.frames) == 8
-    assert len(sink.reports) >= 1
+def test_a_message_is_read_when_it_is_processed():
+    scan = received_scan("a", cdr_scan(5), "cdr", "sensor_msgs/LaserScan")
+    assert scan.time == (7, 0)
+    assert len(scan.read()) == 5
+    with pytest.raises(ValueError, match="type of scans is 'Image', expected one of sensor_msgs/"):
+        received_scan("a", b"", "cdr", "Image")

@@ -2,48 +2,104 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import os
+import shutil
 import signal
+import socket
 import struct
+import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
 import pytest
-from ros1_driving import ECHOES, SCAN, Peer, running_master, scan_of, until
+from live_driving import (
+    DEADLINE,
+    Remote,
+    eventually,
+    heard,
+    odometry_message,
+    points_of,
+    scan_message,
+)
 
 import lineament as ln
 from lineament import LineamentError
+from lineament.live import LiveConfig
 from lineament.live.received import Received
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
+from lineament.output.feature_points import feature_points
 from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message, Moment, layers_of
+from lineament.tasks.warmup import warm_up
 
-# rospy leaves sockets open, calls what is deprecated, and takes any exception for a dead master.
+# rospy leaves sockets open, and calls what is deprecated.
 pytestmark = [
-    pytest.mark.filterwarnings("ignore::DeprecationWarning:ros"),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning"),
 ]
+
+#: Where Debian installs rospy, for the Python that it has.
+DEBIAN = Path("/usr/lib/python3/dist-packages")
+SCAN = "sensor_msgs/LaserScan"
 
 
 @pytest.fixture(scope="module")
-def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with running_master(tmp_path_factory.mktemp("ros")):
+def rospy() -> Iterator[None]:
+    """Make rospy importable, here and in child processes, where it is installed."""
+    with pytest.MonkeyPatch.context() as patch:
+        if importlib.util.find_spec("rospy") is None and (DEBIAN / "rospy").is_dir():
+            patch.setattr(sys, "path", [*sys.path, str(DEBIAN)])
+        pytest.importorskip("rospy", reason="ROS 1 is not installed: see make ros1")
         yield
 
 
 @pytest.fixture(scope="module")
+def master(rospy: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:  # noqa: ARG001
+    """Run a master that this process and its children find."""
+    rosmaster = shutil.which("rosmaster") or pytest.skip("ROS 1 is not installed: no rosmaster")
+    with pytest.MonkeyPatch.context() as patch:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        patch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
+        patch.setenv("ROS_HOSTNAME", "127.0.0.1")
+        patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros")))
+
+        def is_open() -> bool:
+            with socket.socket() as client:
+                return client.connect_ex(("127.0.0.1", port)) == 0
+
+        with subprocess.Popen([rosmaster, "--core", "-p", str(port)]) as process:
+            try:
+                eventually(is_open, pause=0.05)
+                yield
+            finally:
+                process.kill()
+
+
+@pytest.fixture(scope="module")
 def node(master: None) -> Iterator[Ros1Node]:  # noqa: ARG001
-    node = Ros1Node("lineament_test")
-    yield node
-    node.close()
+    with closing(Ros1Node("lineament_test")) as node:
+        yield node
+
+
+@pytest.fixture(scope="module")
+def scanner(master: None) -> Iterator[Remote]:  # noqa: ARG001
+    """A node of rospy in another process, that the tests share."""
+    with closing(Remote("ros1_peer", "scanner")) as peer:
+        yield peer
 
 
 @pytest.fixture
-def peer(master: None) -> Iterator[Peer]:  # noqa: ARG001
-    peer = Peer("scanner")
-    yield peer
-    peer.close()
+def peer(master: None) -> Iterator[Remote]:  # noqa: ARG001
+    """Another node, that may be killed or stopped."""
+    with closing(Remote("ros1_peer", "other")) as peer:
+        yield peer
 
 
 @pytest.fixture
@@ -52,162 +108,129 @@ def topic(request: pytest.FixtureRequest) -> str:
     return f"/{request.node.name}/scan"
 
 
-def connected(peer: Peer, source: Ros1Source, topic: str, kind: str = SCAN, raw=False) -> None:
-    peer.advertise(topic=topic, kind=kind, raw=raw)
-    until(lambda: source.publishers and peer.connections(topic=topic))
+def connected(peer: Remote, source: Ros1Source, kind: str = SCAN, raw: bool = False) -> None:
+    (topic, *_), before = source._subscribed, source.publishers
+    peer.publish(topic, kind, raw)
+    eventually(lambda: source.publishers > before and peer.listeners(topic))
 
 
 def received(source: Ros1Source, n: int) -> list[Received]:
     """Take the next `n` messages."""
     found: list[Received] = []
-    until(lambda: found.extend(source.receive(0.1)) or len(found) >= n)
+    eventually(lambda: found.extend(source.receive(0.1)) or len(found) >= n, pause=0)
     assert len(found) == n
     return found
 
 
-def test_scan_of_a_genuine_publisher(node, peer, topic):
-    source = Ros1Source(node, topic)
-    connected(peer, source, topic)
-    peer.publish(topic=topic, messages=[scan_of(intensities=[7.0, 8.0, 9.0])])
+def test_scan_of_a_genuine_publisher(node, scanner, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic))
+    connected(scanner, source)
+    scanner.write(topic, {**scan_message(12, [1.0, 2.5, 0.0]), "intensities": [7.0, 8.0, 9.0]})
     (came,) = received(source, 1)
     scan = came.read()
-    assert came.publisher == "/scanner"
-    assert came.time == (12, 345_678_901)
-    assert not came.is_odometry
+    assert (came.publisher, came.time, came.is_odometry) == ("/scanner", (12, 500_000_001), False)
     assert scan.ranges.tolist() == [1.0, 2.5, 0.0]
     assert scan.intensities.tolist() == [7.0, 8.0, 9.0]
-    assert scan.frame_id == "laser"
-    assert scan.stamp == pytest.approx(12.345678901)
-    assert (scan.angle_min, scan.angle_increment) == (-0.5, 0.5)
-    assert (scan.time_increment, scan.scan_time) == (0.25, 0.5)
-    assert (scan.range_min, scan.range_max) == (0.125, 30.0)
+    assert (scan.frame_id, scan.angle_min, scan.angle_increment) == ("laser", -0.75, 0.75)
+    assert (scan.scan_time, scan.range_min, scan.range_max) == (0.125, 0.125, 32.0)
     assert (source.lost, source.ended, source.problems()) == (0, False, [])
-    source.close()
-    until(lambda: not peer.connections(topic=topic))
 
 
-def test_echo_that_is_asked_for(node, peer, topic):
-    source = Ros1Source(node, topic, ECHOES, echo="strongest")
-    connected(peer, source, topic, ECHOES)
-    echoes = scan_of(ranges=[[1.0, 4.0], [], [2.0]], intensities=[[5.0, 6.0], [], [5.0]])
-    peer.publish(topic=topic, messages=[echoes])
+def test_echo_that_is_asked_for(node, scanner, topic):
+    kind = "MultiEchoLaserScan"
+    source = Ros1Source(node, LiveConfig(topic=topic, type=kind, echo="strongest"))
+    connected(scanner, source, f"sensor_msgs/{kind}")
+    ranges = [{"echoes": [1.0, 4.0]}, {"echoes": []}, {"echoes": [2.0]}]
+    intensities = [{"echoes": [5.0, 6.0]}, {"echoes": []}, {"echoes": [5.0]}]
+    scanner.write(topic, {**scan_message(), "ranges": ranges, "intensities": intensities})
     (came,) = received(source, 1)
     assert came.read().ranges.tolist() == pytest.approx([4.0, math.nan, 2.0], nan_ok=True)
-    source.close()
 
 
-def test_odometry_comes_with_the_scans(node, peer, topic):
-    source = Ros1Source(node, topic, odometry="/odom")
-    connected(peer, source, topic)
-    peer.advertise(topic="/odom", kind="nav_msgs/Odometry")
-    until(lambda: peer.connections(topic="/odom"))
-    turned = {"z": math.sin(0.25), "w": math.cos(0.25)}
-    odometry = {
-        "header": {"stamp": [3, 250_000_000], "frame_id": "odom"},
-        "child_frame_id": "base",
-        "pose": {"pose": {"position": {"x": 1.0, "y": 2.0}, "orientation": turned}},
-        "twist": {"twist": {"linear": {"x": 0.5, "y": 0.25}, "angular": {"z": -1.5}}},
-    }
-    peer.publish(topic="/odom", messages=[odometry])
+def test_odometry_comes_with_the_scans(node, scanner, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic, deskew="/odom"))
+    connected(scanner, source)
+    scanner.publish("/odom", "nav_msgs/Odometry")
+    eventually(lambda: scanner.listeners("/odom"))
+    scanner.write("/odom", odometry_message(0.5, 3))
     (came,) = received(source, 1)
     assert came.is_odometry
-    assert came.read() == (3.25, (0.5, 0.25, -1.5), pytest.approx((1.0, 2.0, 0.5)), "odom", "base")
-    peer.publish(topic=topic, messages=[scan_of()])
+    pose = pytest.approx((1.0, 2.0, 0.5))
+    assert came.read() == (3.5, (0.5, -1.0, 0.25), pose, "odom", "base")
+    scanner.write(topic, scan_message())
     (came,) = received(source, 1)
     assert not came.is_odometry
-    source.close()
 
 
-def test_flood_of_one_publisher_leaves_the_scan_of_another(node, peer, topic):
-    source = Ros1Source(node, topic, depth=3)
-    connected(peer, source, topic)
-    other = Peer("other")
-    other.advertise(topic=topic, kind=SCAN)
-    until(lambda: source.publishers == 2 and other.connections(topic=topic))
-    other.publish(topic=topic, messages=[scan_of(stamp=(1, 0))])
-    peer.publish(topic=topic, messages=[scan_of(stamp=(k, 0)) for k in range(50)])
-    until(lambda: source.lost == 47)
-    came = source.receive(0)
-    assert sorted((one.publisher, one.time[0]) for one in came) == [
-        ("/other", 1),
-        ("/scanner", 47),
-        ("/scanner", 48),
-        ("/scanner", 49),
-    ]
-    other.close()
-    source.close()
+def test_a_flood_of_one_publisher_leaves_the_scan_of_another(node, scanner, peer, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic, depth=3))
+    connected(scanner, source)
+    connected(peer, source)
+    peer.write(topic, scan_message(1))
+    scanner.write(topic, *(scan_message(k) for k in range(50)))
+    eventually(lambda: source.lost == 47 and len(source._inbox._waiting) == 2)
+    came = sorted((one.publisher, one.time[0]) for one in source.receive(0))
+    assert came == [("/other", 1), ("/scanner", 47), ("/scanner", 48), ("/scanner", 49)]
 
 
-def raw_scan(number: int, ranges: list[float] | None = None) -> bytes:
-    ranges = [1.0, 2.0] if ranges is None else ranges
+def raw_scan(number: int, ranges: tuple[float, ...] = (1.0, 2.0)) -> bytes:
     head = struct.pack("<IIII5s7f", number, 5, 0, 5, b"laser", 0, 1, 1, 0, 0, 0.1, 30)
-    n = len(ranges)
-    return head + struct.pack(f"<I{n}fI", n, *ranges, 0)
+    return head + struct.pack(f"<I{len(ranges)}fI", len(ranges), *ranges, 0)
 
 
-def test_gaps_in_the_numbers_are_lost_scans(node, peer, topic):
-    source = Ros1Source(node, topic)
-    connected(peer, source, topic, raw=True)
+def test_gaps_in_the_numbers_are_lost_scans(node, scanner, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic))
+    connected(scanner, source, raw=True)
     # Three are missing; then another begins to count; then none is numbered.
     numbers = [7, 8, 12, 1, 2_000_000_000, 0, 0]
-    peer.publish_raw(topic=topic, messages=[raw_scan(k).hex() for k in numbers])
+    scanner.write(topic, *map(raw_scan, numbers))
     received(source, len(numbers))
     assert source.lost == 3
-    source.close()
 
 
-def test_garbage_is_told_in_one_line_and_survived(node, peer, topic):
-    source = Ros1Source(node, topic)
-    connected(peer, source, topic, raw=True)
+def test_garbage_comes_and_is_refused_in_one_line(node, scanner, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic))
+    connected(scanner, source, raw=True)
     good = raw_scan(1)
-    many = struct.pack("<I", 1_000_000)
-    at = len(good) - 16
-    garbage = [b"", b"\xff", good[:-5], good + b"12345", raw_scan(1, []), good[:at] + many]
-    peer.publish_raw(topic=topic, messages=[data.hex() for data in (*garbage, good)])
+    many = good[:-16] + struct.pack("<I", 1_000_000)
+    garbage = [b"", b"\xff", good[:-5], good + b"12345", raw_scan(1, ()), many]
+    scanner.write(topic, *garbage, good)
     *bad, last = received(source, len(garbage) + 1)
     for one in bad:
         with pytest.raises(ValueError, match=r"^[ -~]+$"):
             one.read()
     assert last.read().ranges.tolist() == [1.0, 2.0]
     assert source.publishers == 1
-    source.close()
 
 
-def test_publisher_that_is_killed_is_waited_for(node, topic):
-    source = Ros1Source(node, topic)
+def test_a_publisher_that_is_killed_is_waited_for(node, topic):
+    source = Ros1Source(node, LiveConfig(topic=topic))
     for stamp in (1, 2):
-        scanner = Peer("dying")
-        connected(scanner, source, topic)
-        scanner.publish(topic=topic, messages=[scan_of(stamp=(stamp, 0))])
-        (came,) = received(source, 1)
-        assert came.time == (stamp, 0)
-        scanner.close()
-        until(lambda: source.publishers == 0)
+        with closing(Remote("ros1_peer", "dying")) as dying:
+            connected(dying, source)
+            dying.write(topic, scan_message(stamp))
+            (came,) = received(source, 1)
+            assert came.time[0] == stamp
+        eventually(lambda: source.publishers == 0)
     assert source.lost == 0
-    source.close()
 
 
-def test_topic_of_another_type_is_told(node, peer, topic):
-    peer.advertise(topic=topic, kind="sensor_msgs/PointCloud2")
-    source = Ros1Source(node, topic)
-    assert source.problems() == [
-        f"{topic} is published as sensor_msgs/PointCloud2, expected sensor_msgs/LaserScan"
-    ]
-    until(lambda: not source.publishers)
-    source.close()
+def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):
+    scanner.publish(topic, "sensor_msgs/PointCloud2")
+    source = Ros1Source(node, LiveConfig(topic=topic))
+    problem = f"{topic} is published as sensor_msgs/PointCloud2, expected {SCAN}"
+    assert source.problems() == [problem]
+    eventually(lambda: not source.publishers)
+    monkeypatch.setattr(node, "_uri", "http://127.0.0.1:1")
+    (problem,) = source.problems()
+    assert problem.startswith("the ROS master at http://127.0.0.1:1 does not answer")
 
 
-def test_messages_are_read_by_a_genuine_listener(node, peer, topic):
+def test_messages_are_read_by_a_genuine_listener(node, scanner, topic):
     publisher = Ros1Publisher(node)
-    scan = ln.LaserScan(
-        [2.0, 2.0 / math.cos(0.25), 9.0],
-        angle_min=0.0,
-        angle_increment=0.25,
-        range_max=8.0,
-        frame_id="laser",
-        stamp=5.5,
-        pose=(1.0, 2.0, math.pi),
-    )
+    geometry = ([2.0, 2.0 / math.cos(0.25), 9.0], 0.0, 0.25)
+    fields = {"range_max": 8.0, "stamp": 5.5, "pose": (1.0, 2.0, math.pi)}
+    scan = ln.LaserScan(*geometry, **fields)
     features = ln.extract(scan)
     make, moment = RosMessages("ros1"), Moment(5, 500_000_000, "laser", "map")
     layers = layers_of(markers_of(features, scan))
@@ -222,66 +245,56 @@ def test_messages_are_read_by_a_genuine_listener(node, peer, topic):
     for message in sent:
         assert publisher.listeners(message.topic) == 0
         publisher.advertise(message.topic, message.kind)
-        peer.listen(topic=message.topic, kind=message.kind)
-    until(lambda: all(publisher.listeners(message.topic) == 1 for message in sent))
+        scanner.listen(message.topic, message.kind)
+    eventually(lambda: all(publisher.listeners(message.topic) == 1 for message in sent))
     for message in sent:
         publisher.publish(message)
     found, transforms, markers, corners, cloud, diagnostics = (
-        until(lambda message=message: peer.take(topic=message.topic))[0] for message in sent
+        heard(scanner, message.topic) for message in sent
     )
-    for one in (found, corners, cloud, transforms["transforms"][0], markers["markers"][0]):
-        assert one["header"]["stamp"] == [5, 500_000_000]
-        assert one["header"]["frame_id"] == ("map" if "child_frame_id" in one else "laser")
-    assert found["ranges"] == pytest.approx([2.0, 2.0 / math.cos(0.25), 9.0])
-    moved = transforms["transforms"][0]["transform"]
-    assert moved["translation"] == {"x": 1.0, "y": 2.0, "z": 0.0}
-    assert moved["rotation"]["z"] == pytest.approx(1.0)
+    (transform,) = transforms["transforms"]
+    for one in (found, corners, cloud, transform, markers["markers"][0]):
+        assert one["header"]["stamp"] == {"sec": 5, "nanosec": 500_000_000}
+        assert one["header"]["frame_id"] == ("map" if one is transform else "laser")
+    assert found["ranges"] == pytest.approx(geometry[0])
+    assert transform["transform"]["translation"] == {"x": 1.0, "y": 2.0, "z": 0.0}
+    assert transform["transform"]["rotation"]["z"] == pytest.approx(1.0)
     assert {one["ns"] for one in markers["markers"]} == {layer.name for layer in layers}
     assert len(corners["poses"]) == len(features.corners)
-    assert cloud["width"] == len(features.segments) + len(features.corners) + len(features.arcs)
+    assert points_of(cloud).tobytes() == feature_points(features).tobytes()
     assert diagnostics["status"][0]["values"] == [{"key": "rate", "value": "9 Hz"}]
     assert publisher.unsent == 0
-    publisher.close()
 
 
-def test_listener_that_stands_still_delays_nobody(node, peer, topic):
+def test_a_listener_that_stands_still_delays_nobody(node, peer, topic):
     publisher = Ros1Publisher(node, depth=2)
     publisher.advertise(topic, "std_msgs/String")
-    peer.listen(topic=topic, kind="std_msgs/String")
-    until(lambda: publisher.listeners(topic))
+    peer.listen(topic, "std_msgs/String")
+    eventually(lambda: publisher.listeners(topic))
     message = Message(topic, "std_msgs/String", struct.pack("<I", 1_000_000) + b"x" * 1_000_000)
-    peer.process.send_signal(signal.SIGSTOP)
+    peer.signal(signal.SIGSTOP)
     for _ in range(50):
         publisher.publish(message)
     assert publisher.unsent > 0
-    peer.process.send_signal(signal.SIGCONT)
-    assert until(lambda: peer.take(topic=topic))
-    publisher.close()
+    peer.signal(signal.SIGCONT)
+    assert heard(peer, topic)
 
 
-def test_type_that_ros_has_not(node, topic):
+def test_a_type_that_ros_does_not_have(node, topic):
     with pytest.raises(LineamentError, match="ROS 1 has no nowhere_msgs/Nothing: its package"):
         Ros1Publisher(node).publish(Message(topic, "nowhere_msgs/Nothing", b""))
 
 
-def test_master_that_has_gone_is_told(node, topic, monkeypatch):
-    source = Ros1Source(node, topic)
-    monkeypatch.setattr(node, "_uri", "http://127.0.0.1:1")
-    (problem,) = source.problems()
-    assert problem.startswith("the ROS master at http://127.0.0.1:1 does not answer")
-    source.close()
-
-
+@pytest.mark.usefixtures("rospy")
 @pytest.mark.parametrize("uri", ["nonsense", "http://127.0.0.1:1"])
 def test_no_master(uri, monkeypatch):
-    pytest.importorskip("rospy", reason="ROS 1 is not installed: rospy cannot be imported")
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     with pytest.raises(LineamentError, match=f"the ROS master at {uri} does not answer"):
         Ros1Node()
 
 
-def test_name_that_is_none():
-    pytest.importorskip("rospy", reason="ROS 1 is not installed: rospy cannot be imported")
+@pytest.mark.usefixtures("rospy")
+def test_a_name_that_ros_does_not_have():
     with pytest.raises(ValueError, match="name is 'a/b', expected letters, digits and _"):
         Ros1Node("a/b")
 
@@ -290,3 +303,97 @@ def test_without_rospy(monkeypatch):
     monkeypatch.setitem(sys.modules, "rosgraph", None)
     with pytest.raises(LineamentError, match="ROS 1 needs the package rosgraph, which is not"):
         Ros1Node()
+
+
+#: A node in a process of its own, which is where it can end: it says when it is up, waits for a
+#: listener or to be ended, then for a line of input.
+NODE = """
+from lineament.live import LiveConfig
+from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
+from lineament.output.scene import Message
+import time
+node = Ros1Node("another")
+source, publisher = Ros1Source(node, LiveConfig(topic="/nothing")), Ros1Publisher(node)
+publisher.advertise("/out", "std_msgs/String")
+print("up", flush=True)
+while not publisher.listeners("/out") and not source.ended:
+    time.sleep(0.05)
+print("ended" if source.ended else "heard", flush=True)
+sys.stdin.readline()
+for _ in range(20):
+    publisher.publish(Message("/out", "std_msgs/String", b"\\0\\0\\x10\\0" + b"x" * 0x100000))
+print(*source.problems(), flush=True)
+node.close()
+print("closed", flush=True)
+"""
+
+#: The command.
+LIVE = """
+from lineament.cli import run
+sys.exit(run(["live", "--ros", "1", "--topic", "/whole/scan", "__log:=x"]))
+"""
+
+
+@pytest.fixture
+def program(master: None) -> Iterator[subprocess.Popen]:  # noqa: ARG001
+    """Start a program with the path of this process; it is killed at the end."""
+    processes = []
+
+    def start(code: str) -> subprocess.Popen:
+        command = [sys.executable, "-c", f"import sys\nsys.path[:] = {sys.path}\n{code}"]
+        pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        processes.append(subprocess.Popen(command, **pipes, text=True))
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_a_node_that_is_replaced_ends(program):
+    node = program(NODE)
+    assert node.stdout.readline() == "up\n"
+    with closing(Remote("ros1_peer", "another")) as replacing:
+        replacing.publish("/replaced", SCAN)
+        output, _ = node.communicate(timeout=DEADLINE)
+    assert output.endswith("ended\n\nclosed\n")
+    assert node.returncode == 0
+
+
+def test_a_node_ends_though_a_listener_stands_still(program, peer):
+    node = program(NODE)
+    assert node.stdout.readline() == "up\n"
+    peer.listen("/out", "std_msgs/String")
+    assert node.stdout.readline() == "heard\n"
+    peer.signal(signal.SIGSTOP)
+    output, _ = node.communicate(timeout=DEADLINE)
+    assert output.endswith("closed\n")
+    assert node.returncode == 0
+
+
+def test_the_command_from_scan_to_features(program, scanner):
+    warm_up(["optimal"])  # The program should not wait for a compiler.
+    live = program(LIVE)
+    below = {"features": "sensor_msgs/PointCloud2", "markers": "visualization_msgs/MarkerArray"}
+    for name, kind in below.items():
+        scanner.listen(f"/whole/scan/{name}", kind)
+    scanner.listen("/diagnostics", "diagnostic_msgs/DiagnosticArray")
+    scanner.publish("/whole/scan", SCAN)
+    wall = scan_message(12, [2 / math.cos(bearing) for bearing in (-0.75, 0.0, 0.75)])
+
+    def publish() -> None:
+        assert live.poll() is None
+        scanner.write("/whole/scan", wall)
+
+    cloud, markers = (heard(scanner, f"/whole/scan/{name}", publish) for name in below)
+    for message in (cloud, markers["markers"][0]):
+        assert message["header"]["stamp"] == {"sec": 12, "nanosec": 500_000_001}
+        assert message["header"]["frame_id"] == "laser"
+    (status,) = heard(scanner, "/diagnostics")["status"]
+    assert status["name"] == "lineament: /whole/scan"
+    os.kill(live.pid, signal.SIGTERM)
+    output, errors = live.communicate(timeout=DEADLINE)
+    assert (live.returncode, output.count("\n")) == (0, 1)
+    assert " lost, 0 malformed messages\n" in output
+    assert "1 publisher of scans" in errors

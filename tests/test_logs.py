@@ -1,78 +1,111 @@
-"""open_log: formats by content, clear errors, bounded work at import."""
+"""open_log: formats by content, one clear line for what is wrong, bounded memory, recordings."""
 
 from __future__ import annotations
 
+import gc
 import gzip
+import json
+import math
 import os
 import subprocess
 import sys
-import zipfile
+import tracemalloc
+from contextlib import contextmanager, suppress
+from itertools import pairwise
 
+import numpy as np
 import pytest
+from text_logs import FLASER, csm_scan, scan_texts, zipped
 
 from lineament import LogError
-from lineament.logs import lines, open_log
+from lineament.logs import lines, open_log, summarize
 
-FLASER = b"FLASER 3 1.5 2.5 60 1 2 0.5 0 0 0 7.5 robot 0.1\n"
+GZIPPED = gzip.compress(FLASER * 9)
 
 
-@pytest.mark.parametrize("name", ["a.log", "a.txt", "a.npz", "a"])
-@pytest.mark.parametrize("pack", [bytes, gzip.compress])
-def test_format_is_found_by_content(tmp_path, name, pack):
-    path = tmp_path / name
-    path.write_bytes(pack(b"# a comment\n" + FLASER))
-    log = open_log(str(path))
-    assert (log.format, len(log), log.topics, log.topic) == ("carmen", 1, ["FLASER"], None)
-    assert log.path == path
+@contextmanager
+def at_most(megabytes):
+    """Memory that is allocated inside stays below a bound."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < megabytes << 20
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("name", ["a.log", "a.npz", "a"])
+@pytest.mark.parametrize("pack", [bytes, gzip.compress, b"\xef\xbb\xbf".__add__])
+@pytest.mark.parametrize(
+    ("kind", "n", "topics"),
+    [
+        ("carmen", 12, ["FLASER"]),
+        ("graph", 9, ["ROBOTLASER1"]),
+        ("dpslam", 12, ["Laser"]),
+        ("csm", 9, ["scan"]),
+        ("rplidar", 4, ["dev0", "dev1", "dev2", "dev3"]),
+        ("tinyslam", 3, ["scan"]),
+        ("csv", 15, ["scan"]),
+        ("csv_beams", 1, ["scan"]),
+    ],
+)
+def test_each_format_is_found_by_content(write, kind, n, topics, name, pack):
+    log = open_log(str(write(scan_texts()[kind], name, pack)))
+    assert log.format == kind.removesuffix("_beams")
+    assert (len(log), log.topics, log.topic, log.path.name) == (n, topics, None, name)
+    assert [topic for topic, _ in log.items()] == topics * (n // len(topics))
+    for topic in topics:
+        assert len(list(open_log(log.path, topic))) == n // len(topics)
+    with pytest.raises(LogError, match=rf"no topic 'x'; topics there are: {', '.join(topics)}"):
+        open_log(log.path, "x")
+    np.testing.assert_array_equal(log.scan(n - 1).ranges, list(log)[-1].ranges)
+    for index in (-1, n):
+        with pytest.raises(LogError, match=rf"has no scan {index}, expected 0 to {n - 1}"):
+            log.scan(index)
 
 
 @pytest.mark.parametrize(
-    ("content", "problem"),
+    ("name", "content", "problem"),
     [
-        (b"", "is empty"),
-        (gzip.compress(b""), "is empty once decompressed"),
-        (b"\x1f\x8b\x08", "gzip data ends early"),
-        (b"\x1f\x8bnonsense that is no gzip", "gzip data is broken"),
-        (b"hello\nworld\n", r"is no log that lineament knows: .*CARMEN \(FLASER, ROBOTLASER1\)"),
-        (bytes(range(256)) * 300, "is no log that lineament knows"),
+        ("a", b"", "is empty, expected"),
+        ("a", gzip.compress(b""), "is empty once decompressed"),
+        ("a", b"\x1f\x8b\x08", "gzip data ends early"),
+        ("a", b"\x1f\x8bnonsense that is no gzip", "gzip data is broken"),
+        ("a", b"hello\nworld\n", r"is no log that lineament knows: .*CARMEN \(FLASER, ROBOTLASER1"),
+        ("a", bytes(range(256)) * 300, "is no log that lineament knows"),
+        ("a", zipped(readme="hello"), "is no log that lineament knows"),
+        # The ending shows which reader's error helps.
+        ("a.log", b"hello\n", r"is no log of CARMEN \(FLASER"),
+        ("a.npz", b"hello\n", "is no whole npz archive"),
+        ("a.npz", zipped(readme="hello"), "expected the keys"),
+        ("a\nb", b"hello\n", r"a\\nb: is no log"),
     ],
 )
-def test_what_is_no_log(tmp_path, content, problem):
-    path = tmp_path / "thing.bin"
-    path.write_bytes(content)
+def test_what_is_no_log(write, name, content, problem):
     with pytest.raises(LogError, match=problem) as caught:
-        open_log(path)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-def test_the_ending_helps_where_content_does_not(tmp_path):
-    (tmp_path / "a.log").write_text("hello\n")
-    with pytest.raises(LogError, match=r"is no log of CARMEN \(FLASER"):
-        open_log(tmp_path / "a.log")
-    (tmp_path / "a.npz").write_text("hello\n")
-    with pytest.raises(LogError, match="is no whole npz archive"):
-        open_log(tmp_path / "a.npz")
+        open_log(write(content, name))
+    assert str(caught.value).isprintable()
 
 
 def test_missing_directory_and_odd_paths(tmp_path):
-    with pytest.raises(LogError, match="there is no such file, expected a log"):
-        open_log(tmp_path / "missing.log")
-    with pytest.raises(LogError, match="is a directory, expected a log file"):
-        open_log(tmp_path)
-    with pytest.raises(LogError, match="is no path"):
-        open_log("nul\0byte")
-    with pytest.raises(LogError, match="is no path"):
-        open_log(None)
-    with pytest.raises(LogError, match="cannot be read"):
-        open_log("x" * 5000)
+    for path, problem in (
+        (tmp_path / "missing.log", "there is no such file, expected a log"),
+        (tmp_path, "is a directory, expected a log file"),
+        ("nul\0byte", "is no path"),
+        (None, "is no path"),
+        ("x" * 5000, "cannot be read"),
+    ):
+        with pytest.raises(LogError, match=problem):
+            open_log(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-def test_a_pipe_is_refused_and_does_not_block(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
+def test_pipes_are_refused_and_do_not_block(tmp_path, write):
+    os.mkfifo(tmp_path / "transforms.json")
     with pytest.raises(LogError, match="is no regular file"):
-        open_log(tmp_path / "pipe")
+        open_log(tmp_path / "transforms.json")
+    # Beside a log of units, which looks there for poses.
+    assert len(list(open_log(write('{"a": [[1, 2]]}', "a.json")))) == 1
 
 
 @pytest.mark.parametrize("error", [PermissionError(13, "denied"), OSError(5, "I/O error")])
@@ -82,48 +115,270 @@ def test_os_errors_do_not_escape(error):
         raise error
 
 
-def test_a_log_that_vanishes(tmp_path):
-    path = tmp_path / "a.log"
-    path.write_bytes(FLASER)
-    log = open_log(path)
-    path.unlink()
+def test_a_log_that_vanishes(write):
+    log = open_log(write(FLASER))
+    log.path.unlink()
     with pytest.raises(LogError, match="there is no such file"):
         list(log)
 
 
-def test_a_zip_that_is_no_npz(tmp_path):
-    for name, problem in (("a.zip", "no log that lineament knows"), ("a.npz", "expected the key")):
-        with zipfile.ZipFile(tmp_path / name, "w") as archive:
-            archive.writestr("readme.txt", "hello")
-        with pytest.raises(LogError, match=problem):
-            open_log(tmp_path / name)
-
-
-def test_lines_keep_their_numbers_over_pieces_and_members(tmp_path, monkeypatch):
-    monkeypatch.setattr(lines, "_PLAIN", 7)
-    monkeypatch.setattr(lines, "_COMPRESSED", 5)
-    expected = [(i + 1, b"line %d" % i + b"x" * (i % 13)) for i in range(60)]
-    text = b"\n".join(line for _, line in expected)
-    (tmp_path / "plain").write_bytes(b"\xef\xbb\xbf" + text)
-    members = gzip.compress(text[:100]) + gzip.compress(text[100:]) + b"\0" * 40
-    (tmp_path / "gz").write_bytes(members)
-    assert list(lines.numbered_lines(tmp_path / "gz")) == expected
-    monkeypatch.setattr(lines, "_COMPRESSED", 64)
-    assert list(lines.numbered_lines(tmp_path / "plain")) == expected
-
-
-def test_an_endless_line_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(lines, "MAX_LINE", 1 << 20)
-    (tmp_path / "a").write_bytes(b"one\n" + b"x" * (1 << 22))
-    with pytest.raises(LogError, match=r":2: line longer than 1 MiB"):
-        list(lines.numbered_lines(tmp_path / "a"))
+def test_a_log_that_grows_while_it_is_read(write):
+    log = open_log(write(FLASER * 3))
+    count = 0
+    for _ in log:
+        with log.path.open("ab") as file:  # Would never end if what is new were read too.
+            file.write(FLASER * 2)
+        count += 1
+    assert (count, len(list(log))) == (3, 9)
 
 
 def test_import_is_light():
-    code = (
-        "import sys, lineament.logs; "
-        "print([m for m in ('numba', 'pyarrow', 'matplotlib', 'lineament.logs.carmen', "
-        "'lineament.logs.npz', 'lineament.logs.info') if m in sys.modules])"
-    )
+    heavy = ("numba", "pyarrow", "matplotlib", *(f"lineament.logs.{x}" for x in ("npz", "carmen")))
+    code = f"import sys, lineament.logs; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# Lines and pieces
+
+
+def test_lines_keep_their_numbers_over_pieces_and_members(write, monkeypatch):
+    monkeypatch.setattr(lines, "_PLAIN", 7)
+    expected = [(i + 1, b"line %d" % i + b"x" * (i % 13)) for i in range(60)]
+    text = b"\n".join(line for _, line in expected)
+    for compressed, plain in ((5, b""), (64, b"\xef\xbb\xbf")):
+        monkeypatch.setattr(lines, "_COMPRESSED", compressed)
+        members = gzip.compress(plain + text[:100]) + gzip.compress(text[100:]) + b"\0" * 40
+        assert list(lines.numbered_lines(write(members))) == expected
+        assert list(lines.numbered_lines(write(plain + text))) == expected
+
+
+def test_an_endless_line_is_refused(write, monkeypatch):
+    monkeypatch.setattr(lines, "MAX_LINE", 1 << 20)
+    path = write(b"one\n" + b"x" * (1 << 20))
+    assert [number for number, _ in lines.numbered_lines(path)] == [1, 2]
+    path = write(b"one\n" + b"x" * ((1 << 20) + 1))
+    with pytest.raises(LogError, match=r":2: line longer than 1 MiB"):
+        list(lines.numbered_lines(path))
+
+
+def test_pieces_of_gzip_do_not_pile_up(write):
+    path = write(FLASER + (b" " * 4095 + b"\n") * (1 << 12), pack=gzip.compress)
+    with at_most(10):
+        assert sum(len(piece) for piece in lines.chunks(path)) == len(FLASER) + (1 << 24)
+        assert len(list(open_log(path))) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "beginning", "problem"),
+    [
+        ("a.csv", b"", ":1: line longer than 16 MiB, expected text"),
+        ("a.json", b'{"readings": [', "JSON object is broken or longer than 4 MiB"),
+    ],
+)
+def test_a_gigabyte_without_a_scan(tmp_path, name, beginning, problem):
+    path = tmp_path / name
+    with path.open("wb") as file:
+        file.write(beginning)
+        file.truncate(1 << 30)  # A hole, which takes no space.
+    with at_most(100), pytest.raises(LogError, match=problem):
+        open_log(path)
+
+
+# Damage
+
+
+def read_what_is_there(path, keep_going=True):
+    """Read a damaged log: every failure must be one line that names the file."""
+    problem = f"{path}: "
+    try:
+        log = open_log(path, keep_going=keep_going)
+        scans = list(log)
+        assert len(log) >= len(scans)
+    except LogError as error:
+        scans, problem = [], str(error)
+    assert problem.startswith(str(path))
+    assert problem.isprintable()
+    return scans
+
+
+@pytest.mark.parametrize("name", scan_texts())
+@pytest.mark.parametrize("pack", [bytes, gzip.compress])
+def test_cut_off_anywhere_and_flipped_bits(write, name, pack):
+    data = pack(scan_texts()[name].encode())
+    whole = [scan.ranges.tolist() for scan in open_log(write(data))]
+    counts = []
+    for cut in np.linspace(1, len(data) - 1, 100).astype(int):
+        scans = read_what_is_there(write(data[:cut]))
+        read_what_is_there(write(data[:cut]), keep_going=False)
+        counts.append(len(scans))
+    assert max(counts) <= len(whole)
+    if name not in ("rplidar", "csv_beams"):  # One object, and one scan, of all.
+        assert counts[-1] >= len(whole) - 2
+        assert all(b >= a for a, b in pairwise(counts))
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        flipped = bytearray(data)
+        flipped[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        for keep_going in (True, False):
+            read_what_is_there(write(bytes(flipped)), keep_going)
+
+
+def test_cut_off_gzip_delivers_whole_scans_only(write):
+    rng = np.random.default_rng(1)
+    ranges = [" ".join(f"{value:.2f}" for value in rng.uniform(0, 20, 20)) for _ in range(60)]
+    text = "".join(f"FLASER 20 {ranges[i]} 1 2 3 0 0 0 {i} h 1\n" for i in range(60))
+    data = gzip.compress(text.encode())
+    whole = [(scan.stamp, scan.ranges.tolist()) for scan in open_log(write(data))]
+    counts = []
+    for cut in range(len(data) // 8, len(data), 37):
+        path = write(data[:cut])
+        log = open_log(path, keep_going=True)
+        scans = [(scan.stamp, scan.ranges.tolist()) for scan in log]
+        assert scans == whole[: len(scans)]
+        assert (log.skipped, len(log)) == (1, len(scans))
+        counts.append(len(scans))
+        with pytest.raises(LogError, match=rf":{len(scans) + 1}: gzip data ends early"):
+            list(open_log(path))
+    assert counts == sorted(counts)
+    assert (len(counts) > 20, counts[-1] >= 55) == (True, True)
+
+
+def test_a_wrong_checksum_at_the_end_costs_no_scan(write):
+    data = bytearray(gzip.compress(FLASER * 500))
+    data[-6] ^= 255
+    log = open_log(write(bytes(data)), keep_going=True)
+    assert (len(list(log)), log.skipped) == (500, 1)
+    with pytest.raises(LogError, match=":501: gzip data is broken: incorrect data check"):
+        list(open_log(log.path))
+
+
+def test_what_a_file_holds_does_not_break_lines_or_steer_terminals(write):
+    with pytest.raises(LogError, match=r"range 1 of 3 is '\\x1b\[31m', expected a number$"):
+        list(open_log(write(FLASER.replace(b"1.5", b"\x1b[31m"))))
+    log = open_log(write("angle_min,angle_increment,frame_id,r0\n0,1,\x1b[1m\x85,1\n"))
+    assert summarize(log).lines()[-1] == r"frames   \x1b[1m\x85"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "angle_deg,range\n-1e308,1\n1e308,2\n1,2\n",
+        "angle_min,angle_increment,r0,r1\n1e308,0.1,1,2\n",
+        "angle_min,angle_increment,r0,r1\n0.5,1e-320,1,2\n",
+        json.dumps(csm_scan(theta=[-1e308, 0, 1e308])),
+        json.dumps(csm_scan(theta=None, min_theta=-1e308, max_theta=1e308)),
+        '{"a": [[1, -1e308], [1, 1e308]]}',
+    ],
+)
+def test_bearings_without_measure_are_refused(write, text):
+    with pytest.raises(LogError, match=r"once around|too small|expected a finite bearing"):
+        list(open_log(write(text)))
+
+
+@pytest.mark.parametrize(
+    "member",
+    [
+        FLASER + b"FLASER 9\n",
+        b'{"a": [[1, 2]',
+        gzip.compress(b'{"a": [[1, 2],' + b"[3, 4]," * 99 + b"[5, 6]]}")[:-9],
+        gzip.compress(FLASER)[:-1],
+        b"#ROSBAG V2.0\n",
+    ],
+)
+def test_temporary_copies_do_not_wait_for_the_collector(write, temporary, member):
+    """An error that is kept and raised again refers to itself by its traceback."""
+    path = write(zipped(member=member), "a.zip")
+    gc.disable()
+    try:
+        for keep_going in (False, True):
+            with suppress(LogError):
+                list(open_log(path / "member", keep_going=keep_going))
+        assert list(temporary.iterdir()) == []
+    finally:
+        gc.enable()
+
+
+# Recordings
+
+#: Scans, beams of the first one, and a range of it or the pose.
+RECORDINGS = {
+    "carmen/acapulco-corrected.log.gz": (861, 181, (0.694727, 0.0963489, 0.402857)),
+    "carmen/aces-corrected.log.gz": (440, 180, None),
+    "carmen/csail-corrected.log.gz": (406, 361, None),
+    "carmen/intel-corrected.log.gz": (910, 180, None),
+    "graph/intel-lab.log.gz": (2672, 180, (4.78, -5.84, -1.69)),
+    "graph/killian.g2o.zip": (3873, 180, (1.96, 37.867, -2.01239)),
+    "text/csm_scans.json": (1, 181, 5.000762),
+    "text/dpslam_loop5.log.gz": (551, 181, 0.642),
+    "text/lidar01.csv": (1, 154, 0.5335),
+    "text/tinyslam_exp1.dat.gz": (756, 682, 2.229),
+    "text/rplidar_kitchenette/scans_2025-09-04-16-43-09.json": (5, 603, 6.095749855041504),
+    "text/rplidar_kitchenette/scans_2025-09-04-16-51-11.json": (5, 598, 6.096749782562256),
+}
+#: What opening says of all that is no log.
+NO_LOG = {
+    "README.md": "is no log that lineament knows",
+    "reserved.tar.xz.enc": "is no log that lineament knows",
+    "benchmark/ple_real.npz": "expected the keys ranges, .*; found azimuth",
+    "benchmark/ple_sim.npz": "expected the keys ranges, .*; found azimuth",
+    "graph/intel-lab.relations": "is no log that lineament knows",
+    "mcap/nav2_turtlebot_no_scan.mcap": "has no LaserScan .*/amcl_pose",
+    "text/rplidar_kitchenette/circle1.json": "is no CSM log",
+    "text/rplidar_kitchenette/circle2.json": "is no CSM log",
+    "text/rplidar_kitchenette/transforms.json": "is no CSM log",
+}
+#: Parts of bags, which their folders stand for, and what sqlite keeps beside databases.
+PARTS = ("metadata.yaml", "-shm", "-wal")
+
+
+def test_each_recording_opens_or_says_why_not(data_dir):
+    seen, logs = set(), 0
+    folders = {path.parent for path in data_dir.rglob("metadata.yaml")}
+    for path in sorted({*data_dir.rglob("*"), *folders}):
+        name = path.relative_to(data_dir).as_posix()
+        if (path.is_dir() and path not in folders) or name.endswith(PARTS):
+            continue
+        seen.add(name)
+        if name in NO_LOG:
+            with pytest.raises(LogError, match=NO_LOG[name]):
+                open_log(path)
+        else:
+            logs += 1
+            check_log(path, RECORDINGS.get(name))
+    assert seen >= {*NO_LOG, *RECORDINGS}
+    assert logs >= 24
+
+
+def check_log(path, expected):
+    """Check every scan of a log, and its summary, at one reading."""
+    log = open_log(path)
+    counts = dict.fromkeys(log.topics, 0)
+    scans = []
+
+    def checked():
+        for topic, scan in log.items():
+            counts[topic] += 1
+            assert math.isfinite(scan.stamp), path
+            assert len(scan) > 50, path
+            assert not np.isnan(scan.angles).any(), path
+            if expected is not None:
+                scans.append(scan)
+            yield topic, scan
+
+    info = summarize(log, checked())
+    assert sum(counts.values()) == len(log) > 0, path
+    assert all(counts.values()), path
+    assert {topic.name: topic.scans for topic in info.topics} == counts
+    assert all(topic.ranges is not None and topic.valid > 0.3 for topic in info.topics), path
+    assert info.skipped == 0
+    if expected is not None:
+        count, beams, first = expected
+        assert (len(scans), len(scans[0])) == (count, beams)
+        if isinstance(first, float):
+            assert np.abs(scans[0].ranges[scans[0].valid] - first).min() < 1e-12
+        else:
+            assert first is None or scans[0].pose == first
+            step = math.radians(0.5 if beams > 200 else 1)
+            given = {(one.range_max, one.angle_min, one.angle_increment) for one in scans}
+            assert given == {(50.0, -math.pi / 2, step)}

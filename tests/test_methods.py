@@ -13,115 +13,169 @@ from lineament import Extractor
 from lineament.methods import DEFAULT_METHOD, METHODS, get_method
 from lineament.methods.liu import Liu
 
+NAN, INF = math.nan, math.inf
+NOT_NUMBERS = ["1", None, True, 1j, [1.0]]
+FITS = ("total", "y_of_x", "weighted")
+ENDS = ("intersection", "beam")
 
-@pytest.mark.parametrize("name", ["lui", "", "liu:", "liu:papers", "paper", "LIU", "liu:paper:x"])
-def test_unknown_names_are_told_with_the_choices(name):
-    if name == "liu:":
-        assert get_method(name) == Liu()
-        return
+#: By method and parameter: the least whole number; "> 0"; "≥ 0"; "acute" angles; or the choices.
+SHARED = {"reach": "≥ 0", "grazing_angle": "acute", "max_missing": 0, "max_vertices": 0}
+MERGED = SHARED | {"threshold": "≥ 0", "unevenness": "≥ 0", "corner_trim": 0, "min_points": 2}
+NEAR = SHARED | {"epsilon": "≥ 0", "sigmas": "≥ 0", "fit": FITS, "noise_factor": "≥ 0"}
+RUNS = NEAR | {"min_points": 3, "min_length": "≥ 0", "max_misses": 0}
+BOUNDS = {
+    "optimal": {"evidence": "> 0", "max_missing": 0, "max_vertices": 0},
+    "liu": {
+        "sigma_d": "> 0",
+        "sigma_r": "> 0",
+        "half_width": 0,
+        "spacing_scale": "> 0",
+        "noise_floor": "≥ 0",
+        "density_k": "≥ 0",
+        "min_points": 2,
+        "support_radius": 1,
+        "threshold": "≥ 0",
+        "response": ("tangent", "product", "relative"),
+        "fit": FITS,
+        "measure": ("raw", "filtered"),
+        "corner": ENDS,
+        "corner_trim": 0,
+        "max_vertices": 0,
+    },
+    "pdbs": {
+        "rule": ("borges_aldon", "fixed", "dietmayer", "santos", "lee"),
+        "distance": "> 0",
+        "c0": "≥ 0",
+        "beta": "acute",
+        "ratio": "> 0",
+        "grazing_angle": "acute",
+        "noise_factor": "≥ 0",
+        "max_missing": 0,
+        "min_points": 1,
+    },
+    "iepf": MERGED
+    | {"proportion": "≥ 0", "noise_factor": "≥ 0", "min_piece": 2, "merge": bool, "corner": ENDS},
+    "split_and_merge": MERGED | {"noise_factor": "≥ 0", "min_piece": 2},
+    "line_tracking": MERGED | {"noise_factor": "> 0", "max_misses": 0, "min_piece": 3},
+    "hough": RUNS | {"angles": 4, "distances": 4, "resolution": "> 0"},
+    "ransac": RUNS | {"trials": 1, "window": 1, "seed": 1},
+    "region_growing": NEAR | {"s_num": 3, "p_min": 3, "l_min": "≥ 0", "delta": "≥ 0"},
+}
+ACCEPTED = {
+    "> 0": [5e-324, 2, np.float32(2), 1e300],
+    "≥ 0": [0, 0.0, 2.5],
+    "acute": [1e-9, 1.57],
+    bool: [True, False],
+}
+REFUSED = {
+    "> 0": [0, -1.0, NAN, INF, 10**400, *NOT_NUMBERS],
+    "≥ 0": [-1e-9, NAN, INF, 10**400, *NOT_NUMBERS],
+    "acute": [0, -0.1, math.pi / 2, 10, *NOT_NUMBERS],
+    bool: [1, 0, None, "yes"],
+}
+
+
+def accepted(bound):
+    if isinstance(bound, int):
+        return [bound, np.int64(bound + 40)]
+    return bound if isinstance(bound, tuple) else ACCEPTED[bound]
+
+
+def refused(bound):
+    if isinstance(bound, tuple):
+        return ["", "chord", None, 1, ["total"]]
+    if isinstance(bound, int) and not isinstance(bound, bool):
+        return [bound - 1, bound + 1.0, NAN, INF, *NOT_NUMBERS]
+    return REFUSED[bound]
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_bounds(name):
+    """Bounds themselves are accepted, with the type of the default; what is beyond is refused."""
+    default = get_method(name)
+    assert {field.name for field in dataclasses.fields(default)} == set(BOUNDS[name])
+    for parameter, bound in BOUNDS[name].items():
+        # A tolerance of 0 in all its parts is refused elsewhere.
+        others = {"threshold": 1.0} if "min_piece" in BOUNDS[name] else {}
+        for value in accepted(bound):
+            kept = getattr(get_method(name, **{**others, parameter: value}), parameter)
+            assert kept == value
+            assert type(kept) is type(getattr(default, parameter))
+        for value in refused(bound):
+            with pytest.raises(ValueError, match=f"^{parameter} is .*, expected ") as error:
+                get_method(name, **{parameter: value})
+            assert repr(value) in str(error.value)
+
+
+def test_refusals_name_what_is_expected():
+    for name, changes, message in (
+        ("liu", {"fit": "huber"}, "fit is 'huber', expected one of: total, y_of_x, weighted"),
+        ("liu", {"min_points": 1}, "min_points is 1, expected a whole number ≥ 2"),
+        ("liu", {"sigma_d": 0}, "sigma_d is 0, expected a number > 0"),
+        ("pdbs", {"beta": 2}, r"beta is 2, expected a number > 0 and < 1\.57079632679"),
+        ("iepf", {"merge": 1}, "merge is 1, expected True or False"),
+        ("ransac", {"seed": 2**31 - 1}, "seed is 2147483647, .* ≥ 1 and < 2147483647"),
+        (
+            "iepf",
+            {"proportion": 0, "noise_factor": 0},
+            "threshold, proportion and noise_factor are all 0, expected one > 0",
+        ),
+        ("split_and_merge", {"noise_factor": 0}, "threshold and noise_factor are both 0"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            get_method(name, **changes)
+    assert get_method("ransac", seed=2**31 - 2).seed == 2**31 - 2
+
+
+@pytest.mark.parametrize("name", ["lui", "", "liu:papers", "paper", "LIU", "liu:paper:x"])
+def test_unknown_names_are_refused_with_the_choices(name):
     with pytest.raises(ValueError, match=rf"method {name!r} is unknown, .*: .*liu, liu:paper"):
         get_method(name)
     with pytest.raises(ValueError, match="is unknown"):
         ln.extract(ln.LaserScan([1.0], 0.0, 0.1), method=name)
 
 
-@pytest.mark.parametrize("name", ["liu", "liu:paper", "liu:scale_free"])
-def test_unknown_parameters_are_told_with_the_choices(name):
+@pytest.mark.parametrize("name", ["liu", "liu:paper"])
+def test_unknown_parameters_are_refused_with_the_choices(name):
     with pytest.raises(ValueError, match=r"'liu' has no parameter 'radius', .*: sigma_d, .*corner"):
         get_method(name, radius=3)
     with pytest.raises(ValueError, match="no parameter 'presets'"):
         Extractor(name, presets=("x",))
 
 
-NAN, INF = math.nan, math.inf
-NOT_NUMBERS = ["1", None, True, 1j, [1.0]]
-
-
-@pytest.mark.parametrize(
-    ("name", "refused"),
-    [
-        ("sigma_d", [0, 0.0, -1.0, NAN, INF, 10**400, *NOT_NUMBERS]),
-        ("sigma_r", [0, -0.3, NAN, INF, *NOT_NUMBERS]),
-        ("spacing_scale", [0, -6, NAN, INF, *NOT_NUMBERS]),
-        ("noise_floor", [-1e-9, NAN, INF, *NOT_NUMBERS]),
-        ("density_k", [-1e-9, NAN, INF, *NOT_NUMBERS]),
-        ("threshold", [-1e-9, NAN, INF, *NOT_NUMBERS]),
-        ("half_width", [-1, 1.0, NAN, *NOT_NUMBERS]),
-        ("min_points", [1, 0, -3, 3.0, *NOT_NUMBERS]),
-        ("support_radius", [0, -1, 6.0, *NOT_NUMBERS]),
-        ("response", ["chord", "", None, 1]),
-        ("fit", ["huber", "", None, 1]),
-        ("measure", ["both", "", None]),
-        ("corner", ["vertex", "", None]),
-    ],
-)
-def test_bounds(name, refused):
-    for value in refused:
-        with pytest.raises(ValueError, match=f"{name} is ") as error:
-            get_method("liu", **{name: value})
-        assert str(value) in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("sigma_d", 1e-3),
-        ("sigma_r", 1e-3),
-        ("spacing_scale", 1e-3),
-        ("noise_floor", 0),
-        ("density_k", 0),
-        ("threshold", 0),
-        ("half_width", 0),
-        ("half_width", np.int64(40)),
-        ("min_points", 2),
-        ("support_radius", 1),
-        ("sigma_d", np.float32(2)),
-    ],
-)
-def test_bounds_themselves_are_taken(name, value):
-    method = get_method("liu", **{name: value})
-    kept = getattr(method, name)
-    assert kept == value
-    assert type(kept) is type(getattr(Liu(), name))
-    rng = np.random.default_rng(0)
-    scan = ln.LaserScan(2 + 0.01 * rng.normal(size=50), 0.0, 0.01)
-    assert isinstance(Extractor(method)(scan), ln.Features)
-
-
 def test_methods_are_values():
     method = get_method("liu", threshold=0.5)
-    assert method == Liu(threshold=0.5)
+    assert method == Liu(threshold=0.5) != get_method("liu:")
     assert hash(method) == hash(Liu(threshold=0.5))
     with pytest.raises(dataclasses.FrozenInstanceError):
         method.threshold = 0.1
-    assert get_method("liu") == Liu()
     assert "threshold=0.5" in repr(method)
+    assert Extractor(method).method is method
+    with pytest.raises(ValueError, match="made before"):
+        Extractor(method, threshold=0.2)
 
 
 def test_presets():
-    assert set(Liu.presets) >= {"paper", "scale_free"}
     paper = get_method("liu:paper")
     assert (paper.noise_floor, paper.fit, paper.measure) == (0.0, "y_of_x", "filtered")
-    assert paper.corner == "beam"
-    assert get_method("liu:paper", fit="total").fit == "total"
+    assert (paper.corner, get_method("liu:paper", fit="total").fit) == ("beam", "total")
     free = get_method("liu:scale_free", support_radius=4)
-    assert (free.response, free.support_radius) == ("relative", 4)
-    for preset in Liu.presets:
-        assert getattr(Liu, preset)(min_points=4).min_points == 4
+    assert (free.response, free.threshold, free.support_radius) == ("relative", 0.25, 4)
+    plain = get_method("iepf:paper")
+    assert (plain.threshold, plain.proportion, plain.noise_factor) == (0.1, 0.0, 0.0)
+    assert (plain.merge, plain.corner) == (False, "beam")
+    assert get_method("pdbs:paper").grazing_angle == math.radians(10)
 
 
-def test_every_method_is_there():
+def test_every_method_is_there_and_lists_its_parameters():
     assert DEFAULT_METHOD in METHODS
+    assert set(METHODS) == set(BOUNDS)
     scan = ln.LaserScan([2.0] * 20, 0.0, 0.01)
     for name in METHODS:
         method = get_method(name)
         assert method.name == name
         assert len(ln.extract(scan, method=name).segments) == (name != "pdbs")
+        for field in dataclasses.fields(method):
+            assert f"\n{field.name} : " in method.__doc__
         for preset in method.presets:
             assert get_method(f"{name}:{preset}").name == name
-
-
-def test_method_made_before_takes_no_parameters():
-    assert Extractor(Liu(threshold=0.2)).method.threshold == 0.2
-    with pytest.raises(ValueError, match="made before"):
-        Extractor(Liu(), threshold=0.2)

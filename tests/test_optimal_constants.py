@@ -3,15 +3,12 @@
 The kernels run as plain Python, in which a number can be replaced.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
-from typing import Any
 
 import numba
 import numpy as np
@@ -54,157 +51,148 @@ def replaced(name: str, value: float) -> Iterator[None]:
         setattr(module, name, before)
 
 
-class Scenes:
-    """What the method finds in scenes of exact ranges; parameters replace its own."""
-
-    def __init__(self, plain: ModuleType, **parameters: Any) -> None:
-        self.plain, self.parameters = plain, parameters
-
-    def found(self, ranges, angles, sigma=1e-4, **parameters):
-        noise = None if sigma is None else self.plain.RangeNoise(sigma=sigma)
-        extractor = self.plain.Extractor("optimal", noise=noise, **parameters | self.parameters)
-        with np.errstate(all="ignore"):
-            return extractor(self.plain.LaserScan(ranges, angles=angles))
-
-    # Each returns whether what is expected holds, from either side.
-
-    def tau(self):
-        """Walls 7.5 cm apart are one that bends, 10.5 cm apart two."""
-        return len(self.panels(0.075).segments) == 1 and len(self.panels(0.105).segments) == 2
-
-    def panels(self, step):
-        angles = fan(15, ONE / 2)
-        return self.found(wall(angles, 2.0, 0) + step * (angles > 0), angles)
-
-    def clutter(self):
-        """A last measurement is on its wall where it is off by 7 cm, on none where by 8 cm."""
-        return [self.last(off).segments["last_beam"][0] for off in (0.07, 0.08)] == [60, 59]
-
-    def last(self, off):
-        angles = fan(30, ONE)
-        ranges = wall(angles, 2.0, 0)
-        ranges[-1] -= off
-        return self.found(ranges, angles)
-
-    def least(self):
-        """Four measurements before a wall are a panel, three are none."""
-        return [len(self.panel(count).segments) for count in (3, 4)] == [2, 3]
-
-    def panel(self, count):
-        angles = fan(20, ONE)
-        ranges = wall(angles, 2.0, 0)
-        ranges[20 : 20 + count] -= 0.8 / np.cos(angles[20 : 20 + count])
-        return self.found(ranges, angles)
-
-    def sigmas(self):
-        """A measurement that is off by 7.5 cm counts for its wall, by 10.5 cm not."""
-        return [self.off(off).segments["n_points"][0] for off in (0.075, 0.105)] == [61, 60]
-
-    def off(self, off):
-        angles = fan(30, ONE)
-        ranges = wall(angles, 2.0, 0)
-        ranges[30] -= off
-        return self.found(ranges, angles)
-
-    def steepest(self):
-        """A measurement 17 spacings behind a wall is a spike, at 12 it may be on a surface."""
-        return [self.behind(spacings).clusters[30] >= 0 for spacings in (12, 17)] == [True, False]
-
-    def behind(self, spacings):
-        angles = fan(30, ONE)
-        ranges = wall(angles, 2.0, 0)
-        ranges[30] += spacings * 2.0 * math.sin(ONE)
-        return self.found(ranges, angles)
-
-    def bend(self):
-        """A wall may bend by 17°, a turn of 23° is a corner."""
-        return [len(self.turn(163, 21).corners), len(self.turn(157, 19).corners)] == [0, 1]
-
-    def turn(self, opening, arm):
-        angles = 0.6 * ONE * np.arange(-arm, arm + 1)
-        return self.found(vertex(angles, 2.0, opening, convex=False), angles)
-
-    def rare(self):
-        """A wall of arms of 0.75 m may bend by 15°, one of arms of 0.85 m has a corner there."""
-        return [len(self.turn(165, arm).corners) for arm in (37, 42)] == [0, 1]
-
-    def reach(self):
-        """A corner is 29 cm from the measurements beside it, not 36 cm from them."""
-        return [len(self.hole(missing).corners) for missing in (3, 4)] == [1, 0]
-
-    def hole(self, missing):
-        angles = fan(30, ONE)
-        ranges = vertex(angles, 3.0, 90, convex=False)
-        ranges[30 : 31 + missing] = np.nan
-        return self.found(ranges, angles, max_missing=20)
-
-    def most_deviation(self):
-        """The end of a wall is known to 8 cm, by its spacing, or it is no edge."""
-        return [(self.end(far).corners["kind"] == "edge").sum() for far in (8, 12)] == [1, 0]
-
-    def end(self, far):
-        angles = fan(20, 2 * ONE)
-        return self.found(wall(angles, far, 0) * np.where(angles > 0, 2.0, 1.0), angles)
-
-    def arc_radius(self):
-        """A column of 1.3 m is round, one of 1.7 m not."""
-        return [len(self.column(radius).arcs) for radius in (1.3, 1.7)] == [1, 0]
-
-    def column(self, radius, turn=1.5, far=4.0):
-        """Measurements at equal turns along a column that is seen from the side."""
-        around = np.linspace(-turn / 2, turn / 2, 60)
-        x, y = far - radius * np.cos(around), radius * np.sin(around)
-        return self.found(np.hypot(x, y), np.arctan2(y, x))
-
-    def arc_turn(self):
-        """A round surface shows 45°, or it is none."""
-        return [len(self.column(1.0, turn).arcs) for turn in (0.6, 0.85)] == [0, 1]
-
-    def evidence(self):
-        """A corner that costs 15 to leave out is one, a corner that costs 10 is none."""
-        return [len(self.turn(154, arm).corners) for arm in (13, 15)] == [0, 1]
-
-    def max_missing(self):
-        """A wall goes on over six missing beams, not over seven."""
-        return [len(self.missing(beams).segments) for beams in (6, 7)] == [1, 2]
-
-    def missing(self, beams):
-        angles = fan(30, ONE)
-        ranges = wall(angles, 2.0, 0)
-        ranges[20 : 20 + beams] = np.nan
-        return self.found(ranges, angles)
+def flat(half=30, step=ONE):
+    """A wall 2 m ahead, and its bearings."""
+    angles = fan(half, step)
+    return wall(angles, 2.0, 0), angles
 
 
-#: Constants, and what they become times a factor.
-SCALED = ("TAU", "CLUTTER", "SIGMAS", "STEEPEST", "RARE", "REACH", "MOST_DEVIATION")
-SCALED += ("ARC_RADIUS", "ARC_TURN")
-CONSTANTS = {name: lambda value, factor: value * factor for name in SCALED}
-CONSTANTS["LEAST"] = lambda value, factor: round(value * factor)
-CONSTANTS["BEND"] = lambda value, factor: math.cos(factor * math.acos(value))
+def nearer(beams, by):
+    """A wall on which some measurements are nearer by so much [m]."""
+    ranges, angles = flat()
+    ranges[beams] -= by
+    return ranges, angles
+
+
+def panels(step):
+    ranges, angles = flat(15, ONE / 2)
+    return ranges + step * (angles > 0), angles
+
+
+def panel(count):
+    ranges, angles = flat(20)
+    ranges[20 : 20 + count] -= 0.8 / np.cos(angles[20 : 20 + count])
+    return ranges, angles
+
+
+def turn(opening, arm):
+    angles = 0.6 * ONE * np.arange(-arm, arm + 1)
+    return vertex(angles, 2.0, opening, convex=False), angles
+
+
+def hole(missing):
+    angles = fan(30, ONE)
+    ranges = vertex(angles, 3.0, 90, convex=False)
+    ranges[30 : 31 + missing] = np.nan
+    return ranges, angles
+
+
+def end(far):
+    angles = fan(20, 2 * ONE)
+    return wall(angles, far, 0) * np.where(angles > 0, 2.0, 1.0), angles
+
+
+def column(radius, shown=1.5, far=4.0):
+    """Measurements at equal turns along a column that is seen from the side."""
+    around = np.linspace(-shown / 2, shown / 2, 60)
+    x, y = far - radius * np.cos(around), radius * np.sin(around)
+    return np.hypot(x, y), np.arctan2(y, x)
+
+
+def count(table):
+    return lambda found: len(getattr(found, table))
+
+
+#: By constant: what it decides, two scenes on either side of it, and what is found in them.
+CASES = {
+    # Walls 7.5 cm apart are one that bends, 10.5 cm apart two.
+    "TAU": (count("segments"), (panels(0.075), 1), (panels(0.105), 2)),
+    # A last measurement is on its wall where it is off by 7 cm, on none where by 8 cm.
+    "CLUTTER": (
+        lambda found: found.segments["last_beam"][0],
+        (nearer(-1, 0.07), 60),
+        (nearer(-1, 0.08), 59),
+    ),
+    # Four measurements before a wall are a panel, three are none.
+    "LEAST": (count("segments"), (panel(3), 2), (panel(4), 3)),
+    # A measurement that is off by 7.5 cm counts for its wall, by 10.5 cm not.
+    "SIGMAS": (
+        lambda found: found.segments["n_points"][0],
+        (nearer(30, 0.075), 61),
+        (nearer(30, 0.105), 60),
+    ),
+    # A measurement 17 spacings behind a wall is a spike, at 12 it may be on a surface.
+    "STEEPEST": (
+        lambda found: found.clusters[30] >= 0,
+        (nearer(30, -24.0 * math.sin(ONE)), True),
+        (nearer(30, -34.0 * math.sin(ONE)), False),
+    ),
+    # A wall may bend by 17°, a turn of 23° is a corner.
+    "BEND": (count("corners"), (turn(163, 21), 0), (turn(157, 19), 1)),
+    # A wall of arms of 0.75 m may bend by 15°, one of arms of 0.85 m has a corner there.
+    "RARE": (count("corners"), (turn(165, 37), 0), (turn(165, 42), 1)),
+    # A corner is 29 cm from the measurements beside it, not 36 cm from them.
+    "REACH": (count("corners"), (hole(3), 1), (hole(4), 0)),
+    # The end of a wall is known to 8 cm, by its spacing, or it is no edge.
+    "MOST_DEVIATION": (
+        lambda found: (found.corners["kind"] == "edge").sum(),
+        (end(8), 1),
+        (end(12), 0),
+    ),
+    # A column of 1.3 m is round, one of 1.7 m not.
+    "ARC_RADIUS": (count("arcs"), (column(1.3), 1), (column(1.7), 0)),
+    # A round surface shows 45°, or it is none.
+    "ARC_TURN": (count("arcs"), (column(1.0, 0.6), 0), (column(1.0, 0.85), 1)),
+    # A corner that costs 15 to leave out is one, a corner that costs 10 is none.
+    "evidence": (count("corners"), (turn(154, 13), 0), (turn(154, 15), 1)),
+    # A wall goes on over six missing beams, not over seven.
+    "max_missing": (
+        count("segments"),
+        (nearer(slice(20, 26), math.nan), 1),
+        (nearer(slice(20, 27), math.nan), 2),
+    ),
+}
+PARAMETERS = ("evidence", "max_missing")
+
+
+def holds(plain, name, **parameters):
+    """Whether what is expected of a constant is found in both of its scenes."""
+    parameters = {"max_missing": 20} | parameters if name == "REACH" else parameters
+    extractor = plain.Extractor("optimal", noise=plain.RangeNoise(sigma=1e-4), **parameters)
+    seen, *scenes = CASES[name]
+    with np.errstate(all="ignore"):
+        return all(
+            seen(extractor(plain.LaserScan(ranges, angles=angles))) == expected
+            for (ranges, angles), expected in scenes
+        )
+
+
+def scaled(name, value, factor):
+    if name == "BEND":
+        return math.cos(factor * math.acos(value))
+    return round(value * factor) if isinstance(value, int) else value * factor
 
 
 @pytest.mark.usefixtures("plain")
 def test_every_constant_is_here():
     constants = vars(importlib.import_module("lineament.kernels.optimal.constants"))
-    assert {name for name in constants if name.isupper()} == CONSTANTS.keys()
+    assert {name for name in constants if name.isupper()} == CASES.keys() - {*PARAMETERS}
 
 
-@pytest.mark.parametrize("name", CONSTANTS)
+@pytest.mark.parametrize("name", sorted(CASES.keys() - {*PARAMETERS}))
 def test_constant(plain, name):
-    holds = getattr(Scenes(plain), name.lower())
     constants = importlib.import_module("lineament.kernels.optimal.constants")
-    value, of = getattr(constants, name), CONSTANTS[name]
-    assert holds()
+    value = getattr(constants, name)
+    assert holds(plain, name)
     for factor in (1.5, 1 / 1.5):
-        with replaced(name, of(value, factor)):
-            assert not holds(), factor
-    assert holds()
+        with replaced(name, scaled(name, value, factor)):
+            assert not holds(plain, name), factor
+    assert holds(plain, name)
 
 
-@pytest.mark.parametrize("name", ["evidence", "max_missing"])
+@pytest.mark.parametrize("name", PARAMETERS)
 def test_default(plain, name):
-    assert getattr(Scenes(plain), name)()
+    assert holds(plain, name)
     value = getattr(plain.Extractor("optimal").method, name)
     for factor in (1.5, 1 / 1.5):
-        other = type(value)(round(value * factor, 6))
-        assert not getattr(Scenes(plain, **{name: other}), name)(), factor
+        assert not holds(plain, name, **{name: scaled(name, value, factor)}), factor

@@ -1,21 +1,19 @@
 """Method optimal on any scan: sound features, the same ones however they are asked for."""
 
-from __future__ import annotations
-
 import math
-from itertools import islice
+from functools import cache
+from itertools import islice, product
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from test_optimal_symmetry import simulated
-from worlds import BOX, NOISE, degenerate_scans, full_circle, random_scan, room
+from worlds import BOX, NOISE, degenerate_scans, full_circle, random_scan, room, scan_of
 
-from lineament import Extractor, LaserScan, LogError
+from lineament import Extractor, LaserScan, LogError, RangeNoise
 from lineament.logs import find_logs, open_log
-from lineament.simulation import SENSORS
+from lineament.simulation import SCENES, SENSORS, scene
 
 EXTRACTORS = {
     "default": Extractor("optimal"),
@@ -26,6 +24,16 @@ every_extractor = pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=
 TABLES = ("segments", "corners", "arcs", "breakpoints", "clusters")
 #: Scale of a surface [m], distance of a corner from its measurements and its deviation [m].
 SURFACE, REACH, MOST = 0.03, 0.3, 0.1
+
+
+@cache
+def simulated(sensor):
+    """Make four scans of each kind of scene."""
+    device, scans = SENSORS[sensor], []
+    for kind, seed in product(SCENES, range(4)):
+        world, pose = scene(kind, seed)
+        scans.append(device.scan(world, pose, np.random.default_rng(seed)))
+    return scans
 
 
 def deviation(features, rho):
@@ -251,3 +259,115 @@ def test_batches_are_those_of_scans_alone(workers):
     batch = extractor.batch(rows, angle_min=-math.pi, angle_increment=step, workers=workers)
     for features, row in zip(batch, rows, strict=True):
         assert_equal_features(features, extractor(LaserScan(row, -math.pi, step)))
+
+
+# Seen in another way
+
+
+def rotated(points, turn):
+    c, s = math.cos(turn), math.sin(turn)
+    return points @ [[c, s], [-s, c]]
+
+
+def seen(scan, ranges, angles):
+    """Make a scan of other ranges and bearings with the limits of one."""
+    limits = {"range_min": scan.range_min, "range_max": scan.range_max}
+    if scan.is_regular:
+        return LaserScan(ranges, float(angles[0]), scan.angle_increment, **limits)
+    return LaserScan(ranges, angles=angles, **limits)
+
+
+def rows_of(features, place=np.asarray, flip=False):
+    """What there is to know of segments, corners and arcs, one row each, by places elsewhere."""
+    lines, corners, arcs = features.segments, features.corners, features.arcs
+    ends = ("end", "start") if flip else ("start", "end")
+    variances = lines["covariance"][:, [0, 1], [0, 1]] ** 0.5
+    numbers = [lines[name] for name in ("n_points", "rms", "misfit")]
+    yield np.column_stack([place(lines[e]) for e in (*ends, "centroid")] + [variances, *numbers])
+    kinds = corners["kind"] == "edge"
+    numbers = [corners[name] for name in ("opening", "quality", "convex", "response")]
+    spread = np.sqrt(np.trace(corners["covariance"], axis1=1, axis2=2))
+    yield np.column_stack([place(corners["position"]), spread, kinds, *numbers])
+    yield np.column_stack([place(arcs["center"]), arcs["radius"], arcs["n_points"]])
+
+
+def assert_same(one, other, beams, place=np.asarray, flip=False):
+    """Hold that features are those of another scan in any order.
+
+    `beams` and `place` lead from the beams and the places of one to those of the other.
+    """
+    tables = zip(rows_of(one, place, flip), rows_of(other), strict=True)
+    for name, (before, after) in zip(TABLES, tables, strict=False):
+        assert len(before) == len(after), name
+        near = np.isclose(before[:, None], after, rtol=1e-5, atol=1e-6).all(axis=2)
+        assert (near.sum(axis=0) == 1).all(), name
+        assert (near.sum(axis=1) == 1).all(), name
+    pairs = set(zip(one.clusters.tolist(), other.clusters[beams].tolist(), strict=True))
+    assert len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
+    assert all((a < 0) == (b < 0) for a, b in pairs)
+
+
+def turned(scan, k):
+    turn = 0.3 + 0.7 * k % 6.0
+    other = seen(scan, scan.ranges, scan.angles + turn)
+    return other, np.arange(len(scan)), lambda points: rotated(points, turn)
+
+
+def mirrored(scan, _):
+    other = seen(scan, scan.ranges[::-1], -scan.angles[::-1])
+    return other, np.arange(len(scan))[::-1], lambda points: points * (1, -1)
+
+
+def rolled(scan, k):
+    """A full circle may begin at any beam."""
+    n, shift = len(scan), (7 + 37 * k) % max(len(scan), 1) if scan.is_full_circle else 0
+    angles = scan.angles - shift * scan.angle_increment
+    return seen(scan, np.roll(scan.ranges, shift), angles), (np.arange(n) + shift) % n, np.asarray
+
+
+@pytest.mark.parametrize("source", [*SENSORS, "random"])
+@pytest.mark.parametrize("change", [turned, mirrored, rolled])
+def test_features_are_those_of_the_scan_seen_in_another_way(source, change):
+    """No direction, no side and no beam is special."""
+    scans = list(map(random_scan, range(60))) if source == "random" else simulated(source)
+    extractor = EXTRACTORS["noise given" if change is rolled else "default"]
+    for k, scan in enumerate(scans):
+        other, beams, place = change(scan, k)
+        flip = change is mirrored
+        assert_same(extractor(scan), extractor(other), beams, place, flip=flip)
+
+
+def test_interlaced_edges_are_the_same_from_both_sides():
+    """A spike among measurements of another surface: which of them is one is not told by order."""
+    angles = math.radians(0.5) * np.arange(-30, 31)
+    for mixed in ((4.0, 2.0), (4.0, 2.0, 4.0, 2.0)):
+        ranges = np.r_[np.full(30, 2.0), mixed, np.full(31 - len(mixed), 4.0)] / np.cos(angles)
+        one = EXTRACTORS["noise given"](scan_of(ranges, angles))
+        other = EXTRACTORS["noise given"](scan_of(ranges[::-1], angles))
+        assert_same(one, other, np.arange(61)[::-1], lambda p: p * (1, -1), flip=True)
+
+
+@pytest.mark.parametrize("scale", [2.0, 4.0])
+def test_lengths_and_noise_scale_together(scale):
+    """But for the scale of a surface and the reach of a corner, which do not matter here."""
+    ring, angles = full_circle(720), math.radians(0.25) * np.arange(-40, 41)
+    column = 1.5 * np.cos(angles) - np.sqrt(0.3**2 - (1.5 * np.sin(angles)) ** 2)
+    for ranges, bearings in ((room(ring, BOX), ring), (column, angles)):
+        one, two = (
+            Extractor("optimal", noise=RangeNoise(sigma=0.004 * k))(scan_of(k * ranges, bearings))
+            for k in (1.0, scale)
+        )
+        assert len(one.arcs) == len(two.arcs) == (bearings is angles)
+        assert len(one.segments) == len(two.segments) == 4 * (bearings is ring)
+        for table, names in (
+            ("segments", ("start", "end", "centroid")),
+            ("corners", ("position",)),
+        ):
+            for name in names:
+                before, after = getattr(one, table)[name], getattr(two, table)[name]
+                np.testing.assert_allclose(after, scale * before, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(two.arcs["radius"], scale * one.arcs["radius"], rtol=1e-6)
+        np.testing.assert_allclose(
+            two.corners["covariance"], scale**2 * one.corners["covariance"], rtol=1e-5, atol=1e-12
+        )
+        assert two.clusters.tolist() == one.clusters.tolist()

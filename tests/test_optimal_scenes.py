@@ -1,14 +1,12 @@
 """Method optimal on scenes by hand: what a person would draw, and nothing else."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
-from lineament import Extractor
+from lineament import Extractor, RangeNoise
 from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
@@ -20,6 +18,10 @@ extractors = pytest.mark.parametrize("extractor", [UNAWARE, AWARE], ids=["estima
 
 def noisy(ranges, seed=0, sigma=NOISE.sigma):
     return ranges + sigma * np.random.default_rng(seed).normal(size=len(ranges))
+
+
+def found_in(extractor, ranges, angles, **noise):
+    return extractor(scan_of(noisy(ranges, **noise), angles))
 
 
 def sweep(world, seed=0, pose=(0.0, 0.0, 0.0)):
@@ -89,7 +91,7 @@ def test_faces_beside_a_hole_are_a_slit(extractor, beams):
     ranges, middle = vertex(angles, 2.0, 90, convex=True), len(angles) // 2
     hole = slice(middle - 1, middle - 1 + beams)
     ranges[hole] = wall(angles[hole], 5.0, 0.0)
-    features = extractor(scan_of(noisy(ranges), angles))
+    features = found_in(extractor, ranges, angles)
     (corner,), (first, second) = of_kind(features, "slit"), features.segments
     assert within(corner["position"] - (2.0, 0.0), corner["covariance"])
     assert corner["segments"].tolist() == [0, 1]
@@ -104,7 +106,7 @@ def test_a_panel_before_a_wall_ends_in_edges(extractor):
     angles = fan(25)
     panel = abs(np.tan(angles)) < 0.2
     ranges = np.where(panel, wall(angles, 2.0, 0.0), wall(angles, 4.0, 0.0))
-    features = extractor(scan_of(noisy(ranges, sigma=1e-4), angles))
+    features = found_in(extractor, ranges, angles, sigma=1e-4)
     edges, near = of_kind(features, "edge"), features.segments[1]
     assert len(edges) == len(features.corners) == 2
     assert edges["segments"].tolist() in ([[-1, 1], [1, -1]], [[1, -1], [-1, 1]])
@@ -121,18 +123,6 @@ def test_a_panel_before_a_wall_ends_in_edges(extractor):
         assert 0.9 * least < edge["covariance"][1, 1] < 1.1 * least + (0.2 * NOISE.sigma) ** 2
         assert 0.0 < edge["quality"] < 1.0
     assert features.breakpoints["occluder"].tolist()[:2] == [near["first_beam"], near["last_beam"]]
-
-
-@extractors
-def test_wall_of_four_beams_is_a_wall(extractor):
-    angles = fan(25)
-    ranges, middle = wall(angles, 3.0, 0.0), len(angles) // 2
-    ranges[middle - 2 : middle + 2] = wall(angles[middle - 2 : middle + 2], 1.5, 0.0)
-    features = extractor(scan_of(noisy(ranges), angles))
-    assert features.segments["n_points"][1] == 4
-    assert len(features.segments) == 3
-    assert features.corners["kind"].tolist() == ["edge", "edge"]
-    assert features.breakpoints["occluder"].tolist()[:2] == [middle - 2, middle + 1]
 
 
 # Columns and polygons
@@ -190,17 +180,6 @@ def test_bowed_wall_is_one(extractor, waves, amplitude, sigma):
 
 
 @extractors
-@pytest.mark.parametrize("step", [0.01, 0.02])
-def test_panels_with_small_steps_are_one_wall(extractor, step):
-    angles = fan(45)
-    depth = 2.0 + step * (np.floor(2.0 * np.tan(angles) / 0.8) % 2)
-    for sigma in (0.003, 0.01):
-        features = extractor(scan_of(noisy(depth / np.cos(angles), sigma=sigma), angles))
-        assert len(features.segments) == 1
-        assert len(features.corners) == 0
-
-
-@extractors
 @pytest.mark.parametrize("behind", [np.nan, np.inf, 5.0])
 def test_doorway_is_not_bridged(extractor, behind):
     angles = fan(40)
@@ -222,7 +201,7 @@ def test_step_of_short_walls_parts_them_wherever_it_is(beams):
     angles = math.radians(1.0) * (np.arange(n) - n // 2)
     ranges = np.where(np.arange(n) < first, wall(angles, 3.0, 0), wall(angles, 3.2, 0))
     for seed in range(5):
-        features = AWARE(scan_of(noisy(ranges, seed), angles))
+        features = found_in(AWARE, ranges, angles, seed=seed)
         assert len(features.segments) == 2
         assert features.segments["first_beam"][1] == first
         assert features.breakpoints["beam"][0].tolist() == [first - 1, first]
@@ -267,3 +246,153 @@ def test_room_all_around_is_closed_over_the_seam(extractor, turn):
             true = (2.0 if x > 0 else -2.4, 1.3 if y > 0 else -1.7)
             error = np.array(true) @ [[c, -s], [s, c]] - corner["position"]
             assert within(error, corner["covariance"], 5.0)
+
+
+# Clutter
+
+
+@extractors
+@pytest.mark.parametrize("between", [(2.7,), (2.5, 3.2), (3.6,)])
+def test_mixed_pixels_between_two_depths_are_noise(extractor, between):
+    angles = fan(30)
+    ranges, edge = np.where(angles < 0, wall(angles, 2.0, 0.0), wall(angles, 4.0, 0.0)), 90
+    ranges[edge : edge + len(between)] = between
+    features = found_in(extractor, ranges, angles)
+    assert len(features.segments) == 2
+    assert features.corners["kind"].tolist() == ["edge"]
+    assert (features.clusters[edge : edge + len(between)] == -1).all()
+    assert features.segments["last_beam"][0] == edge - 1
+    assert features.segments["first_beam"][1] == edge + len(between)
+
+
+@extractors
+@pytest.mark.parametrize("off", [-1.0, -0.3, 0.3, 2.0])
+def test_spike_on_a_wall_is_dropped(extractor, off):
+    angles = fan(30)
+    ranges = noisy(wall(angles, 2.0, 10.0))
+    ranges[60] += off
+    features = extractor(scan_of(ranges, angles))
+    (line,) = features.segments
+    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
+    assert line["n_points"] == len(angles) - 1
+    assert features.clusters[60] == -1
+    assert (np.delete(features.clusters, 60) == 0).all()
+    assert features.breakpoints["kind"].tolist() == ["scan_end", "scan_end"]
+
+
+@extractors
+@pytest.mark.parametrize("far", [30.0, 1e3, 1e5])
+def test_what_is_far_away_does_not_disturb_what_is_near(extractor, far):
+    angles = fan(80)
+    ranges = noisy(room(angles, BOX), 1)
+    ranges[20:22] = far, 1.01 * far
+    features = extractor(scan_of(ranges, angles))
+    assert 3 <= len(features.segments) <= 4
+    assert len(of_kind(features, "corner")) == 2
+    assert features.segments["rms"].max() < 0.012
+
+
+@extractors
+def test_panels_of_one_wall_beside_a_slit_have_no_corner(extractor):
+    """Their lines cross somewhere, as all lines do."""
+    angles = fan(30)
+    for seed in range(40):
+        ranges = noisy(wall(angles, 2.0, 20.0), seed)
+        ranges[8:10] = 9.0
+        features = extractor(scan_of(ranges, angles))
+        assert len(of_kind(features, "slit")) == len(of_kind(features, "corner")) == 0
+
+
+@extractors
+def test_drop_outs_do_not_cut_a_wall(extractor):
+    angles = fan(30)
+    ranges = noisy(wall(angles, 2.0, 10.0))
+    lost = np.random.default_rng(1).random(len(angles)) < 0.2
+    ranges[lost] = np.inf
+    (line,) = extractor(scan_of(ranges, angles)).segments
+    assert line["n_points"] == (~lost).sum()
+    assert line["rms"] == pytest.approx(NOISE.sigma, rel=0.2)
+
+
+@pytest.mark.parametrize("max_missing", [0, 3, 6])
+def test_wall_goes_on_over_as_many_missing_beams_as_are_allowed(max_missing):
+    angles, extractor = fan(30), Extractor("optimal", max_missing=max_missing)
+    for missing, pieces in ((max_missing, 1), (max_missing + 1, 2)):
+        ranges = noisy(wall(angles, 2.0, 0.0))
+        ranges[50 : 50 + missing] = np.nan
+        assert len(extractor(scan_of(ranges, angles)).segments) == pieces
+
+
+@extractors
+@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
+def test_wall_ends_at_its_last_measurements(extractor, normal):
+    angles = math.radians(normal) + fan(30)
+    scan = scan_of(noisy(wall(angles, 2.0, normal)), angles)
+    (line,) = extractor(scan).segments
+    direction = [math.cos(line["angle"]), math.sin(line["angle"])]
+    for end, point in ((line["start"], scan.points[0]), (line["end"], scan.points[-1])):
+        assert (end - point) @ direction == pytest.approx(0.0, abs=1e-9)
+        assert np.hypot(*(end - point)) < 4 * NOISE.sigma
+
+
+def test_evidence_is_what_a_corner_must_have():
+    """A faint corner is two walls for who asks for little, one wall for who asks for much."""
+    angles = fan(6)
+    scan = scan_of(noisy(vertex(angles, 3.0, 150, convex=False), 2), angles)
+    (corner,) = Extractor("optimal", evidence=10.0, noise=NOISE)(scan).corners
+    for evidence, corners in ((0.9 * corner["response"], 1), (1.1 * corner["response"], 0)):
+        found = Extractor("optimal", evidence=evidence, noise=NOISE)(scan)
+        assert len(found.corners) == corners
+
+
+# Noise
+
+
+@pytest.mark.parametrize("sigma", [0.001, 0.01, 0.03])
+def test_noise_is_estimated_whatever_else_is_there(sigma):
+    """Corners, and clutter among 3 % of the measurements."""
+    angles, found = full_circle(), []
+    for seed in range(20):
+        ranges, rng = noisy(room(angles, BOX), seed, sigma), np.random.default_rng(seed + 99)
+        ranges[rng.random(len(ranges)) < 0.03] *= 0.7
+        found.append(UNAWARE(scan_of(ranges, angles)).noise.sigma)
+    assert np.mean(found) == pytest.approx(sigma, rel=0.03)
+    assert np.std(found) < 0.06 * sigma
+
+
+#: Walls whose ranges differ, and what is off them in proportion to range.
+LONG, PROPORTIONAL = [(1.0, 0.0), (3.0, 90.0), (6.0, 180.0), (3.0, 270.0)], 0.01
+
+
+def test_noise_that_grows_with_range_is_estimated():
+    angles, found = full_circle(), []
+    for seed in range(20):
+        ranges = room(angles, LONG)
+        noise = UNAWARE(scan_of(ranges * noisy(1.0 + 0.0 * ranges, seed), angles)).noise
+        found.append(math.hypot(noise.sigma, 3.0 * noise.proportional))
+        assert 0.008 < noise.proportional < 0.0105
+    assert np.mean(found) == pytest.approx(3.0 * PROPORTIONAL, rel=0.1)
+
+
+def test_a_room_in_noise_that_grows_with_range_is_closed_too():
+    """Its seam is no border of a wall."""
+    angles = full_circle()
+    for seed in range(20):
+        ranges = room(angles, LONG)
+        features = UNAWARE(scan_of(ranges * noisy(1.0 + 0.0 * ranges, seed), angles))
+        assert len(features.segments) == len(features.corners) == 4, seed
+
+
+def test_noise_is_no_more_than_a_sensor_has():
+    ranges = np.random.default_rng(1).uniform(1.0, 9.0, 500)
+    noise = UNAWARE(scan_of(ranges, full_circle(500))).noise
+    assert math.hypot(noise.sigma, noise.proportional * ranges.max()) <= 0.1 + 1e-9
+
+
+def test_a_given_noise_is_that_of_the_covariances():
+    angles = fan(20)
+    scan = scan_of(noisy(wall(angles, 2.0, 0.0), sigma=0.001), angles)
+    one, two = (
+        Extractor("optimal", noise=RangeNoise(sigma=s))(scan).segments for s in (0.01, 0.02)
+    )
+    np.testing.assert_allclose(two["covariance"], 4 * one["covariance"], rtol=1e-6)

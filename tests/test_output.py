@@ -117,19 +117,6 @@ def test_exception_leaves_the_old_file(target, error):
     assert list(target.parent.iterdir()) == [target]
 
 
-def test_failure_while_the_rest_is_written_leaves_nothing(target, monkeypatch):
-    writer = open_writer(target)
-
-    def fail(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(writer, "_write", fail)
-    with pytest.raises(LineamentError, match="cannot be written: No space left") as caught, writer:
-        writer.write(random_features(1), SCAN)
-    assert str(target) in str(caught.value)
-    assert list(target.parent.iterdir()) == []
-
-
 @pytest.mark.skipif(resource is None, reason="no limits of files on this system")
 @pytest.mark.parametrize("ending", [ending for ending in ENDINGS if ending != ".rrd"])
 def test_full_disk_leaves_one_line_and_nothing_else(tmp_path, ending):
@@ -382,28 +369,21 @@ def rerun(*arguments):
 def test_recording_is_whole_and_has_everything(tmp_path):
     pytest.importorskip("rerun")
     path = tmp_path / "a.rrd"
-    with open_writer(path) as writer:
-        for k in range(250):
-            scan = LaserScan([2.0] * 6, 0.0, 0.1, stamp=0.5 * k, pose=(k, 0.0, 0.1))
-            writer.write(FOUND, scan)
-    rerun("verify", path)
-    stats = rerun("stats", path)
-    for entity in ("", "/points", "/segments", "/arcs", "/corners", "/edges", "/ellipses"):
-        assert f"/world/scan{entity}: " in stats
-    assert "num_rows = 1 750" in stats.replace("\u2009", " ")
-    assert "log_time" not in stats
-    assert "stamp" in stats
-
-
-def test_recording_has_the_marks_of_the_layers(tmp_path):
-    pytest.importorskip("rerun")
-    path = tmp_path / "a.rrd"
     with open_writer(path, ["/a/scan"]) as writer:
-        writer.write(FOUND, LaserScan([2.0] * 6, 0.0, 0.1, pose=(3.0, 4.0, 0.5)), "/a/scan")
+        for k in range(250):
+            scan = LaserScan([2.0] * 6, 0.0, 0.1, stamp=0.5 * k, pose=(k, 4.0, 0.5))
+            writer.write(FOUND, scan, "/a/scan")
+    rerun("verify", path)
+    text = rerun("stats", path)
+    for entity in ("", "/points", "/segments", "/arcs", "/corners", "/edges", "/ellipses"):
+        assert f"/world/a/scan{entity}: " in text
+    assert "num_rows = 1 750" in text.replace("\u2009", " ")
+    assert "log_time" not in text
     text = rerun("print", "-vvv", path)
-    assert "/world/a/scan/corners" in text
-    for numbers in ("[1.0, 2.0, 0.0]", "[-1.0, 3.0, 0.0]", "[3.0, 4.0, 0.0]"):
-        assert numbers in text, numbers
+    assert "PT124.5S" in text  # the last stamp
+    for numbers in ("[[249.0, 4.0, 0.0]]", "angle: 0.5", "[[1.0, 2.0, 0.0]]", "[[-1.0, 3.0, 0.0]]"):
+        assert numbers in text, numbers  # where the scanner is, the corner, the edge
+    assert "[[[1.0, 0.0, 0.0], [1.0, 2.0, 0.0]], " in text
 
 
 def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from worlds import BOX, fan, full_circle, random_scan, room, scan_of, vertex
 
 import lineament as ln
 from lineament.evaluation.ple import polylines_of, score_map
-from lineament.kernels.layout import BEAM, COUNTS, FLOATS, INTS, POINTS, RHO, X, Y
+from lineament.kernels import layout as at
 from lineament.kernels.polylines import CLOSED_COST, PLANES, fit_polylines
 
 LINK, MISSING = 1.0, 6
@@ -20,15 +20,14 @@ LINK, MISSING = 1.0, 6
 def least_cost(ranges, angles, budget, worst):
     """Run the kernel, and give the cost of the polylines that it chose."""
     points = np.flatnonzero(~np.isnan(ranges))
-    n, m = len(ranges), len(points)
-    floats, ints = np.zeros((FLOATS, n + 1)), np.zeros((INTS, n + 1), np.int64)
-    counts = np.zeros(COUNTS, np.int64)
-    floats[RHO, :m], ints[BEAM, :m], counts[POINTS] = ranges[points], points, m
-    bearings = np.stack((np.cos(angles), np.sin(angles)))
-    floats[[X, Y], :m] = bearings[:, points] * ranges[points]
+    n, m, memory = len(ranges), len(points), at.workspace(len(ranges))
+    work, bearings = at.named(*memory), np.stack((np.cos(angles), np.sin(angles)))
+    work.marks[at.BEAM, :m], work.counts[at.POINTS] = points, m
+    work.points[at.RHO, :m] = ranges[points]
+    work.points[[at.X, at.Y], :m] = bearings[:, points] * ranges[points]
     costs = np.zeros((PLANES, n + 2, budget + 1))
     follow = np.zeros((n + 2, budget + 1), np.int64)
-    fit_polylines(floats, ints, counts, bearings, budget, MISSING, LINK, worst, costs, follow)
+    fit_polylines(*memory, bearings, budget, MISSING, LINK, worst, costs, follow)
     return costs[CLOSED_COST, m].min()
 
 

@@ -1,30 +1,22 @@
-"""Bags of every kind: what is in them comes back; topics, faults, indices."""
-
-from __future__ import annotations
+"""Bags of every kind: what is in them comes back; topics, order, folders, databases, recordings."""
 
 import math
+import os
 import shutil
 import sqlite3
 
 import numpy as np
 import pytest
 import ros_bags
+from ros_bags import every_kind, ranges_of, write
 
 from lineament import LogError
 from lineament.logs import open_log
 from lineament.logs.base import Head
 from lineament.logs.rosbag2 import Rosbag2Log
 
-every_kind = pytest.mark.parametrize("kind", ros_bags.KINDS)
 FORMATS = {"rosbag1": "rosbag1", "sqlite3": "rosbag2", "mcap": "mcap"}
-
-
-def write(folder, kind, items, name="log"):
-    return ros_bags.write_bag(folder / f"{name}{ros_bags.ending(kind)}", kind, items)
-
-
-def ranges_of(i):
-    return (1.0 + i + 0.01 * np.arange(40)).astype(np.float32)
+STAMPS = [i / 4 for i in range(30)]
 
 
 def two_scanners(kind, n=30):
@@ -35,6 +27,10 @@ def two_scanners(kind, n=30):
         yield topic, 1000 * i, messages.scan(i / 4, ranges_of(i), frame=topic[1:])
         if i % 10 == 0:
             yield "/odom", 1000 * i + 1, messages.odometry(i / 4, 0.0, 0.0, 0.0)
+
+
+def stamps_of(log):
+    return [scan.stamp for scan in log]
 
 
 @every_kind
@@ -49,14 +45,12 @@ def test_what_is_written_comes_back(tmp_path, kind):
         ("/odom", "nav_msgs/Odometry", 3),
         ("/rear", "sensor_msgs/LaserScan", 15),
     ]
-    items = list(log.items())
-    assert [topic for topic, _ in items] == ["/front", "/rear"] * 15
-    for i, (topic, scan) in enumerate(items):
-        assert (scan.stamp, scan.frame_id) == (i / 4, topic[1:])
+    for i, (topic, scan) in enumerate(log.items()):
+        assert (topic, scan.stamp, scan.frame_id) == (("/front", "/rear")[i % 2], i / 4, topic[1:])
         np.testing.assert_array_equal(scan.ranges, ranges_of(i))
+    assert i == 29
     rear = open_log(path, "/rear")
-    assert len(rear) == 15
-    assert [scan.stamp for scan in rear] == [i / 4 for i in range(1, 30, 2)]
+    assert (len(rear), stamps_of(rear)) == (15, STAMPS[1::2])
     assert rear.scan(2).stamp == 1.25
 
 
@@ -71,19 +65,25 @@ def test_no_scans(tmp_path, kind):
         open_log(path, "/odom")
 
 
+def test_an_error_lists_twenty_topics(tmp_path):
+    odometry = ros_bags.Messages(2).odometry(1.0, 0.0, 0.0, 0.0)
+    path = write(tmp_path, "mcap", [(f"/odom{i:02}", i, odometry) for i in range(23)])
+    with pytest.raises(LogError, match=r"/odom19 \(nav_msgs/Odometry, 1\), 3 more$"):
+        open_log(path)
+
+
 @every_kind
-def test_faulty_messages_are_told_by_number(tmp_path, kind):
+def test_faulty_messages_are_reported_by_number(tmp_path, kind):
     messages = ros_bags.Messages(ros_bags.ros_of(kind))
     items = [("/scan", i, messages.scan(i, [1.0, 2.0])) for i in range(4)]
     items[1] = ("/scan", 1, messages.scan(1.0, []))
     items[3] = ("/scan", 3, ("sensor_msgs/msg/LaserScan", b"\0\1\0\0nonsense"))
     path = write(tmp_path, kind, items)
-    read = []
-    with pytest.raises(LogError, match="/scan message 1: ranges is empty"):
-        read.extend(open_log(path))
-    assert [scan.stamp for scan in read] == [0.0]
+    scans, problem = ros_bags.read(path)
+    assert problem.endswith("/scan message 1: ranges is empty, expected at least one beam")
+    assert stamps_of(scans) == [0.0]
     log = open_log(path, keep_going=True)
-    assert [scan.stamp for scan in log] == [0.0, 2.0]
+    assert stamps_of(log) == [0.0, 2.0]
     assert (len(log), log.skipped) == (4, 2)
     assert "/scan message 3: ends early" in log.faults[1]
 
@@ -107,7 +107,7 @@ def test_echo_and_ring_are_chosen(tmp_path):
 
 
 def test_two_publishers_of_a_ros_1_topic(tmp_path):
-    """Each has a connection, of which the bag tells the node; the topic is one."""
+    """Each has a connection, with the name of its node; the topic is one."""
     from rosbags import rosbag1
 
     messages, path = ros_bags.Messages(1), tmp_path / "log.bag"
@@ -119,37 +119,29 @@ def test_two_publishers_of_a_ros_1_topic(tmp_path):
             )
             writer.write(connection, i, ros_bags.serialized(message, 1))
     log = open_log(path)
-    assert [scan.stamp for scan in log] == [0.0, 1.0]
+    assert stamps_of(log) == [0.0, 1.0]
     (topic,) = log.contents()
     assert (topic.count, topic.publishers) == (2, 2)
 
 
 def test_a_topic_of_two_types(tmp_path):
     """Only the messages that are scans are read."""
-    messages = ros_bags.Messages(2)
-    first = write(tmp_path, "mcap", [("/scan", 0, messages.scan(1.0, [1.0]))], "a_0")
-    second = write(tmp_path, "mcap", [("/scan", 0, messages.odometry(1.0, 0.0, 0.0, 0.0))], "a_1")
-    folder = tmp_path / "bag"
+    messages, folder = ros_bags.Messages(2), tmp_path / "bag"
     folder.mkdir()
-    for part in (first, second):
-        part.rename(folder / part.name)
+    write(folder, "mcap", [("/scan", 0, messages.scan(1.0, [1.0]))], "a_0")
+    write(folder, "mcap", [("/scan", 0, messages.odometry(1.0, 0.0, 0.0, 0.0))], "a_1")
     (folder / "metadata.yaml").write_text("")
     log = open_log(folder)
     assert (len(log), len(list(log))) == (1, 1)
 
 
-# --- order
-
-
 @pytest.mark.parametrize("kind", ["rosbag1", "mcap", "sqlite3"])
 def test_order(tmp_path, kind):
-    """That of the file, or of the times of receipt in a database; stamps run as they like."""
+    """That of the file, or of the times of receipt in a database, whatever the stamps are."""
     messages = ros_bags.Messages(ros_bags.ros_of(kind))
-    times = [3, 1, 2, 2]
-    items = [("/scan", time, messages.scan(10.0 * i, [1.0])) for i, time in enumerate(times)]
-    path = write(tmp_path, kind, items)
+    items = [("/scan", t, messages.scan(10.0 * i, [1.0])) for i, t in enumerate([3, 1, 2, 2])]
     expected = [10.0, 20.0, 30.0, 0.0] if kind == "sqlite3" else [0.0, 10.0, 20.0, 30.0]
-    assert [scan.stamp for scan in open_log(path)] == expected
+    assert stamps_of(open_log(write(tmp_path, kind, items))) == expected
 
 
 # --- folders of ROS 2
@@ -160,61 +152,76 @@ def split_bag(tmp_path, kind="sqlite3"):
     folder = tmp_path / "split"
     folder.mkdir()
     items = list(two_scanners(kind))
-    ending = {"sqlite3": ".db3", "mcap": ".mcap"}[kind]
     for i, number in enumerate((0, 9, 10)):
         part = write(tmp_path, kind, items[11 * i : 11 * (i + 1)], f"part{i}")
         (data,) = part.glob("*.db3") if part.is_dir() else (part,)
-        shutil.move(data, folder / f"split_{number}{ending}")
+        shutil.move(data, folder / f"split_{number}{data.suffix}")
     return folder
 
 
-def metadata(folder, names):
+def metadata(folder, *names, more=""):
     lines = "".join(f"    - {name}\n" for name in names)
-    text = f"rosbag2_bagfile_information:\n  version: 4\n  relative_file_paths:\n{lines}"
+    text = f"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n{lines}{more}"
     (folder / "metadata.yaml").write_text(text)
 
 
 @pytest.mark.parametrize("kind", ["sqlite3", "mcap"])
 def test_parts_in_the_order_of_the_metadata_or_of_their_numbers(tmp_path, kind):
     folder = split_bag(tmp_path, kind)
-    stamps = [i / 4 for i in range(30)]
     ending = ".db3" if kind == "sqlite3" else ".mcap"
     if kind == "sqlite3":
-        assert [scan.stamp for scan in open_log(folder)] == stamps
+        assert stamps_of(open_log(folder)) == STAMPS
+    # Early metadata name parts with their folder; newer ones have a second list.
     names = [f"split/split_{number}{ending}" for number in (10, 0, 9)]
-    metadata(folder, names)
-    # In its beginning, metadata named parts with their folder.
-    assert [scan.stamp for scan in open_log(folder)] == stamps[20:] + stamps[:20]
+    files = "".join(f"  - path: split_{n}{ending}\n    message_count: 1\n" for n in (0, 9, 10))
+    metadata(folder, *names, more=f"  files:\n{files}")
+    assert stamps_of(open_log(folder)) == STAMPS[20:] + STAMPS[:20]
     (folder / "metadata.yaml").write_text("nonsense: [")
     log = open_log(folder)
-    assert [scan.stamp for scan in log] == stamps
-    assert (len(log), log.format) == (30, "rosbag2")
+    assert (stamps_of(log), len(log), log.format) == (STAMPS, 30, "rosbag2")
 
 
 def test_parts_that_are_missing_or_compressed(tmp_path):
     folder = split_bag(tmp_path)
-    metadata(folder, ["split_0.db3", "split_1.db3", "../outside_9.db3", "split_9.db3"])
+    metadata(folder, "split_0.db3", "split_1.db3", "../outside_9.db3", "split_9.db3")
     with pytest.raises(LogError, match=r"has no split_1.db3, which metadata\.yaml lists"):
         open_log(folder)
     log = open_log(folder, keep_going=True)
     assert (len(list(log)), log.skipped) == (20, 2)
     assert "has no outside_9.db3" in log.faults[1]
-    metadata(folder, ["split_0.db3.zstd"])
+    metadata(folder, "split_0.db3.zstd")
     (folder / "split_0.db3.zstd").touch()
     with pytest.raises(LogError, match="decompress it first"):
         open_log(folder)
 
 
-def test_a_folder_with_other_files_is_no_bag_without_metadata(tmp_path):
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_among_the_parts_is_not_waited_for(tmp_path):
     folder = split_bag(tmp_path)
+    os.mkfifo(folder / "more.db3")
+    metadata(folder, "split_0.db3", "more.db3")
+    with pytest.raises(LogError, match=r"has no more\.db3, which metadata\.yaml lists"):
+        open_log(folder)
+
+
+@pytest.mark.parametrize(
+    "text", ["\n" * 300_000, "- " + " " * 300_000 + "x", "- a.db3 " * 40_000 + "x"]
+)
+def test_metadata_of_blanks_take_no_time(tmp_path, text):
+    """Where a search goes back over what it has seen, these take hours."""
+    folder = split_bag(tmp_path)
+    (folder / "metadata.yaml").write_text(text)
+    assert len(open_log(folder)) == 30
+
+
+def test_which_folders_are_bags(tmp_path):
+    folder = split_bag(tmp_path)
+    assert Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
     (folder / "notes.txt").write_text("what is this?")
     assert not Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
-    metadata(folder, [])
+    metadata(folder)
     assert Rosbag2Log.recognises(Head(folder, b"", is_directory=True))
-
-
-def test_a_folder_with_metadata_alone(tmp_path):
-    metadata(tmp_path, [])
+    metadata(tmp_path)
     with pytest.raises(LogError, match=r"holds no part of a ROS 2 bag, expected \.db3 or \.mcap"):
         open_log(tmp_path)
 
@@ -224,24 +231,44 @@ def test_a_folder_with_metadata_alone(tmp_path):
 
 @pytest.fixture
 def database(tmp_path):
-    folder = write(tmp_path, "sqlite3", two_scanners("sqlite3"))
-    (path,) = folder.glob("*.db3")
+    (path,) = write(tmp_path, "sqlite3", two_scanners("sqlite3")).glob("*.db3")
     return path
 
 
+def changed(database, script):
+    with sqlite3.connect(database) as writer:
+        writer.executescript(script)
+    writer.close()
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
 def test_a_database_alone_is_read_and_left_as_it_is(database):
-    before = database.read_bytes(), sorted(database.parent.iterdir())
-    assert len(list(open_log(database))) == 30
-    assert (database.read_bytes(), sorted(database.parent.iterdir())) == before
+    before = contents(database.parent)
+    assert stamps_of(open_log(database)) == STAMPS
+    assert contents(database.parent) == before
+    changed(database, "DROP INDEX timestamp_idx")
+    assert stamps_of(open_log(database)) == STAMPS
 
 
-def test_what_a_stopped_recorder_left_beside_a_database(database):
+def test_what_a_stopped_recorder_left_beside_a_database(database, tmp_path):
+    """It is read, in place or in a copy, and nothing is created beside it."""
     writer = sqlite3.connect(database)
     writer.execute("PRAGMA journal_mode = WAL")
     writer.execute("DELETE FROM messages WHERE timestamp > 5000")
     writer.commit()
     assert len(list(open_log(database))) == 6
+    folder = tmp_path / "copy"
+    folder.mkdir()
+    for path in (database, database.with_name(f"{database.name}-wal")):
+        shutil.copy(path, folder)
     writer.close()
+    before = contents(folder)
+    log = open_log(folder)
+    assert len(log) == len(list(log)) == 6
+    assert contents(folder) == before
 
 
 @pytest.mark.parametrize(
@@ -254,6 +281,16 @@ def test_what_a_stopped_recorder_left_beside_a_database(database):
             "ALL SELECT id FROM n) SELECT id, 1 AS topic_id, 2 AS timestamp, x'00' AS data FROM n",
             "expected the tables topics and messages",
         ),
+        (
+            "ALTER TABLE messages RENAME COLUMN data TO x; ALTER TABLE messages ADD COLUMN "
+            "data AS (zeroblob(250000000))",
+            "column data of its table messages is computed",
+        ),
+        (
+            "ALTER TABLE messages RENAME TO old; "
+            "CREATE VIRTUAL TABLE messages USING fts4(topic_id, timestamp, data)",
+            "expected the tables topics and messages",
+        ),
         ("UPDATE messages SET data = 'text' WHERE id = 1", "/front: message is 'text', expected"),
         ("UPDATE messages SET data = x'28b52ffd00'", "/front: zstd data is broken"),
         ("UPDATE topics SET serialization_format = 'json'", "encoding is 'json', expected ros1"),
@@ -261,15 +298,77 @@ def test_what_a_stopped_recorder_left_beside_a_database(database):
     ],
 )
 def test_databases_that_are_strange(database, change, problem):
-    with sqlite3.connect(database) as writer:
-        writer.executescript(change)
-    writer.close()
+    changed(database, change)
     with pytest.raises(LogError, match=problem):
         list(open_log(database))
 
 
-def test_a_database_without_an_index_of_time(database):
-    with sqlite3.connect(database) as writer:
-        writer.execute("DROP INDEX timestamp_idx")
-    writer.close()
-    assert [scan.stamp for scan in open_log(database)] == [i / 4 for i in range(30)]
+def test_a_database_whose_damage_is_no_text(database):
+    data = database.read_bytes()
+    database.write_bytes(data.replace(b"CREATE TABLE messages", b"CREATE TABLE (\xdf ssages"))
+    with pytest.raises(LogError, match=r"cannot be read as a ROS 2 bag \(sqlite3\)"):
+        open_log(database)
+
+
+# --- recordings
+
+
+@pytest.mark.parametrize(
+    ("name", "counts", "beams"),
+    [
+        ("mcap/scans_demo.mcap", {"/front_scan": 331, "/rear_scan": 330}, (726, 726)),
+        ("rosbag1/scans_demo.bag", {"/front_scan": 331, "/rear_scan": 330}, (726, 726)),
+        ("rosbag1/demo_stationary_simple_environment.bag", {"/scan": 1265}, (512, 512)),
+        ("rosbag1/jackal_mocap.bag", {"/scan": 414}, (897, 897)),
+        ("rosbag1/corridor_alternating_beams.bag", {"/scan_filtered": 4752}, (179, 180)),
+        ("rosbag1/urg_handheld_v2_old.bag", {"/scan": 360}, (681, 681)),
+        ("rosbag1/urg_v1_2.bag", {"scan": 123}, (512, 512)),
+        ("rosbag2/jackal_mocap", {"/scan": 189}, (897, 897)),
+        ("rosbag2/ld19", {"/scan": 436}, (452, 456)),
+        ("rosbag2/ld19/data1_nov1_0.db3", {"/scan": 436}, (452, 456)),
+        ("rosbag2/two_publishers", {"/scan": 507}, (82, 524)),
+    ],
+)
+def test_recordings_open(data_dir, name, counts, beams):
+    log = open_log(data_dir / name)
+    form = name.partition("/")[0]
+    assert (log.format, log.topics, len(log)) == (form, list(counts), sum(counts.values()))
+    found = dict.fromkeys(counts, 0)
+    lengths = set()
+    for topic, scan in log.items():
+        found[topic] += 1
+        lengths.add(len(scan))
+    assert found == counts
+    assert (min(lengths), max(lengths)) == beams
+
+
+def test_a_recording_without_scans_lists_what_it_has(data_dir):
+    with pytest.raises(LogError) as caught:
+        open_log(data_dir / "mcap" / "nav2_turtlebot_no_scan.mcap")
+    assert caught.value.problem == (
+        "has no LaserScan or MultiEchoLaserScan; topics there are: "
+        "/amcl_pose (geometry_msgs/PoseWithCovarianceStamped, 135), /odom (nav_msgs/Odometry, "
+        "2639), /tf (tf2_msgs/TFMessage, 5422), /tf_static (tf2_msgs/TFMessage, 1)"
+    )
+
+
+def test_the_same_recording_in_two_containers(data_dir):
+    names = "rosbag1/scans_demo.bag", "mcap/scans_demo.mcap"
+    bag, mcap = (open_log(data_dir / name).items() for name in names)
+    for (topic, scan), (other_topic, other) in zip(bag, mcap, strict=True):
+        assert (topic, scan.stamp, scan.frame_id) == (other_topic, other.stamp, other.frame_id)
+        np.testing.assert_array_equal(scan.ranges, other.ranges)
+
+
+def test_oddities_of_recordings(data_dir):
+    # Codes below range_min are invalid.
+    log = open_log(data_dir / "rosbag1" / "demo_stationary_simple_environment.bag")
+    assert 0.3 < np.mean([scan.valid.mean() for scan in log]) < 0.4
+    # The increment changes with the number of beams.
+    for scan in open_log(data_dir / "rosbag2" / "ld19"):
+        assert scan.angle_increment == pytest.approx(2 * math.pi / len(scan), rel=0.01)
+    # Two publishers on a topic, of which one sees nothing.
+    scans = list(open_log(data_dir / "rosbag2" / "two_publishers"))
+    assert (np.diff(stamps_of(scans)) < 0).sum() > 100
+    blind = sum(not scan.valid.any() for scan in scans)
+    assert 200 < blind < len(scans) - 200

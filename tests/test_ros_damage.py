@@ -1,180 +1,183 @@
-"""Bags that are cut off, damaged or hostile: what is whole is read, then one clear line."""
+"""Bags that are cut off, damaged, hostile, packed or growing: what is whole is read."""
 
-from __future__ import annotations
-
+import bz2
+import gzip
+import math
 import random
 import re
-import shutil
+import sqlite3
 import struct
 import tracemalloc
-from pathlib import Path
+import zipfile
 
+import lz4.frame
 import numpy as np
 import pytest
 import ros_bags
+import zstandard
 from mcap.writer import Writer
+from ros_bags import every_kind, ranges_of, read
+from text_logs import zipped
 
 from lineament import LogError
-from lineament.logs import open_log, ros_bag
+from lineament.logs import find_logs, open_log, ros_bag
 
-every_kind = pytest.mark.parametrize("kind", ros_bags.KINDS)
 N = 60
+STAMPS = [float(i) for i in range(N)]
 
 
 @pytest.fixture(scope="module")
 def bags(tmp_path_factory):
-    """A whole bag of each kind, as a file: of a folder its database."""
-    folder = tmp_path_factory.mktemp("bags")
-    found: dict[str, Path] = {}
-    for kind in ros_bags.KINDS:
-        messages = ros_bags.Messages(ros_bags.ros_of(kind))
-        items = [("/scan", i, messages.scan(i, ranges_of(i))) for i in range(N)]
-        path = ros_bags.write_bag(folder / f"{kind}{ros_bags.ending(kind)}", kind, items)
-        found[kind] = next(path.glob("*.db3")) if path.is_dir() else path
-    return found
+    return ros_bags.bags_of_scans(tmp_path_factory.mktemp("bags"), N)
 
 
-def ranges_of(i):
-    return (1.0 + i + 0.01 * np.arange(40)).astype(np.float32)
+@pytest.fixture
+def altered(bags, tmp_path):
+    """Writes what a function makes of the bytes of a bag, under its name."""
+
+    def alter(kind, change):
+        path = tmp_path / bags[kind].name
+        path.write_bytes(change(bytearray(bags[kind].read_bytes())))
+        return path
+
+    return alter
+
+
+def stamps_of(scans):
+    return [scan.stamp for scan in scans]
 
 
 def is_whole(scan):
-    """Whether a scan is the one that its stamp tells."""
     return np.array_equal(scan.ranges, ranges_of(scan.stamp))
 
 
-def read(path, **options):
-    """Read scans up to the first error: them, and its text."""
-    scans = []
-    try:
-        scans.extend(open_log(path, **options))
-    except LogError as error:
-        assert "\n" not in str(error)  # noqa: PT017
-        assert str(path) in str(error)  # noqa: PT017
-        return scans, error.problem
-    return scans, None
+def changed(data, at, form, value):
+    struct.pack_into(form, data, at, value)
+    return data
+
+
+# --- cut off, flipped, overwritten
 
 
 @every_kind
-def test_cut_off_anywhere(bags, tmp_path, kind):
+def test_cut_off_anywhere(altered, kind):
     """What comes before the cut is read; nothing else is made up."""
-    data = bags[kind].read_bytes()
-    path = tmp_path / bags[kind].name
     most = 0
-    for cut in np.linspace(1, len(data) - 1, 100).astype(int):
-        path.write_bytes(data[:cut])
+    for share in np.linspace(0.001, 0.999, 100):
+        path = altered(kind, lambda data, share=share: data[: int(share * len(data))])
         scans, problem = read(path)
-        assert all(is_whole(scan) for scan in scans)
-        assert [scan.stamp for scan in scans] == list(range(len(scans)))
+        # Of a database the page at the cut is read as if it ended with zeros.
+        assert sum(not is_whole(scan) for scan in scans) <= kind.startswith("sqlite3")
+        assert stamps_of(scans) == STAMPS[: len(scans)]
         # A part of the index may go without any loss.
         assert problem or len(scans) == N
         kept, problem = read(path, keep_going=True)
         assert problem is None or not kept
-        assert len(kept) >= len(scans)
+        assert stamps_of(kept[: len(scans)]) == stamps_of(scans)
         most = max(most, len(scans))
     assert most > 0.8 * N
 
 
-@every_kind
-@pytest.mark.parametrize("damage", ["bit", "word"])
-def test_bits_that_flip_and_words_that_are_wrong(bags, tmp_path, kind, damage):
-    data = bags[kind].read_bytes()
-    path = tmp_path / bags[kind].name
-    chance = random.Random(5)
-    damaged = 0
+@pytest.mark.parametrize("kind", ["mcap", "mcap-lz4", "mcap-zstd", "mcap-ros1"])
+def test_a_scan_from_a_chunk_with_a_checksum_is_the_one_that_was_written(altered, kind):
+    chance, harmed = random.Random(5), 0
     for _ in range(100):
-        changed = bytearray(data)
-        at = chance.randrange(len(data) - 4)
-        if damage == "bit":
-            changed[at] ^= 1 << chance.randrange(8)
-        else:
-            word = chance.choice((0, 1, 2, 2**31, 2**32 - 1, chance.randrange(2**32)))
-            struct.pack_into("<I", changed, at, word)
-        path.write_bytes(changed)
-        scans, problem = read(path, keep_going=True)
-        assert len(scans) <= N
-        damaged += problem is not None or not all(is_whole(scan) for scan in scans)
-        if kind in ("mcap", "mcap-lz4", "mcap-zstd", "mcap-ros1"):
-            # Chunks have checksums: a scan that comes is the one that was written.
-            assert all(is_whole(scan) for scan in scans)
-    assert damaged < 100
+
+        def damaged(data):
+            words = 0, 1, 2, 2**31, 2**32 - 1, chance.randrange(2**32)
+            return changed(data, chance.randrange(len(data) - 4), "<I", chance.choice(words))
+
+        scans, problem = read(altered(kind, damaged), keep_going=True)
+        assert all(map(is_whole, scans))
+        harmed += problem is not None or len(scans) < N
+    assert 10 < harmed < 100
 
 
-@pytest.mark.parametrize(
-    ("kind", "begin"),
-    [
-        ("rosbag1", b"compression="),
-        ("mcap", b"sensor_msgs"),
-        ("mcap-plain", b"sensor_msgs"),
-        ("mcap-plain", b"/scan"),
-    ],
-)
-def test_any_byte_of_the_structure_may_be_wrong(bags, tmp_path, kind, begin):
-    """Those around the first chunk, schema, channel or message: lengths, codes and names."""
-    data = bags[kind].read_bytes()
-    first = max(data.index(begin) - 60, 0)
-    path = tmp_path / bags[kind].name
-    for at in range(first, first + 150):
-        for value in (0, 1, 255):
-            path.write_bytes(data[:at] + bytes((value,)) + data[at + 1 :])
-            read(path)
+def test_a_damaged_chunk_is_left_out_and_the_next_one_read(altered):
+    def flipped(data):
+        at = len(data) // 3
+        return changed(data, at, "B", data[at] ^ 1)
 
-
-def test_a_damaged_chunk_is_left_and_the_next_one_read(bags, tmp_path):
-    data = bytearray(bags["mcap"].read_bytes())
-    data[len(data) // 3] ^= 1
-    path = tmp_path / "flipped.mcap"
-    path.write_bytes(data)
+    path = altered("mcap", flipped)
     scans, problem = read(path)
     assert "chunk has another checksum than it says" in problem
     assert 0 < len(scans) < N / 2
     log = open_log(path, keep_going=True)
-    kept = [scan.stamp for scan in log]
+    kept = stamps_of(log)
     assert (kept[0], kept[-1], len(log), log.skipped) == (0.0, N - 1, N, 1)
     assert N / 2 < len(kept) < N
 
 
-def test_a_cut_off_bag_has_the_length_of_what_is_whole(bags, tmp_path):
-    for kind in ("rosbag1", "mcap-zstd", "mcap-plain"):
-        path = tmp_path / bags[kind].name
-        path.write_bytes(bags[kind].read_bytes()[: bags[kind].stat().st_size // 2])
-        log = open_log(path, keep_going=True)
-        assert 0 < len(log) == len(list(log)) < N
-        assert log.skipped == 1
+def test_names_are_read_where_the_rest_of_a_description_is_broken(altered):
+    """A definition of no sensible length, and letters of a topic that are none."""
+
+    def overlong(data):
+        return changed(data, data.index(b"ros2msg") + 7, "<I", 2**31)
+
+    assert len(read(altered("mcap-bare", overlong))[0]) == N
+
+    def renamed(data):
+        at = data.index(b"\5\0\0\0/scan") + 4
+        return changed(data, at, "5s", b"/s\xff\x07n")
+
+    log = open_log(altered("mcap-bare", renamed))
+    assert (log.topics, len(list(log))) == (["/s\ufffdn"], N)
+
+
+@pytest.mark.parametrize("kind", ["rosbag1", "mcap-zstd", "mcap-plain"])
+def test_a_cut_off_bag_has_the_length_of_what_is_whole(altered, kind):
+    log = open_log(altered(kind, lambda data: data[: len(data) // 2]), keep_going=True)
+    assert 0 < len(log) == len(list(log)) < N
+    assert log.skipped == 1
 
 
 # --- indices that are wrong
 
 
-def test_an_index_of_an_mcap_file_that_points_anywhere(bags, tmp_path):
-    path = tmp_path / "log.mcap"
-    data = bytearray(bags["mcap"].read_bytes())
-    for start in (0, 1, 8, 100, len(data) // 2, len(data) - 10, len(data), 2**63, 2**64 - 1):
-        struct.pack_into("<Q", data, len(data) - 8 - 20, start)
-        path.write_bytes(data)
-        log = open_log(path)
-        assert len(log) == len(list(log)) == N
+@pytest.mark.parametrize("kind", ["mcap", "rosbag1"])
+@pytest.mark.parametrize("start", [0, 1, 8, 13, 100, 5000, 0.5, -10, -1, 2**63, 2**64 - 1])
+def test_an_index_that_points_anywhere(altered, kind, start):
+    def moved(data):
+        at = len(data) - 28 if kind == "mcap" else data.index(b"index_pos=") + len(b"index_pos=")
+        to = int(0.5 * len(data)) if start == 0.5 else start % len(data) if start < 0 else start
+        return changed(data, at, "<Q", to)
+
+    log = open_log(altered(kind, moved))
+    assert len(log) == len(list(log)) == N
 
 
-def test_an_index_of_a_ros_1_bag_that_points_anywhere(bags, tmp_path):
-    path = tmp_path / "log.bag"
-    data = bytearray(bags["rosbag1"].read_bytes())
-    at = data.index(b"index_pos=") + len(b"index_pos=")
-    for start in (0, 1, 13, 5000, len(data) // 2, len(data) - 10, len(data), 2**63, 2**64 - 1):
-        struct.pack_into("<Q", data, at, start)
-        path.write_bytes(data)
-        log = open_log(path)
-        assert len(log) == len(list(log)) == N
+@pytest.mark.parametrize(
+    ("count", "each"), [(2**63, 2**63), (2**64 - 1, 2**64 - 1), (N, 7), (7, N)]
+)
+def test_statistics_that_are_wrong(altered, count, each):
+    def miscounted(data):
+        (start,) = struct.unpack_from("<Q", data, len(data) - 28)
+        at = data.index(struct.pack("<Q", N), start)
+        data = changed(data, at, "<Q", count)
+        return changed(data, data.index(struct.pack("<IH", 10, 1), at) + 6, "<Q", each)
+
+    log = open_log(altered("mcap", miscounted))
+    assert len(log) == len(list(log)) == N
 
 
-def test_a_ros_1_bag_that_was_not_closed(bags, tmp_path):
+def test_counts_come_from_the_index(altered, monkeypatch):
+    """Nothing else is read: where that is forbidden the length is still known."""
+    monkeypatch.setattr(ros_bag.RecordBag, "messages", None)
+    for kind in ("mcap", "mcap-plain", "rosbag1", "rosbag1-lz4"):
+        assert len(open_log(altered(kind, bytes))) == N
+    with pytest.raises(TypeError):
+        open_log(altered("mcap-bare", bytes))
+
+
+def test_a_ros_1_bag_that_was_not_closed(altered):
     """Its index is missing, its chunks are whole."""
-    data = bytearray(bags["rosbag1"].read_bytes())
-    at = data.index(b"index_pos=") + len(b"index_pos=")
-    (end,) = struct.unpack_from("<Q", data, at)
-    data[at : at + 8] = bytes(8)
-    path = tmp_path / "log.bag.active"
-    path.write_bytes(data[:end])
+
+    def unclosed(data):
+        at = data.index(b"index_pos=") + len(b"index_pos=")
+        (end,) = struct.unpack_from("<Q", data, at)
+        return changed(data, at, "<Q", 0)[:end]
+
+    path = altered("rosbag1", unclosed)
     scans, problem = read(path)
     assert len(scans) == len(open_log(path)) == N
     assert "ends without an index: it is cut off, or still recorded" in problem
@@ -189,102 +192,95 @@ def record(header, data, length=None):
     return struct.pack("<I", len(header)) + header + struct.pack("<I", size) + data
 
 
-def test_the_index_records_of_early_recorders(bags, tmp_path):
-    """They have the length that those of the version before would have."""
-    data = bags["rosbag1"].read_bytes()
-    at, changed = 13, bytearray(data[:13])
-    while at < len(data):
-        sizes = struct.unpack_from("<I", data, at)[0]
-        header = data[at + 4 : at + 4 + sizes]
-        start = at + 8 + sizes
-        size = struct.unpack_from("<I", data, start - 4)[0]
-        is_index = b"op=\4" in header
-        changed += record(header, data[start : start + size], size // 12 * 20 if is_index else None)
-        at = start + size
-    path = tmp_path / "early.bag"
-    path.write_bytes(changed)
-    assert changed != data
-    assert read(path)[1] is None
-    assert len(read(path)[0]) == N
+def test_the_index_records_of_early_recorders(altered):
+    """They have the length that those of the version before would have, or lack their count."""
+
+    def early(data):
+        at, made = 13, data[:13]
+        while at < len(data):
+            start = at + 8 + struct.unpack_from("<I", data, at)[0]
+            header = data[at + 4 : start - 4]
+            (size,) = struct.unpack_from("<I", data, start - 4)
+            is_index = b"op=\4" in header
+            piece = data[start : start + size]
+            made += record(header, piece, size // 12 * 20 if is_index else None)
+            at = start + size
+        assert made != data
+        return made
+
+    assert stamps_of(open_log(altered("rosbag1", early))) == STAMPS
+    uncounted = altered("rosbag1", lambda data: data.replace(b"\0count=", b"\0conut="))
+    assert stamps_of(open_log(uncounted)) == STAMPS
 
 
 # --- bombs
 
 
-def chunk(codec, data, size):
-    header = (
-        field(b"op", b"\5") + field(b"compression", codec) + field(b"size", struct.pack("<I", size))
-    )
-    return record(header, data)
-
-
 def rosbag1_bomb(path, codec, data, size):
     start = field(b"op", b"\3") + field(b"index_pos", bytes(8))
-    path.write_bytes(b"#ROSBAG V2.0\n" + record(start, b"") + chunk(codec, data, size))
+    header = field(b"op", b"\5") + field(b"compression", codec)
+    chunk = record(header + field(b"size", struct.pack("<I", size)), data)
+    path.write_bytes(b"#ROSBAG V2.0\n" + record(start, b"") + chunk)
 
 
 def mcap_bomb(path, codec, data, size):
     """A chunk that says how large it becomes, in a file without index."""
     with path.open("wb") as file:
-        writer = Writer(file, use_chunking=False)
-        writer.start("ros2")
+        Writer(file, use_chunking=False).start("ros2")
         name = struct.pack("<I", len(codec)) + codec
         body = struct.pack("<QQQI", 0, 0, size, 0) + name + struct.pack("<Q", len(data)) + data
         file.write(b"\6" + struct.pack("<Q", len(body)) + body)
 
 
-def packed(codec, plain):
-    import bz2
-
-    import lz4.frame
-    import zstandard
-
-    pack = {"bz2": bz2.compress, "lz4": lz4.frame.compress, "zstd": zstandard.compress}
-    return pack[codec](plain)
+PACK = {b"bz2": bz2.compress, b"lz4": lz4.frame.compress, b"zstd": zstandard.compress}
 
 
 @pytest.mark.parametrize(
-    ("write", "codec"),
-    [(rosbag1_bomb, "bz2"), (rosbag1_bomb, "lz4"), (mcap_bomb, "lz4"), (mcap_bomb, "zstd")],
+    ("bomb", "codec"),
+    [(rosbag1_bomb, b"bz2"), (rosbag1_bomb, b"lz4"), (mcap_bomb, b"lz4"), (mcap_bomb, b"zstd")],
 )
-def test_bombs(tmp_path, monkeypatch, write, codec):
+def test_bombs(tmp_path, monkeypatch, bomb, codec):
     monkeypatch.setattr(ros_bag, "MAX_PIECE", 1 << 20)
-    path = tmp_path / "bomb"
-    data = packed(codec, bytes(1 << 25))
+    path, data = tmp_path / "bomb", PACK[codec](bytes(1 << 25))
     tracemalloc.start()
     try:
         for size, problem in (
             (1 << 31, "chunk of 2147483648 bytes, expected at most 1 MiB"),
             (1 << 19, "chunk holds other than 524288 bytes|Frame requires too much memory"),
         ):
-            write(path, codec.encode(), data, size)
+            bomb(path, codec, data, size)
             assert re.search(problem, read(path)[1])
         assert tracemalloc.get_traced_memory()[1] < 1 << 23
     finally:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("write", [rosbag1_bomb, mcap_bomb])
-def test_chunks_that_cannot_be_read(tmp_path, write):
-    path = tmp_path / "bag"
+@pytest.mark.parametrize("bomb", [rosbag1_bomb, mcap_bomb])
+def test_chunks_that_cannot_be_read(tmp_path, bomb):
     for codec, data, size, problem in (
         (b"lzma", b"", 0, "chunk compressed by lzma, expected none, bz2, lz4, zstd"),
-        (b"lz4", b"nonsense", 100, "lz4 data is broken"),
-        (b"zstd", b"nonsense", 100, "zstd data is broken"),
-        (b"bz2", b"nonsense", 100, "bz2 data is broken"),
+        *((codec, b"nonsense", 100, f"{codec.decode()} data is broken") for codec in PACK),
         (b"none", b"12345", 4, "chunk holds other than 4 bytes"),
+        (b"none", b"1234", 4, "chunk has a record|reaches past|unpack"),
     ):
-        write(path, codec, data, size)
-        assert problem in read(path)[1]
+        bomb(tmp_path / "bag", codec, data, size)
+        assert re.search(problem, read(tmp_path / "bag")[1])
 
 
 @pytest.mark.parametrize("kind", ["rosbag1", "mcap-plain"])
-def test_a_record_that_says_it_is_huge(bags, tmp_path, kind, monkeypatch):
-    """It is told before memory is taken for it."""
+def test_the_largest_record(bags, kind, monkeypatch):
+    """A larger one is refused before memory is taken for it."""
     monkeypatch.setattr(ros_bag, "MAX_PIECE", 100)
-    path = tmp_path / bags[kind].name
-    shutil.copy(bags[kind], path)
-    assert "expected at most 0 MiB" in read(path)[1]
+    assert "expected at most 0 MiB" in read(bags[kind])[1]
+    reader = ros_bag.RecordReader
+    monkeypatch.setattr(reader, "__abstractmethods__", frozenset())
+    with reader(bags[kind]) as source:
+        assert len(source.take(100, "piece")) == source.at == 100
+        with pytest.raises(LogError, match=r"byte 100: piece has 101 bytes, expected at most"):
+            source.take(101, "piece")
+        source.skip(source.left, "rest")
+        with pytest.raises(LogError, match=r"is cut off: end has 1 bytes, 0 are left"):
+            source.skip(1, "end")
 
 
 @pytest.mark.parametrize(
@@ -304,5 +300,113 @@ def test_a_record_that_says_it_is_huge(bags, tmp_path, kind, monkeypatch):
 def test_files_that_end_at_once(tmp_path, data, problem):
     path = tmp_path / "thing"
     path.write_bytes(data)
-    with pytest.raises(LogError, match=problem):
-        list(open_log(path))
+    assert re.search(problem, read(path)[1])
+
+
+def test_a_cloud_of_signalling_nans(tmp_path):
+    points = np.zeros((1, 4), [("x", "f4"), ("y", "f4"), ("ring", "f4")])
+    points["x"], points["y"] = 1.0, np.arange(4)
+    for name, i in (("x", 0), ("y", 1), ("ring", 2)):
+        points[name].view("u4")[0, i] = 0x7F800001
+    cloud = ros_bags.Messages(2).cloud(1.0, points)
+    (scan,) = open_log(ros_bags.write(tmp_path, "mcap", [("/cloud", 0, cloud)]), ring=0)
+    assert scan.ranges.tolist() == [math.hypot(1, 3)]
+
+
+# --- packed
+
+
+@every_kind
+def test_whole_bags_in_archives(bags, tmp_path, temporary, kind):
+    data = bags[kind].read_bytes()
+    inside = f"day/{bags[kind].name}"
+    (tmp_path / "a.gz").write_bytes(gzip.compress(data))
+    (tmp_path / "a.zip").write_bytes(zipped(**{inside: data, "readme.txt": b"hello"}))
+    (tmp_path / "b.zip").write_bytes(zipped(**{f"{inside}.gz": gzip.compress(data)}))
+    for name in ("a.gz", "a.zip", "b.zip"):
+        scans, problem = read(tmp_path / name)
+        assert (stamps_of(scans), problem) == (STAMPS, None)
+    assert open_log(tmp_path / "a.zip").name == f"{tmp_path / 'a.zip'}/{inside}"
+    assert list(temporary.iterdir()) == []
+
+
+@every_kind
+@pytest.mark.parametrize("pack", ["gzip", "zip"])
+def test_bags_in_archives_that_are_cut_off(altered, temporary, kind, pack):
+    """What a cut gzip file held before the cut is read only where that is asked for."""
+    most = 0
+    for share in np.linspace(0.01, 0.9999, 20):
+        if pack == "gzip":
+            path = altered(kind, lambda d, s=share: (p := gzip.compress(d))[: int(s * len(p))])
+        else:
+            path = altered(kind, lambda d, s=share: zipped(bag=bytes(d[: int(s * len(d))])))
+        scans, problem = read(path)
+        assert problem or len(scans) == N
+        assert pack == "zip" or not scans
+        kept, problem = read(path, keep_going=True)
+        assert stamps_of(kept) == STAMPS[: len(kept)]
+        assert len(kept) >= len(scans)
+        assert problem is None or not kept
+        most = max(most, len(kept))
+    assert most > 0.5 * N
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_recorded_bag_in_a_zip(data_dir, tmp_path):
+    """A folder with its metadata, and with what sqlite keeps beside a database."""
+    folder = data_dir / "rosbag2" / "ld19"
+    with zipfile.ZipFile(tmp_path / "ld19.zip", "w") as archive:
+        for path in folder.iterdir():
+            archive.write(path, f"ld19/{path.name}")
+    assert find_logs(tmp_path) == [str(tmp_path / "ld19.zip")]
+    log, plain = open_log(tmp_path / "ld19.zip"), open_log(folder)
+    assert len(log) == len(plain) == 436
+    for scan, other in zip(log, plain, strict=True):
+        assert scan.stamp == other.stamp
+        np.testing.assert_array_equal(scan.ranges, other.ranges)
+
+
+# --- growing
+
+
+@pytest.mark.parametrize("kind", ["rosbag1", "mcap", "mcap-plain"])
+def test_a_bag_that_grows_while_it_is_read(bags, altered, kind):
+    """What is appended is left for the next time; else this would not end."""
+    whole = bags[kind].read_bytes()
+    path = altered(kind, lambda data: data[: len(data) // 2])
+    log = open_log(path, keep_going=True)
+    expected, stamps = len(log), []
+    for scan in log:
+        with path.open("ab") as file:
+            file.write(whole[len(whole) // 4 : len(whole) // 2])
+        stamps.append(scan.stamp)
+    assert stamps == STAMPS[:expected]
+    assert log.skipped == 1
+
+
+@pytest.mark.parametrize("journal", ["WAL", "MEMORY"])
+def test_a_database_that_grows_while_it_is_read(altered, journal):
+    """In both ways in which recorders write."""
+    path = altered("sqlite3", bytes)
+    recorder = sqlite3.connect(path)
+    recorder.execute(f"PRAGMA journal_mode = {journal}")
+    recorder.execute("UPDATE topics SET type = type")
+    recorder.commit()
+    add = (
+        "INSERT INTO messages (topic_id, timestamp, data) SELECT topic_id, timestamp + 1000, data "
+        "FROM messages LIMIT 2"
+    )
+    log, stamps, problem = open_log(path), [], "sqlite3"
+    try:
+        for scan in log:
+            recorder.execute(add)
+            recorder.commit()
+            stamps.append(scan.stamp)
+            assert len(stamps) < 4 * N
+    except LogError as error:
+        problem = error.problem
+    recorder.close()
+    assert "sqlite3" in problem
+    assert stamps[:N] == STAMPS[: len(stamps)]
+    assert len(list(open_log(path))) > N
+    assert not path.with_name(f"{path.name}-wal").exists()

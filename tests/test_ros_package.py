@@ -90,7 +90,8 @@ def test_parameter_that_is_not_known(package, ros_node):
 def test_source_takes_bytes_and_knows_publishers(package, ros_node):
     executor = Executor()
     executor.add_node(ros_node)
-    source = package.bridge.RclpySource(ros_node, executor, "/scan", odometry="/odom")
+    config = ln.live.LiveConfig(deskew="/odom")
+    source = package.bridge.RclpySource(ros_node, executor, config)
     assert (source.publishers, source.lost, source.ended, source.problems()) == (1, 0, False, [])
     assert source.receive(0.1) == []
     data = RosMessages("cdr").scan("/scan", MOMENT, SCAN).data
@@ -137,12 +138,12 @@ def test_node_runs_until_it_is_interrupted(package, monkeypatch):
 
     executor.waiting = [scan_and_end]
     assert package.node.main() == 0
-    (told,) = executor.node.publishers["/diagnostics"].published
-    assert struct.unpack_from("<I", told)[0] == 0x0100
-    assert b"lineament: /scan" in told
+    (report,) = executor.node.publishers["/diagnostics"].published
+    assert struct.unpack_from("<I", report)[0] == 0x0100
+    assert b"lineament: /scan" in report
 
 
-def test_main_tells_what_is_wrong_in_a_line(package, monkeypatch, capsys):
+def test_what_is_wrong_is_one_line(package, monkeypatch, capsys):
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     monkeypatch.setattr(Node, "overrides", {"method": "nonsense"})
     assert package.node.main() == 1

@@ -1,9 +1,8 @@
 """Poses of topics, at the stamps of scans."""
 
-from __future__ import annotations
-
 import math
 
+import numpy as np
 import pytest
 import ros_bags
 
@@ -18,7 +17,7 @@ def write(path, kind, make):
     """Write a bag of what `make` gives of messages: (topic, time of receipt [s], message)."""
     messages = ros_bags.Messages(ros_bags.ros_of(kind))
     items = [(topic, round(time * SECOND), message) for topic, time, message in make(messages)]
-    return ros_bags.write_bag(path / f"log{ros_bags.ending(kind)}", kind, items)
+    return ros_bags.write(path, kind, items)
 
 
 def poses(path, pose_topic):
@@ -54,7 +53,7 @@ def test_between_two_poses(tmp_path, kind, maker):
 
 
 @both
-def test_a_transform_of_its_own(tmp_path, kind):
+def test_a_stamped_transform(tmp_path, kind):
     def make(messages):
         yield "/vicon", 1.0, messages.transform(1.0, "world", "robot", 1.0, 2.0, 0.5)
         yield from scans(messages, 1.0)
@@ -111,20 +110,21 @@ def test_scans_do_not_wait_for_ever(tmp_path, monkeypatch):
     assert found[5] is None  # Of the poses, only the newest are kept.
 
 
-def test_a_broken_pose_is_told(tmp_path):
+@pytest.mark.parametrize("x", [math.nan, math.inf, -1e308, 1e100])
+def test_a_pose_without_measure_is_reported(tmp_path, x):
     def make(messages):
-        yield "/odom", 1.0, messages.odometry(1.0, math.nan, 0.0, 0.0)
+        yield "/odom", 1.0, messages.odometry(1.0, x, 0.0, 0.0)
         yield from scans(messages, 1.0)
 
     path = write(tmp_path, "mcap", make)
-    with pytest.raises(LogError, match=r"/odom message 0: pose is \(nan, 0.0, 0.0\), expected"):
+    with pytest.raises(LogError, match=r"/odom message 0: pose is \(.*, 0.0, 0.0\), expected"):
         poses(path, "/odom")
     log = open_log(path, pose_topic="/odom", keep_going=True)
     assert [scan.pose for scan in log] == [None]
     assert log.skipped == 1
 
 
-def test_scans_that_wait_where_a_bag_breaks_are_given(tmp_path):
+def test_scans_that_wait_where_a_bag_breaks_are_returned(tmp_path):
     def make(messages):
         yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)
         yield from scans(messages, 1.0, 2.0, 3.0)
@@ -156,3 +156,16 @@ def test_topics_that_have_no_poses(tmp_path, pose_topic, problem):
     path = write(tmp_path, "mcap", make)
     with pytest.raises(LogError, match=problem):
         open_log(path, pose_topic=pose_topic)
+
+
+def test_poses_of_motion_capture(data_dir):
+    """The truth of this run was refined from them: they agree to centimetres."""
+    topic = "/vrpn_client_node/jackal/pose"
+    found = list(open_log(data_dir / "rosbag1" / "jackal_mocap.bag", pose_topic=topic))
+    with np.load(data_dir / "truth" / "jackal_mocap_02171554.npz") as truth:
+        stamps, expected = truth["stamps"], truth["poses"]
+    nearest = np.abs(stamps[:, None] - [scan.stamp for scan in found]).argmin(axis=1)
+    off = np.array([scan.pose for scan in found])[nearest] - expected
+    turn = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.05
+    assert np.abs(turn).max() < 0.15

@@ -1,18 +1,23 @@
-"""Where logs are: folders, patterns and addresses."""
+"""Where logs are: folders, patterns, addresses, archives and what hostile ones must not do."""
 
 from __future__ import annotations
 
 import gzip
+import io
 import os
+import struct
+import subprocess
+import sys
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 from text_logs import BEAMS, FLASER, zipped
 
-from lineament import LogError
-from lineament.logs import find_logs, open_log
-from lineament.logs import sources as copies
-from lineament.logs import sources as remote
+from lineament import LaserScan, LogError
+from lineament.logs import find_logs, open_log, save_npz, sources
 
 # Folders and patterns
 
@@ -51,11 +56,12 @@ def test_folders_and_patterns(fleet, monkeypatch):
     assert find_logs(f"{fleet}/**/*.log*") == [everything[i] for i in (0, 2, 4)]
     monkeypatch.chdir(fleet)
     assert find_logs("day2/*") == [str(Path("day2/a.csv")), str(Path("day2/b.log"))]
+    assert find_logs("./day2/b.log") == ["./day2/b.log"]
 
 
 def test_what_is_named_is_taken(fleet):
-    # Opening it tells what is wrong.
-    for name in ("day1/readme.txt", "missing.log", "day3/none.zip"):
+    # Opening it reports what is wrong.
+    for name in ("day1/readme.txt", "missing.log", "day3/none.zip", "day1/empty.log"):
         assert find_logs(fleet / name) == [str(fleet / name)]
     odd = fleet / "a[1].log"
     odd.write_bytes(FLASER)
@@ -63,15 +69,12 @@ def test_what_is_named_is_taken(fleet):
 
 
 def test_nothing_found(tmp_path, fleet):
-    for path in (tmp_path / "*.nothing", fleet / "day1" / "readme*"):
+    (tmp_path / "empty").mkdir()
+    for path in (tmp_path / "*.nothing", fleet / "day1" / "readme*", tmp_path / "empty"):
         with pytest.raises(LogError, match="holds no log"):
             find_logs(path)
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(LogError, match=r"empty: holds no log"):
-        find_logs(tmp_path / "empty")
-    with pytest.raises(
-        LogError, match=r"is a directory, expected a log file: .*broken\.log\.gz, .*, …"
-    ):
+    several = r"is a directory, expected a log file: .*broken\.log\.gz, .*, …"
+    with pytest.raises(LogError, match=several):
         open_log(fleet)
     with pytest.raises(LogError, match=r"is a directory, expected a log file$"):
         open_log(tmp_path / "empty")
@@ -131,7 +134,9 @@ def test_what_cannot_be_fetched(memory, monkeypatch):
     with pytest.raises(LogError, match="holds no log"):
         find_logs("memory://no/*.bag")
     memory.pipe("/a.log", FLASER)
-    monkeypatch.setattr(copies, "MAX_COPY", 10)
+    monkeypatch.setattr(sources, "MAX_COPY", len(FLASER))
+    assert len(open_log("memory://a.log")) == 1
+    monkeypatch.setattr(sources, "MAX_COPY", len(FLASER) - 1)
     with pytest.raises(LogError, match="is larger than"):
         open_log("memory://a.log")
 
@@ -145,5 +150,177 @@ def test_what_cannot_be_fetched(memory, monkeypatch):
     ],
 )
 def test_failures_on_the_way(error, problem):
-    with pytest.raises(LogError, match=rf"^s3://a: {problem}"), remote._fsspec("s3://a"):
+    with pytest.raises(LogError, match=rf"^s3://a: {problem}"), sources._fsspec("s3://a"):
         raise error
+
+
+# Archives
+
+
+def npz_bytes(tmp_path):
+    save_npz(tmp_path / "made.npz", [LaserScan([1.0, 2.0], 0.0, 0.1, stamp=7.5)])
+    return (tmp_path / "made.npz").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["a.zip", "a.log", "a"])
+def test_a_zip_of_one_log(write, temporary, name):
+    hidden = {"__MACOSX/._b.log": FLASER, ".hidden.log": FLASER, "day/readme": b"hello"}
+    path = write(zipped(**{"day/b.log": FLASER + b"FLASER 9\n"}, **hidden), name)
+    log = open_log(path, keep_going=True)
+    assert (log.format, log.name) == ("carmen", f"{path}/day/b.log")
+    assert [scan.stamp for scan in log] == [scan.stamp for scan in log] == [7.5]
+    assert log.faults[0].startswith(f"{path}/day/b.log:2: FLASER has 1")
+    assert len(list(temporary.iterdir())) == 1
+    del log
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_zip_of_several_logs(write, tmp_path, temporary):
+    files = {"b.csv": BEAMS, "day/a.log.gz": gzip.compress(FLASER), "c": b"?", "d": b""}
+    path = write(zipped(**files), "logs.zip")
+    both = [f"{path}/b.csv", f"{path}/day/a.log.gz"]
+    with pytest.raises(LogError, match=rf"holds several logs, expected a log file: {both[0]}, "):
+        open_log(path)
+    assert find_logs(path) == find_logs([tmp_path]) == both
+    assert [open_log(log).format for log in both] == ["csv", "carmen"]
+    with pytest.raises(LogError, match=r"logs\.zip/d\.log: there is no such file in the archive"):
+        open_log(path / "d.log")
+    assert list(temporary.iterdir()) == []
+
+
+def test_npz_logs_in_gzip_and_zip(write, tmp_path, temporary):
+    data = npz_bytes(tmp_path)
+    packed = write(data, "a.npz.gz", gzip.compress)
+    for path in (packed, write(zipped(**{"inside.npz": data}), "b.zip")):
+        log = open_log(path)
+        assert (log.format, next(iter(log)).stamp) == ("npz", 7.5)
+    # Cut off, it still says so.
+    packed.write_bytes(gzip.compress(data)[:-200])
+    for keep_going, problem in ((True, "is no whole npz"), (False, "gzip data ends early")):
+        with pytest.raises(LogError, match=rf"a\.npz\.gz: {problem}"):
+            open_log(packed, keep_going=keep_going)
+    del log
+    assert list(temporary.iterdir()) == []
+
+
+def test_nothing_is_written_where_an_archive_says(tmp_path, temporary):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    path = inner / "evil.zip"
+    outside = tmp_path / "absolute.log"
+    names = ["../outside.log", str(outside), "a/../../outside.log", "ok.log"]
+    path.write_bytes(zipped(**dict.fromkeys(names, FLASER)))
+    assert find_logs(path) == [str(path)]
+    # Even what is asked for by such a name comes to lie in our own folder.
+    logs = [open_log(path), open_log(f"{path}/../outside.log")]
+    assert [next(iter(log)).stamp for log in logs] == [7.5, 7.5]
+    assert all(temporary in log.path.parents for log in logs)
+    assert not list(tmp_path.rglob("*.log"))
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2, zipfile.ZIP_DEFLATED])
+def test_damaged_archives(tmp_path, write, temporary, method):
+    with zipfile.ZipFile(tmp_path / "whole.zip", "w", method) as archive:
+        for name in ("a.log", "b.log"):
+            archive.writestr(name, FLASER * 50)
+    whole = (tmp_path / "whole.zip").read_bytes()
+    rng = np.random.default_rng(3)
+    damaged = [whole[:cut] for cut in range(4, len(whole), 7)]
+    for at in rng.integers(4, len(whole), 80):
+        damaged.append(whole[:at] + bytes([whole[at] ^ 1 << rng.integers(8)]) + whole[at + 1 :])
+        damaged.append(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+    for data in damaged:
+        path = write(data, "a.zip")
+        for source in (path, f"{path}/a.log"):
+            problem = ""
+            try:
+                assert len(list(open_log(source))) == 50
+            except LogError as error:
+                problem = str(error)
+            assert not problem or problem.startswith(str(path))
+            assert problem.isprintable()
+        find_logs(path)
+    assert list(temporary.iterdir()) == []
+
+
+def test_an_encrypted_archive(write):
+    data = bytearray(zipped(**{"a.log": FLASER}))
+    for mark, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        data[data.index(mark) + offset] |= 1
+    path = write(bytes(data), "a.zip")
+    with pytest.raises(LogError, match="is no log that lineament knows"):
+        open_log(path)
+    with pytest.raises(LogError, match=r"is no whole zip archive: .*encrypted"):
+        open_log(path / "a.log")
+
+
+def test_a_member_that_says_it_is_larger_than_the_archive(write):
+    data = bytearray(zipped(**{"a.log": FLASER * 50_000}))
+    struct.pack_into("<I", data, data.index(b"PK\1\2") + 20, 1 << 31)
+    with pytest.raises(LogError, match="is no whole zip archive: it ends early"):
+        open_log(write(bytes(data), "a.zip") / "a.log")
+
+
+def test_archives_in_archives_are_not_looked_into(write):
+    inner = zipped(**{"a.log": FLASER})
+    for _ in range(3):
+        inner = zipped(**{"inner.zip": inner})
+        with pytest.raises(LogError, match="is no log that lineament knows"):
+            open_log(write(inner, "a.zip"))
+
+
+@pytest.mark.parametrize("kind", ["zip", "npz.gz"])
+def test_a_bomb_is_refused(write, tmp_path, temporary, monkeypatch, kind):
+    monkeypatch.setattr(sources, "SMALL_COPY", 1 << 20)
+    zeros = FLASER + bytes(1 << 24)
+    data = npz_bytes(tmp_path) + zeros
+    path = write(zipped(**{"a.log": zeros}) if kind == "zip" else gzip.compress(data), f"a.{kind}")
+    with pytest.raises(LogError, match="unpacks to more than 300 times its size"):
+        open_log(path)
+    assert list(temporary.iterdir()) == []
+    monkeypatch.setattr(sources, "MAX_COPY", 1 << 10)
+    with pytest.raises(LogError, match="is larger than 0 GiB unpacked"):
+        open_log(path)
+    assert list(temporary.iterdir()) == []
+
+
+def test_what_grows_as_text_does_is_no_bomb():
+    for size, packed in ((sources.SMALL_COPY, 1), (300 << 20, 1 << 20)):
+        sources.check_growth("a", size, packed)
+        with pytest.raises(LogError, match="300 times"):
+            sources.check_growth("a", size + 1, packed)
+
+
+def test_too_many_files(write, monkeypatch):
+    path = write(zipped(a=b"1", b=b"2", c=FLASER), "a.zip")
+    monkeypatch.setattr(sources, "MAX_MEMBERS", 3)
+    assert len(open_log(path)) == 1
+    monkeypatch.setattr(sources, "MAX_MEMBERS", 2)
+    with pytest.raises(LogError, match="holds 3 files, expected at most 2"):
+        open_log(path)
+
+
+def test_a_full_disk(temporary, monkeypatch):
+    class FullDisk(io.BytesIO):
+        def write(self, _):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "open", lambda *_: FullDisk())
+    with pytest.raises(LogError, match=r"a\.bag: cannot be copied to .*: No space left on device"):
+        sources.LocalCopy("a.bag", iter([b"data"]))
+    assert list(temporary.iterdir()) == []
+
+
+def test_readers_in_several_threads(write, temporary):
+    path = write(zipped(**{"a.log": FLASER * 20}), "a.zip")
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda _: len(list(open_log(path))), range(4))) == [20] * 4
+    assert list(temporary.iterdir()) == []
+
+
+def test_copies_go_when_the_program_ends(write, temporary):
+    path = write(zipped(**{"a.log": FLASER}), "a.zip")
+    code = f"from lineament.logs import open_log; log = open_log({str(path)!r})"
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    assert list(temporary.iterdir()) == []

@@ -1,148 +1,403 @@
-"""Stages by themselves: what they refuse, their edges, and that a trace is made of them."""
+"""Each stage equals its slow twin: on random and degenerate scans, and by hand; what it refuses."""
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
+import naive
 import numpy as np
 import pytest
-from worlds import NOISE, degenerate_scans, random_scan
+from equality import assert_same_filtered
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from naive_fit import fit_line, jacobian_covariance
+from worlds import (
+    BOX,
+    NOISE,
+    STEP,
+    degenerate_scans,
+    fan,
+    full_circle,
+    random_scan,
+    room,
+    scan_of,
+    wall,
+)
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.methods import stages
 
+DEGENERATE = degenerate_scans()
+seeds = st.integers(0, 2**32 - 1)
+RESPONSES = ("tangent", "product", "relative")
+FITS = ("total", "y_of_x", "weighted")
 SCAN = LaserScan([2.0] * 9, 0.0, 0.01)
 POINTS = [(2.0, 0.1 * i) for i in range(9)]
-NAN, INF = float("nan"), float("inf")
+NAN, INF = math.nan, math.inf
+clusters = stages.adaptive_clusters
 
 
-@pytest.mark.parametrize(
-    ("stage", "changes", "message"),
-    [
-        ("bilateral_filter", {"sigma_d": 0}, "sigma_d is 0"),
-        ("bilateral_filter", {"sigma_d": NAN}, "sigma_d is nan"),
-        ("bilateral_filter", {"sigma_r": -1.0}, r"sigma_r is -1\.0"),
-        ("bilateral_filter", {"sigma_r": "1"}, "sigma_r is '1'"),
-        ("bilateral_filter", {"half_width": -1}, "half_width is -1"),
-        ("bilateral_filter", {"half_width": 1.5}, r"half_width is 1\.5"),
-        ("adaptive_clusters", {"spacing_scale": 0.0}, r"spacing_scale is 0\.0"),
-        ("adaptive_clusters", {"noise_floor": -0.1}, r"noise_floor is -0\.1"),
-        ("adaptive_clusters", {"density_k": INF}, "density_k is inf"),
-        ("adaptive_clusters", {"min_points": 0}, "min_points is 0"),
-        ("adaptive_clusters", {"min_points": True}, "min_points is True"),
-        ("adaptive_clusters", {"ranges": [1.0, 2.0]}, r"ranges has shape \(2,\), expected \(9,\)"),
-        ("corner_response", {"support_radius": 0}, "support_radius is 0"),
-        ("corner_response", {"response": "chord"}, "response is 'chord', expected one of: "),
-        ("primary_corners", {"threshold": -1.0}, r"threshold is -1\.0"),
-        ("primary_corners", {"min_points": 1}, "min_points is 1"),
-        ("primary_corners", {"support_radius": 2.0}, r"support_radius is 2\.0"),
-        ("primary_corners", {"response": None}, "response is None"),
-        ("fit_line", {"fit": "huber"}, "fit is 'huber', expected one of: total, y_of_x, weighted"),
-    ],
-)
-def test_refusals_name_parameter_and_value(stage, changes, message):
-    given = SCAN if stage in ("bilateral_filter", "adaptive_clusters") else POINTS
-    with pytest.raises(ValueError, match=message):
-        getattr(stages, stage)(given, **changes)
+# Filter
 
 
-@pytest.mark.parametrize(
-    ("points", "message"),
-    [
-        ([1.0, 2.0], r"points has shape \(2,\)"),
-        ([(1.0, 2.0, 3.0)], r"points has shape \(1, 3\)"),
-        ([(1.0, NAN), (1.0, 2.0)], "not finite"),
-        ([(1.0, INF), (1.0, 2.0)], "not finite"),
-    ],
-)
-@pytest.mark.parametrize("stage", ["corner_response", "primary_corners", "fit_line"])
-def test_refusals_of_points(stage, points, message):
-    with pytest.raises(ValueError, match=message):
-        getattr(stages, stage)(points)
+def assert_same_filter(scan, **parameters):
+    found = stages.bilateral_filter(scan, **parameters)
+    assert_same_filtered(found, naive.bilateral(scan, **parameters), **parameters)
+    assert (np.isnan(found) == ~scan.valid).all()
 
 
-def test_fit_needs_two_points_that_a_beam_can_meet():
-    for points in ([], [(1.0, 2.0)]):
-        with pytest.raises(ValueError, match=f"points has {len(points)} points"):
-            stages.fit_line(points)
-    with pytest.raises(ValueError, match="at the origin"):
-        stages.fit_line([(0.0, 0.0), (1.0, 1.0)])
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_filter_of_degenerate_scans(name):
+    assert_same_filter(DEGENERATE[name])
+    assert_same_filter(DEGENERATE[name], half_width=2, sigma_d=1.0)
 
 
-def test_fit_of_coinciding_points_has_no_direction():
-    for fit in stages.FITS:
-        line = stages.fit_line([(1.0, 1.0)] * 3, noise=NOISE, fit=fit)
-        assert line["covariance"][1, 1] == pytest.approx(np.pi**2 / 12)
-        assert np.isfinite(line["covariance"]).all()
-        assert line["centroid"].tolist() == [1.0, 1.0]
+@settings(max_examples=15)
+@given(seeds, st.floats(0.3, 20), st.floats(0.01, 2), st.integers(0, 20))
+def test_filter_of_random_scans(seed, sigma_d, sigma_r, half_width):
+    scan = random_scan(seed, 90)
+    assert_same_filter(scan, sigma_d=sigma_d, sigma_r=sigma_r, half_width=half_width)
+
+
+def test_filter_by_hand():
+    scan = LaserScan([2.0, 2.3, NAN, 2.0], 0.0, 0.01)
+    # Neighbours of the first within 1 beam: itself (1) and the second (e^-1/2 e^-1/2).
+    w = math.exp(-1 / 2) * math.exp(-0.5)
+    expected = [(2 + 2.3 * w) / (1 + w), (2.3 + 2 * w) / (1 + w), NAN, 2.0]
+    found = stages.bilateral_filter(scan, sigma_d=1.0, sigma_r=0.3, half_width=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert stages.bilateral_filter(scan, half_width=0).tolist()[:2] == [2.0, 2.3]
+
+
+def test_filter_goes_over_the_seam_of_a_full_circle_only():
+    ranges = np.full(360, 2.0)
+    ranges[-1] = 2.2
+    ring = stages.bilateral_filter(LaserScan(ranges, 0.0, 2 * math.pi / 360))
+    assert stages.bilateral_filter(LaserScan(ranges, 0.0, 0.01))[0] == pytest.approx(2, abs=1e-9)
+    assert ring[0] > 2.01
+    np.testing.assert_allclose(ring[0], ring[-2], rtol=1e-7)
+
+
+# Noise
+
+
+def assert_same_noise(scan):
+    found, expected = stages.estimate_noise(scan), naive.sigma(scan)
+    assert (found is None) == (expected is None) == (not scan.valid.any())
+    if found is not None:
+        assert found.sigma == pytest.approx(expected, rel=1e-12)
+        assert found == RangeNoise(sigma=found.sigma)
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_noise_of_degenerate_scans(name):
+    assert_same_noise(DEGENERATE[name])
+
+
+@settings(max_examples=40)
+@given(seeds)
+def test_noise_of_random_scans(seed):
+    assert_same_noise(random_scan(seed))
+
+
+@pytest.mark.parametrize("sigma", [0.003, 0.01, 0.05])
+def test_noise_is_estimated_in_spite_of_structure(sigma):
+    angles = full_circle(1800)
+    ranges = room(angles, BOX) + sigma * np.random.default_rng(2).normal(size=len(angles))
+    ranges[200:300] += 1.5
+    assert stages.estimate_noise(scan_of(ranges, angles)).sigma == pytest.approx(sigma, rel=0.12)
+
+
+def test_noise_of_a_lattice_is_that_of_rounding():
+    scan = LaserScan(np.tile([2.0] * 7 + [2.1] * 8, 20), 0.0, 0.001)
+    assert stages.estimate_noise(scan).sigma == pytest.approx(0.1 / math.sqrt(12))
+
+
+# Clusters
+
+
+def assert_same_clusters(scan, scale=6.0, floor=3.0, density_k=3.0, min_points=3):
+    sigma = naive.sigma(scan)
+    twin = naive.clusters(
+        scan,
+        np.where(naive.valid(scan), scan.ranges, NAN),
+        NAN if sigma is None else sigma,
+        scale=scale,
+        floor=floor,
+        density_k=density_k,
+        min_points=min_points,
+    )
+    found = clusters(
+        scan, spacing_scale=scale, noise_floor=floor, density_k=density_k, min_points=min_points
+    )
+    assert found.tolist() == twin.labels(len(scan)).tolist()
+    assert found.dtype == np.int32
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_clusters_of_degenerate_scans(name):
+    assert_same_clusters(DEGENERATE[name])
+    assert_same_clusters(DEGENERATE[name], min_points=1, floor=0.0)
+
+
+@settings(max_examples=40)
+@given(seeds, st.floats(1, 10), st.floats(0, 5), st.floats(0, 6), st.integers(1, 9))
+def test_clusters_of_random_scans(seed, scale, floor, k, least):
+    assert_same_clusters(random_scan(seed), scale, floor, k, least)
+
+
+@pytest.mark.parametrize(("factor", "joined"), [(1 + 1e-9, True), (1 - 1e-9, False)])
+def test_distance_threshold_and_noise_floor_by_hand(factor, joined):
+    # T_d = λ ρ Δφ + 3 √2 σ; the spacing over a step in range by the law of cosines.
+    expected = [0] * 6 if joined else [0] * 3 + [1] * 3
+    d = math.sqrt(2**2 + 2.05**2 - 2 * 2 * 2.05 * math.cos(0.01))
+    scan = LaserScan([2.0] * 3 + [2.05] * 3, 0.0, 0.01)
+    plain = {"noise_floor": 0.0, "density_k": 0.0, "noise": RangeNoise()}
+    found = clusters(scan, spacing_scale=d / (2.05 * 0.01) * factor, **plain)
+    assert found.tolist() == expected
+    d = math.sqrt(2**2 + 2.1**2 - 2 * 2 * 2.1 * math.cos(0.001))
+    noise = RangeNoise(sigma=(d - 6 * 2.1 * 0.001) / (3 * math.sqrt(2)) * factor)
+    scan = LaserScan([2.0] * 3 + [2.1] * 3, 0.0, 0.001)
+    assert clusters(scan, noise=noise).tolist() == expected
+
+
+@pytest.mark.parametrize(("k", "expected"), [(2.2, [0] * 6), (2.1, [0] * 4 + [1, 1])])
+def test_density_threshold_by_hand(k, expected):
+    # Spacings 0.1, 0.1, 0.4 along a beam's direction nearly: μ = 0.2, σ = 0.1414; T_d is tiny.
+    ranges = np.cumsum([1.0, 0.1, 0.1, 0.4, 0.5, 1e-10])
+    noise = RangeNoise(sigma=0.4 / (3 * math.sqrt(2)) * (1 + 1e-6))
+    scan = LaserScan(ranges, angles=1e-9 * np.arange(6))
+    assert clusters(scan, noise=noise, density_k=k, min_points=2).tolist() == expected
+
+
+def test_density_is_skipped_below_three_spacings():
+    ranges = np.cumsum([1.0, 0.1, 0.1, 0.11, 1e-10, 1e-10])
+    noise = RangeNoise(sigma=0.105 / (3 * math.sqrt(2)))
+    scan = LaserScan(ranges, angles=1e-9 * np.arange(6))
+    assert clusters(scan, noise=noise, density_k=100.0).tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_cluster_of_two_is_noise_and_numbers_have_no_holes():
+    scan = LaserScan([2.0] * 3 + [3.0] * 2 + [2.0] * 3, 0.0, 0.01)
+    found = clusters(scan, noise=RangeNoise(sigma=0.001))
+    assert found.tolist() == [0, 0, 0, -1, -1, 1, 1, 1]
+
+
+def test_clusters_merge_over_the_seam_of_a_full_circle_only():
+    ranges = np.full(90, 2.0)
+    ranges[30:60] = 5.0
+    for step, last in ((2 * math.pi / 90, 0), (6.0 / 90, 2)):
+        found = clusters(LaserScan(ranges, 0.0, step), noise=RangeNoise(sigma=0.001))
+        assert found.tolist() == [0] * 30 + [1] * 30 + [last] * 30
+
+
+@pytest.mark.parametrize(("n", "label"), [(4, -1), (5, 0)])
+def test_ring_counts_its_first_point_once(n, label):
+    scan = LaserScan(np.full(n, 2.0), 0.0, 2 * math.pi / n)
+    assert set(clusters(scan, min_points=5).tolist()) == {label}
 
 
 def test_clusters_of_other_ranges_leave_invalid_beams_out():
     scan = LaserScan([2.0, NAN, 2.0, 2.0, 2.0], 0.0, 0.01)
-    found = stages.adaptive_clusters(scan, [9.0, 2.0, 2.0, 2.0, 2.0], noise=NOISE)
-    assert found.tolist() == [-1, -1, 0, 0, 0]
+    assert clusters(scan, [9.0, 2.0, 2.0, 2.0, 2.0], noise=NOISE).tolist() == [-1, -1, 0, 0, 0]
+    assert clusters(scan, noise=NOISE).tolist() == [0, -1, 0, 0, 0]
 
 
-def test_given_arrays_stay_as_they_are():
-    ranges = np.full(9, 2.0)
-    scan = LaserScan([NAN] + [2.0] * 8, 0.0, 0.01)
-    stages.adaptive_clusters(scan, ranges)
-    assert ranges.tolist() == [2.0] * 9
-    points = np.array(POINTS)
+# The corner operator
+
+
+def points_of(seed):
+    rng = np.random.default_rng(seed)
+    m = int(rng.integers(0, 60))
+    if rng.random() < 0.5:
+        return np.cumsum(rng.normal(size=(m, 2)), axis=0)
+    turns = np.cumsum(rng.choice([0, 0, 0, 1.2], m) * rng.normal(size=m))
+    path = np.cumsum(0.02 * np.column_stack((np.cos(turns), np.sin(turns))), axis=0)
+    return path + [2, 1] + 1e-4 * rng.normal(size=(m, 2))  # No two at one distance of a chord.
+
+
+@settings(max_examples=30)
+@given(seeds, st.integers(1, 9), st.sampled_from(RESPONSES))
+def test_response_of_random_clusters(seed, radius, response):
+    points = points_of(seed)
+    found = stages.corner_response(points, support_radius=radius, response=response)
+    expected = [naive.response(points, i, radius, response) for i in range(len(points))]
+    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
+    if response == "relative":
+        assert ((found >= 0) & (found <= 1 + 1e-12)).all()
+
+
+@settings(max_examples=30)
+@given(seeds, st.sampled_from(RESPONSES), st.integers(2, 6), st.floats(0.05, 0.5))
+def test_primary_corners_of_random_clusters(seed, response, least, threshold):
+    points = points_of(seed)
+    found = stages.primary_corners(
+        points, support_radius=4, threshold=threshold, response=response, min_points=least
+    )
+    own = {"radius": 4, "threshold": threshold, "reading": response, "min_points": least}
+    expected = naive.primary_corners(points, False, **own) if len(points) else []
+    assert found["beam"].tolist() == [i for i, _, _ in expected]
+    for name, k in (("chord_distance", 1), ("response", 2)):
+        np.testing.assert_allclose(found[name], [e[k] for e in expected], rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [[], [(1, 1)], [(1, 1)] * 2, [(1, 1)] * 9, [(1, 0), (2, 0), (1, 0)], [(1, 0), (1, 0), (2, 0)]],
+)
+@pytest.mark.parametrize("response", RESPONSES)
+def test_response_of_degenerate_clusters(points, response):
+    found = stages.corner_response(points, response=response)
+    expected = [naive.response(np.array(points), i, 6, response) for i in range(len(points))]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert len(stages.primary_corners(points, response=response)) <= len(points)
+
+
+# Lines
+
+
+def seen_wall(seed, sigma):
+    rng = np.random.default_rng(seed)
+    normal = rng.uniform(-180, 180)
+    angles = math.radians(normal) + rng.uniform(-1.1, 0.3) + STEP * np.arange(rng.integers(3, 120))
+    rho = wall(angles, rng.uniform(0.5, 6), normal) + sigma * rng.normal(size=len(angles))
+    return angles, rho, tuple(rng.uniform(0, 1, 4) * [0.02, 0.005, 0.004, 0.02])
+
+
+@pytest.mark.parametrize("fit", FITS)
+@settings(max_examples=25)
+@given(seeds)
+def test_fits_equal_their_twins(fit, seed):
+    angles, rho, noise = seen_wall(seed, 0.01)
+    points = naive.polar(rho, angles)
+    found = stages.fit_line(points, noise=RangeNoise(*noise), fit=fit)
+    expected = fit_line(points, angles, rho, noise, fit)
+    for name in ("start", "end", "centroid", "n_points"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
+    turn = math.remainder(found["angle"] - expected["angle"], 2 * math.pi)
+    assert turn == pytest.approx(0, abs=1e-9)
+    assert found["rms"] == pytest.approx(expected["rms"], rel=1e-7, abs=1e-12)
+    np.testing.assert_allclose(found["covariance"], expected["covariance"], rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("fit", FITS)
+@pytest.mark.parametrize("seed", range(6))
+def test_covariance_is_that_of_moved_measurements(fit, seed):
+    angles, rho, noise = seen_wall(seed, 1e-5)
+    line = stages.fit_line(naive.polar(rho, angles), noise=RangeNoise(*noise), fit=fit)
+    expected = jacobian_covariance(angles, rho, noise, fit)
+    scale = np.sqrt(np.outer(*[np.diag(expected)] * 2))
+    np.testing.assert_allclose(line["covariance"] / scale, expected / scale, atol=2e-3)
+
+
+@pytest.mark.parametrize("fit", FITS)
+@pytest.mark.parametrize("normal", [0, 45, 90, 135, 180, 270])
+def test_walls_of_any_direction_fit_exactly(fit, normal):
+    angles = math.radians(normal) + fan(30)
+    line = stages.fit_line(naive.polar(wall(angles, 2.0, normal), angles), fit=fit)
+    across = np.array([math.cos(math.radians(normal)), math.sin(math.radians(normal))])
+    for name in ("start", "end", "centroid"):
+        assert line[name] @ across == pytest.approx(2.0, abs=1e-12)
+    turn = line["angle"] - math.radians(normal) - math.pi / 2
+    assert math.remainder(turn, 2 * math.pi) == pytest.approx(0, abs=1e-12)
+    assert line["rms"] < 1e-12
+
+
+@pytest.mark.parametrize("fit", FITS)
+def test_fit_of_coinciding_points_has_no_direction(fit):
+    line = stages.fit_line([(1.0, 1.0)] * 3, noise=NOISE, fit=fit)
+    assert line["covariance"][1, 1] == pytest.approx(np.pi**2 / 12)
+    assert np.isfinite(line["covariance"]).all()
+    assert line["centroid"].tolist() == [1.0, 1.0]
+
+
+# What is refused, and what is not
+
+
+@pytest.mark.parametrize(
+    ("stage", "given", "changes", "message"),
+    [
+        ("bilateral_filter", SCAN, {"sigma_d": 0}, "sigma_d is 0"),
+        ("bilateral_filter", SCAN, {"sigma_r": "1"}, "sigma_r is '1'"),
+        ("bilateral_filter", SCAN, {"half_width": 1.5}, r"half_width is 1\.5"),
+        ("adaptive_clusters", SCAN, {"spacing_scale": 0.0}, r"spacing_scale is 0\.0"),
+        ("adaptive_clusters", SCAN, {"noise_floor": -0.1}, r"noise_floor is -0\.1"),
+        ("adaptive_clusters", SCAN, {"density_k": INF}, "density_k is inf"),
+        ("adaptive_clusters", SCAN, {"min_points": 0}, "min_points is 0"),
+        ("adaptive_clusters", SCAN, {"ranges": [1.0]}, r"ranges has shape \(1,\), expected \(9,\)"),
+        ("corner_response", POINTS, {"support_radius": 0}, "support_radius is 0"),
+        ("corner_response", POINTS, {"response": "chord"}, "response is 'chord', expected one of"),
+        ("primary_corners", POINTS, {"support_radius": 2.0}, r"support_radius is 2\.0"),
+        ("primary_corners", POINTS, {"threshold": -1.0}, r"threshold is -1\.0"),
+        ("primary_corners", POINTS, {"min_points": 1}, "min_points is 1"),
+        ("primary_corners", POINTS, {"response": None}, "response is None"),
+        ("fit_line", POINTS, {"fit": "huber"}, "fit is 'huber', expected one of: total, y_of_x"),
+        ("fit_line", [], {}, "points has 0 points"),
+        ("fit_line", POINTS[:1], {}, "points has 1 points"),
+        ("fit_line", [(0.0, 0.0), (1.0, 1.0)], {}, "at the origin"),
+        *(
+            (stage, points, {}, message)
+            for stage in ("corner_response", "primary_corners", "fit_line")
+            for points, message in (
+                ([1.0, 2.0], r"points has shape \(2,\)"),
+                ([(1.0, 2.0, 3.0)], r"points has shape \(1, 3\)"),
+                ([(1.0, NAN), (1.0, 2.0)], "not finite"),
+                ([(1.0, INF), (1.0, 2.0)], "not finite"),
+            )
+        ),
+    ],
+)
+def test_refusals_name_parameter_and_value(stage, given, changes, message):
+    with pytest.raises(ValueError, match=message):
+        getattr(stages, stage)(given, **changes)
+
+
+def test_given_arrays_stay_as_they_are_and_may_be_empty():
+    ranges, points = np.full(9, 2.0), np.array(POINTS)
+    clusters(LaserScan([NAN] + [2.0] * 8, 0.0, 0.01), ranges)
     stages.primary_corners(points)
     stages.fit_line(points)
+    assert ranges.tolist() == [2.0] * 9
     assert points.tolist() == [list(p) for p in POINTS]
+    empty = LaserScan([], 0.0, 0.1)
+    assert stages.bilateral_filter(empty).shape == clusters(empty).shape == (0,)
 
 
-def test_empty_inputs():
-    scan = LaserScan([], 0.0, 0.1)
-    assert stages.bilateral_filter(scan).shape == (0,)
-    assert stages.adaptive_clusters(scan).shape == (0,)
-    assert stages.estimate_noise(scan) is None
-    assert stages.corner_response([]).shape == (0,)
-    assert len(stages.primary_corners([])) == 0
+# A run is made of its stages
 
-
-SCANS = {**degenerate_scans(), **{f"random {k}": random_scan(k) for k in range(12)}}
+SCANS = {**DEGENERATE, **{f"random {k}": random_scan(k) for k in range(12)}}
 
 
 @pytest.mark.parametrize("scan", SCANS.values(), ids=SCANS)
 @pytest.mark.parametrize("noise", [None, RangeNoise(sigma=0.02)])
 def test_trace_is_made_of_the_stages(scan, noise):
     extractor = Extractor("liu", response="relative", threshold=0.25, noise=noise)
-    trace = extractor.trace(scan)
-    method, features = extractor.method, extractor(scan)
+    trace, features = extractor.trace(scan), extractor(scan)
+    assert (trace.scan, trace.method, trace.threshold) == (scan, "liu", 0.25)
     for name in ("segments", "corners", "breakpoints"):
-        found, expected = getattr(trace.features, name), getattr(features, name)
-        for field in found.dtype.names:
-            np.testing.assert_array_equal(found[field], expected[field])
+        assert getattr(trace.features, name).tobytes() == getattr(features, name).tobytes()
     np.testing.assert_array_equal(trace.filtered, stages.bilateral_filter(scan))
-    clusters = stages.adaptive_clusters(scan, trace.filtered, noise=noise)
-    np.testing.assert_array_equal(trace.clusters, clusters)
-    np.testing.assert_array_equal(trace.clusters, features.clusters)
+    labels = clusters(scan, trace.filtered, noise=noise)
+    np.testing.assert_array_equal(trace.clusters, labels)
+    np.testing.assert_array_equal(features.clusters, labels)
     assert trace.features.noise == (noise or stages.estimate_noise(scan))
     accepted = trace.candidates[trace.candidates["accepted"]]
-    assert (accepted["response"] > method.threshold).all()
-    rejected = trace.candidates[~trace.candidates["accepted"]]
-    assert (rejected["response"] <= method.threshold).all()
+    assert (trace.candidates["accepted"] == (trace.candidates["response"] > 0.25)).all()
     assert sorted(accepted["beam"]) == trace.cuts.tolist()
     for corner in features.corners:
         (own,) = accepted[accepted["beam"] == corner["beam"]]
         assert own["response"] == corner["response"]
-        assert own["cluster"] == features.clusters[corner["beam"]]
+        assert own["cluster"] == labels[corner["beam"]]
     if len(features.segments):
         assert sorted(features.corners["beam"]) == trace.cuts.tolist()
-    assert (trace.scan, trace.method, trace.threshold) == (scan, "liu", method.threshold)
-    # A class begins where the spacing exceeds both thresholds, and only there.
-    known = ~np.isnan(trace.spacing)
-    limit = np.fmax(trace.distance_threshold, trace.density_threshold)
+    # A cluster begins where the spacing exceeds both thresholds, and only there.
+    known, limit = ~np.isnan(trace.spacing), trace.distance_threshold
     asked = ~np.isnan(trace.density_threshold)
-    assert (trace.spacing[asked] > trace.distance_threshold[asked]).all()
-    beams = np.flatnonzero(~np.isnan(trace.filtered))
-    for before, beam in pairwise(beams):
-        together = clusters[before] == clusters[beam]
-        if clusters[before] >= 0 and clusters[beam] >= 0 and known[beam]:
-            within = trace.spacing[beam] <= limit[beam]
+    assert (trace.spacing[asked] > limit[asked]).all()
+    limit = np.fmax(limit, trace.density_threshold)
+    for before, beam in pairwise(np.flatnonzero(~np.isnan(trace.filtered))):
+        if labels[before] >= 0 and labels[beam] >= 0 and known[beam]:
+            together, within = labels[before] == labels[beam], trace.spacing[beam] <= limit[beam]
             assert together >= within
-            if not scan.is_full_circle:
-                assert together == within
+            assert together == within or scan.is_full_circle

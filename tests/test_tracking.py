@@ -1,57 +1,90 @@
-"""The tracker: who is who, by hand, through occlusion, and what must always hold."""
+"""Association and tracker: by hand, against their slow twins, by what must hold."""
 
 import math
 from dataclasses import replace
 from itertools import pairwise
 
+import naive_tracking as naive
 import numpy as np
 import pytest
 from handmade import arc, corner, features, random_features, segment, shaken
 
 import lineament as ln
-from lineament.motion import Tracker, associate
+from lineament.motion import Tracker, associate, estimate_motion
+from lineament.motion.association import KINDS, chi_square
+from lineament.reproduce.tracking import LOGS, load_recording, stand_in_odometry
 from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, building, drive, drive_poses, room, truth
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 1), (-1, 1), 31, 60))
-CORNER = corner(2, 1, segments=(0, 1))
-COLUMN = arc(0, -2, 0.3, 70, 80)
-FRAME = features(segments=WALLS, corners=[CORNER], arcs=[COLUMN])
-#: Deviations of 1 cm and 10 mrad.
-NEAR = np.diag((0.01, 0.01, 0.01)) ** 2
+FRAME = features(
+    segments=WALLS, corners=[corner(2, 1, segments=(0, 1))], arcs=[arc(0, -2, 0.3, 70, 80)]
+)
+#: A motion that is known to 1 cm and 10 mrad, and to ten times as much.
+NEAR, WIDE = np.diag((0.01, 0.01, 0.01)) ** 2, np.diag((0.1, 0.1, 0.1)) ** 2
+SPREAD = np.array([[4e-4, 1e-4, 1e-4], [1e-4, 9e-4, -2e-4], [1e-4, -2e-4, 4e-4]])
+NONE = np.empty((0, 2), np.intp)
 
 
 def at(frame, stamp):
     return replace(frame, stamp=stamp)
 
 
+def convex(x, y):
+    row = corner(x, y)
+    row["convex"] = True
+    return row
+
+
+def edges(*kinds):
+    return [corner(2, 1, kind=kind) for kind in kinds]
+
+
 # Association
 
 
-def test_pairs_within_and_beyond_the_gate_by_hand():
-    # Deviations of 1 cm on both sides: d² = (3 cm)²/2 cm² = 4.5 within 9.21, (5 cm)² = 12.5 not.
-    for shift, found in ((0.03, [[0, 0]]), (0.05, [])):
-        moved = features(corners=[corner(2 + shift, 1)])
-        assert associate(FRAME, moved).corners.tolist() == found
-    # Roughness and a motion that is not known widen it.
-    moved = features(corners=[corner(2.05, 1)])
-    assert len(associate(FRAME, moved, roughness=0.02).corners) == 1
-    assert len(associate(FRAME, moved, covariance=4 * NEAR).corners) == 1
+@pytest.mark.parametrize(
+    ("now", "settings", "found"),
+    [
+        # Deviations of 1 cm on both sides: d² = (3 cm)²/2 cm² = 4.5 is within 9.21.
+        ({"corners": [corner(2.03, 1)]}, {}, 1),
+        ({"corners": [corner(2.05, 1)]}, {}, 0),
+        ({"corners": [corner(2.05, 1)]}, {"roughness": 0.02}, 1),
+        ({"corners": [corner(2.05, 1)]}, {"covariance": 4 * NEAR}, 1),
+        ({"corners": [convex(2, 1)]}, {}, 0),
+        ({"corners": [corner(2, 1, sigma=math.nan)]}, {}, 0),
+        ({"corners": edges("edge")}, {}, 0),
+        ({"corners": edges("slit")}, {}, 1),
+        ({"arcs": [arc(0.02, -2, 0.31, 70, 80)]}, {}, 1),
+        ({"arcs": [arc(0, -2, 0.37, 70, 80)]}, {}, 0),
+        ({"segments": [segment((2.02, -1), (2.02, 1), 10, 30)]}, {}, 1),
+        ({"segments": [segment((2.06, -1), (2.06, 1), 10, 30)]}, {}, 0),
+        # The back of the wall; 0.1 rad with deviations of 0.01 rad.
+        ({"segments": [segment((2.0, 1), (2.0, -1), 10, 30)]}, {}, 0),
+        ({"segments": [segment((1.9, -1), (2.1, 1), 10, 30)]}, {}, 0),
+        # A part of it; 0.6 of 1.1 m beside it, and 0.5.
+        ({"segments": [segment((2.0, -0.2), (2.0, 0.2), 10, 30)]}, {}, 1),
+        ({"segments": [segment((2.0, 0.4), (2.0, 1.5), 10, 30)]}, {}, 1),
+        ({"segments": [segment((2.0, 0.6), (2.0, 1.7), 10, 30)]}, {}, 0),
+    ],
+)
+def test_a_pair_is_within_its_gate(now, settings, found):
+    assert len(associate(FRAME, features(**now), **settings)) == found
+    twin = naive.associate(FRAME, features(**now), **settings)
+    assert len(twin) == found
 
 
-def test_offset_angle_and_overlap_of_segments():
-    wall = features(segments=[WALLS[0]])
+@pytest.mark.parametrize("kinds", [("edge", "edge"), ("corner", "edge"), ("edge", "slit")])
+def test_edges_have_no_pair(kinds):
+    before, now = (features(corners=edges(kind)) for kind in kinds)
+    assert associate(before, now).corners.tolist() == []
 
-    def found(start, end):
-        return len(associate(wall, features(segments=[segment(start, end, 10, 30)])).segments)
 
-    assert found((2.02, -1), (2.02, 1))
-    assert not found((2.06, -1), (2.06, 1))
-    assert not found((2.0, 1), (2.0, -1))  # The back of the wall.
-    assert not found((1.9, -1), (2.1, 1))  # 0.1 rad with deviations of 0.01 rad.
-    assert found((2.0, -0.2), (2.0, 0.2))  # A part of it.
-    assert found((2.0, 0.4), (2.0, 1.5))  # 0.6 of 1.1 m beside it.
-    assert not found((2.0, 0.6), (2.0, 1.7))
+def test_rows_stay_what_they_are_among_edges():
+    # An edge lies nearer to where the corner was than the corner itself.
+    rows = [corner(2, 1, kind="edge"), corner(2.01, 1, kind="slit"), corner(0, 0, kind="edge")]
+    assert associate(FRAME, features(corners=rows)).corners.tolist() == [[0, 1]]
+    assert associate(features(corners=rows), FRAME).corners.tolist() == [[1, 0]]
 
 
 def test_far_along_an_uncertain_line_the_offset_is_uncertain():
@@ -61,14 +94,6 @@ def test_far_along_an_uncertain_line_the_offset_is_uncertain():
     assert len(associate(wall, piece).segments) == 1
 
 
-def test_arcs_by_centre_and_radius_and_corners_by_convexity():
-    assert len(associate(FRAME, features(arcs=[arc(0.02, -2, 0.31, 70, 80)])).arcs) == 1
-    assert len(associate(FRAME, features(arcs=[arc(0, -2, 0.37, 70, 80)])).arcs) == 0
-    other = corner(2, 1)
-    other["convex"] = True
-    assert len(associate(FRAME, features(corners=[other])).corners) == 0
-
-
 def test_of_several_the_nearest_and_of_pieces_the_longest_is_taken():
     now = features(corners=[corner(2.02, 1), corner(2.005, 1)])
     assert associate(FRAME, now).corners.tolist() == [[0, 1]]
@@ -76,44 +101,115 @@ def test_of_several_the_nearest_and_of_pieces_the_longest_is_taken():
     assert associate(FRAME, features(segments=pieces)).segments.tolist() == [[0, 1]]
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_pairs_are_one_to_one(seed):
-    before = random_features(seed)
-    now = shaken(before, seed).transform(0.02, -0.01, 0.003)
-    matches = associate(before, now, covariance=9 * NEAR)
-    for kind in ("segments", "corners", "arcs"):
-        for side in getattr(matches, kind).T:
-            assert len(set(side.tolist())) == len(side)
+@pytest.mark.parametrize("gate", [0, 1, math.nan])
+def test_a_gate_must_be_a_share(gate):
+    with pytest.raises(ValueError, match=f"gate is {gate}, expected"):
+        associate(FRAME, FRAME, gate=gate)
 
 
-def test_a_gate_must_be_a_share():
-    with pytest.raises(ValueError, match="gate is 1, expected"):
-        associate(FRAME, FRAME, gate=1)
+@pytest.mark.parametrize("degrees", [2, 3])
+@pytest.mark.parametrize("probability", [1e-9, 0.1, 0.5, 0.99, 1 - 1e-12])
+def test_quantiles(probability, degrees):
+    expected = naive.chi2.ppf(probability, degrees)
+    np.testing.assert_allclose(chi_square(probability, degrees), expected, rtol=1e-7)
 
 
-def test_the_covariance_of_the_motion_must_be_a_matrix():
-    with pytest.raises(ValueError, match=r"covariance is .* expected \(3, 3\)"):
-        associate(FRAME, FRAME, covariance=np.eye(2))
+# Against the twins
 
 
-@pytest.mark.parametrize(
-    ("before", "now"), [("edge", "edge"), ("edge", "corner"), ("corner", "edge"), ("slit", "edge")]
-)
-def test_edges_have_no_pair(before, now):
-    frames = [features(corners=[corner(2, 1, kind=kind)]) for kind in (before, now)]
-    assert associate(*frames).corners.tolist() == []
+def assert_same_pairs(found, expected):
+    for kind in KINDS:
+        assert getattr(found, kind).tolist() == getattr(expected, kind).tolist()
 
 
-def test_corners_and_slits_pair_and_keep_their_rows_among_edges():
-    # An edge lies nearer to where the corner was than the corner itself.
-    rows = [corner(2, 1, kind="edge"), corner(2.01, 1, kind="slit"), corner(0, 0, kind="edge")]
-    assert associate(FRAME, features(corners=rows)).corners.tolist() == [[0, 1]]
-    assert associate(features(corners=rows), FRAME).corners.tolist() == [[1, 0]]
+def assert_same_motion(found, expected):
+    if expected is None:
+        assert found is None
+        return
+    np.testing.assert_allclose(found.pose, expected.pose, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(
+        found.covariance, expected.covariance, rtol=1e-6, atol=1e-6 * expected.covariance.max()
+    )
+    # The directions have no sign, and no order.
+    projections = [motion.unobserved.T @ motion.unobserved for motion in (found, expected)]
+    np.testing.assert_allclose(*projections, atol=1e-6)
 
 
-def test_features_without_a_covariance_are_left_alone():
-    unknown = features(corners=[corner(2, 1, sigma=math.nan)])
-    assert associate(FRAME, unknown).corners.tolist() == []
+def varied(seed):
+    """Random features with full covariances, of which some are not known."""
+    rng, frame = np.random.default_rng(seed), random_features(seed)
+    for table in (frame.segments, frame.corners, frame.arcs):
+        size = table["covariance"].shape[-1]
+        factor = 0.01 * rng.normal(size=(len(table), size, size))
+        table["covariance"] = factor @ np.swapaxes(factor, 1, 2)
+        table["covariance"][rng.random(len(table)) < 0.05] = math.nan
+    frame.segments["misfit"] = rng.choice([0.0, 0.01], len(frame.segments))
+    frame.corners["convex"] = rng.random(len(frame.corners)) < 0.3
+    frame.corners["kind"] = rng.choice(["corner", "slit", "edge"], len(frame.corners))
+    frame.corners["segments"][:, 0] -= rng.random(len(frame.corners)) < 0.3
+    return frame
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_pairs_and_motion_of_random_features(seed):
+    before, rng = varied(seed), np.random.default_rng([seed, 1])
+    motion = tuple((rng.normal(size=3) * (0.1, 0.1, 0.3 if seed % 3 else 3.0)).tolist())
+    now = shaken(before, seed).transform(*motion)
+    back = inverse(motion)
+    for spread, roughness in ((None, 0.0), (SPREAD, 0.0), (SPREAD, 0.02)):
+        given = {"gate": 0.9, "roughness": roughness}
+        found = associate(before, now, back, spread, **given)
+        assert_same_pairs(found, naive.associate(before, now, back, spread, **given))
+        estimates = [
+            estimate(found, back, spread, roughness=roughness)
+            for estimate in (estimate_motion, naive.estimate_motion)
+        ]
+        assert_same_motion(*estimates)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_crowds_are_paired_at_the_least_cost(seed):
+    rng = np.random.default_rng(seed)
+    crowds = [
+        features(
+            corners=[corner(*rng.normal(size=2) * 0.03) for _ in range(rng.integers(12))],
+            arcs=[arc(*rng.normal(size=2) * 0.03, 0.2, 0, 9) for _ in range(rng.integers(12))],
+            segments=[
+                segment((2, -y), (2 + 0.01 * rng.normal(), y), 10, 30)
+                for y in rng.uniform(0.3, 2, size=rng.integers(12))
+            ],
+        )
+        for _ in range(2)
+    ]
+    assert_same_pairs(associate(*crowds), naive.associate(*crowds))
+
+
+def assert_same_tracks(found, expected):
+    for name in (*KINDS, "born", "ended"):
+        assert getattr(found, name).tolist() == getattr(expected, name).tolist()
+    assert_same_motion(found.motion, expected.motion)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tracker_of_random_features(seed):
+    tracker, twin = Tracker(max_missed=2), naive.NaiveTracker(max_missed=2)
+    frame = varied(seed)
+    for k in range(6):
+        now = replace(shaken(frame, 10 * seed + k), stamp=0.1 * k)
+        assert_same_tracks(tracker(now), twin(now))
+
+
+@pytest.mark.parametrize("log", LOGS)
+@pytest.mark.slow
+def test_tracker_of_a_real_log(data_dir, log):
+    file, skipped = LOGS[log]
+    recording, extract = load_recording(data_dir / file, 12, skipped), ln.Extractor()
+    frames = [extract(scan) for scan in recording.scans]
+    odometry = stand_in_odometry(recording.poses, seed=1)
+    for poses in (odometry, [None] * len(frames)):
+        tracker, twin = Tracker(), naive.NaiveTracker()
+        for frame, pose in zip(frames, poses, strict=True):
+            assert_same_tracks(tracker(frame, pose), twin(frame, pose))
 
 
 # Tracks
@@ -135,7 +231,7 @@ def test_numbers_last_while_the_sensor_moves():
 
 def test_births_deaths_and_occlusion_of_a_few_frames():
     tracker = Tracker(max_missed=2, roughness=0.0)
-    hidden = features(segments=WALLS[1:], arcs=[COLUMN])
+    hidden = features(segments=WALLS[1:], arcs=FRAME.arcs)
     assert tracker(FRAME).born.tolist() == [0, 1, 2, 3]
     for _ in range(2):
         tracks = tracker(hidden)
@@ -155,13 +251,9 @@ def test_edges_are_ignored():
         frame = at(FRAME.transform(*inverse(pose)), 0.1 * i)
         silhouettes = [corner(0.3, -2, segments=(-1, 1), kind="edge"), frame.corners[0]]
         silhouettes.append(corner(-0.3, -2, segments=(1, -1), kind="edge"))
-        with_edges = replace(frame, corners=np.array(silhouettes))
-        expected, tracks = plain(frame), tracker(with_edges)
+        expected, tracks = plain(frame), tracker(replace(frame, corners=np.array(silhouettes)))
         assert tracks.corners.tolist() == [-1, *expected.corners, -1]
-        for name in ("segments", "arcs", "born", "ended"):
-            assert getattr(tracks, name).tolist() == getattr(expected, name).tolist()
-        if i:
-            assert tracks.motion.pose == expected.motion.pose
+        assert_same_tracks(replace(tracks, corners=expected.corners), expected)
         pose = compose(pose, (0.05, 0.01, 0.02))
     assert len(tracker._seen.corners) == 1
 
@@ -176,8 +268,7 @@ def test_a_track_is_found_where_the_motion_has_brought_it():
 
 
 def test_frames_without_features_are_survived():
-    tracker = Tracker(max_missed=1)
-    none = features()
+    tracker, none = Tracker(max_missed=1), features()
     assert tracker(none).motion is None
     assert len(tracker(none).motion.unobserved) == 3
     assert tracker(FRAME).born.tolist() == [0, 1, 2, 3]
@@ -192,37 +283,49 @@ def test_odometry_is_taken_for_its_change_alone():
     tracks = tracker(FRAME.transform(*inverse(motion)), compose(far, (0.62, -0.28, 0.79)))
     assert tracks.segments.tolist() == [0, 1]
     np.testing.assert_allclose(tracks.motion.pose, motion, atol=1e-3)
-
-
-def test_odometry_must_be_finite():
-    tracker = Tracker()
-    tracker(FRAME, (0, 0, 0))
-    with pytest.raises(ValueError, match=r"odometry is .*, expected three finite numbers"):
-        tracker(FRAME, (0, math.nan, 0))
-    assert tracker(FRAME, (0, 0, 0)).born.tolist() == []
+    for bad in ((0, math.nan, 0), (0, 0)):
+        with pytest.raises(ValueError, match=r"odometry is .*, expected three finite numbers"):
+            tracker(FRAME, bad)
+    assert tracker(FRAME.transform(*inverse(motion))).born.tolist() == []
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_number_is_given_twice(seed):
+def test_no_number_is_given_twice_and_memory_does_not_grow(seed):
     tracker, rng, ended, last = Tracker(max_missed=1), np.random.default_rng(seed), set(), -1
     frame = random_features(seed)
     for _ in range(10):
         tracks = tracker(shaken(frame, int(rng.integers(1000))))
-        numbers = np.concatenate((tracks.segments, tracks.corners, tracks.arcs)).tolist()
+        numbers = np.concatenate([getattr(tracks, kind) for kind in KINDS]).tolist()
         assert len(set(numbers)) == len(numbers)
         assert not ended & set(numbers)
         assert tracks.born.tolist() == list(range(last + 1, last + 1 + len(tracks.born)))
         last += len(tracks.born)
         ended |= set(tracks.ended.tolist())
+        for kind in KINDS:
+            assert len(getattr(tracker._seen, kind)) <= 2 * len(getattr(frame, kind))
     assert ended
 
 
-def test_memory_does_not_grow():
-    tracker = Tracker(max_missed=3)
-    for i in range(40):
-        tracker(random_features(i))
-    assert len(tracker._seen.segments) <= 4 * 12
-    assert len(tracker._seen.segments) == len(tracker._tracks["segments"])
+@pytest.mark.parametrize(
+    ("accepted", "refused"),
+    [
+        ({"max_missed": 0}, {"max_missed": -1}),
+        ({"max_missed": 1}, {"max_missed": True}),
+        ({"gate": 1e-9}, {"gate": 0.0}),
+        ({"gate": 1 - 1e-9}, {"gate": 1.0}),
+        ({"roughness": 0.0}, {"roughness": -1e-9}),
+        ({"roughness": 1e9}, {"roughness": math.inf}),
+    ],
+)
+def test_settings(accepted, refused):
+    tracker = Tracker(**accepted)
+    assert tracker(FRAME).born.tolist() == [0, 1, 2, 3]
+    assert len(tracker(FRAME).ended) + len(tracker(features()).ended) == (
+        4 if accepted.get("max_missed") == 0 else 0
+    )
+    ((name, value),) = refused.items()
+    with pytest.raises(ValueError, match=f"{name} is {value}, expected"):
+        Tracker(**refused)
 
 
 def test_stamps_that_stand_still_or_run_back_give_no_twist():
@@ -232,55 +335,37 @@ def test_stamps_that_stand_still_or_run_back_give_no_twist():
         assert tracker.twist is None
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"max_missed": -1}, "max_missed is -1, expected"),
-        ({"max_missed": True}, "max_missed is True, expected"),
-        ({"gate": 0.0}, "gate is 0.0, expected"),
-        ({"roughness": math.nan}, "roughness is nan, expected"),
-    ],
-)
-def test_settings_refused(settings, message):
-    with pytest.raises(ValueError, match=message):
-        Tracker(**settings)
+@pytest.mark.parametrize("gap", [1e-9, 1e-4])
+def test_a_stamp_that_is_wrong_does_not_throw_the_tracks_off(gap):
+    # By its stamp the sensor has gone 10 cm in no time.
+    extract, tracker, numbers = ln.Extractor(), Tracker(), []
+    for i, scan in enumerate(drive(room(), [(-1, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)):
+        frame = replace(extract(scan), stamp=0.9 + gap if i == 10 else scan.stamp)
+        numbers.append(set(tracker(frame).segments.tolist()))
+        if i == 10:
+            assert tracker.twist is None
+    assert all(now & before for before, now in pairwise(numbers))
+    assert len(numbers[8] & numbers[16]) >= 4
+    assert tracker.twist == pytest.approx((1.0, 0.0, 0.0), abs=0.05)
 
 
 def test_a_drive_through_rooms_without_noise_is_followed_exactly():
     world, waypoints = building()
-    sensor = SENSORS["utm30lx"]
     stamps, poses = drive_poses(waypoints[:3], speed=0.6, rate=5)
     tracker, way = Tracker(roughness=0.0), (0.0, 0.0, 0.0)
     for stamp, pose in zip(stamps.tolist(), map(tuple, poses.tolist()), strict=True):
-        tracks = tracker(at(truth(world, pose, sensor), stamp))
+        tracks = tracker(at(truth(world, pose, SENSORS["utm30lx"]), stamp))
         if tracks.motion is not None:
             way = compose(way, tracks.motion.pose)
     np.testing.assert_allclose(way, relative(tuple(poses[0]), tuple(poses[-1])), atol=0.02)
 
 
 @pytest.mark.slow
-def test_scans_tell_their_own_twist_for_deskewing():
+def test_scans_give_their_own_twist_for_deskewing():
     sensor, extract, tracker = replace(SENSORS["utm30lx"], rate=10.0), ln.Extractor(), Tracker()
-    way = drive(room(), [(-1.5, 0), (1, 0)], sensor, speed=0.8, moving=True, seed=3)
     twists = []
-    for scan in way:
+    for scan in drive(room(), [(-1.5, 0), (1, 0)], sensor, speed=0.8, moving=True, seed=3):
         tracker(extract(ln.deskew(scan, tracker.twist)))
         twists.append(tracker.twist)
     assert twists[0] is None
-    errors = np.array(twists[6:-1]) - (0.8, 0.0, 0.0)
-    assert np.abs(errors).max() < 0.06
-
-
-@pytest.mark.parametrize("gap", [1e-9, 1e-4])
-def test_a_stamp_that_is_wrong_does_not_throw_the_tracks_off(gap):
-    # By its stamp the sensor has gone 10 cm in no time.
-    extract, tracker = ln.Extractor(), Tracker()
-    numbers = []
-    for i, scan in enumerate(drive(room(), [(-1, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)):
-        features = replace(extract(scan), stamp=0.9 + gap if i == 10 else scan.stamp)
-        numbers.append(set(tracker(features).segments.tolist()))
-        if i == 10:
-            assert tracker.twist is None
-    assert all(now & before for before, now in pairwise(numbers))
-    assert len(numbers[8] & numbers[16]) >= 4
-    assert tracker.twist == pytest.approx((1.0, 0.0, 0.0), abs=0.05)
+    assert np.abs(np.array(twists[6:-1]) - (0.8, 0.0, 0.0)).max() < 0.06

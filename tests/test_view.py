@@ -74,14 +74,20 @@ def asked(server, target):
 # The answers.
 
 
-def test_the_log_is_told_with_how_far_it_was_read(server):
+def test_the_log_and_how_far_it_was_read(server):
     status, facts = asked(server, "/api/log")
     assert status == 200
-    assert facts["name"] == "wall.npz"
-    assert facts["format"] == "npz"
-    assert facts["methods"] == ["pdbs", "tight"]
-    assert (facts["scans"], facts["total"], facts["complete"]) == (9, 9, True)
-    assert (facts["error"], facts["skipped"], facts["faults"]) == ("", 0, [])
+    assert facts == {
+        "name": "wall.npz",
+        "format": "npz",
+        "methods": ["pdbs", "tight"],
+        "scans": 9,
+        "total": 9,
+        "complete": True,
+        "error": "",
+        "skipped": 0,
+        "faults": [],
+    }
 
 
 def test_a_scan_comes_with_its_features(server, log):
@@ -144,11 +150,10 @@ def test_stamps_come_in_blocks(server):
     ],
 )
 def test_a_bad_question_gets_one_clear_line(server, target, status, words, capfd):
-    found, told = asked(server, target)
-    assert found == status
-    assert list(told) == ["error"]
-    assert words in told["error"]
-    assert "\n" not in told["error"]
+    found, answered = asked(server, target)
+    assert (found, list(answered)) == (status, ["error"])
+    assert words in answered["error"]
+    assert "\n" not in answered["error"]
     assert capfd.readouterr() == ("", "")
 
 
@@ -192,17 +197,12 @@ def test_the_page_needs_nothing_from_elsewhere(server):
         assert "https://" not in text, name
 
 
-def test_colours_of_clusters_are_those_of_the_figures(server):
-    from lineament.output.canvas import PALETTE
+def test_colours_are_those_of_the_figures(server):
+    from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR, PALETTE
 
     script = server.page["/drawing.js"].decode()
     listed = script[script.index("PALETTE = [") : script.index("];")]
     assert [part.strip(' \n",') for part in listed.split('"')[1::2]] == PALETTE.tolist()
-
-
-def test_colours_of_corners_and_edges_are_those_of_the_figures(server):
-    from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR
-
     light = server.page["/style.css"].decode().partition("@media")[0]
     assert f"--corner: {CORNER_COLOR}; --edge: {EDGE_COLOR};" in light
 

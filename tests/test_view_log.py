@@ -19,7 +19,7 @@ from lineament import Extractor, LaserScan
 from lineament.cli import run
 from lineament.logs import save_npz
 from lineament.view import Session
-from lineament.view.store import ScanStore, pack, unpack
+from lineament.view.store import ScanStore
 
 
 @pytest.fixture(scope="module")
@@ -32,18 +32,8 @@ def log(tmp_path_factory):
 def assert_scans_equal(scan, other):
     for name in ("ranges", "angles"):
         np.testing.assert_array_equal(getattr(scan, name), getattr(other, name))
-    for name in (
-        "is_regular",
-        "angle_min",
-        "angle_increment",
-        "range_min",
-        "range_max",
-        "stamp",
-        "scan_time",
-        "time_increment",
-        "frame_id",
-        "pose",
-    ):
+    fields = "is_regular angle_min angle_increment range_min range_max stamp scan_time"
+    for name in (*fields.split(), "time_increment", "frame_id", "pose"):
         assert getattr(scan, name) == getattr(other, name), name
 
 
@@ -76,14 +66,7 @@ def any_scans():
     yield LaserScan([1e300, -np.inf], angles=[0.0, 1e-9])
 
 
-def test_packing_loses_nothing():
-    for scan in any_scans():
-        topic, same = unpack(pack("/scan", scan))
-        assert topic == "/scan"
-        assert_scans_equal(same, scan)
-
-
-@pytest.mark.parametrize("capacity", [0, 1200, 1 << 20])
+@pytest.mark.parametrize("capacity", [0, 2000, 1 << 20])
 def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
     scans = list(any_scans())
     items = [(f"scan{k}", scan) for k, scan in enumerate(scans)]
@@ -94,6 +77,7 @@ def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
             topic, scan = kept.item(index)
             assert topic == f"scan{index}"
             assert_scans_equal(scan, scans[index])
+        assert (len(kept._starts), -1 in kept._starts) == (len(scans), capacity < 1 << 20)
         for index in (-1, len(scans)):
             with pytest.raises(IndexError):
                 kept.item(index)
@@ -115,7 +99,7 @@ def test_a_full_disk_is_less_room_and_no_failure(monkeypatch):
             def write(self, _):
                 raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr(kept, "_records", Full(kept._records))
+        monkeypatch.setattr(kept, "_file", Full(kept._file))
         kept.fill(items[2:])
         for index, (_, scan) in enumerate(items):
             assert_scans_equal(kept.item(index)[1], scan)
@@ -161,13 +145,13 @@ def test_what_is_wrong_is_one_line(log, arguments, status, words, capfd):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child there")
 @pytest.mark.slow
-def test_the_command_tells_its_address_and_ends_quietly(log):
+def test_the_command_writes_its_address_and_ends_quietly(log):
     command = [sys.executable, "-m", "lineament", "view", str(log), "-m", "pdbs", "--no-browser"]
     with subprocess.Popen(
         [*command, "--host", "0.0.0.0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        told = process.stdout.readline()
-        port = int(told.split("http://localhost:")[1].split("/")[0])
+        line = process.stdout.readline()
+        port = int(line.split("http://localhost:")[1].split("/")[0])
         with closing(http.client.HTTPConnection("127.0.0.1", port, timeout=30)) as connection:
             connection.request("GET", "/api/log")
             assert json.loads(connection.getresponse().read())["name"] == "wall.npz"

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
-from browser import MISSING, open_browser
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
 from view_scans import corners
 
 from lineament import Extractor
@@ -13,14 +20,22 @@ from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+DRIVER = shutil.which("chromedriver")
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--disable-dev-shm-usage", "--no-proxy-server"),
+)
+
 pytestmark = [
-    pytest.mark.skipif(bool(MISSING), reason=MISSING or "there is a browser"),
+    pytest.mark.skipif(
+        not (CHROMIUM and DRIVER), reason="no chromium or chromedriver: make browser"
+    ),
     pytest.mark.slow,
 ]
 
 METHODS = ("liu:scale_free", "pdbs")
-SPACE, LEFT, RIGHT, HOME, END = " ", "\ue012", "\ue014", "\ue011", "\ue010"
-
 #: Pixel in the window of a point of the first panel.
 PLACE = """
 return import("/main.js").then(({ app }) => {
@@ -47,10 +62,10 @@ def log(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(log):
-    with (
-        Session(log, {name: Extractor(name) for name in METHODS}) as session,
-        ViewServer(session) as server,
-    ):
+    extractors = {name: Extractor(name) for name in METHODS}
+    for extractor in extractors.values():  # The page must not wait for a compiler.
+        extractor.trace(open_log(log).scan(0))
+    with Session(log, extractors) as session, ViewServer(session) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield server.address
@@ -58,21 +73,63 @@ def address(log):
         thread.join()
 
 
+class Page:
+    """The page in a window. Elements are named by CSS selectors."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver, self.run = driver, driver.execute_script
+
+    def text(self, selector: str) -> str | None:
+        return self.run("return document.querySelector(arguments[0])?.innerText", selector)
+
+    def wait(self, script: str) -> Any:
+        """Wait until a JavaScript expression is true; return its value."""
+        waiting = WebDriverWait(self.driver, 60, poll_frequency=0.05)
+        return waiting.until(lambda _: self.run(f"return {script}"), f"never true: {script}")
+
+    def point(self, *places: tuple[float, float], press: bool = False) -> None:
+        """Move the mouse to a place in the window, and maybe click; or drag it from it on."""
+        actions = ActionBuilder(self.driver, duration=50)
+        for k, (x, y) in enumerate(places):
+            actions.pointer_action.move_to_location(round(x), round(y))
+            if press and k == 0:
+                actions.pointer_action.pointer_down()
+        if press:
+            actions.pointer_action.pointer_up()
+        actions.perform()
+
+    def press(self, *keys: str) -> None:
+        webdriver.ActionChains(self.driver).send_keys(*keys).perform()
+
+    def resize(self, width: int, height: int, scheme: str = "light") -> None:
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    with open_browser(tmp_path_factory.mktemp("profile")) as browser:
-        yield browser
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    # With the path of the driver, selenium does not look for one to download.
+    driver = webdriver.Chrome(options, Service(DRIVER))
+    yield Page(driver)
+    driver.quit()
 
 
 @pytest.fixture
-def page(browser, address):
+def page(browser: Page, address: str) -> Iterator[Page]:
     """The page, anew, with a scan on it; it must not have complained in the end."""
     browser.resize(1366, 768)
-    browser.open("about:blank")
-    browser.open(address)
+    browser.driver.get("about:blank")
+    browser.driver.get(address)
     browser.wait("document.body.dataset.scan === '0' && document.querySelector('#reading').hidden")
     yield browser
-    assert browser.console() == []
+    assert browser.driver.get_log("browser") == []
     assert browser.text("#problem") == ""
 
 
@@ -113,13 +170,18 @@ def test_scrubbing_and_keys_change_the_scan(page):
     shown(page, 17)
     page.wait("document.querySelector('#position').textContent === 'scan 17 / 24, 0.85 s'")
     assert "scan=17" in page.run("return location.hash")
-    for key, index in ((RIGHT, 18), (LEFT, 17), (HOME, 0), (END, 24)):
+    for key, index in (
+        (Keys.ARROW_RIGHT, 18),
+        (Keys.ARROW_LEFT, 17),
+        (Keys.HOME, 0),
+        (Keys.END, 24),
+    ):
         page.press(key)
         shown(page, index)
 
 
 def test_playing_goes_on_to_the_end_and_stops(page):
-    page.press(SPACE)
+    page.press(" ")
     assert page.run("return document.querySelector('#play').ariaLabel") == "Pause"
     shown(page, 24)
     page.wait("document.querySelector('#play').ariaLabel === 'Play'")
@@ -127,7 +189,7 @@ def test_playing_goes_on_to_the_end_and_stops(page):
 
 def test_hovering_tells_the_numbers_of_a_feature(page, log):
     corner = found(log, 0).corners[0]
-    page.point(*page.run(PLACE, corner["position"].tolist()))
+    page.point(page.run(PLACE, corner["position"].tolist()))
     page.wait("!document.querySelector('.card').hidden")
     told = page.text(".card")
     x, y = corner["position"]
@@ -135,7 +197,7 @@ def test_hovering_tells_the_numbers_of_a_feature(page, log):
     assert f"kind corner quality {corner['quality']:.2f}" in " ".join(told.split())
     assert f"{x:.3f}, {y:.3f} m" in told
     segment = found(log, 0).segments[0]
-    page.point(*page.run(PLACE, segment["centroid"].tolist()))
+    page.point(page.run(PLACE, segment["centroid"].tolist()))
     page.wait("document.querySelector('.card').innerText.includes('segment 0')")
     assert f"{segment['n_points']} readings" in page.text(".card")
 
@@ -143,7 +205,7 @@ def test_hovering_tells_the_numbers_of_a_feature(page, log):
 def test_a_click_pins_a_feature_once_and_it_can_be_removed(page, log):
     place = page.run(PLACE, found(log, 0).corners[0]["position"].tolist())
     for _ in range(2):
-        page.point(*place, click=True)
+        page.point(place, press=True)
     page.wait("document.querySelectorAll('#pins tbody tr').length === 1")
     assert "corner 0" in page.text("#pins tbody")
     assert "scan 0, liu:scale_free" in page.text("#pins tbody")
@@ -155,7 +217,7 @@ def test_a_click_on_a_reading_is_answered(page, log):
     scan = open_log(log).scan(0)
     expected = explain(Extractor(METHODS[0]).trace(scan), 25)
     page.run(LOOK_AT, scan.points[25].tolist())
-    page.point(*page.run(PLACE, scan.points[25].tolist()), click=True)
+    page.point(page.run(PLACE, scan.points[25].tolist()), press=True)
     page.wait("document.querySelector('#why .summary')")
     assert page.text("#why h3") == "beam 25, scan 0, liu:scale_free"
     assert page.text("#why .summary") == expected.summary
@@ -164,14 +226,13 @@ def test_a_click_on_a_reading_is_answered(page, log):
 
 def test_a_beam_is_asked_for_by_its_number(page):
     page.run("document.querySelector('#beam').focus()")
-    for key in "115\ue007":
-        page.press(key)
+    page.press("115", Keys.ENTER)
     page.wait("document.querySelector('#why h3')?.textContent.startsWith('beam 115, ')")
     assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
 
 
 def test_a_click_to_where_nothing_came_back_is_answered(page):
-    page.point(*page.run(PLACE, [0.6, 0.93]), click=True)
+    page.point(page.run(PLACE, [0.6, 0.93]), press=True)
     page.wait("document.querySelector('#why .summary')")
     assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
 
@@ -200,12 +261,12 @@ def test_wheel_and_drag_move_the_view(page):
     assert page.run(state)[2] == pytest.approx(1.25 * scale)
     page.press("f")
     assert page.run(state) == pytest.approx([x, y, scale])
-    page.drag((300, 300), (340, 280))
+    page.point((300, 300), (340, 280), press=True)
     assert page.run(state) == pytest.approx([x - 40 / scale, y - 20 / scale, scale])
 
 
 def test_a_narrow_window_needs_no_scrolling_sideways(page):
-    page.resize(390, 844, dark=True)
+    page.resize(390, 844, "dark")
     page.wait("document.documentElement.scrollWidth <= 390")
     assert page.run("return document.querySelector('canvas').clientHeight") > 300
     dark = "getComputedStyle(document.body).backgroundColor === 'rgb(13, 17, 23)'"
@@ -214,7 +275,7 @@ def test_a_narrow_window_needs_no_scrolling_sideways(page):
 
 def test_a_server_that_has_gone_is_told(page):
     page.run("window.fetch = () => Promise.reject(new TypeError('gone'))")
-    page.press(RIGHT)
+    page.press(Keys.ARROW_RIGHT)
     page.wait("!document.querySelector('#problem').hidden")
     assert "The server has ended" in page.text("#problem")
     page.run("document.querySelector('#problem').textContent = ''")

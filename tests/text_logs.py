@@ -8,35 +8,21 @@ import zipfile
 
 FLASER = b"FLASER 3 1.5 2.5 60 1 2 0.5 0 0 0 7.5 robot 0.1\n"
 BEAMS = b"0.1,2\n0.2,3\n"
-LASER = "ROBOTLASER1 0 -1.570796 3.141593 1.570796 50.0 0.1 0 3 1 2 3 0"
 
 
-def robotlaser(laser, robot, stamp):
-    poses = " ".join(map(str, (*laser, *robot)))
-    return f"{LASER} {poses} 0 0 0 0 0 {stamp} robot 0.1\n"
+def flaser(ranges, name="FLASER", stamp=7.5, pose=(1, 2, 0.5)):
+    words = [name, len(ranges), *ranges, *pose, 9, 9, 9, stamp, "robot", 0.1]
+    return " ".join(map(str, words)) + "\n"
 
 
-def scan_texts():
-    """One small log of each format, as text."""
-    vertex = "".join(
-        f"VERTEX2 {i} {i} 2 0.5\n" + robotlaser((i, 0, 0), (i, 0, 0), i) for i in range(9)
-    )
-    carmen = "".join(f"FLASER 3 1.5 2.5 60 {i} 2 0.5 0 0 0 {i} robot 0.1\n" for i in range(12))
-    dpslam = "".join(f"Odometry {i}.25 2.0 0.5 \nLaser 3 1.500 2.500 8.191\n" for i in range(12))
-    csm = "\n".join(json.dumps(csm_scan(stamp=i)) for i in range(9))
-    units = {f"dev{k}": [[1.0 + k, 0.1 * i] for i in range(9)] for k in range(4)}
-    header = "stamp,angle_min,angle_increment,r0,r1,r2\n"
-    rows = "".join(f"{i},-0.5,0.25,1.5,,{i}.125\n" for i in range(15))
-    return {
-        "carmen": carmen,
-        "graph": vertex,
-        "dpslam": dpslam,
-        "csm": csm,
-        "rplidar": json.dumps(units, indent=1),
-        "tinyslam": "".join(tinyslam_line(1000 + i) for i in range(3)),
-        "csv": header + rows,
-        "csv_beams": "".join(f"{0.01 * i:.2f},{2 + i / 64}\n" for i in range(40)),
-    }
+def robotlaser(
+    ranges=(1, 2, 3), remissions=(), laser=(4, 5, 0.25), robot=(9, 9, 9), stamp=12.5,
+    step=1.570796, largest="50.000000",
+):  # fmt: skip
+    header = ["ROBOTLASER1", 0, -1.570796, 3.141593, step, largest, 0.1, 0]
+    lists = [len(ranges), *ranges, len(remissions), *remissions]
+    words = [*header, *lists, *laser, *robot, 0, 0, 0, 0, 0, stamp, "robot", 0.1]
+    return " ".join(map(str, words)) + "\n"
 
 
 def csm_scan(stamp=7, **changes):
@@ -54,9 +40,28 @@ def csm_scan(stamp=7, **changes):
     }
 
 
-def tinyslam_line(stamp, ranges=None):
-    ranges = [500 + i for i in range(682)] if ranges is None else ranges
+def tinyslam_line(stamp, ranges=range(500, 1182)):
     return " ".join(map(str, [stamp, *range(24), *ranges])) + " \n"
+
+
+def scan_texts():
+    """One small log of each format, as text."""
+    poses = [(i, 0, 0) for i in range(9)]
+    units = {f"dev{k}": [[1.0 + k, 0.1 * i] for i in range(9)] for k in range(4)}
+    header = "stamp,angle_min,angle_increment,r0,r1,r2\n"
+    return {
+        "carmen": "".join(flaser([1.5, 2.5, 60], stamp=i) for i in range(12)),
+        "graph": "".join(
+            f"VERTEX2 {i} {i} 2 0.5\n" + robotlaser(laser=pose, robot=pose, stamp=i)
+            for i, pose in enumerate(poses)
+        ),
+        "dpslam": "".join(f"Odometry {i}.25 2.0 0.5 \nLaser 3 1.5 2.5 8.191\n" for i in range(12)),
+        "csm": "\n".join(json.dumps(csm_scan(stamp=i)) for i in range(9)),
+        "rplidar": json.dumps(units, indent=1),
+        "tinyslam": "".join(tinyslam_line(1000 + i) for i in range(3)),
+        "csv": header + "".join(f"{i},-0.5,0.25,1.5,,{i}.125\n" for i in range(15)),
+        "csv_beams": "".join(f"{0.01 * i:.2f},{2 + i / 64}\n" for i in range(40)),
+    }
 
 
 def zipped(**files):

@@ -1,7 +1,5 @@
 """Scans from rclpy and features to rclpy, as the bytes that ROS 2 has on the wire."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -10,8 +8,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosidl_runtime_py.utilities import get_message
 
-from lineament.live.decoding import received_odometry, received_scan
-from lineament.live.received import Received
+from lineament.live import LiveConfig
+from lineament.live.received import Received, received_odometry, received_scan
+from lineament.live.sinks import Publisher
 from lineament.output.scene import Message
 
 __all__ = ["RclpyPublisher", "RclpySource"]
@@ -22,26 +21,16 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 class RclpySource:
     """Scans, and odometry where it is wanted, from topics that a node subscribes raw.
 
-    Whatever else the node has to do, such as to answer for its parameters, is done while it is
-    waited for scans: there is no second thread.
+    Whatever else the node has to do, such as to answer for its parameters, is done while it waits
+    for scans: there is no second thread.
 
     Parameters
     ----------
     node : rclpy.node.Node
     executor : rclpy.executors.Executor
         Has the node.
-    topic : str
-        Topic of the scans.
-    kind : {"LaserScan", "MultiEchoLaserScan"}
-        Type of its messages, of sensor_msgs.
-    echo : {"first", "last", "strongest"}
-        Which echo of the latter.
-    odometry : str, optional
-        Topic of a ``nav_msgs/msg/Odometry``.
-    reliability : {"best-effort", "reliable"}
-        Best effort matches any publisher.
-    depth : int
-        Messages of a topic that may wait.
+    config : lineament.live.LiveConfig
+        Topics, type, echo, reliability; and `depth`, the messages of a topic that may wait.
 
     Attributes
     ----------
@@ -49,40 +38,22 @@ class RclpySource:
         Scans that the middleware knows to have lost.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        executor: Executor,
-        topic: str,
-        kind: str = "LaserScan",
-        *,
-        echo: str = "first",
-        odometry: str | None = None,
-        reliability: str = "best-effort",
-        depth: int = 10,
-    ) -> None:
-        self._node, self._executor, self._depth = node, executor, depth
-        self._kind, self._echo = f"sensor_msgs/{kind}", echo
+    def __init__(self, node: Node, executor: Executor, config: LiveConfig) -> None:
+        self._node, self._executor, self._config = node, executor, config
         self._came: list[Received] = []
         self.lost = 0
-        qos = _profile(depth, reliability)
-        self._kinds = {topic: f"sensor_msgs/msg/{kind}"}
+        topic, kind = config.scan_topic, f"sensor_msgs/msg/{config.type}"
+        qos = _profile(config.depth, config.reliability)
+        events = SubscriptionEventCallbacks(message_lost=self._note_lost)
         self._scans = node.create_subscription(
-            get_message(self._kinds[topic]),
-            topic,
-            self._put_scan,
-            qos,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._note_lost),
-            raw=True,
+            get_message(kind), topic, self._put_scan, qos, event_callbacks=events, raw=True
         )
-        self._subscriptions = [self._scans]
-        if odometry is not None:
-            self._kinds[odometry] = ODOMETRY
-            self._subscriptions.append(
-                node.create_subscription(
-                    get_message(ODOMETRY), odometry, self._put_odometry, qos, raw=True
-                )
+        self._subscribed = {topic: (kind, self._scans)}
+        if (odometry := config.odometry_topic) is not None:
+            subscription = node.create_subscription(
+                get_message(ODOMETRY), odometry, self._put_odometry, qos, raw=True
             )
+            self._subscribed[odometry] = ODOMETRY, subscription
 
     @property
     def ended(self) -> bool:
@@ -91,14 +62,14 @@ class RclpySource:
 
     @property
     def publishers(self) -> int:
-        """How many publishers of scans are matched."""
+        """Number of publishers of scans."""
         return int(self._scans.get_publisher_count())
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait up to `timeout` seconds for something to do; give all that came, oldest first."""
+        """Wait up to `timeout` seconds for something to do; return what came, oldest first."""
         self._executor.spin_once(timeout_sec=timeout)
         # One call does one thing: what else waits is taken without waiting for more.
-        for known in range(1, self._depth):
+        for known in range(1, self._config.depth):
             if len(self._came) < known:
                 break
             self._executor.spin_once(timeout_sec=0)
@@ -106,21 +77,22 @@ class RclpySource:
         return came
 
     def problems(self) -> list[str]:
-        """Tell of publishers of another type; rclpy itself warns of an incompatible QoS."""
+        """Return publishers of another type; rclpy itself warns of an incompatible QoS."""
         return [
             f"{topic} is published as {publisher.topic_type}, expected {kind}"
-            for topic, kind in self._kinds.items()
+            for topic, (kind, _) in self._subscribed.items()
             for publisher in self._node.get_publishers_info_by_topic(topic)
             if publisher.topic_type != kind
         ]
 
     def close(self) -> None:
         """End the subscriptions."""
-        for subscription in self._subscriptions:
+        for _, subscription in self._subscribed.values():
             self._node.destroy_subscription(subscription)
 
     def _put_scan(self, data: bytes, info: Any) -> None:
-        self._came.append(received_scan(_publisher(info), data, "cdr", self._kind, self._echo))
+        kind, echo = f"sensor_msgs/{self._config.type}", self._config.echo
+        self._came.append(received_scan(_publisher(info), data, "cdr", kind, echo))
 
     def _put_odometry(self, data: bytes, info: Any) -> None:
         self._came.append(received_odometry(_publisher(info), data, "cdr"))
@@ -129,44 +101,35 @@ class RclpySource:
         self.lost = int(status.total_count)
 
 
-class RclpyPublisher:
-    """Publishes messages that are serialised already, reliably.
+class RclpyPublisher(Publisher):
+    """Publishes serialised messages, reliably; rclpy does not report those that are not sent.
 
     Parameters
     ----------
     node : rclpy.node.Node
     depth : int
-        Messages of a topic that are kept for listeners who do not keep up.
+        Messages of a topic that are kept for slow listeners.
     """
 
-    #: Messages that could not be sent: rclpy does not tell.
-    unsent = 0
-
     def __init__(self, node: Node, depth: int = 10) -> None:
+        super().__init__()
         self._node, self._depth = node, depth
-        self._topics: dict[str, Any] = {}
-
-    def advertise(self, topic: str, kind: str) -> None:
-        """Make a topic known before its first message."""
-        self._topics[topic] = self._node.create_publisher(
-            get_message(kind), topic, _profile(self._depth, "reliable")
-        )
-
-    def publish(self, message: Message) -> None:
-        """Send a message in CDR."""
-        if message.topic not in self._topics:
-            self.advertise(message.topic, message.kind)
-        self._topics[message.topic].publish(message.data)
-
-    def listeners(self, topic: str) -> int:
-        """How many listen to a topic; 0 for one that is not advertised."""
-        return self._topics[topic].get_subscription_count() if topic in self._topics else 0
 
     def close(self) -> None:
         """Withdraw all topics."""
         for publisher in self._topics.values():
             self._node.destroy_publisher(publisher)
         self._topics.clear()
+
+    def _open(self, topic: str, kind: str) -> Any:
+        qos = _profile(self._depth, "reliable")
+        return self._node.create_publisher(get_message(kind), topic, qos)
+
+    def _send(self, topic: Any, message: Message) -> None:
+        topic.publish(message.data)
+
+    def _count(self, topic: Any) -> int:
+        return int(topic.get_subscription_count())
 
 
 def _profile(depth: int, reliability: str) -> QoSProfile:
@@ -179,6 +142,6 @@ def _profile(depth: int, reliability: str) -> QoSProfile:
 
 
 def _publisher(info: Any) -> str:
-    """Tell publishers apart, in releases whose rclpy does."""
+    """Identity of a publisher, in releases whose rclpy has it."""
     identity = info.get("publisher_gid")
     return identity["data"].hex() if identity else "the publisher"

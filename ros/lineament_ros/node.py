@@ -1,4 +1,4 @@
-"""The node: `lineament live`, told by the parameters of ROS and heard by its topics."""
+"""The node: `lineament live`, configured by parameters of ROS."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from contextlib import ExitStack, closing
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import rclpy
@@ -22,7 +22,7 @@ from .bridge import RclpyPublisher, RclpySource
 
 __all__ = ["config_of", "main"]
 
-#: Parameters of `LiveConfig`; names, domain and namespace are ROS's own affair.
+#: Parameters of `LiveConfig`; names, domain and namespace are those of ROS.
 KNOWN = (
     "topic",
     "type",
@@ -46,7 +46,7 @@ def main() -> int:
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
-    # Else ROS would be gone before the node has told its last.
+    # Otherwise ROS would be gone before the last report.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         with ExitStack() as stack:
@@ -60,7 +60,7 @@ def main() -> int:
 
 
 def _node(stack: ExitStack) -> Node:
-    """Make the node of what its parameters say; `stack` closes all of it."""
+    """Make the node from its parameters; `stack` closes all of it."""
     node = rclpy.create_node("lineament", automatically_declare_parameters_from_overrides=True)
     stack.callback(node.destroy_node)
     try:
@@ -73,27 +73,18 @@ def _node(stack: ExitStack) -> Node:
     executor = SingleThreadedExecutor()
     stack.callback(executor.shutdown)
     executor.add_node(node)
-    topic = node.resolve_topic_name(config.topic)
-    odometry = config.odometry_topic and node.resolve_topic_name(config.deskew)
-    source = RclpySource(
-        node,
-        executor,
-        topic,
-        config.type,
-        echo=config.echo,
-        odometry=odometry,
-        reliability=config.reliability,
-        depth=config.depth,
-    )
-    publisher = RclpyPublisher(node, config.depth)
-    stack.enter_context(closing(source))
-    stack.enter_context(closing(publisher))
-    sink = RosSink(publisher, RosMessages("cdr"), topic, config.name)
-    return Node(source, pipeline, [sink], tell=node.get_logger().info)
+    # Names as ROS resolves them: with remappings and the namespace of the node.
+    resolved = replace(config, topic=node.resolve_topic_name(config.topic))
+    if config.odometry_topic:
+        resolved = replace(resolved, deskew=node.resolve_topic_name(config.deskew))
+    source = stack.enter_context(closing(RclpySource(node, executor, resolved)))
+    publisher = stack.enter_context(closing(RclpyPublisher(node, config.depth)))
+    sink = RosSink(publisher, RosMessages("cdr"), resolved)
+    return Node(source, pipeline, [sink], write=node.get_logger().info)
 
 
 def config_of(node: rclpy.node.Node) -> LiveConfig:
-    """Make a configuration of the parameters of a node, and declare those that were not given.
+    """Make a configuration from the parameters of a node, and declare those that were not given.
 
     Raises
     ------

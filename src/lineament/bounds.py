@@ -1,14 +1,14 @@
 """Cramér-Rao bounds: how well lines, corners, arcs and wall ends can be known at all.
 
 A beam of bearing φ meets a surface at range ρ and incidence ψ. An error of the range moves the
-reading along the surface's normal by its cos ψ, an error of the bearing by ρ sin ψ times it, so
-that the reading tells the offset of the surface there with the variance
+measurement along the surface's normal by its cos ψ, an error of the bearing by ρ sin ψ times it, so
+that the offset of the surface is measured there with the variance
 
     b = σ_r(ρ)² cos² ψ + ρ² σ_φ² sin² ψ,   σ_r(ρ)² = σ² + (p ρ)² + q²/12
 
 (`RangeNoise`). The Fisher information of a feature is the sum of g gᵀ/b over its beams, where g is
 what the offset changes by with the feature's parameters; the bound is its inverse. The lattice q is
-taken for independent noise of variance q²/12, and what the size of the errors tells about the
+taken for independent noise of variance q²/12, and what the size of the errors says of the
 range (2p² to 1 per beam) is left out.
 
 Everything is in the frame of the scanner.
@@ -25,8 +25,6 @@ A wall 2 m ahead, seen over 30° by 91 beams with noise of 1 cm, is known to 1.0
 >>> np.sqrt(np.diag(wall.covariance)).round(4).tolist()
 [0.001, 0.0033]
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -55,8 +53,8 @@ class LineBound:
     Attributes
     ----------
     centroid : ndarray, shape (2,)
-        The mean of the readings, weighted by their information [m]: there, and only there, offset
-        and angle are independent.
+        The mean of the measurements, weighted by their information [m]: there, and only there,
+        offset and angle are independent.
     angle : float
         Direction of the line [rad].
     covariance : ndarray, shape (2, 2)
@@ -107,7 +105,7 @@ def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: Range
     angle : float
         Its direction [rad].
     noise : RangeNoise
-        Noise of the readings.
+        Noise of the measurements.
 
     Raises
     ------
@@ -180,7 +178,7 @@ def corner_bound(before: LineBound, after: LineBound) -> Array:
 def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: RangeNoise) -> Array:
     """Bound of a circle that is met by beams: on its near side, or from within on its far side.
 
-    With m the unit vector from the centre to the reading, its offset changes by (m_x, m_y, 1)
+    With m the unit vector from the centre to the measurement, its offset changes by (m_x, m_y, 1)
     with the parameters.
 
     Parameters
@@ -192,7 +190,7 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Rang
     radius : float
         Its radius [m].
     noise : RangeNoise
-        Noise of the readings.
+        Noise of the measurements.
 
     Returns
     -------
@@ -236,8 +234,8 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Rang
 def wall_end_bound(end: ArrayLike, angle: float, increment: float) -> float:
     """Variance of a wall's end that lies anywhere between the last beam and the next.
 
-    Uniform over one spacing of the readings, (ρ Δφ / cos ψ)²/12: no Cramér-Rao bound, as the end
-    has none, but what is left to chance where only the beams that meet the wall are known.
+    Uniform over one spacing of the beams, (ρ Δφ / cos ψ)²/12: no Cramér-Rao bound, as the end has
+    none, but what is left to chance where only the beams that meet the wall are known.
 
     Parameters
     ----------

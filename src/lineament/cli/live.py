@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import METHOD, PATH, QUIET, SET, settings_of, wrong_usage
+from .options import METHOD, NOISE, PATH, QUIET, SET, settings_of, wrong_usage
 
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report
 
 __all__ = ["live"]
+
+_TYPES = click.Choice(["LaserScan", "MultiEchoLaserScan"])
+_ECHOES = click.Choice(["first", "last", "strongest"])
+_RELIABILITIES = click.Choice(["best-effort", "reliable"])
+_FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 
 
 @click.command()
@@ -24,45 +28,32 @@ __all__ = ["live"]
 @click.option("--topic", help="Topic of the scans.  [default: scan]")
 @click.option("--namespace", help="Put before topics that do not begin with /.")
 @click.option("--name", help="Name of the node.  [default: lineament]")
-@click.option(
-    "--type",
-    type=click.Choice(["LaserScan", "MultiEchoLaserScan"]),
-    help="Type of the messages.  [default: LaserScan]",
-)
-@click.option("--echo", type=click.Choice(["first", "last", "strongest"]), help="Which echo.")
+@click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
+@click.option("--echo", type=_ECHOES, help="Which echo.  [default: first]")
 @click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
 @click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
-@click.option("--localhost", is_flag=True, default=None, help="Stay on this machine.")
+@click.option("--localhost", **_FLAG, help="Stay on this machine.")
 @click.option(
-    "--reliability",
-    type=click.Choice(["best-effort", "reliable"]),
-    help="Of the subscription.  [default: best-effort]",
+    "--reliability", type=_RELIABILITIES, help="Of the subscription.  [default: best-effort]"
 )
 @click.option("--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.")
 @METHOD
 @SET
-@click.option(
-    "--noise",
-    type=click.FloatRange(min=0),
-    metavar="SIGMA",
-    help="Noise of the ranges [m].  [default: estimated from each scan]",
-)
+@NOISE
 @click.option(
     "--deskew",
     metavar="off|scans|poses|TOPIC",
     help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
 )
 @click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
-@click.option("--track", is_flag=True, default=None, help="Number features from scan to scan.")
+@click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--from", "log", metavar="LOG", help="Play a log in place of a topic.")
-@click.option("--log-topic", metavar="TOPIC", help="Which scans of the log.")
-@click.option("--poses", metavar="TOPIC", help="Which topic of the log gives the poses.")
-@click.option("--ring", type=click.IntRange(min=0), help="Which ring of a point cloud of the log.")
-@click.option(
-    "--keep-going", is_flag=True, default=None, help="Leave out what is faulty in the log."
-)
-@click.option("--rate", type=click.FloatRange(min=0), help="How many times faster; 0: at once.")
-@click.option("--loop", is_flag=True, default=None, help="Begin the log anew at its end.")
+@click.option("--log-topic", metavar="TOPIC", help="Topic of the scans in the log.")
+@click.option("--poses", metavar="TOPIC", help="Topic of the poses in the log.")
+@click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud in the log.")
+@click.option("--keep-going", **_FLAG, help="Skip what is faulty in the log.")
+@click.option("--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.")
+@click.option("--loop", **_FLAG, help="Start the log again at its end.")
 @click.option(
     "--foxglove",
     type=click.IntRange(0, 65535),
@@ -85,48 +76,44 @@ def live(
 
     totals = "stopped before the first scan"
     with stopping() as is_stopped:
+        from ..live import run_live
+
         configured = _configured(config, settings, remappings, given)
-        totals = _run(configured, is_stopped, quiet)
+        # On a terminal reports are shown in one line that changes, and makes way for others.
+        is_shown = sys.stderr.isatty() and not quiet
+        beginning = "\r\033[K" if is_shown else ""
+
+        def write(line: str) -> None:
+            if not quiet:
+                click.echo(beginning + line, err=True)
+
+        def show(report: Report) -> None:
+            if is_shown:
+                width = shutil.get_terminal_size().columns - 1
+                click.echo(beginning + str(report)[:width], nl=False, err=True)
+
+        try:
+            with wrong_usage():
+                totals = run_live(configured, is_stopped, write=write, show=show).totals
+        finally:
+            click.echo(beginning, nl=False, err=True)
     if not quiet:
         click.echo(totals)
 
 
 def _configured(
-    config: Path | None,
+    path: Path | None,
     settings: tuple[str, ...],
     remappings: tuple[str, ...],
     given: dict[str, Any],
 ) -> LiveConfig:
     from ..live import LiveConfig, read_config
 
-    told = {} if config is None else read_config(config)
-    told.update({name: value for name, value in given.items() if value is not None})
-    for argument in remappings:  # What roslaunch adds is for rospy, which finds it by itself.
-        if told.get("ros") != 1 or ":=" not in argument:
+    options = {} if path is None else read_config(path)
+    options.update({name: value for name, value in given.items() if value is not None})
+    for argument in remappings:  # Those of roslaunch are for rospy, which finds them by itself.
+        if options.get("ros") != 1 or ":=" not in argument:
             raise click.UsageError(f"got an unexpected argument {argument!r}")
     with wrong_usage():
-        configured = LiveConfig(**told)
-    return replace(configured, parameters={**configured.parameters, **settings_of(settings)})
-
-
-def _run(config: LiveConfig, is_stopped: Callable[[], bool], quiet: bool) -> str:
-    from ..live import run_live
-
-    # On a terminal reports are shown in one line that changes, and makes way for others.
-    is_shown = sys.stderr.isatty() and not quiet
-    beginning = "\r\033[K" if is_shown else ""
-
-    def tell(line: str) -> None:
-        if not quiet:
-            click.echo(beginning + line, err=True)
-
-    def show(report: Report) -> None:
-        if is_shown:
-            width = shutil.get_terminal_size().columns - 1
-            click.echo(beginning + str(report)[:width], nl=False, err=True)
-
-    try:
-        with wrong_usage():
-            return run_live(config, is_stopped, tell=tell, show=show).totals
-    finally:
-        click.echo(beginning, nl=False, err=True)
+        config = LiveConfig(**options)
+    return replace(config, parameters={**config.parameters, **settings_of(settings)})

@@ -28,7 +28,7 @@ __all__ = ["view"]
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
-@click.option("--no-browser", is_flag=True, help="Tell the address, and open no browser.")
+@click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 def view(
     log: Path | str,
     methods: tuple[str, ...],
@@ -39,11 +39,11 @@ def view(
     port: int,
     no_browser: bool,
 ) -> None:
-    """Look at LOG in the browser: scans, features, and why a line is missing."""
+    """Look at LOG in the browser: scans, features, and why a segment is missing."""
     from ..methods import DEFAULT_METHOD, method_names
     from ..view import Session, serve
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
     session = Session(log, extractors, **reading)
-    serve(session, host, port, browser=not no_browser, tell=click.echo)
+    serve(session, host, port, browser=not no_browser, write=click.echo)

@@ -1,6 +1,10 @@
 """Numba functions of arrays. They know no objects, files or methods, and check nothing.
 
-Each works on the workspace of one scan (see `layout`) and allocates nothing.
+Each works on the workspace of one scan and allocates nothing. In all of them, `floats` and `ints`
+are that workspace (see `layout`), `bearings` the cosines and sines of the beams, shape (2, n),
+`circular` is whether the scan is a full circle, and `noise` is (sigma, proportional, bearing,
+quantum), see `lineament.RangeNoise`. Parameters of a method come as a plain tuple, which Python
+passes in half the time of a named one; the kernel names them.
 """
 
 from numba import njit

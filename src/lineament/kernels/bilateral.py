@@ -28,15 +28,8 @@ def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, ci
     sums are in float32 (twice as many fit a register), the result is good to 0.05 mm at the
     default widths.
 
-    Parameters
-    ----------
-    floats : float64 array
-        Of the workspace, see `layout`. RANGE is read, FILTERED written: NaN where not usable.
-    range_min, range_max, sigma_d, sigma_r : float
-    half_width : int
-    circular : bool
-        Whether the window goes over the seam; else it ends at the ends of the scan.
-    scratch : float32 array, see `scratch_shape`
+    From RANGE, FILTERED: NaN where not usable. The window goes over the seam of a full circle; else
+    it ends at the ends of the scan. `scratch` is a float32 array, see `scratch_shape`.
     """
     n, h, beams = floats.shape[1] - at.EXTRA, half_width, at.beams_of(floats)
     least, away = max(range_min, LEAST_RANGE), F(-1e4 * sigma_r)

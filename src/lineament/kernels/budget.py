@@ -27,15 +27,11 @@ def limit_pieces(floats, ints, bearings, max_vertices, link, worst, costs, follo
     neighbouring pieces become one, or are left out, such that Σ (χ² - worst² · points) over the
     pieces that remain is the least of all ways. χ² is that of the line with the least squared range
     errors over all points from the first to the last of a piece. Where a corner joined pieces, one
-    joins what became of them. The clusters of the points stay.
+    joins what became of them. The clusters of the points stay. Pieces are in the order of their
+    points.
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. RANGE, BEAM and the pieces, in the order of their points, are
-        read; the pieces are rewritten.
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
     max_vertices : int
         The budget, at least 1.
     link : float

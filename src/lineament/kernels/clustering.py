@@ -16,19 +16,13 @@ def cluster(floats, ints, bearings, step, circular, noise, scale, floor, density
     a noise floor (equation 10), or else at most T_K = μ_K + k σ_K of the cluster, once that has
     three spacings (11-13): density only joins. Clusters under `min_points` are noise.
 
+    From FILTERED, the points with their thresholds (DENSITY_THRESHOLD is NaN where it is not
+    needed), and the clusters.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. FILTERED is read; X, Y, RHO, SPACING, the thresholds
-        (DENSITY_THRESHOLD is NaN where it is not needed), BEAM, LABEL and the clusters are
-        written.
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
     step : float
         Δφ [rad].
-    circular : bool
-        Whether the last cluster may go on in the first.
-    noise : float64 array, shape (4,)
     scale, floor, density_k : float
         λ, the noise floor in units of √2 σ, and k.
     min_points : int

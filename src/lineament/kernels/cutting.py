@@ -17,11 +17,10 @@ from .corner_operator import corner_response
 def cut(floats, ints, radius, threshold, kind, min_points):
     """Cut the clusters of a scan where the corner operator responds (Liu et al. 2023, steps 5-7).
 
+    From points and clusters, candidates and pieces.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. X, Y and the clusters are read; candidates and pieces are
-        written.
     radius, kind
         As in `corner_operator.corner_response`.
     threshold : float

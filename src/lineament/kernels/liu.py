@@ -1,6 +1,6 @@
 """The steps of Liu et al. 2023, one scan after the other."""
 
-from typing import NamedTuple
+from collections import namedtuple
 
 from . import kernel
 from . import layout as at
@@ -12,24 +12,12 @@ from .measuring import measure
 from .noise import estimate_noise
 
 
-class Parameters(NamedTuple):
-    """Those of `methods.liu.Liu`; choices as the numbers that the kernels of the steps take."""
-
-    sigma_d: float
-    sigma_r: float
-    half_width: int
-    spacing_scale: float
-    noise_floor: float
-    density_k: float
-    min_points: int
-    support_radius: int
-    threshold: float
-    response: int
-    fit: int
-    measure: int
-    corner: bool
-    corner_trim: int
-    max_vertices: int
+#: Those of `methods.liu.Liu`; choices as the numbers that the kernels of the steps take.
+Parameters = namedtuple(
+    "Parameters",
+    "sigma_d sigma_r half_width spacing_scale noise_floor density_k min_points support_radius "
+    "threshold response fit measure corner corner_trim max_vertices",
+)
 
 
 @kernel
@@ -42,18 +30,12 @@ def extract_rows(
 
     Parameters
     ----------
-    ranges : float64 array, shape (m, n)
-    rows : int
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
     sensor : tuple
         (range_min, range_max, step, circular).
     given_noise : float64 array, shape (4,)
         See `noise.estimate_noise`.
     parameters : tuple
-        See `Parameters`; a plain tuple, which Python passes in half the time of a named one.
-    floats, ints
-        The workspace, see `layout`.
+        See `Parameters`.
     scratch : tuple
         That of `bilateral.filter_ranges`, and the two arrays of `budget.limit_pieces`.
     noises : float64 array, shape (m, 4)

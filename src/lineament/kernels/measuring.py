@@ -25,18 +25,14 @@ class Options(NamedTuple):
 
 @kernel
 def measure(floats, ints, row, bearings, circular, noise, options, tables):
-    """Write the features of a scan behind those of the scans before it.
+    """Write the features of a scan, from points, clusters and pieces.
+
+    They come behind those of the scans before it.
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points, clusters and pieces are read.
     row : int
         Which scan of the tables this is.
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
-    circular : bool
-    noise : float64 array, shape (4,)
     options : tuple
         See `Options`.
     tables : tuple of arrays

@@ -22,15 +22,7 @@ _BITS_OF_INFINITY = 0x7FF0000000000000
 def estimate_noise(floats, range_min, range_max, given, noise):
     """Write the noise of a scan: as `given`, or, where that is NaN, estimated.
 
-    Parameters
-    ----------
-    floats : float64 array
-        Of the workspace, see `layout`. RANGE is read.
-    range_min, range_max : float
-    given : float64 array, shape (4,)
-        (sigma, proportional, bearing, quantum).
-    noise : float64 array, shape (4,)
-        Result; NaN for a scan without a usable range.
+    It is NaN for a scan without a usable range.
     """
     for part in range(4):
         noise[part] = given[part]

@@ -33,11 +33,6 @@ def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, cost
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points are read, X and Y of vertices and the pieces are
-        rewritten.
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
     budget : int
         At least 1.
     max_missing : int

@@ -3,15 +3,13 @@
 One way: source → (the newest scan of each publisher) → deskewing → features → tracks → sinks.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from .._lazy import lazily
 
 if TYPE_CHECKING:
     from .config import LiveConfig, read_config
-    from .counters import Report
+    from .counters import Counts, Report
     from .node import Node
     from .pipeline import Frame, Pipeline
     from .received import Odometry, Received, Source
@@ -20,6 +18,7 @@ if TYPE_CHECKING:
     from .sinks import FoxgloveSink, RosSink, Sink
 
 _HOME = {
+    "Counts": "counters",
     "FoxgloveSink": "sinks",
     "Frame": "pipeline",
     "LiveConfig": "config",
@@ -37,6 +36,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Counts",
     "FoxgloveSink",
     "Frame",
     "LiveConfig",
@@ -52,6 +52,5 @@ __all__ = [
     "read_config",
     "run_live",
 ]
-
 
 __getattr__ = lazily(__name__, _HOME)

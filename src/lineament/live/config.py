@@ -1,10 +1,10 @@
-"""What a live node is told: by flags, by a TOML file, by both."""
+"""The configuration of a live node: from flags, from a TOML file, or from both."""
 
 from __future__ import annotations
 
+import math
 import os
 import re
-import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -16,19 +16,41 @@ from ..scan import Pose
 
 __all__ = ["LiveConfig", "read_config", "resolved"]
 
-_ECHOES = ("first", "last", "strongest")
-_TYPES = ("LaserScan", "MultiEchoLaserScan")
-_RELIABILITIES = ("best-effort", "reliable")
+_CHOICES: dict[str, tuple[object, ...]] = {
+    "type": ("LaserScan", "MultiEchoLaserScan"),
+    "echo": ("first", "last", "strongest"),
+    "reliability": ("best-effort", "reliable"),
+    "ros": (0, 1, 2),
+}
+_BOUNDS: dict[str, tuple[float, float]] = {
+    "depth": (1, 1000),
+    "rate": (0, 1e6),
+    "noise": (0, 1000),
+    "domain": (0, 232),
+    "foxglove": (0, 65535),
+}
+_NAMES = ("topic", "namespace", "name", "deskew")
+#: What each annotation accepts, and how it is called in a message.
+_KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
+    "str": (str, "a text"),
+    "bool": (bool, "true or false"),
+    "int": (int, "a whole number"),
+    "float": ((int, float), "a number"),
+    "Pose": ((tuple, list), "three numbers"),
+    "Mapping[str, Any]": (Mapping, "a table"),
+}
+#: Values of `LiveConfig.deskew` that are not topics.
+_NOT_TOPICS = ("off", "scans", "poses")
 
 
 @dataclass(frozen=True, slots=True)
 class LiveConfig:
-    """Where a node listens, what it does with a scan, and where it tells what it found.
+    """Where a node listens, what it does with a scan, and where it publishes features.
 
     Parameters
     ----------
     topic : str
-        Topic of the scans. What is found goes to topics below it: ``TOPIC/features`` and others.
+        Topic of the scans. Features go to topics below it: ``TOPIC/features`` and others.
     namespace : str
         Put before topics that do not begin with ``/``.
     name : str
@@ -40,13 +62,13 @@ class LiveConfig:
     ros : int
         2, or 1 for ROS 1 (rospy); 0 for none, where a log is played for Foxglove alone.
     domain : int, optional
-        Domain of DDS; by default that of the environment's ``ROS_DOMAIN_ID``, or 0.
+        DDS domain; by default that of the environment's ``ROS_DOMAIN_ID``, or 0.
     localhost : bool
         Whether DDS stays on this machine.
     reliability : str
-        Of the subscription: ``best-effort``, which any publisher matches, or ``reliable``.
+        Of the subscription: ``best-effort``, which matches any publisher, or ``reliable``.
     depth : int
-        How many messages of a topic are kept for a reader that is behind.
+        Messages of a topic that are kept for a slow reader.
     method : str
         Name of the method.
     parameters : dict
@@ -54,40 +76,39 @@ class LiveConfig:
     noise : float, optional
         Noise of the ranges [m]; estimated from each scan by default.
     deskew : str
-        Where the motion of the sensor is known from: ``off``, ``scans`` (their own features),
+        Where the motion of the sensor is known from: ``off``, ``scans`` (their features),
         ``poses`` (of a log that is played), or a topic of ``nav_msgs/Odometry``.
     laser_pose : (x, y, theta)
-        Pose of the scanner in the frame whose twist the odometry tells [m, m, rad].
+        Pose of the scanner in the frame of the odometry's twist [m, m, rad].
     track : bool
         Whether features are recognised from scan to scan.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
-        Which scans of the log, where it has several kinds.
+        Topic of the scans in the log, where it has several.
     poses : str, optional
-        Which topic of the log gives the poses.
+        Topic of the poses in the log.
     ring : int, optional
-        Which ring of a point cloud of the log is the scan.
+        Ring of a point cloud in the log that is the scan.
     keep_going : bool
-        Whether to leave out what is faulty in the log.
+        Whether to skip what is faulty in the log.
     rate : float
-        How many times faster than it was recorded; 0 for as fast as scans are worked at.
+        Factor on the speed of the log; 0 for as fast as scans are processed.
     loop : bool
-        Whether the log begins anew at its end.
+        Whether the log starts again at its end.
     foxglove : int, optional
-        Port on which Foxglove is served by WebSocket.
+        Port of the WebSocket server for Foxglove.
     host : str
-        Address on which it is served.
+        Address of that server.
 
     Raises
     ------
     ValueError
-        If a value is none of these. The message names the parameter.
+        If a value is not one of these. The message names the parameter.
 
     Examples
     --------
-    >>> config = LiveConfig(topic="scan", namespace="robot1", method="liu")
-    >>> config.scan_topic
+    >>> LiveConfig(topic="scan", namespace="robot1", method="liu").scan_topic
     '/robot1/scan'
     """
 
@@ -119,31 +140,11 @@ class LiveConfig:
 
     def __post_init__(self) -> None:
         for known in fields(self):
-            _check_type(known.name, known.type, getattr(self, known.name))
-        _check_choice("type", self.type, _TYPES)
-        _check_choice("echo", self.echo, _ECHOES)
-        _check_choice("reliability", self.reliability, _RELIABILITIES)
-        _check_choice("ros", self.ros, (0, 1, 2))
-        _check_name("topic", self.topic)
-        _check_name("namespace", self.namespace.strip("/") or "none")
-        _check_name("name", self.name)
+            _check(known.name, str(known.type), getattr(self, known.name))
         if "/" in self.name:
-            raise ValueError(f"name is {self.name!r}, expected no /: for that there is namespace")
-        if self.deskew not in ("off", "scans", "poses"):
-            _check_name("deskew", self.deskew)
-        _check_between("depth", self.depth, 1, 1000)
-        _check_between("rate", self.rate, 0, 1e6)
-        if self.noise is not None:
-            _check_between("noise", self.noise, 0, 1000)
-        if self.domain is not None:
-            _check_between("domain", self.domain, 0, 232)
-        if self.foxglove is not None:
-            _check_between("foxglove", self.foxglove, 0, 65535)
+            raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
         if len(self.laser_pose) != 3 or not all(map(_is_finite, self.laser_pose)):
             raise ValueError(f"laser_pose is {self.laser_pose}, expected three finite numbers")
-        self._check_log()
-
-    def _check_log(self) -> None:
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
         if self.log is not None and self.odometry_topic is not None:
@@ -161,13 +162,11 @@ class LiveConfig:
     @property
     def odometry_topic(self) -> str | None:
         """Full name of the topic of the odometry, where there is one."""
-        if self.deskew in ("off", "scans", "poses"):
-            return None
-        return resolved(self.deskew, self.namespace)
+        return None if self.deskew in _NOT_TOPICS else resolved(self.deskew, self.namespace)
 
 
 def resolved(topic: str, namespace: str) -> str:
-    """Full name of a topic, by the rules of ROS: what begins with ``/`` is one already.
+    """Return the full name of a topic; one that begins with ``/`` is full already, as in ROS.
 
     Examples
     --------
@@ -176,17 +175,16 @@ def resolved(topic: str, namespace: str) -> str:
     """
     if topic.startswith("/"):
         return topic
-    parts = [part for part in namespace.split("/") if part]
-    return "/" + "/".join([*parts, topic])
+    return "/" + "/".join([*filter(None, namespace.split("/")), topic])
 
 
 def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read the parameters of a `LiveConfig` from a TOML file; the table is flat, but `parameters`.
+    r"""Read parameters of a `LiveConfig` from a TOML file: a flat table, and ``[parameters]``.
 
     Raises
     ------
     LineamentError
-        If the file cannot be read, is no TOML, or has a key that is no parameter.
+        If the file cannot be read, is not TOML, or has an unknown key.
 
     Examples
     --------
@@ -197,56 +195,39 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     {'topic': '/front/scan', 'parameters': {'evidence': 12}}
     """
     try:
-        with Path(path).open("rb") as file:
-            found = tomllib.load(file)
+        found = tomllib.loads(Path(path).read_bytes().decode())
     except OSError as error:
         raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:
-        raise LineamentError(f"{path}: is no TOML: {error}") from None
+        raise LineamentError(f"{path}: is not TOML: {error}") from None
     known = [parameter.name for parameter in fields(LiveConfig)]
-    for name, value in found.items():
+    for name in found:
         if name not in known:
             raise LineamentError(f"{path}: has {name!r}, expected one of {', '.join(known)}")
-        if isinstance(value, list):
-            found[name] = tuple(value)
-    return found
+    return {k: tuple(value) if isinstance(value, list) else value for k, value in found.items()}
 
 
-#: What each annotation takes, and what it is called.
-_KINDS: dict[str, tuple[tuple[type, ...], str]] = {
-    "str": ((str,), "a text"),
-    "bool": ((bool,), "true or false"),
-    "int": ((int,), "a whole number"),
-    "float": ((int, float), "a number"),
-    "Pose": ((tuple, list), "three numbers"),
-    "Mapping[str, Any]": ((Mapping,), "a table"),
-}
-
-
-def _check_type(name: str, annotation: Any, value: object) -> None:
-    kind, _, optional = str(annotation).partition(" | ")
+def _check(name: str, annotation: str, value: Any) -> None:
+    """Check the type of a parameter, and its value where a table above bounds it."""
+    kind, _, optional = annotation.partition(" | ")
+    if optional and value is None:
+        return
     types, wanted = _KINDS[kind]
-    is_optional = bool(optional) and value is None
-    is_bool = isinstance(value, bool) and kind != "bool"
-    if not is_optional and (is_bool or not isinstance(value, types)):
+    is_known = isinstance(value, types)
+    if not is_known or (isinstance(value, bool) and kind != "bool"):
         raise ValueError(f"{name} is {value!r}, expected {wanted}")
-
-
-def _check_choice(name: str, value: object, choices: tuple[object, ...]) -> None:
-    if value not in choices:
-        wanted = ", ".join(map(str, choices))
+    if name in _CHOICES and value not in _CHOICES[name]:
+        wanted = ", ".join(map(str, _CHOICES[name]))
         raise ValueError(f"{name} is {value!r}, expected one of {wanted}")
-
-
-def _check_between(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise ValueError(f"{name} is {value}, expected {low} to {high}")
-
-
-def _check_name(name: str, value: str) -> None:
-    if not re.fullmatch(r"/?\w+(/\w+)*", value, re.ASCII):
+    if name in _BOUNDS and not _BOUNDS[name][0] <= value <= _BOUNDS[name][1]:
+        raise ValueError(f"{name} is {value}, expected {_BOUNDS[name][0]} to {_BOUNDS[name][1]}")
+    text = value.strip("/") or "none" if name == "namespace" else value
+    if name in _NAMES and not re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII):
         raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and abs(value) <= sys.float_info.max
+    try:
+        return isinstance(value, int | float) and math.isfinite(value)
+    except OverflowError:  # an integer beyond all floats
+        return False

@@ -11,21 +11,21 @@ from cyclonedds.qos import Policy, Qos
 
 from ..errors import one_line
 from ..output.scene import Message
-from .decoding import received_odometry, received_scan
-from .participant import Participant, close_entity
+from .config import LiveConfig
+from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
 from .raw_dds import ANY_STATE, RawReader, RawWriter
-from .received import Received
-from .ros_names import HASHES, ros_type, wire_topic, wire_type
+from .received import Received, received_odometry, received_scan
+from .sinks import Publisher
 
 __all__ = ["DdsPublisher", "DdsSource", "Participant"]
 
 NANO = 1_000_000_000
-SCAN, ODOMETRY = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry"
-#: A writer waits this long for a slow reader [ns], then gives the message up.
+ODOMETRY = "nav_msgs/msg/Odometry"
+#: A writer waits this long for a slow reader [ns], then drops the message.
 PATIENCE = NANO // 1000
-#: Publishers that are looked at in one go.
+#: Publishers that are examined at once.
 MOST_PUBLISHERS = 1000
-#: What the standard calls the policy of reliability.
+#: Number of the reliability policy in the standard.
 _RELIABILITY = 11
 
 
@@ -36,48 +36,32 @@ class DdsSource:
     ----------
     participant : Participant
         Who listens.
-    topic : str
-        Topic of the scans.
-    kind : {"sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan"}
-        Its type.
-    echo : {"first", "last", "strongest"}
-        Which echo of each beam, where there are several.
-    odometry : str, optional
-        Topic of ``nav_msgs/msg/Odometry``.
-    reliability : {"best-effort", "reliable"}
-        Best effort matches any publisher. A reliable one sends again what the network has lost.
+    config : LiveConfig
+        Topics, type, echo and reliability. Best effort matches any publisher; a reliable one
+        sends again what the network has lost.
     depth : int
-        How many messages of a topic may wait for `receive`. If more come, best effort counts the
-        newest as lost; reliable forgets the oldest.
+        Messages of a topic that may wait for `receive`. Beyond, best effort counts the newest as
+        lost; reliable forgets the oldest.
 
     Raises
     ------
     LineamentError
-        If a topic has no name of ROS 2.
+        If a topic does not have a name of ROS 2.
     """
 
     #: A robot may always publish again.
     ended = False
 
-    def __init__(
-        self,
-        participant: Participant,
-        topic: str,
-        kind: str = SCAN,
-        *,
-        echo: str = "first",
-        odometry: str | None = None,
-        reliability: str = "best-effort",
-        depth: int = 64,
-    ) -> None:
-        open_topic = partial(_Subscription, participant, reliability=reliability, depth=depth)
-        scan = partial(received_scan, encoding="cdr", kind=kind.replace("/msg/", "/"), echo=echo)
-        self._scans = open_topic(topic, kind, scan)
+    def __init__(self, participant: Participant, config: LiveConfig, depth: int = 64) -> None:
+        subscribe = partial(_Subscription, participant, reliability=config.reliability, depth=depth)
+        kind = f"sensor_msgs/{config.type}"
+        scan = partial(received_scan, encoding="cdr", kind=kind, echo=config.echo)
+        self._scans = subscribe(config.scan_topic, f"sensor_msgs/msg/{config.type}", scan)
         self._topics = [self._scans]
-        if odometry is not None:
-            # Before the scans, which find the motion that came with them.
+        if config.odometry_topic is not None:
             motion = partial(received_odometry, encoding="cdr")
-            self._topics.insert(0, open_topic(odometry, ODOMETRY, motion))
+            # Before the scans, which need the motion that came with them.
+            self._topics.insert(0, subscribe(config.odometry_topic, ODOMETRY, motion))
         self._arrivals = WaitSet(participant.entity)
         for subscription in self._topics:
             self._arrivals.attach(subscription.condition)
@@ -85,15 +69,15 @@ class DdsSource:
 
     @property
     def publishers(self) -> int:
-        """How many publishers of scans there are. One that is killed counts until its lease ends.
+        """Number of publishers of scans.
 
-        It is the publisher that tells how long that is: 10 s unless it is configured.
+        One that is killed counts until its lease ends, 10 s unless it is configured otherwise.
         """
         return int(self._scans.reader.get_subscription_matched_status().current_count)
 
     @property
     def lost(self) -> int:
-        """Scans that came and found no place. What the network loses best effort does not know."""
+        """Scans that came when the depth was used up. Losses of the network are not known."""
         reader = self._scans.reader
         return int(
             reader.get_sample_rejected_status().total_count
@@ -101,7 +85,7 @@ class DdsSource:
         )
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait up to `timeout` [s] for messages; give all that came: odometry, then scans.
+        """Wait up to `timeout` [s] for messages; return all that came: odometry, then scans.
 
         A signal does not end the wait: it is handled when the wait is over.
         """
@@ -109,14 +93,9 @@ class DdsSource:
         return [message for subscription in self._topics for message in subscription.take()]
 
     def problems(self) -> list[str]:
-        """Tell, one line each, what was found since the last call that keeps messages away."""
+        """Return what was found since the last call that keeps messages away, a line each."""
         found = _publishers(self._found)
         return [line for topic in self._topics for line in topic.problems(found)]
-
-    def close(self) -> None:
-        """End the subscriptions; publishers see it at once."""
-        for entity in (self._arrivals, self._found, *(topic.reader for topic in self._topics)):
-            close_entity(entity)
 
 
 class _Subscription:
@@ -133,8 +112,13 @@ class _Subscription:
         depth: int,
     ) -> None:
         self._topic, self._kind, self._make = topic, kind, make
-        qos = _reader_qos(kind, reliability, depth)
-        self.reader = RawReader(participant.entity, participant.topic(topic, kind), qos, depth)
+        policies = [Policy.Reliability.BestEffort, Policy.History.KeepAll]
+        policies.append(Policy.ResourceLimits(max_samples=depth))
+        if reliability == "reliable":
+            # Not to keep all: that would make the publisher wait.
+            policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]
+        opened = participant.topic(topic, kind)
+        self.reader = RawReader(participant.entity, opened, _qos(kind, *policies), depth)
         self.condition = ReadCondition(self.reader, ANY_STATE)
 
     def take(self) -> list[Received]:
@@ -158,90 +142,38 @@ class _Subscription:
         return lines
 
 
-class DdsPublisher:
-    """Publishes messages to topics of ROS 2, reliably; who comes later has what comes later.
+class DdsPublisher(Publisher):
+    """Publishes messages in CDR to topics of ROS 2, reliably and volatile.
 
     Parameters
     ----------
     participant : Participant
         Who publishes.
     depth : int
-        How many of the newest messages of a topic are kept for a reader that is behind. One that
-        does not read at all holds nobody up: it misses messages.
-
-    Attributes
-    ----------
-    unsent : int
-        Messages that could not be sent.
+        How many of the newest messages of a topic are kept for a slow reader. One that does not
+        read at all delays nobody: it misses messages.
     """
 
     def __init__(self, participant: Participant, depth: int = 1) -> None:
+        super().__init__()
         self._participant, self._depth = participant, depth
-        self._writers: dict[str, RawWriter] = {}
-        self.unsent = 0
 
-    def advertise(self, topic: str, kind: str) -> None:
-        """Tell of a topic before there is a message for it.
+    def _open(self, topic: str, kind: str) -> RawWriter:
+        history = Policy.History.KeepLast(self._depth)
+        qos = _qos(kind, Policy.Reliability.Reliable(PATIENCE), history)
+        participant = self._participant
+        return RawWriter(participant.entity, participant.topic(topic, kind), qos)
 
-        Raises
-        ------
-        LineamentError
-            If `topic` is no name of a topic.
-        """
-        self._writer(topic, kind)
+    def _send(self, topic: RawWriter, message: Message) -> None:
+        self.unsent += not topic.write_raw(message.data)
 
-    def listeners(self, topic: str) -> int:
-        """How many listen to a topic; 0 for one that is not advertised."""
-        if topic not in self._writers:
-            return 0
-        return self._writers[topic].listeners
-
-    def publish(self, message: Message) -> None:
-        """Send a message in CDR.
-
-        Raises
-        ------
-        LineamentError
-            If its topic has no name of ROS 2.
-        """
-        if not self._writer(message.topic, message.kind).write_raw(message.data):
-            self.unsent += 1
-
-    def close(self) -> None:
-        """End the topics; listeners see it at once."""
-        for writer in self._writers.values():
-            close_entity(writer)
-        self._writers.clear()
-
-    def _writer(self, topic: str, kind: str) -> RawWriter:
-        if topic not in self._writers:
-            participant = self._participant
-            qos = _qos(
-                kind,
-                Policy.Reliability.Reliable(PATIENCE),
-                Policy.History.KeepLast(self._depth),
-            )
-            self._writers[topic] = RawWriter(
-                participant.entity, participant.topic(topic, kind), qos
-            )
-        return self._writers[topic]
-
-
-def _reader_qos(kind: str, reliability: str, depth: int) -> Qos:
-    if reliability == "reliable":
-        # Not to keep all: that would make the publisher wait.
-        return _qos(kind, Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth))
-    return _qos(
-        kind,
-        Policy.Reliability.BestEffort,
-        Policy.History.KeepAll,
-        Policy.ResourceLimits(max_samples=depth),
-    )
+    def _count(self, topic: RawWriter) -> int:
+        return topic.listeners
 
 
 def _qos(kind: str, *policies: object) -> Qos:
-    type_hash = f"typehash={HASHES[kind]};".encode()
-    return Qos(*policies, Policy.Durability.Volatile, Policy.Userdata(type_hash))
+    identity = Policy.Userdata(f"typehash={type_hash(kind)};".encode())
+    return Qos(*policies, Policy.Durability.Volatile, identity)
 
 
 def _publishers(reader: BuiltinDataReader) -> list[tuple[str, str]]:

@@ -1,6 +1,4 @@
-"""Foxglove, live: what is found is served by WebSocket, in the messages of its recordings."""
-
-from __future__ import annotations
+"""Foxglove, live: messages are served by WebSocket, the same as in a recording."""
 
 from collections import defaultdict
 
@@ -10,31 +8,32 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 from ..errors import LineamentError
 from ..output.foxglove import FoxgloveMessages
 from ..output.scene import Message
+from .sinks import Publisher
 
 __all__ = ["FoxgloveMessages", "FoxgloveServer"]
 
-#: Messages that wait for a viewer that does not keep up; then the oldest go.
+#: Messages that wait for a slow viewer; then the oldest are dropped.
 _BACKLOG = 64
 
 
-class FoxgloveServer:
+class FoxgloveServer(Publisher):
     """Serves Foxglove's own messages to its app: "Open connection", ``ws://localhost:8765``.
 
-    A viewer that does not keep up loses messages and delays nobody.
+    A viewer that does not keep up loses messages, uncounted, and delays nobody.
 
     Parameters
     ----------
     host : str
-        Address to listen on: this machine alone, or ``0.0.0.0`` for whoever can reach it.
+        Address to listen on: this machine alone, or ``0.0.0.0`` for all that can reach it.
     port : int
         Port to listen on; 0 for any that is free.
     name : str
-        What the app calls the server.
+        Name of the server in the app.
 
     Raises
     ------
     LineamentError
-        If nothing can be served there.
+        If the server cannot listen there.
 
     Attributes
     ----------
@@ -49,13 +48,10 @@ class FoxgloveServer:
     >>> server.close()
     """
 
-    #: Messages that could not be sent: the SDK does not tell.
-    unsent = 0
-
     def __init__(self, host: str = "127.0.0.1", port: int = 8765, name: str = "lineament") -> None:
+        super().__init__()
         self._messages, self._viewers = FoxgloveMessages(), _Viewers()
         self._context = foxglove.Context()
-        self._channels: dict[str, foxglove.Channel] = {}
         try:
             self._server = foxglove.start_server(
                 name=name,
@@ -72,43 +68,30 @@ class FoxgloveServer:
             ) from None
         self.address = f"ws://{host}:{self._server.port}"
 
-    def advertise(self, topic: str, kind: str) -> None:
-        """Make a topic known before its first message.
-
-        Parameters
-        ----------
-        topic : str
-        kind : str
-            Name of the type of its messages: ``SceneUpdate``, ``LaserScan`` ...
-        """
-        name, encoding, data = self._messages.schema(kind)
-        self._channels[topic] = foxglove.Channel(
-            topic,
-            message_encoding=self._messages.encoding,
-            schema=foxglove.Schema(name=name, encoding=encoding, data=data),
-            context=self._context,
-        )
-
-    def publish(self, message: Message) -> None:
-        """Send a message to those who see its topic, without waiting until it is sent."""
-        if message.topic not in self._channels:
-            self.advertise(message.topic, message.kind)
-        self._channels[message.topic].log(message.data)
-
-    def listeners(self, topic: str) -> int:
-        """How many viewers show a topic; 0 for one that is not advertised."""
-        return len(self._viewers.of[topic])
-
     def close(self) -> None:
         """End the connections, and stop listening."""
         self._server.stop()
-        for channel in self._channels.values():
+        for channel in self._topics.values():
             channel.close()
-        self._channels.clear()
+        self._topics.clear()
+
+    def _open(self, topic: str, kind: str) -> foxglove.Channel:
+        name, encoding, data = self._messages.schema(kind)
+        schema = foxglove.Schema(name=name, encoding=encoding, data=data)
+        encoding = self._messages.encoding
+        return foxglove.Channel(
+            topic, message_encoding=encoding, schema=schema, context=self._context
+        )
+
+    def _send(self, topic: foxglove.Channel, message: Message) -> None:
+        topic.log(message.data)
+
+    def _count(self, topic: foxglove.Channel) -> int:
+        return len(self._viewers.of[topic.topic()])
 
 
 class _Viewers(ServerListener):
-    """Keeps who is subscribed, by topic, as the server's threads tell it."""
+    """Keeps who is subscribed, by topic; called by the server's threads."""
 
     def __init__(self) -> None:
         self.of: defaultdict[str, set[int]] = defaultdict(set)

@@ -1,19 +1,14 @@
-"""`Node`: takes the newest scans from a source, works at them, and tells what it found."""
-
-from __future__ import annotations
+"""`Node`: takes the newest scans from a source, processes them, and publishes what it found."""
 
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from ..errors import one_line
 from ..scan import LaserScan
 from .counters import Counters, Report
 from .pipeline import Pipeline, check_beams
 from .received import Received, Source
-
-if TYPE_CHECKING:
-    from .sinks import Sink
+from .sinks import Sink
 
 __all__ = ["Node"]
 
@@ -21,18 +16,18 @@ __all__ = ["Node"]
 _WAIT = 0.1
 #: Time between two reports [s].
 _EACH = 1.0
-#: Time after which it is told that nothing comes [s].
+#: Time after which the absence of publishers is a message [s].
 _PATIENCE = 2.0
-#: Publishers whose faults are told; there are few, unless names are made up.
-_MOST_TOLD = 64
+#: Publishers whose faults are messages; there are few, unless names are made up.
+_MOST_FAULTY = 64
 
 
 class Node:
     """Turns a stream of scans into a stream of features.
 
-    There is no queue: of the scans that came while one was in work, only the newest of each
-    publisher is worked at, and the others are counted as dropped. What makes no sense is
-    counted, and told once for each publisher.
+    There is no queue: of the scans that came while one was processed, only the newest of each
+    publisher is processed, and the others are counted as dropped. Malformed messages are counted,
+    and are a line once for each publisher.
 
     Parameters
     ----------
@@ -42,10 +37,10 @@ class Node:
         What is done with them.
     sinks : sequence of Sink
         Where features go.
-    tell : callable
-        Is told in a line what a person should know.
+    write : callable
+        Called with each line that a person should see.
     show : callable
-        Is shown each report, each second.
+        Called with each report, each second.
 
     Examples
     --------
@@ -54,8 +49,7 @@ class Node:
     >>> from lineament.logs import save_npz
     >>> path = pathlib.Path(tempfile.mkdtemp(), "log.npz")
     >>> save_npz(path, [LaserScan([2.0, 2.0, 2.0], 0.0, 0.01, stamp=i / 10) for i in range(3)])
-    >>> node = Node(ReplaySource(path, rate=0), Pipeline(LiveConfig()), [])
-    >>> node.run().total_scans
+    >>> Node(ReplaySource(path, rate=0), Pipeline(LiveConfig()), []).run().total.scans
     3
     """
 
@@ -65,17 +59,17 @@ class Node:
         pipeline: Pipeline,
         sinks: Sequence[Sink],
         *,
-        tell: Callable[[str], None] = print,
+        write: Callable[[str], None] = print,
         show: Callable[[Report], None] = lambda report: None,  # noqa: ARG005
     ) -> None:
         self._source, self._pipeline, self._sinks = source, pipeline, tuple(sinks)
-        self._tell, self._show = tell, show
+        self._write, self._show = write, show
         self._faulty: set[str] = set()
         self._problems: set[str] = set()
         self._publishers: int | None = None
 
     def run(self, is_stopped: Callable[[], bool] = lambda: False) -> Report:
-        """Work until the source ends or `is_stopped` says so, which is asked ten times a second.
+        """Work until the source ends or `is_stopped` returns True; it is called every 0.1 s.
 
         Returns
         -------
@@ -86,14 +80,14 @@ class Node:
         counters = Counters(started)
         while not is_stopped() and not self._source.ended:
             for received in self._newest(self._source.receive(_WAIT), counters):
-                self._work(received, counters)
+                self._process(received, counters)
             now = time.monotonic()
             if now - reported >= _EACH and not self._source.ended:
                 reported = now
-                self._tell_problems()
+                self._write_problems()
                 self._watch(now - started)
                 self._report(counters, now)
-        self._tell_problems()
+        self._write_problems()
         return self._report(counters, time.monotonic())
 
     def _newest(self, received: list[Received], counters: Counters) -> list[Received]:
@@ -104,48 +98,48 @@ class Node:
         counters.dropped += len(scans) - len(newest)
         return [*odometry[-1:], *newest.values()]
 
-    def _work(self, received: Received, counters: Counters) -> None:
+    def _process(self, received: Received, counters: Counters) -> None:
         try:
-            read = received.read()
-            if not isinstance(read, LaserScan):
-                self._pipeline.hear(read)
+            message = received.read()
+            if not isinstance(message, LaserScan):
+                self._pipeline.hear(message)
                 return
-            check_beams(read)
+            check_beams(message)
             # What can be read may still make no sense: a robot that turns a million times a sweep.
-            frame = self._pipeline(received.publisher, read, received.time)
+            frame = self._pipeline(received.publisher, message, received.time)
         except ValueError as error:
             counters.malformed += 1
-            self._tell_fault(received, error)
+            self._write_fault(received, error)
             return
         for sink in self._sinks:
-            sink.tell(frame)
-        counters.add(read, frame.features, time.monotonic() - received.arrived)
+            sink.publish(frame)
+        counters.add(message, frame.features, time.monotonic() - received.arrived)
 
-    def _tell_fault(self, received: Received, error: ValueError) -> None:
-        if received.publisher not in self._faulty and len(self._faulty) < _MOST_TOLD:
+    def _write_fault(self, received: Received, error: ValueError) -> None:
+        if received.publisher not in self._faulty and len(self._faulty) < _MOST_FAULTY:
             self._faulty.add(received.publisher)
             what = "an odometry" if received.is_odometry else "a scan"
             text = f"{what} of {received.publisher} makes no sense: {error}"
-            self._tell(one_line(f"{text} (others like it are only counted)"))
+            self._write(one_line(f"{text} (others like it are only counted)"))
 
-    def _tell_problems(self) -> None:
-        """Tell what keeps scans from coming, each thing once."""
+    def _write_problems(self) -> None:
+        """Write what keeps scans from coming, each problem once."""
         for problem in self._source.problems():
             if problem not in self._problems:
                 self._problems.add(problem)
-                self._tell(one_line(problem))
+                self._write(one_line(problem))
 
     def _watch(self, seconds: float) -> None:
-        """Tell when publishers come and go."""
+        """Write when publishers come and go."""
         publishers = self._source.publishers
         if publishers == self._publishers or (not publishers and seconds < _PATIENCE):
             return
-        if publishers:
-            self._tell(f"{publishers} publisher{'s' if publishers > 1 else ''} of scans")
-        else:
-            self._tell("no publisher of scans: waiting for one")
-            self._faulty.clear()
         self._publishers = publishers
+        if publishers:
+            self._write(f"{publishers} publisher{'s' if publishers > 1 else ''} of scans")
+        else:
+            self._write("no publisher of scans: waiting for one")
+            self._faulty.clear()
 
     def _report(self, counters: Counters, now: float) -> Report:
         report = counters.report(

@@ -1,7 +1,8 @@
-"""What is done with a scan that came: made straight, its features found, and recognised."""
+"""What is done with each scan: deskewing, feature extraction, tracking."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ..extractor import Extractor
@@ -10,30 +11,34 @@ from ..methods import get_method
 from ..motion import Tracker, Tracks
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
-from ..scan import LaserScan, RangeNoise
+from ..scan import LaserScan, Pose, RangeNoise
+from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
-from .motion import OdometryMotion, PoseMotion, ScanMotion, StandingMotion
 from .received import Odometry, Time
 
-__all__ = ["Frame", "Pipeline", "check_beams"]
+__all__ = ["Frame", "Pipeline", "check_beams", "twist_of_laser"]
 
 NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
 _LAST = 2.0**31 - 1
-#: More beams than any scanner has: buffers of such a size are not made for a broken message.
+#: More beams than any scanner has: buffers of that size are not made for a broken message.
 MOST_BEAMS = 65_536
-#: Publishers whose buffers and tracks are kept: beyond, those of the oldest go.
+#: Publishers whose buffers and tracks are kept; the oldest are forgotten.
 _MOST_PUBLISHERS = 8
+#: Odometry farther from a scan in time says nothing of it [s].
+_OLDEST = 0.5
+#: Poses farther apart in time give no velocity [s].
+_LONGEST = 1.0
 
 
 def check_beams(scan: LaserScan) -> None:
-    """Refuse a scan without beams, or with more than any scanner has; ValueError."""
+    """Raise ValueError for a scan without beams, or with more than any scanner has."""
     if not 0 < len(scan) <= MOST_BEAMS:
         raise ValueError(f"has {len(scan)} beams, expected 1 to {MOST_BEAMS}")
 
 
 def time_of(stamp: float) -> Time:
-    """Seconds and nanoseconds of a stamp; what a message cannot hold is its first or last time.
+    """Seconds and nanoseconds of a stamp, clipped to what a message can hold.
 
     Examples
     --------
@@ -52,10 +57,10 @@ class Frame(NamedTuple):
     scan : LaserScan
         As it came.
     straight : LaserScan
-        What the features were found in: the same, or without the motion of the sensor.
+        The scan that the features were found in: the same, or deskewed.
     features : Features
     tracks : Tracks or None
-        None where they are not asked for.
+        None unless tracking is on.
     time : (int, int)
         Stamp of its message, exactly: seconds and nanoseconds.
     """
@@ -68,7 +73,7 @@ class Frame(NamedTuple):
 
 
 class Pipeline:
-    """Works at the scans of some publishers, each with buffers and tracks of its own.
+    """Processes the scans of some publishers, with separate buffers and tracks for each.
 
     Parameters
     ----------
@@ -78,7 +83,7 @@ class Pipeline:
     Raises
     ------
     ValueError
-        If the method or a parameter of it is unknown or out of bounds.
+        If the method or one of its parameters is unknown or out of bounds.
 
     Examples
     --------
@@ -91,8 +96,8 @@ class Pipeline:
 
     def __init__(self, config: LiveConfig) -> None:
         self._config = config
-        self._lines: dict[str, _Line] = {}
-        self._line_of("")  # What is wrong with the method shows at once.
+        self._publishers: dict[str, _Publisher] = {}
+        self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
     def __call__(self, publisher: str, scan: LaserScan, time: Time | None = None) -> Frame:
@@ -106,52 +111,90 @@ class Pipeline:
         time : (int, int), optional
             Its stamp, exactly; by default that of the scan.
         """
-        line = self._line_of(publisher)
-        if self._odometry is not None:
-            line.motion.hear(self._odometry)
-        straight = deskew(scan, line.motion.twist(scan))
-        features = line.extractor(straight)
-        tracks = None if line.tracker is None else line.tracker(features)
+        kept = self._publisher(publisher)
+        twist, kept.last = self._twist(kept, scan), scan
+        straight = deskew(scan, twist)
+        features = kept.extractor(straight)
+        tracks = None if kept.tracker is None else kept.tracker(features)
         if not self._config.track:
             tracks = None
         return Frame(scan, straight, features, tracks, time or time_of(scan.stamp))
 
     def hear(self, odometry: Odometry) -> None:
-        """Take in what the odometry tells of the motion; ValueError if nothing moves so."""
+        """Take the newest odometry; ValueError if nothing can move like that."""
         if not all(abs(speed) <= FASTEST for speed in odometry.twist):
             raise ValueError(
                 f"its twist is {odometry.twist}, expected finite numbers, at most {FASTEST:g}"
             )
         self._odometry = odometry
 
-    def _line_of(self, publisher: str) -> _Line:
-        line = self._lines.get(publisher)
-        if line is None:
-            if len(self._lines) >= _MOST_PUBLISHERS:
-                del self._lines[next(iter(self._lines))]
-            line = self._lines[publisher] = _Line.of(self._config)
-        return line
+    def _twist(self, kept: _Publisher, scan: LaserScan) -> Twist | None:
+        """Twist of the scanner while it takes a scan, in its own frame; None if unknown."""
+        if self._config.deskew == "off":
+            return None
+        if self._config.deskew == "scans":
+            return kept.tracker.twist if kept.tracker else None
+        if self._config.deskew == "poses":
+            return _twist_from_poses(kept.last, scan)
+        return _twist_from_odometry(self._odometry, scan, self._config.laser_pose)
+
+    def _publisher(self, name: str) -> _Publisher:
+        if name not in self._publishers:
+            if len(self._publishers) >= _MOST_PUBLISHERS:
+                del self._publishers[next(iter(self._publishers))]
+            self._publishers[name] = _Publisher(self._config)
+        return self._publishers[name]
 
 
-class _Line(NamedTuple):
-    """What is kept of one publisher from scan to scan."""
+class _Publisher:
+    """What is kept of a publisher from scan to scan."""
 
-    extractor: Extractor
-    tracker: Tracker | None
-    motion: StandingMotion
-
-    @classmethod
-    def of(cls, config: LiveConfig) -> _Line:
+    def __init__(self, config: LiveConfig) -> None:
         noise = None if config.noise is None else RangeNoise(sigma=config.noise)
-        method = get_method(config.method, **config.parameters)
-        extractor = Extractor(method, noise=noise)
-        needs_tracker = config.track or config.deskew == "scans"
-        tracker = Tracker() if needs_tracker else None
-        motion = StandingMotion()
-        if config.deskew == "scans" and tracker is not None:
-            motion = ScanMotion(tracker)
-        elif config.deskew == "poses":
-            motion = PoseMotion()
-        elif config.odometry_topic is not None:
-            motion = OdometryMotion(config.laser_pose)
-        return cls(extractor, tracker, motion)
+        self.extractor = Extractor(get_method(config.method, **config.parameters), noise=noise)
+        self.tracker = Tracker() if config.track or config.deskew == "scans" else None
+        self.last: LaserScan | None = None
+
+
+def _twist_from_odometry(
+    odometry: Odometry | None, scan: LaserScan, laser_pose: Pose
+) -> Twist | None:
+    """Twist of the scanner by the newest odometry; None if that is not of the time of the scan."""
+    if odometry is None or abs(scan.stamp - odometry.stamp) > _OLDEST:
+        return None
+    return twist_of_laser(odometry.twist, laser_pose)
+
+
+def _twist_from_poses(last: LaserScan | None, scan: LaserScan) -> Twist | None:
+    """Mean twist between two successive scans of a log; None if it cannot be known."""
+    if last is None or last.pose is None or scan.pose is None:
+        return None
+    seconds = scan.stamp - last.stamp
+    return twist_between(last.pose, scan.pose, seconds) if 0 < seconds < _LONGEST else None
+
+
+def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:
+    """Twist of a scanner that is mounted on a moving body, in the scanner's frame.
+
+    A point at p of a rigid body moves with v + ω × p.
+
+    Parameters
+    ----------
+    twist : (v_x, v_y, omega)
+        Of the body, in its frame [m/s, m/s, rad/s].
+    laser_pose : (x, y, theta)
+        Pose of the scanner in the frame of the body [m, m, rad].
+
+    Examples
+    --------
+    A scanner half a metre in front of the axle, turned to the left, on a turning robot:
+
+    >>> forward, left, turn_rate = twist_of_laser((1.0, 0.0, 2.0), (0.5, 0.0, math.pi / 2))
+    >>> round(forward, 3), round(left, 3), turn_rate
+    (1.0, -1.0, 2.0)
+    """
+    forward, left, turn_rate = twist
+    x, y, theta = laser_pose
+    vx, vy = forward - turn_rate * y, left + turn_rate * x
+    c, s = math.cos(theta), math.sin(theta)
+    return c * vx + s * vy, c * vy - s * vx, turn_rate

@@ -1,16 +1,14 @@
-"""Topics of DDS whose messages are bytes, whatever they hold: as ROS 2 has them on the wire.
+"""Topics of DDS whose messages are bytes: as ROS 2 has them on the wire.
 
 The Python binding of Cyclone DDS reads and writes objects of classes that describe each field.
-Here the bytes are wanted: they are decoded elsewhere, and only if they are needed; a malformed
-message has to arrive, so that it can be counted and told; and the binding keeps all of Python
-waiting while a writer waits for a slow reader. So these few functions of Cyclone DDS are called
-directly. A topic is known by its name and that of its type, as ROS 2's own bindings do it.
+Here bytes are needed: they are decoded elsewhere, and only if they are used; a malformed message
+has to arrive, so that it is counted and reported; and the binding holds the interpreter while a
+writer waits for a slow reader. So these few functions of Cyclone DDS are called directly. A topic
+is identified by its name and that of its type, as in ROS 2's own bindings.
 """
 
-from __future__ import annotations
-
 import ctypes
-from typing import Any, NamedTuple
+from typing import Any
 
 from cyclonedds.core import DDSException, Entity, InstanceState, SampleState, ViewState
 from cyclonedds.domain import DomainParticipant
@@ -20,13 +18,13 @@ from cyclonedds.qos import Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-__all__ = ["ANY_STATE", "RawReader", "RawTopic", "RawWriter", "Sample"]
+__all__ = ["ANY_STATE", "RawReader", "RawTopic", "RawWriter"]
 
 #: Every message, read or not.
 ANY_STATE = ViewState.Any | SampleState.Any | InstanceState.Any
-#: What a serialised message holds: data, not a key.
+#: Kind of a serialised message: data, not a key.
 _DATA = 2
-#: All that Cyclone DDS looks at: a message has one byte at least, and nothing of it is a key.
+#: Description of a type as far as Cyclone DDS uses it: at least one byte, and no key.
 _ONE_BYTE = (ctypes.c_uint32 * 3)(0x01_01_00_00, 0, 0)
 
 
@@ -38,10 +36,7 @@ class _Description(ctypes.Structure):
     """``dds_topic_descriptor_t``."""
 
     _fields_ = (
-        ("size", ctypes.c_uint32),
-        ("alignment", ctypes.c_uint32),
-        ("flags", ctypes.c_uint32),
-        ("n_keys", ctypes.c_uint32),
+        *((name, ctypes.c_uint32) for name in ("size", "alignment", "flags", "n_keys")),
         ("type_name", ctypes.c_char_p),
         ("keys", ctypes.c_void_p),
         ("n_operations", ctypes.c_uint32),
@@ -65,34 +60,21 @@ def _function(name: str, result: Any, *arguments: Any) -> Any:
     return function
 
 
-_P, _Entity = ctypes.POINTER, dds_c_t.entity
+_P, _Entity, _Int, _Word = ctypes.POINTER, dds_c_t.entity, ctypes.c_int32, ctypes.c_uint32
+_Pointer, _Size, _Text = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_char_p
 _create_topic = _function(
-    "dds_create_topic",
-    _Entity,
-    *(_Entity, _P(_Description), ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p),
+    "dds_create_topic", _Entity, _Entity, _P(_Description), _Text, _Pointer, _Pointer
 )
-_get_type = _function("dds_get_entity_sertype", ctypes.c_int32, _Entity, _P(ctypes.c_void_p))
-_take = _function(
-    "dds_takecdr",
-    ctypes.c_int32,
-    *(_Entity, _P(ctypes.c_void_p), ctypes.c_uint32, _P(dds_c_t.sample_info), ctypes.c_uint32),
-)
-_size = _function("ddsi_serdata_size", ctypes.c_uint32, ctypes.c_void_p)
-_copy = _function(
-    "ddsi_serdata_to_ser",
-    None,
-    *(ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_char_p),
-)
-_release = _function("ddsi_serdata_unref", None, ctypes.c_void_p)
+_get_type = _function("dds_get_entity_sertype", _Int, _Entity, _P(_Pointer))
+_take = _function("dds_takecdr", _Int, _Entity, _P(_Pointer), _Word, _P(dds_c_t.sample_info), _Word)
+_size = _function("ddsi_serdata_size", _Word, _Pointer)
+_copy = _function("ddsi_serdata_to_ser", None, _Pointer, _Size, _Size, _Text)
+_release = _function("ddsi_serdata_unref", None, _Pointer)
 _serialised = _function(
-    "ddsi_serdata_from_ser_iov",
-    ctypes.c_void_p,
-    *(ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t, _P(_Piece), ctypes.c_size_t),
+    "ddsi_serdata_from_ser_iov", _Pointer, _Pointer, ctypes.c_int, _Size, _P(_Piece), _Size
 )
-_count_listeners = _function(
-    "dds_get_matched_subscriptions", ctypes.c_int32, *(_Entity, ctypes.c_void_p, ctypes.c_size_t)
-)
-_write = _function("dds_writecdr", ctypes.c_int32, _Entity, ctypes.c_void_p)
+_count_listeners = _function("dds_get_matched_subscriptions", _Int, _Entity, _Pointer, _Size)
+_write = _function("dds_writecdr", _Int, _Entity, _Pointer)
 
 
 class RawTopic(Topic[Any]):
@@ -108,26 +90,11 @@ class RawTopic(Topic[Any]):
         description = _Description(
             size=1, alignment=1, type_name=type_name.encode(), n_operations=2, operations=_ONE_BYTE
         )
-        # The participant is kept as long as the topic.
+        # The participant lives as long as the topic.
         self._keepalive_entities = [participant]
         self.data_type = bytes
         made = _create_topic(participant._ref, description, name.encode(), None, None)
         Entity.__init__(self, made)
-
-
-class Sample(NamedTuple):
-    """A message as it came.
-
-    Attributes
-    ----------
-    data : bytes
-        The message in CDR, from its first four bytes on, which tell the encoding.
-    publisher : int
-        Handle of its publisher.
-    """
-
-    data: bytes
-    publisher: int
 
 
 class RawReader(DataReader[Any]):
@@ -140,19 +107,19 @@ class RawReader(DataReader[Any]):
         self._taken = (ctypes.c_void_p * depth)()
         self._infos = (dds_c_t.sample_info * depth)()
 
-    def take_raw(self) -> list[Sample]:
-        """Take the messages that wait, oldest first."""
+    def take_raw(self) -> list[tuple[bytes, int]]:
+        """Take the messages that wait, oldest first: each in CDR, and its publisher's handle."""
         n = _take(self._ref, self._taken, len(self._taken), self._infos, ANY_STATE)
         if n < 0:
             raise DDSException(n, "while messages were taken")
         samples = []
         for i in range(n):
             serialised, info = self._taken[i], self._infos[i]
-            if info.valid_data:  # What is none tells that a publisher has gone.
+            if info.valid_data:  # Otherwise it is the notice that a publisher has gone.
                 size = _size(serialised)
                 data = ctypes.create_string_buffer(size)
                 _copy(serialised, 0, size, data)
-                samples.append(Sample(data.raw, info.publication_handle))
+                samples.append((data.raw, info.publication_handle))
             _release(serialised)
             self._taken[i] = None
         return samples
@@ -168,12 +135,11 @@ class RawWriter(DataWriter[Any]):
 
     @property
     def listeners(self) -> int:
-        """How many listen at the moment."""
-        n: int = _count_listeners(self._ref, None, 0)
-        return max(n, 0)
+        """Number of listeners at the moment."""
+        return max(int(_count_listeners(self._ref, None, 0)), 0)
 
     def write_raw(self, data: bytes) -> bool:
-        """Write a message in CDR; tell whether it went out: a slow reader can be in the way."""
+        """Write a message in CDR; return False if a slow reader prevented it."""
         data += bytes(-len(data) % 4)  # Messages end on a full word.
         serialised = _serialised(self._type, _DATA, 1, _Piece(data, len(data)), len(data))
         if not serialised:

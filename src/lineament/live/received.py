@@ -1,35 +1,48 @@
-"""What comes to a live node, and what it comes from."""
+"""Messages that a live node receives, where they come from, and where they wait."""
 
-from __future__ import annotations
-
+import time
+from collections import deque
 from collections.abc import Callable
+from functools import cache, partial
+from threading import Condition
 from typing import NamedTuple, Protocol
 
-from ..rosmsg.poses import Odometry
+from ..rosmsg.poses import Odometry, odometry
+from ..rosmsg.scans import Decoder, decoders
+from ..rosmsg.wire import Buffer, WireReader
 from ..scan import LaserScan
 
-__all__ = ["Odometry", "Received", "Source", "Time"]
+__all__ = [
+    "Inbox",
+    "Odometry",
+    "Received",
+    "Source",
+    "Time",
+    "received_odometry",
+    "received_scan",
+]
 
 #: Seconds and nanoseconds of a stamp, exactly as a message has them.
 Time = tuple[int, int]
+#: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
+_MOST_PUBLISHERS = 64
 
 
 class Received(NamedTuple):
-    """A message that came, not yet decoded: most of those that wait are never worked at.
+    """A message as it came; it is decoded by `read`, since most of those that wait never are.
 
     Attributes
     ----------
     publisher : str
-        Who sent it; of each publisher only the newest scan is worked at.
+        Who sent it; only the newest scan of each publisher is processed.
     read : callable
-        Decodes it; ValueError in one line if it makes no sense.
+        Decodes it; raises ValueError, in one line, if it is malformed.
     arrived : float
         When it was taken, by the clock `time.monotonic` [s].
     is_odometry : bool
         Whether it is an odometry rather than a scan.
     time : (int, int), optional
-        Its stamp, exactly: what is told of it has the same. None where only `LaserScan.stamp`
-        tells it.
+        Its stamp, exactly. None where only `LaserScan.stamp` is known.
     """
 
     publisher: str
@@ -44,21 +57,129 @@ class Source(Protocol):
 
     @property
     def lost(self) -> int:
-        """Messages that are known to have been lost before they could be received."""
+        """Scans that are known to have been lost before they could be received."""
 
     @property
     def ended(self) -> bool:
-        """Whether nothing will come any more."""
+        """Whether nothing more will come."""
 
     @property
     def publishers(self) -> int:
-        """How many there are at the moment."""
+        """Number of publishers of scans at the moment."""
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait up to `timeout` seconds, and give all that came, oldest first."""
+        """Wait up to `timeout` seconds, and return all messages that came, oldest first."""
 
     def problems(self) -> list[str]:
-        """Tell what keeps messages from coming, a line each; each is told once."""
+        """Return what keeps messages from coming, a line each."""
 
     def close(self) -> None:
         """Stop listening."""
+
+
+class Inbox:
+    """The newest messages of each publisher, from a transport's threads until they are taken.
+
+    A publisher that sends faster than is taken displaces its own messages, never another's.
+
+    Parameters
+    ----------
+    depth : int
+        Messages of a publisher that may wait.
+
+    Attributes
+    ----------
+    lost : int
+        Scans that were lost on the way, or displaced here.
+
+    Examples
+    --------
+    >>> inbox = Inbox(depth=1)
+    >>> for arrived in (1.0, 2.0):
+    ...     inbox.put(Received("scanner", lambda: None, arrived))
+    >>> [received.arrived for received in inbox.take(timeout=0)], inbox.lost
+    ([2.0], 1)
+    """
+
+    def __init__(self, depth: int) -> None:
+        self.lost = 0
+        self._depth = depth
+        self._waiting: dict[tuple[str, bool], deque[Received]] = {}
+        self._changed = Condition()
+
+    def put(self, received: Received, missing: int = 0) -> None:
+        """Add a message; `missing` scans are known to have been lost just before it."""
+        key = received.publisher, received.is_odometry
+        with self._changed:
+            if key not in self._waiting and len(self._waiting) < _MOST_PUBLISHERS:
+                self._waiting[key] = deque(maxlen=self._depth)
+            queue = self._waiting.get(key)
+            is_full = queue is None or len(queue) == self._depth
+            self.lost += missing + (is_full and not received.is_odometry)
+            if queue is not None:
+                queue.append(received)
+                self._changed.notify()
+
+    def take(self, timeout: float) -> list[Received]:
+        """Wait up to `timeout` seconds for a message; return all that wait, oldest first."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting, timeout)
+            queues = list(self._waiting.values())
+            self._waiting.clear()
+        return sorted((one for queue in queues for one in queue), key=lambda one: one.arrived)
+
+
+def received_scan(
+    publisher: str, data: Buffer, encoding: str, kind: str, echo: str = "first"
+) -> Received:
+    r"""Return what a source gives of a serialised scan that has just arrived.
+
+    Parameters
+    ----------
+    publisher : str
+        Who sent it.
+    data : bytes-like
+        The message; `Received.read` decodes it.
+    encoding : {"ros1", "cdr"}
+        How it is serialised.
+    kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
+        Its type.
+    echo : {"first", "last", "strongest"}
+        Which echo of the latter.
+
+    Raises
+    ------
+    ValueError
+        If the type is another one; from `Received.read`: if the message is malformed.
+
+    Examples
+    --------
+    >>> scan = received_scan("scanner", b"\x01\0\0\0\x02\0", "ros1", "sensor_msgs/LaserScan")
+    >>> scan.read()
+    Traceback (most recent call last):
+    ValueError: ends early: 16 bytes expected from byte 0, 6 are left
+    """
+    read = partial(_decoder(kind, echo), data, encoding)
+    return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
+
+
+@cache
+def _decoder(kind: str, echo: str) -> Decoder:
+    known = decoders(echo, ring=None)
+    if kind not in known:
+        raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
+    return known[kind]
+
+
+def received_odometry(publisher: str, data: Buffer, encoding: str) -> Received:
+    """Return what a source gives of a serialised ``nav_msgs/Odometry`` that has just arrived."""
+    return Received(publisher, partial(odometry, data, encoding), time.monotonic(), True)
+
+
+def _stamp(data: Buffer, encoding: str) -> Time | None:
+    """Stamp in the header of a message, exactly; None if there is no header."""
+    try:
+        seconds, nanoseconds, _ = WireReader(data, encoding).numbers("header")
+    except ValueError:
+        return None
+    return seconds, nanoseconds

@@ -1,7 +1,5 @@
 """A log played as if its scanner were running."""
 
-from __future__ import annotations
-
 import math
 import os
 import time
@@ -15,31 +13,30 @@ from .received import Received
 __all__ = ["ReplaySource"]
 
 #: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
-_LEAP = 10.0
-_STEP = 0.1
-#: What is given so soon after it was due is given alone [s].
+_LEAP, _STEP = 10.0, 0.1
+#: A scan that is returned so soon after it was due is returned alone [s].
 _PUNCTUAL = 0.01
-#: Scans that are given at once, where reading is slower than the rate that is asked for.
+#: Most scans at once, where reading is slower than the rate.
 _MOST = 64
 
 
 class ReplaySource:
-    """Gives the scans of a log at the times of their stamps.
+    """Returns the scans of a log at the times of their stamps.
 
-    A scan is due when as much time has passed since the scan before as between their stamps,
-    divided by the rate. Scans that are due together come together: the node works at the newest
-    and counts the others as dropped, as it does on a robot.
+    Two scans are as far apart in time as their stamps, divided by the rate. Scans that are due
+    together come together: the node processes the newest and counts the others as dropped, as it
+    does on a robot.
 
     Parameters
     ----------
     path : path-like
         The log.
     rate : float
-        How many times faster than it was recorded; 0 for one scan whenever one is asked for.
+        Factor on the speed; 0 for one scan at each call of `receive`.
     loop : bool
-        Whether to begin anew at the end; the stamps are then those of the log again.
+        Whether to start again at the end, with the same stamps.
     clock : callable
-        The time [s].
+        Returns the time [s].
     **reading
         How the log is read, as for `lineament.open_log`.
 
@@ -85,24 +82,24 @@ class ReplaySource:
 
     @property
     def publishers(self) -> int:
-        """The log, until its end."""
+        """1, the log, until its end."""
         return int(not self.ended)
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait until the next scan is due, up to `timeout` [s]; give those that are."""
+        """Wait until the next scan is due, up to `timeout` [s]; return those that are."""
         came: list[Received] = []
         if self._read_ahead():
             time.sleep(max(min(self._due - self._clock(), timeout), 0.0))
         now = self._clock()
         while len(came) < _MOST and self._read_ahead() and self._due <= now:
             came.append(self._take())
-            # When there is time, the scan at hand is worked at before the next one is read.
+            # When there is time, this scan is processed before the next one is read.
             if self._clock() - came[-1].arrived < _PUNCTUAL:
                 break
         return came
 
     def problems(self) -> list[str]:
-        """Tell what was skipped in the log."""
+        """Return what was skipped in the log."""
         return [f"skipped: {fault}" for fault in self._log.faults]
 
     def close(self) -> None:
@@ -113,11 +110,11 @@ class ReplaySource:
         assert self._next is not None
         (topic, scan), self._next = self._next, None
         self._stamp = scan.stamp
-        # Latency counts from when the scan was due: a node that comes late to it is late.
+        # Latency counts from when the scan was due.
         return Received(topic, lambda: scan, self._due if self._rate else self._clock())
 
     def _read_ahead(self) -> bool:
-        """Have the next scan read, and know when it is due; False at the end."""
+        """Read the next scan, and find when it is due; False at the end."""
         if self._next is None:
             self._next = self._following()
             if self._next is None:

@@ -6,31 +6,29 @@ import xmlrpc.client
 from collections.abc import Callable
 from functools import cache
 from http.client import HTTPConnection, HTTPException
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import LineamentError, one_line
-from .decoding import received_odometry, received_scan
-from .inbox import Inbox
-from .received import Received
-
-if TYPE_CHECKING:
-    from ..output.scene import Message
+from ..output.scene import Message
+from .config import LiveConfig
+from .received import Inbox, Received, received_odometry, received_scan
+from .sinks import Publisher
 
 __all__ = ["Ros1Node", "Ros1Publisher", "Ros1Source"]
 
 ODOMETRY = "nav_msgs/Odometry"
 #: How long the master may take to answer [s].
 _PATIENCE = 3.0
-#: A leap of the sequence number that is no loss: somebody else counts, or began anew.
+#: A larger step of the sequence number is no loss: the publisher was started again.
 _LEAP = 10_000
 
 
 class Ros1Node:
     """The one node of ROS 1 that a process can be; sources and publishers share it.
 
-    The master is found by ``ROS_MASTER_URI``, and this machine is found by ``ROS_IP`` or
-    ``ROS_HOSTNAME``, as for any node; ``__name:=`` and other remappings of the command line hold.
-    Signals are left to the program.
+    ``ROS_MASTER_URI`` names the master, ``ROS_IP`` or ``ROS_HOSTNAME`` this machine, as for any
+    node; ``__name:=`` and other remappings of the command line hold. Signals are left to the
+    program.
 
     Parameters
     ----------
@@ -42,7 +40,7 @@ class Ros1Node:
     LineamentError
         If rospy is not installed, or the master does not answer.
     ValueError
-        If it is no name of a node.
+        If the name is not valid in ROS 1.
     """
 
     def __init__(self, name: str = "lineament") -> None:
@@ -67,7 +65,7 @@ class Ros1Node:
         return bool(self._rospy.is_shutdown())
 
     def ask_master(self, method: str, *arguments: str) -> Any:
-        """Ask the master, who has three seconds; LineamentError if it does not answer."""
+        """Call a method of the master; LineamentError if it does not answer within 3 s."""
         try:
             with xmlrpc.client.ServerProxy(self._uri, _Hasty()) as master:
                 _, _, answer = getattr(master, method)("/lineament", *arguments)
@@ -79,64 +77,42 @@ class Ros1Node:
         return answer
 
     def subscribe(self, topic: str, kind: str, callback: Callable[[Any, Any], None]) -> Any:
-        """Subscribe a topic; `callback` is given each raw message, and `kind`."""
+        """Subscribe to a topic; `callback` receives each raw message, and `kind`."""
         return self._rospy.Subscriber(topic, _raw(kind), callback, kind, tcp_nodelay=True)
 
     def advertise(self, topic: str, kind: str, depth: int) -> Any:
-        """Make a publisher of raw messages, which is called with bytes."""
+        """Make a rospy publisher of raw messages."""
         return self._rospy.Publisher(topic, _raw(kind), tcp_nodelay=True, queue_size=depth)
 
     def close(self) -> None:
-        """Leave ROS; a process cannot come back."""
+        """Leave ROS, and close all topics; a process cannot come back."""
         self._rospy.signal_shutdown("closed")
 
 
 class Ros1Source:
-    """Scans of a topic of ROS 1.
+    """Scans, and odometry where it is wanted, from topics of ROS 1.
 
     Parameters
     ----------
     node : Ros1Node
-    topic : str
-        Topic of the scans.
-    kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
-        Type of its messages.
-    echo : {"first", "last", "strongest"}
-        Which echo of the latter.
-    odometry : str, optional
-        Topic of a ``nav_msgs/Odometry``.
-    depth : int
-        Messages of each publisher that may wait until they are taken.
-
-    Attributes
-    ----------
-    lost : int
-        Scans that did not come: by gaps in the sequence numbers that publishers give, which is
-        also how ROS 1's own statistics tell, and by not being taken in time.
+    config : LiveConfig
+        Topics, type and echo; and `depth`, the messages of each publisher that may wait.
     """
 
-    def __init__(
-        self,
-        node: Ros1Node,
-        topic: str,
-        kind: str = "sensor_msgs/LaserScan",
-        *,
-        echo: str = "first",
-        odometry: str | None = None,
-        depth: int = 10,
-    ) -> None:
-        self._node, self._echo = node, echo
-        self._inbox = Inbox(depth)
+    def __init__(self, node: Ros1Node, config: LiveConfig) -> None:
+        self._node, self._echo = node, config.echo
+        self._inbox = Inbox(config.depth)
         self._numbers: dict[str, int] = {}
-        self._subscribed = {topic: (kind, node.subscribe(topic, kind, self._put_scan))}
-        self._scans = self._subscribed[topic][1]
-        if odometry is not None:
+        topic, kind = config.scan_topic, f"sensor_msgs/{config.type}"
+        self._scans = node.subscribe(topic, kind, self._put_scan)
+        self._subscribed = {topic: (kind, self._scans)}
+        if (odometry := config.odometry_topic) is not None:
             subscription = node.subscribe(odometry, ODOMETRY, self._put_odometry)
             self._subscribed[odometry] = ODOMETRY, subscription
 
     @property
     def lost(self) -> int:
-        """Scans that are known to have been lost."""
+        """Scans that did not come, by gaps in sequence numbers, or were not taken in time."""
         return self._inbox.lost
 
     @property
@@ -146,24 +122,24 @@ class Ros1Source:
 
     @property
     def publishers(self) -> int:
-        """How many publishers of scans are connected."""
+        """Number of publishers of scans that are connected."""
         return int(self._scans.get_num_connections())
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait up to `timeout` seconds, and give all that came, oldest first."""
+        """Wait up to `timeout` seconds, and return all messages that came, oldest first."""
         return self._inbox.take(timeout)
 
     def problems(self) -> list[str]:
-        """Tell of topics without publishers whether they are of another type, or the master gone.
+        """Return why topics have no publishers: another type, or the master does not answer.
 
         Publishers that are connected stay so without a master.
         """
-        unheard = {
+        silent = {
             topic: kind
             for topic, (kind, subscription) in self._subscribed.items()
             if not subscription.get_num_connections()
         }
-        if not unheard or self.ended:
+        if not silent or self.ended:
             return []
         try:
             published = dict(self._node.ask_master("getPublishedTopics", ""))
@@ -171,14 +147,9 @@ class Ros1Source:
             return [str(error)]
         return [
             f"{topic} is published as {published[topic]}, expected {kind}"
-            for topic, kind in unheard.items()
+            for topic, kind in silent.items()
             if published.get(topic, kind) != kind
         ]
-
-    def close(self) -> None:
-        """Stop listening."""
-        for _, subscription in self._subscribed.values():
-            subscription.unregister()
 
     def _put_scan(self, message: Any, kind: str) -> None:
         publisher = _publisher(message)
@@ -189,15 +160,15 @@ class Ros1Source:
         self._inbox.put(received_odometry(_publisher(message), message.raw, "ros1"))
 
     def _missing(self, publisher: str, data: bytes) -> int:
-        """Count the scans of a publisher between its last and this one, by their numbers."""
+        """Count the scans between the last of a publisher and this one, by their numbers."""
         number = int.from_bytes(data[:4], "little")
         gap = number - self._numbers.get(publisher, number) - 1
         self._numbers[publisher] = number
         return gap if 0 < gap < _LEAP else 0
 
 
-class Ros1Publisher:
-    """Publishes serialised messages of ROS 1, each under the genuine type.
+class Ros1Publisher(Publisher):
+    """Publishes serialised messages of ROS 1, each under its genuine type.
 
     A listener that does not keep up loses the oldest messages and delays nobody. The sequence
     numbers of headers stay as they are in the bytes: rospy's numbering is not for raw messages.
@@ -210,57 +181,26 @@ class Ros1Publisher:
     """
 
     def __init__(self, node: Ros1Node, depth: int = 10) -> None:
+        super().__init__()
         self._node, self._depth = node, depth
-        self._topics: dict[str, Any] = {}
-        self._unsent = 0
 
-    @property
-    def unsent(self) -> int:
-        """Messages that newer ones pushed out, since a listener did not keep up."""
-        return self._unsent
+    def _open(self, topic: str, kind: str) -> Any:
+        return self._node.advertise(topic, kind, self._depth)
 
-    def advertise(self, topic: str, kind: str) -> None:
-        """Make a topic known before its first message.
-
-        Raises
-        ------
-        LineamentError
-            If the package of the type is not installed.
-        """
-        self._topics[topic] = self._node.advertise(topic, kind, self._depth)
-
-    def publish(self, message: Message) -> None:
-        """Send a message, without waiting until it is sent.
-
-        Raises
-        ------
-        LineamentError
-            If the package of its type is not installed.
-        """
+    def _send(self, topic: Any, message: Message) -> None:
         if self._node.ended:
             return
-        topic, kind, data = message
-        if topic not in self._topics:
-            self.advertise(topic, kind)
-        publisher = self._topics[topic]
-        # A full queue gives way, and rospy counts nothing.
-        self._unsent += sum(len(one._queue) >= self._depth for one in publisher.impl.connections)
-        publisher.publish(_raw(kind)(data))
+        # rospy drops the oldest message of a full queue, and does not count it.
+        self.unsent += sum(len(one._queue) >= self._depth for one in topic.impl.connections)
+        topic.publish(topic.data_class(message.data))
 
-    def listeners(self, topic: str) -> int:
-        """How many listen to a topic; 0 for one that is not advertised."""
-        return self._topics[topic].get_num_connections() if topic in self._topics else 0
-
-    def close(self) -> None:
-        """Withdraw all topics."""
-        for publisher in self._topics.values():
-            publisher.unregister()
-        self._topics.clear()
+    def _count(self, topic: Any) -> int:
+        return int(topic.get_num_connections())
 
 
 @cache
 def _raw(kind: str) -> Any:
-    """Make the class of a type's messages that are bytes; its name and its sum are the genuine."""
+    """Make the class of a type's messages as bytes; its name and checksum are the genuine ones."""
     from roslib.message import get_message_class
 
     genuine = get_message_class(kind)
@@ -270,7 +210,7 @@ def _raw(kind: str) -> Any:
 
     class Raw(genuine):  # type: ignore[misc, valid-type]
         __slots__ = ("raw",)
-        _has_header = False  # rospy would write a number of its own into it
+        _has_header = False  # else rospy would overwrite the sequence number
 
         def __init__(self, raw: bytes = b"") -> None:
             self.raw = raw
@@ -292,7 +232,7 @@ def _publisher(message: Any) -> str:
 
 
 class _Hasty(xmlrpc.client.Transport):
-    """HTTP that does not wait for ever."""
+    """HTTP with a time limit."""
 
     def make_connection(self, host: Any) -> HTTPConnection:
         connection = super().make_connection(host)

@@ -1,13 +1,15 @@
-"""Where a live node tells what it found: topics of ROS, and Foxglove."""
+"""Where a live node publishes what it found: topics of ROS, and Foxglove."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
 from ..scan import LaserScan
+from .config import LiveConfig
 from .counters import Report
 from .pipeline import Frame
 from .received import Time
@@ -19,32 +21,49 @@ __all__ = ["FoxgloveSink", "Publisher", "RosSink", "Sink"]
 
 DIAGNOSTICS = "/diagnostics"
 
-#: Topics below that of the scans, and their types.
-_BELOW = {
-    "features": "sensor_msgs/PointCloud2",
-    "corners": "geometry_msgs/PoseArray",
-    "markers": "visualization_msgs/MarkerArray",
-}
 
+class Publisher(ABC):
+    """What carries messages: DDS, ROS 1, a WebSocket.
 
-class Publisher(Protocol):
-    """What carries messages: DDS, ROS 1, a WebSocket."""
+    Attributes
+    ----------
+    unsent : int
+        Messages that could not be sent, as far as the transport reports it.
+    """
 
-    @property
-    def unsent(self) -> int:
-        """Messages that could not be sent."""
+    unsent = 0
+
+    def __init__(self) -> None:
+        self._topics: dict[str, Any] = {}
 
     def advertise(self, topic: str, kind: str) -> None:
-        """Make a topic known, so that others can listen to it before there is a message."""
+        """Announce a topic, so that others can subscribe before there is a message.
+
+        Raises
+        ------
+        LineamentError
+            If the transport does not have such a topic, or such a type.
+        """
+        self._topics[topic] = self._open(topic, kind)
 
     def publish(self, message: Message) -> None:
-        """Send a message."""
+        """Send a message, without waiting for slow listeners; its topic is advertised first."""
+        if message.topic not in self._topics:
+            self.advertise(message.topic, message.kind)
+        self._send(self._topics[message.topic], message)
 
     def listeners(self, topic: str) -> int:
-        """How many listen to a topic: what nobody listens to need not be made."""
+        """Return the number of listeners of a topic; 0 if it is not advertised."""
+        return self._count(self._topics[topic]) if topic in self._topics else 0
 
-    def close(self) -> None:
-        """Stop."""
+    @abstractmethod
+    def _open(self, topic: str, kind: str) -> Any: ...
+
+    @abstractmethod
+    def _send(self, topic: Any, message: Message) -> None: ...
+
+    @abstractmethod
+    def _count(self, topic: Any) -> int: ...
 
 
 class Sink(Protocol):
@@ -54,64 +73,56 @@ class Sink(Protocol):
     def unsent(self) -> int:
         """Messages that could not be sent."""
 
-    def tell(self, frame: Frame) -> None:
-        """Tell what was found in a scan."""
+    def publish(self, frame: Frame) -> None:
+        """Publish what was found in a scan."""
 
     def diagnose(self, report: Report, time: Time) -> None:
-        """Tell how the node is."""
-
-    def close(self) -> None:
-        """Stop."""
+        """Publish how the node is doing."""
 
 
 class RosSink:
-    """Tells features as a cloud, corners as poses, and markers, each below the scan's topic.
+    """Publishes features as a cloud, corners as poses, and markers, on topics below the scan's.
+
+    Messages that have no listeners are not made.
 
     Parameters
     ----------
     publisher : Publisher
     messages : RosMessages
         Makes the messages.
-    topic : str
-        Topic of the scans: what is found goes to ``TOPIC/features`` (a point a feature),
-        ``TOPIC/corners`` and ``TOPIC/markers``.
-    name : str
-        Name of the node, in diagnostics.
-    tells_scan : bool
-        Whether scans and their poses are told too, since a log has no publisher of its own.
+    config : LiveConfig
+        Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
+        ``TOPIC/markers``. The scans of a log are published too, with their poses on ``/tf``.
     """
 
-    def __init__(
-        self,
-        publisher: Publisher,
-        messages: RosMessages,
-        topic: str,
-        name: str,
-        *,
-        tells_scan: bool = False,
-    ) -> None:
-        self._publisher, self._messages = publisher, messages
-        self._topic, self._name, self._tells_scan = topic, name, tells_scan
-        topics = {f"{topic}/{below}": kind for below, kind in _BELOW.items()}
-        topics[DIAGNOSTICS] = "diagnostic_msgs/DiagnosticArray"
-        if tells_scan:
+    def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
+        self._publisher, self._make, self._name = publisher, messages, config.name
+        self._publishes_scan = config.log is not None
+        self._topic = topic = config.scan_topic
+        topics = {
+            f"{topic}/features": "sensor_msgs/PointCloud2",
+            f"{topic}/corners": "geometry_msgs/PoseArray",
+            f"{topic}/markers": "visualization_msgs/MarkerArray",
+            DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
+        }
+        if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
-        for name_of_topic, kind in topics.items():
-            publisher.advertise(name_of_topic, messages.kind(kind))
+        for name, kind in topics.items():
+            publisher.advertise(name, messages.kind(kind))
 
     @property
     def unsent(self) -> int:
         """Messages that could not be sent."""
         return self._publisher.unsent
 
-    def tell(self, frame: Frame) -> None:
-        """Tell what was found in a scan; the cloud first, since programs wait for it."""
-        publisher, make, topic = self._publisher, self._messages, self._topic
-        # A log may name no frame; where its scans are told too, all of it is in one that has a
-        # name, for /tf knows no other.
-        name = frame.scan.frame_id or (LASER_FRAME if self._tells_scan else "")
-        moment = _moment(frame, name)
+    def publish(self, frame: Frame) -> None:
+        """Publish what was found in a scan; the cloud first, since programs wait for it."""
+        publisher, make, topic = self._publisher, self._make, self._topic
+        # A log may name no frame, but /tf needs a name.
+        moment = _moment(
+            frame, frame.scan.frame_id or (LASER_FRAME if self._publishes_scan else "")
+        )
         features = frame.features
         if publisher.listeners(f"{topic}/features"):
             publisher.publish(make.cloud(f"{topic}/features", moment, features, frame.tracks))
@@ -120,11 +131,11 @@ class RosSink:
         if publisher.listeners(f"{topic}/markers"):
             layers = layers_of(markers_of(features, frame.straight))
             publisher.publish(make.features(f"{topic}/markers", moment, layers))
-        if self._tells_scan:
-            self._tell_scan(moment, frame.scan)
+        if self._publishes_scan:
+            self._publish_scan(moment, frame.scan)
 
-    def _tell_scan(self, moment: Moment, scan: LaserScan) -> None:
-        publisher, make, topic = self._publisher, self._messages, self._topic
+    def _publish_scan(self, moment: Moment, scan: LaserScan) -> None:
+        publisher, make, topic = self._publisher, self._make, self._topic
         if scan.pose is not None and publisher.listeners("/tf"):
             publisher.publish(make.transform("/tf", moment, scan.pose))
         if scan.is_regular and publisher.listeners(topic):
@@ -133,42 +144,42 @@ class RosSink:
             publisher.publish(make.points(f"{topic}/points", moment, scan))
 
     def diagnose(self, report: Report, time: Time) -> None:
-        """Tell how the node is, on ``/diagnostics``."""
-        moment = Moment(*time, "", "")
-        self._publisher.publish(
-            self._messages.diagnostics(
-                DIAGNOSTICS,
-                moment,
-                name=f"{self._name}: {self._topic}",
-                hardware_id=self._topic,
-                level=report.level,
-                summary=str(report),
-                values=report.values,
-            )
+        """Publish the report on ``/diagnostics``."""
+        message = self._make.diagnostics(
+            DIAGNOSTICS,
+            Moment(*time, "", ""),
+            name=f"{self._name}: {self._topic}",
+            hardware_id=self._topic,
+            level=report.level,
+            summary=str(report),
+            values=report.values,
         )
-
-    def close(self) -> None:
-        """Stop."""
-        self._publisher.close()
+        self._publisher.publish(message)
 
 
 class FoxgloveSink:
-    """Tells scans, their poses and the layers of their features, as a recording of them has it.
+    """Publishes scans, their poses and the layers of their features, as in a recording.
 
     Parameters
     ----------
     publisher : Publisher
     messages : FoxgloveMessages
         Makes the messages.
-    topic : str
-        Topic of the scans; the layers go to ``TOPIC/features``.
+    config : LiveConfig
+        Scans go to its topic, the layers of features to ``TOPIC/features``.
     """
 
-    def __init__(self, publisher: Publisher, messages: FoxgloveMessages, topic: str) -> None:
-        self._publisher, self._messages, self._topic = publisher, messages, topic
-        self._topics = {"/tf": "FrameTransform", topic: "LaserScan"}
-        # A scan that was made straight is no regular one any more.
-        self._topics |= {f"{topic}/points": "PointCloud", f"{topic}/features": "SceneUpdate"}
+    def __init__(
+        self, publisher: Publisher, messages: FoxgloveMessages, config: LiveConfig
+    ) -> None:
+        self._publisher, self._messages = publisher, messages
+        self._topic = topic = config.scan_topic
+        self._topics = {
+            "/tf": "FrameTransform",
+            topic: "LaserScan",
+            f"{topic}/points": "PointCloud",  # of a scan that is irregular since it was deskewed
+            f"{topic}/features": "SceneUpdate",
+        }
         for name, kind in self._topics.items():
             publisher.advertise(name, kind)
 
@@ -177,8 +188,8 @@ class FoxgloveSink:
         """Messages that could not be sent."""
         return self._publisher.unsent
 
-    def tell(self, frame: Frame) -> None:
-        """Tell what was found in a scan, and the scan made straight, where somebody looks on."""
+    def publish(self, frame: Frame) -> None:
+        """Publish the deskewed scan and its features, if anybody listens to any of the topics."""
         if not any(map(self._publisher.listeners, self._topics)):
             return
         scan = frame.straight
@@ -188,13 +199,9 @@ class FoxgloveSink:
             self._publisher.publish(message)
 
     def diagnose(self, report: Report, time: Time) -> None:
-        """Tell nothing: the picture shows it."""
-
-    def close(self) -> None:
-        """Stop."""
-        self._publisher.close()
+        """Do nothing: Foxglove shows scans as they come."""
 
 
 def _moment(frame: Frame, name: str) -> Moment:
-    """When the scan was taken, exactly as its message says, in the frame of this name."""
+    """Make the moment of a scan, with the exact stamp of its message and this frame."""
     return Moment(*frame.time, name, "world" if name == WORLD_FRAME else WORLD_FRAME)

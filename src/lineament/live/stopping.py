@@ -1,6 +1,4 @@
-"""`stopping`: SIGINT and SIGTERM end a node when it has done what it is at."""
-
-from __future__ import annotations
+"""`stopping`: SIGINT and SIGTERM end a node after the scan in work; imported before all else."""
 
 import signal
 import sys
@@ -17,11 +15,11 @@ class _Stop(BaseException):
 
 @contextmanager
 def stopping() -> Iterator[Callable[[], bool]]:
-    """Give a function that says whether SIGINT or SIGTERM has come.
+    """Yield a function that returns whether SIGINT or SIGTERM has come.
 
-    Once it has been asked, nothing is interrupted by them. Before, while a node starts, which may
-    compile for a minute, the first of them leaves the block at once. Those that come later change
-    nothing: a launcher may send one beside that of the terminal.
+    Once it has been called, the signals interrupt nothing. Before, while a node starts, which may
+    compile for a minute, the first of them leaves the block at once. Later ones change nothing: a
+    launcher may send one beside that of the terminal.
 
     Examples
     --------
@@ -47,20 +45,20 @@ def stopping() -> Iterator[Callable[[], bool]]:
         is_running = True
         return has_come
 
-    def tell_unraisable(unraisable: sys.UnraisableHookArgs) -> None:
-        # Raised within a callback of the compiler it is lost there, and found by `is_stopped`.
+    def report_unraisable(unraisable: "sys.UnraisableHookArgs") -> None:
+        # Raised within a callback of the compiler it is lost there, but `is_stopped` knows.
         if unraisable.exc_type is not _Stop:
-            tell_before(unraisable)
+            hook(unraisable)
 
-    tell_before, sys.unraisablehook = sys.unraisablehook, tell_unraisable
+    hook, sys.unraisablehook = sys.unraisablehook, report_unraisable
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield is_stopped
     except BaseException:
-        # What a start fails with that was interrupted, in an import say, is of no interest.
+        # An interrupted start may fail with anything, in an import say: that is no error.
         if is_running or not has_come:
             raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        sys.unraisablehook = tell_before
+        sys.unraisablehook = hook

@@ -192,6 +192,8 @@ class Log(ABC):
 
     def _check_topic(self) -> None:
         if self.topic is not None and self.topic not in self.topics:
-            known = ", ".join(self.topics) or "none that carries scans"
-            problem = f"has no topic {self.topic!r}; topics there are: {known}"
-            raise LogError(self.name, problem)
+            raise self._no_such_topic(self.topics)
+
+    def _no_such_topic(self, topics: list[str]) -> LogError:
+        known = ", ".join(topics) or "none that carries scans"
+        return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")

@@ -82,7 +82,7 @@ def robotlaser(line: bytes, corrected: Pose | None = None) -> LaserScan:
     pose = read["x"], read["y"], read["theta"]
     if corrected is not None:
         robot = read["robot_x"], read["robot_y"], read["robot_theta"]
-        pose = corrected if pose == robot else _moved(pose, robot, corrected)
+        pose = _moved(pose, robot, corrected)
     return LaserScan(
         ranges,
         snap(read["start"]),
@@ -97,10 +97,10 @@ def robotlaser(line: bytes, corrected: Pose | None = None) -> LaserScan:
 
 def _moved(laser: Pose, robot: Pose, corrected: Pose) -> Pose:
     """Return the pose of the laser, which is fixed to the robot, with the robot at `corrected`."""
-    x, y = laser[0] - robot[0], laser[1] - robot[1]
-    turn = corrected[2] - robot[2]
-    cos, sin = math.cos(turn), math.sin(turn)
-    return corrected[0] + cos * x - sin * y, corrected[1] + sin * x + cos * y, laser[2] + turn
+    x, y, turn = (a - b for a, b in zip(laser, robot, strict=True))
+    angle = corrected[2] - robot[2]
+    cos, sin = math.cos(angle), math.sin(angle)
+    return corrected[0] + cos * x - sin * y, corrected[1] + sin * x + cos * y, corrected[2] + turn
 
 
 def _read_limit(line: bytes, range_max: dict[str, float]) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import one_line
 from ..scan import LaserScan, Pose
@@ -24,8 +23,8 @@ _LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 _FORWARD, _BACKWARD = 0.5, 0.1
 #: Ranges are counted in steps of 1 mm up to here [m], for a median in constant memory.
 _LONGEST = 1e3
-#: Most steps of stamps, and ranges to be counted, that are kept.
-_BUFFER = 1 << 16
+#: Most steps of stamps that are kept.
+_STEPS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -208,11 +207,8 @@ class _Counter:
         self.forward, self.backwards, self.stride = 0, 0, 1
         self.steps: list[float] = []
         self.limits = first.range_min, first.range_max
-        # Ranges that wait to be counted, and how many are.
-        self.waiting: list[NDArray[np.float64]] = []
-        self.counted = 0
         self.low, self.high = math.inf, -math.inf
-        self.histogram = np.zeros(0, dtype=np.int64)
+        self.histogram = np.zeros(round(1000 * _LONGEST) + 1, dtype=np.int64)
         self.travelled, self.pose = 0.0, first.pose
         self.frames: dict[str, None] = {}
 
@@ -229,11 +225,12 @@ class _Counter:
         self._add_pose(scan.pose)
         self.limits = min(self.limits[0], scan.range_min), max(self.limits[1], scan.range_max)
         ranges = scan.ranges[scan.valid]
-        self.valid += len(ranges)
         if len(ranges):
-            self.waiting.append(ranges)
-        if self.valid - self.counted >= _BUFFER:
-            self._count_ranges()
+            self.valid += len(ranges)
+            self.low = min(self.low, float(ranges.min()))
+            self.high = max(self.high, float(ranges.max()))
+            millimetres = np.rint(1000 * np.minimum(ranges, _LONGEST)).astype(np.intp)
+            np.add.at(self.histogram, millimetres, 1)
 
     def _add_stamp(self, stamp: float) -> None:
         step, self.stamp = stamp - self.stamp, stamp
@@ -243,7 +240,7 @@ class _Counter:
             if self.forward % self.stride == 0:
                 self.steps.append(step)
             self.forward += 1
-            if len(self.steps) >= _BUFFER:
+            if len(self.steps) >= _STEPS:
                 self.steps, self.stride = self.steps[::2], 2 * self.stride
 
     def _add_pose(self, pose: Pose | None) -> None:
@@ -252,25 +249,13 @@ class _Counter:
             self.travelled += math.dist(pose[:2], (self.pose or pose)[:2])
             self.pose = pose
 
-    def _count_ranges(self) -> None:
-        values = np.concatenate(self.waiting)
-        self.waiting, self.counted = [], self.valid
-        self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
-        bins = np.rint(1000 * np.minimum(values, _LONGEST)).astype(np.int64)
-        counts = np.bincount(bins, minlength=len(self.histogram))
-        counts[: len(self.histogram)] += self.histogram
-        self.histogram = counts
-
     def _ranges(self) -> tuple[float, float, float] | None:
-        if self.waiting:
-            self._count_ranges()
         if not self.valid:
             return None
         ranks = ((self.valid - 1) // 2 + 1, self.valid // 2 + 1)
         median = float(np.mean(np.searchsorted(np.cumsum(self.histogram), ranks))) / 1000
         # Half a millimetre of rounding must not carry it past the extremes.
-        low, high = float(self.low), float(self.high)
-        return low, min(max(median, low), high), high
+        return self.low, min(max(median, self.low), self.high), self.high
 
     def info(self, name: str) -> TopicInfo:
         has_stamps = (self.start, self.end) != (0, 0)  # A log without stamps has zeros.

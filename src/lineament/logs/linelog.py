@@ -115,8 +115,7 @@ class LineLog(Log):
         if not found:
             return LogError(self.name, f"is no log of {self.description}")
         if self.topic is not None:
-            known = ", ".join(topics) or "none that carries scans"
-            return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")
+            return self._no_such_topic(topics)
         there = ", ".join(f"{name} ({count})" for name, count in found.most_common(8))
         choose = f"; choose topic {topics[0]}" if topics else ""
         return LogError(

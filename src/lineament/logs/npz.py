@@ -43,7 +43,7 @@ class NpzLog(Log):
     def _open(self) -> None:
         self._check_topic()
         self._arrays = _load(self.source)
-        self._n, self._m = self._arrays["ranges"].shape
+        self._n = len(self._arrays["ranges"])
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
@@ -53,7 +53,7 @@ class NpzLog(Log):
         return head.data.startswith(ZIP) and head.data[30 : 30 + length].endswith(b".npy")
 
     def __len__(self) -> int:
-        return int(self._n)
+        return self._n
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         for i in range(self._n):

@@ -187,7 +187,7 @@ def _expanded(path: str | os.PathLike[str]) -> list[str]:
         matches = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207
         logs = [log for match in matches for log in _logs_at(Path(match))]
     else:
-        return _logs_in_file(Path(path), is_named=True)
+        return _logs_in_file(path, is_named=True)
     if not logs:
         raise LogError(path, "holds no log")
     return logs
@@ -212,9 +212,10 @@ def _logs_in_folder(folder: Path) -> Iterator[str]:
             yield from _logs_at(path)
 
 
-def _logs_in_file(path: Path, *, is_named: bool = False) -> list[str]:
+def _logs_in_file(path: str | os.PathLike[str], *, is_named: bool = False) -> list[str]:
     """Return the logs in an archive of several, else the file itself if it is a log or named."""
-    name = path.name.lower().removesuffix(".gz")
+    file = Path(path)
+    name = file.name.lower().removesuffix(".gz")
     is_log = is_named or (_has_ending(name) and not name.endswith(_SHARED_ENDINGS))
     inside: list[str] = []
     try:
@@ -223,7 +224,7 @@ def _logs_in_file(path: Path, *, is_named: bool = False) -> list[str]:
         is_log = is_log or bool(inside) or _recognised(head) is not None
     except LogError:
         # Opening a log that is broken or must not be read reports that.
-        is_log = is_log or (path.is_file() and path.stat().st_size > 0 and _has_ending(name))
+        is_log = is_log or (file.is_file() and file.stat().st_size > 0 and _has_ending(name))
     if len(inside) > 1:
         return inside
     return [str(path)] if is_log else []

@@ -16,6 +16,9 @@ from .lines import reading
 #: Largest chunk, record or message that is held in memory [bytes].
 MAX_PIECE = 1 << 28
 
+#: Compressions of chunks.
+_CODECS = ("bz2", "lz4", "zstd")
+
 #: What a bag calls with each fault that it finds: it raises, or counts and returns.
 Fault = Callable[[LogError], None]
 
@@ -223,39 +226,31 @@ def decompress(codec: str, data: Buffer, size: int) -> Buffer:
         raise ValueError(f"chunk of {size} bytes, expected at most {MAX_PIECE >> 20} MiB")
     if codec in ("", "none"):
         plain = data
-    elif codec in _DECOMPRESSORS:
+    elif codec in _CODECS:
         try:
             # One byte more than expected is asked for, so that a chunk that is longer shows.
-            plain = _DECOMPRESSORS[codec](data, size + 1)
+            plain = _decompressed(codec, data, size + 1)
         # The libraries have their own errors: RuntimeError, OSError, ZstdError, EOFError.
         except Exception as error:
             raise ValueError(f"{codec} data is broken: {error}") from None
     else:
-        known = ", ".join(_DECOMPRESSORS)
+        known = ", ".join(_CODECS)
         raise ValueError(f"chunk compressed by {codec:.20}, expected none, {known}")
     if len(plain) != size:
         raise ValueError(f"chunk holds other than {size} bytes once decompressed")
     return plain
 
 
-def _bz2(data: Buffer, most: int) -> bytes:
-    import bz2
+def _decompressed(codec: str, data: Buffer, most: int) -> bytes:
+    if codec == "bz2":
+        from bz2 import BZ2Decompressor
 
-    return bz2.BZ2Decompressor().decompress(data, most)
+        return BZ2Decompressor().decompress(data, most)
+    if codec == "lz4":
+        from lz4.frame import LZ4FrameDecompressor
 
-
-def _lz4(data: Buffer, most: int) -> bytes:
-    from lz4.frame import LZ4FrameDecompressor
-
-    plain: bytes = LZ4FrameDecompressor().decompress(data, max_length=most)
-    return plain
-
-
-def _zstd(data: Buffer, most: int) -> bytes:
+        return bytes(LZ4FrameDecompressor().decompress(data, max_length=most))
     from zstandard import ZstdDecompressor
 
     # Its one-shot function trusts the size in the frame's own header; a stream does not.
     return ZstdDecompressor(max_window_size=MAX_PIECE).stream_reader(data).read(most)
-
-
-_DECOMPRESSORS = {"bz2": _bz2, "lz4": _lz4, "zstd": _zstd}

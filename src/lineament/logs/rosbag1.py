@@ -74,7 +74,8 @@ class _Reader(RecordReader):
         code = _code(head)
         if code == _MESSAGE:
             if b"conn" in head:
-                connection = self.sender(_word(head, b"conn"))
+                (number,) = _WORD.unpack(_field(head, b"conn", 4))
+                connection = self.sender(number)
             else:  # Version 1: each message says all about itself.
                 names = _text(head, b"topic"), _text(head, b"type"), "ros1"
                 connection = self.wanted(Connection.named(*names))
@@ -103,13 +104,13 @@ class _Reader(RecordReader):
 
     def _magic(self) -> bytes:
         """Read the first line, which says the version."""
-        line = self.take(min(self.left, len(_MAGICS[0])), "first line")
-        if not line.endswith(b"\n"):
-            line += self.take(min(self.left, len(_MAGICS[1]) - len(line)), "first line")
-        if line not in _MAGICS:
-            known = ", ".join(magic.decode().strip() for magic in _MAGICS)
-            raise LogError(self.path, f"begins with {line!r:.40}, expected a bag: {known}")
-        return line
+        line = self.take(min(self.left, len(_MAGICS[1])), "first line")
+        for magic in _MAGICS:
+            if line.startswith(magic):
+                self.go(len(magic))
+                return magic
+        known = ", ".join(magic.decode().strip() for magic in _MAGICS)
+        raise LogError(self.path, f"begins with {line!r:.40}, expected a bag: {known}")
 
     def _record(self) -> tuple[_Header, bytes]:
         """Read one record; without its data where that is of no interest."""

@@ -76,13 +76,24 @@ class LocalCopy(os.PathLike[str]):
     """
 
     def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
-        self._name = name
         # A folder of its own: what a reader looks for beside its log is not there.
         folder = tempfile.mkdtemp(prefix="lineament-")
-        self._path = str(Path(folder, "log"))
         self.remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self._name, self._path = name, str(Path(folder, "log"))
+        size = 0
         try:
-            self._write(pieces, packed)
+            with Path(self._path).open("wb") as file:
+                for piece in pieces:
+                    size += len(piece)
+                    if size > MAX_COPY:
+                        raise LogError(name, f"is larger than {MAX_COPY >> 30} GiB unpacked")
+                    if packed is not None:
+                        check_growth(name, size, packed)
+                    try:
+                        file.write(piece)
+                    except OSError as error:
+                        problem = f"cannot be copied to {self._path}: {error.strerror or error}"
+                        raise LogError(name, problem) from None
         except BaseException:
             self.remove()
             raise
@@ -92,21 +103,6 @@ class LocalCopy(os.PathLike[str]):
 
     def __str__(self) -> str:
         return self._name
-
-    def _write(self, pieces: Iterable[bytes], packed: int | None) -> None:
-        size = 0
-        with Path(self._path).open("wb") as file:
-            for piece in pieces:
-                size += len(piece)
-                if size > MAX_COPY:
-                    raise LogError(self._name, f"is larger than {MAX_COPY >> 30} GiB unpacked")
-                if packed is not None:
-                    check_growth(self._name, size, packed)
-                try:
-                    file.write(piece)
-                except OSError as error:
-                    problem = f"cannot be copied to {self._path}: {error.strerror or error}"
-                    raise LogError(self._name, problem) from None
 
 
 def check_growth(name: object, size: int, packed: int) -> None:

@@ -16,9 +16,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.line_fit import FITS
 from ..kernels.rivals.hough import Parameters, find_by_votes
-from .lines import LineMethod
+from .lines import NearMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -29,7 +28,7 @@ _numbers = attrgetter(*Parameters._fields)
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hough(LineMethod):
+class Hough(NearMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
 
     1. *Part* the scan at its breakpoints. In each cluster:
@@ -66,16 +65,6 @@ class Hough(LineMethod):
     max_misses: int = parameter(
         2, "points in a row that may lie off the line without ending a piece", low=0
     )
-    epsilon: float = parameter(
-        0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
-    )
-    sigmas: float = parameter(
-        2.5, "standard deviations of its range noise that a point may lie off besides", low=0
-    )
-    fit: str = parameter("weighted", "how the final lines are fitted", choices=FITS)
-    noise_factor: float = parameter(
-        3.0, "standard deviations of the breakpoint detector, see `PDBS`", low=0
-    )
 
     def own_arrays(self, beams: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:  # noqa: ARG002
         """Make the accumulator and its directions."""
@@ -87,5 +76,4 @@ class Hough(LineMethod):
         """Part, find by votes, settle the borders and fit."""
         self._part(block, row, self.min_points, self.noise_factor)
         find_by_votes(block.floats, block.ints, block.noises[row], _numbers(self), *block.own)
-        self._settle(block, row, self.epsilon)
-        self._finish(block, row, fit=FITS[self.fit])
+        self._finish(block, row)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from ..kernels.line_fit import TOTAL, WEIGHTED
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
-from .lines import LineMethod
+from .lines import PieceMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -24,7 +24,7 @@ __all__ = ["IEPF"]
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class IEPF(LineMethod):
+class IEPF(PieceMethod):
     """Iterative end point fit.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -63,13 +63,6 @@ class IEPF(LineMethod):
         "whether a corner lies where its lines meet, or on its measurement",
         choices=("intersection", "beam"),
     )
-    unevenness: float = parameter(
-        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
-    )
-    corner_trim: int = parameter(
-        1, "measurements next to a corner that the last fits leave out", low=0
-    )
-    min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def __post_init__(self) -> None:
         MethodBase.__post_init__(self)
@@ -92,9 +85,9 @@ class IEPF(LineMethod):
         if self.merge:
             self._settle(block, row, self.unevenness)
         if self.corner == "intersection":
-            self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)
+            self._measure(block, row, fit=WEIGHTED, trim=self.corner_trim)
         else:
-            self._finish(block, row, fit=TOTAL, sharp=False)
+            self._measure(block, row, fit=TOTAL, sharp=False)
 
     @property
     def least_response(self) -> float:

@@ -13,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..kernels.line_fit import WEIGHTED
 from ..kernels.rivals.line_tracking import track_lines
-from .lines import LineMethod
+from .lines import PieceMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -24,7 +23,7 @@ __all__ = ["LineTracking"]
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LineTracking(LineMethod):
+class LineTracking(PieceMethod):
     """Line tracking.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -56,13 +55,6 @@ class LineTracking(LineMethod):
     )
     max_misses: int = parameter(2, "points in a row that a line passes over as outliers", low=0)
     min_piece: int = parameter(3, "least points of a line", low=3)
-    unevenness: float = parameter(
-        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
-    )
-    corner_trim: int = parameter(
-        1, "measurements next to a corner that the last fits leave out", low=0
-    )
-    min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def find(self, block: Block, row: int) -> None:
         """Cluster, track, merge and fit."""
@@ -71,5 +63,4 @@ class LineTracking(LineMethod):
             block.floats, block.ints, block.noises[row], self.threshold, self.noise_factor,
             self.max_misses, self.min_piece,
         )  # fmt: skip
-        self._settle(block, row, self.unevenness)
-        self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)
+        self._finish(block, row)

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
-from ..kernels.line_fit import FITS
 from ..kernels.rivals.ransac import PERIOD, Parameters, find_by_consensus
-from .lines import LineMethod
+from .lines import NearMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -25,7 +24,7 @@ _numbers = attrgetter(*Parameters._fields)
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ransac(LineMethod):
+class Ransac(NearMethod):
     """Random sample consensus within the clusters of a scan.
 
     1. *Part* the scan at its breakpoints. In each cluster, until no piece is long enough:
@@ -60,21 +59,10 @@ class Ransac(LineMethod):
     max_misses: int = parameter(
         2, "points in a row that may lie off the line without ending a piece", low=0
     )
-    epsilon: float = parameter(
-        0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
-    )
-    sigmas: float = parameter(
-        2.5, "standard deviations of its range noise that a point may lie off besides", low=0
-    )
     seed: int = parameter(1, "where the generator starts", low=1, below=PERIOD)
-    fit: str = parameter("weighted", "how the final lines are fitted", choices=FITS)
-    noise_factor: float = parameter(
-        3.0, "standard deviations of the breakpoint detector, see `PDBS`", low=0
-    )
 
     def find(self, block: Block, row: int) -> None:
         """Part, find by consensus, settle the borders and fit."""
         self._part(block, row, self.min_points, self.noise_factor)
         find_by_consensus(block.floats, block.ints, block.noises[row], _numbers(self))
-        self._settle(block, row, self.epsilon)
-        self._finish(block, row, fit=FITS[self.fit])
+        self._finish(block, row)

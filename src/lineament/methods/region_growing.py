@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
-from ..kernels.line_fit import FITS
 from ..kernels.rivals.region_growing import Parameters, grow_regions
-from .lines import LineMethod
+from .lines import NearMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -23,7 +22,7 @@ _numbers = attrgetter(*Parameters._fields)
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RegionGrowing(LineMethod):
+class RegionGrowing(NearMethod):
     """The method of Gao et al. 2018, its thresholds scaled by the noise.
 
     1. *Part* the scan at its breakpoints.
@@ -49,23 +48,15 @@ class RegionGrowing(LineMethod):
     s_num: int = parameter(6, "points of a seed", low=3)
     p_min: int = parameter(6, "least points of a region", low=3)
     l_min: float = parameter(0.0, "least length of a region [m]", low=0)
-    epsilon: float = parameter(
-        0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
-    )
     delta: float = parameter(
         0.1, "the same along the beam: from where the beam meets the line [m]", low=0
     )
     sigmas: float = parameter(
         3.0, "standard deviations of its range noise that a point may lie off besides", low=0
     )
-    fit: str = parameter("weighted", "how the final lines are fitted", choices=FITS)
-    noise_factor: float = parameter(
-        3.0, "standard deviations of the breakpoint detector, see `PDBS`", low=0
-    )
 
     def find(self, block: Block, row: int) -> None:
         """Part, seed and grow, settle the overlaps and fit."""
         self._part(block, row, self.s_num, self.noise_factor)
         grow_regions(block.floats, block.ints, block.noises[row], _numbers(self))
-        self._settle(block, row, self.epsilon)
-        self._finish(block, row, fit=FITS[self.fit])
+        self._finish(block, row)

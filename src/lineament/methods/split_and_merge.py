@@ -12,10 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..kernels.line_fit import WEIGHTED
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
-from .lines import LineMethod
+from .lines import PieceMethod
 from .parameters import documented, parameter
 from .workspace import Block
 
@@ -24,7 +23,7 @@ __all__ = ["SplitAndMerge"]
 
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SplitAndMerge(LineMethod):
+class SplitAndMerge(PieceMethod):
     """Split-and-merge.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -54,13 +53,6 @@ class SplitAndMerge(LineMethod):
         2.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
-    unevenness: float = parameter(
-        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
-    )
-    corner_trim: int = parameter(
-        1, "measurements next to a corner that the last fits leave out", low=0
-    )
-    min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def __post_init__(self) -> None:
         MethodBase.__post_init__(self)
@@ -74,8 +66,7 @@ class SplitAndMerge(LineMethod):
             block.floats, block.ints, block.noises[row], True, self.threshold, 0.0,
             self.noise_factor, self.min_piece,
         )  # fmt: skip
-        self._settle(block, row, self.unevenness)
-        self._finish(block, row, fit=WEIGHTED, trim=self.corner_trim)
+        self._finish(block, row)
 
     @property
     def least_response(self) -> float:

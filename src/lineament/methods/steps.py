@@ -1,11 +1,10 @@
-"""Steps that methods share: the noise first; clusters; at the end the budget and the measuring."""
+"""Steps that methods share: the noise first; clusters; at the end the measuring."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.budget import LINK, WORST, limit_pieces
 from ..kernels.layout import RANGE
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure as _measure
@@ -13,7 +12,7 @@ from ..kernels.noise import estimate_noise as _estimate_noise
 from ..kernels.rivals.pdbs import BORGES_ALDON, part_by_distance
 from .workspace import Block
 
-__all__ = ["budget_scratch", "estimate_noise", "limit_vertices", "measure", "part"]
+__all__ = ["budget_scratch", "estimate_noise", "measure", "part"]
 
 
 def estimate_noise(block: Block, row: int) -> None:
@@ -40,17 +39,6 @@ def part(
         block.floats, block.ints, block.bearings, block.sensor, block.noises[row],
         (rule, constant, angle), max_missing, min_points,
     )  # fmt: skip
-
-
-def limit_vertices(block: Block, max_vertices: int) -> None:
-    """Join or leave out pieces until they have no more vertices than allowed; 0 allows any number.
-
-    See `kernels.budget.limit_pieces`.
-    """
-    if max_vertices:
-        costs, follow = budget_scratch(block.beams, max_vertices)
-        budget = len(follow[0]) - 1
-        limit_pieces(block.floats, block.ints, block.bearings, budget, LINK, WORST, costs, follow)
 
 
 def budget_scratch(beams: int, max_vertices: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

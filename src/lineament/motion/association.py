@@ -1,7 +1,5 @@
 """Which features of a frame are those of another: pairs within gates of their covariances."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -34,7 +32,7 @@ class Matches:
     Attributes
     ----------
     before, now : Features
-        The features of either frame, each in the frame of its own sensor.
+        The features of either frame, each in its sensor's frame.
     segments, corners, arcs : ndarray of int, shape (m, 2)
         Indices into the tables of `before` and of `now`.
     """
@@ -48,10 +46,9 @@ class Matches:
     def __len__(self) -> int:
         return sum(len(getattr(self, kind)) for kind in KINDS)
 
-    def tables(self, kind: str) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        """Paired records of one kind, before and now, row by row."""
-        before, now = getattr(self, kind).T
-        return getattr(self.before, kind)[before], getattr(self.now, kind)[now]
+    def same_as(self, other: "Matches") -> bool:
+        """Whether the pairs are those of another association."""
+        return all(np.array_equal(getattr(self, kind), getattr(other, kind)) for kind in KINDS)
 
 
 def associate(
@@ -76,7 +73,7 @@ def associate(
     Parameters
     ----------
     before, now : Features
-        Features of two frames, each in the frame of its own sensor.
+        Features of two frames, each in its sensor's frame.
     motion : (x, y, theta)
         Expected pose of the later sensor in the frame of the earlier [m, m, rad].
     covariance : array_like, shape (3, 3), optional

@@ -1,7 +1,5 @@
 """`deskew`: a scan as if all of its beams had been taken at once, from where its first one was."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -42,12 +40,12 @@ def beam_times(scan: LaserScan) -> Array | None:
 def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     """Undo the motion of the sensor while it swept.
 
-    The velocity is taken to be constant over the sweep. Each reading is moved to where it lies as
-    seen from the pose of the sensor at the scan's stamp, and the beams are put in the order of
+    The velocity is taken to be constant over the sweep. Each measurement is moved to where it lies
+    as seen from the pose of the sensor at the scan's stamp, and the beams are put in the order of
     their new bearings, which are irregular. It is then a scan whose beams are all of one time:
     `scan_time` and `time_increment` are 0, and to deskew it again changes nothing.
 
-    A reading that has come to lie behind two neighbouring beams, farther than both by more than
+    A measurement that has come to lie behind two neighbouring beams, farther than both by more than
     they differ, is hidden from that pose, and becomes NaN: else near and far beams would alternate
     along an edge. What a standing sensor would have seen and the moving one did not stays open. A
     beam without a return keeps its range, and its place between its neighbours. Where the beams of

@@ -1,7 +1,5 @@
 """The motion of the sensor between two frames, from the features that both have."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -35,7 +33,7 @@ class Motion:
     covariance : ndarray, shape (3, 3)
         Of (x, y, theta) [m, m, rad].
     unobserved : ndarray, shape (m, 3)
-        Directions in (x, y, theta) of which the features told nothing, unit vectors in metres (an
+        Directions in (x, y, theta) of which the features say nothing, unit vectors in metres (an
         angle as the way at the features' distance): there, the motion is the prior's. Along a bare
         corridor there is one, where nothing was matched there are three.
     """
@@ -53,7 +51,7 @@ class Motion:
 
     @property
     def observable(self) -> bool:
-        """Whether the features told the motion in all directions."""
+        """Whether the features determine the motion in all directions."""
         return not len(self.unobserved)
 
     def twist(self, duration: float) -> Twist:
@@ -72,14 +70,14 @@ def estimate_motion(
 
     Gauss-Newton on the offset and angle of each segment from its earlier line, and on the distance
     of each corner and arc from where it was, each by the covariance of both. A corner is the
-    intersection of its two segments: where both are matched it tells nothing new and is left out;
-    where one is, its place along that one counts alone. Pairs beyond
-    the 99 % quantile of χ² count less, by the square of how far they are off.
+    intersection of its two segments: where both are matched it is nothing new and is left out;
+    where one is, its place along that one counts alone. Pairs beyond the 99 % quantile of χ² count
+    less, by the square of how far they are off.
 
     The covariances of the segments, of noise alone, count whole. The misfit of a wall is the same
     in both frames: it counts by the part of the wall that one frame saw alone.
 
-    Directions of which the features tell nothing are found by the eigenvalues of their information
+    Directions of which the features say nothing are found by the eigenvalues of their information
     (angles as the way at the features' distance): one counts as unobserved if its deviation is
     more than 0.1 m, or if the information is no more than what errors of the walls' own directions
     feign: parallel walls are never quite parallel as measured. The prior fills these in.
@@ -87,7 +85,7 @@ def estimate_motion(
     Parameters
     ----------
     matches : Matches
-        Pairs of features, each in the frame of its own sensor. Edges are not among those of
+        Pairs of features, each in its sensor's frame. Edges are not among those of
         `associate`; others are taken as they are.
     prior : (x, y, theta)
         The motion as known before [m, m, rad]: from odometry or from the last frames.

@@ -1,7 +1,5 @@
 """`Tracker`: features that keep their numbers from frame to frame, and the motion between."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass, replace
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import TABLES, Features
+from ..features import TABLES, Features, make_records
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
 from ..scan.poses import Twist, inverse, poses_along, relative
@@ -21,7 +19,7 @@ __all__ = ["Tracker", "Tracks"]
 
 Numbers = NDArray[np.int64]
 
-#: Deviations of the motion that odometry tells [m, rad], and their growth with way and turn.
+#: Deviations of the motion by odometry [m, rad], and their growth with way and turn.
 _ODOMETRY = (0.03, 0.01), (0.1, 0.1)
 #: The same of the motion that goes on as it was, or of none: no way is known to grow with.
 _CONTINUED = (0.1, 0.1), (0.5, 0.5)
@@ -59,13 +57,12 @@ class Tracks:
 class Tracker:
     """Recognises features from frame to frame, and estimates the motion of the sensor.
 
-    A frame's features are paired with the last sight of all tracks (`associate`), first under the
-    expected motion, then under the one that the pairs tell (`estimate_motion`, from the tracks
-    that were seen in the very last frame). The expected motion is that of the odometry; without
-    it, the sensor goes on as it did. A feature without a pair begins a track; a track ends when it
-    is missed in more than `max_missed` frames in a row. The world is taken to stand still: what
-    moves by more than its gate from frame to frame gets a new number. Corners of kind "edge" are
-    ignored: they may be silhouettes, which move with the sensor.
+    Features are paired with the last sight of all tracks (`associate`), first under the expected
+    motion (by odometry; without it, the sensor goes on as it did), then under that of the pairs
+    (`estimate_motion`, from the tracks seen in the very last frame). A feature without a pair
+    begins a track; a track ends when it is missed in more than `max_missed` frames in a row. The
+    world is taken to stand still: what moves by more than its gate from frame to frame gets a new
+    number. Corners of kind "edge" are ignored: they may be silhouettes, which move with the sensor.
 
     Parameters
     ----------
@@ -100,7 +97,8 @@ class Tracker:
         chi_square(gate, 2)
         self.max_missed, self.gate, self.roughness = max_missed, gate, roughness
         #: Last sight of each track, in the frame of the last scan; those of that scan come first.
-        self._seen = _nothing()
+        empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
+        self._seen = Features(**empty, clusters=np.empty(0, np.int32))
         self._tracks = {kind: np.empty(0, np.int64) for kind in KINDS}
         self._missed = {kind: np.empty(0, np.int64) for kind in KINDS}
         self._stamp: float | None = None
@@ -169,7 +167,7 @@ class Tracker:
         return self._renew(features, matches, motion)
 
     def _follow(self, features: Features, prior: Pose, spread: Array) -> tuple[Motion, Matches]:
-        """Find the tracks again, and the motion that they tell."""
+        """Find the tracks again, and the motion by them."""
         motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
             found = associate(
@@ -180,7 +178,7 @@ class Tracker:
                 gate=self.gate,
                 roughness=self.roughness,
             )
-            if matches is not None and _are_same(matches, found):
+            if matches is not None and found.same_as(matches):
                 break
             matches = found
             motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
@@ -232,11 +230,6 @@ class Tracker:
         )
 
 
-def _are_same(one: Matches, other: Matches) -> bool:
-    """Whether the pairs are those of another round: then so would be all that follows."""
-    return all(np.array_equal(getattr(one, kind), getattr(other, kind)) for kind in KINDS)
-
-
 def _together(
     features: Features, seen: Features, kept: dict[str, NDArray[np.bool_]], motion: Motion | None
 ) -> Features:
@@ -251,8 +244,3 @@ def _together(
         for kind, words in zip(KINDS, missed, strict=True)
     }
     return replace(features, **tables)
-
-
-def _nothing() -> Features:
-    tables: dict[str, Any] = {name: np.empty(0, dtype) for name, dtype in TABLES.items()}
-    return Features(**tables, clusters=np.empty(0, np.int32))

@@ -13,7 +13,6 @@ from ..files import ending_of, naming_errors, written_beside
 from ..scan import Array
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -143,10 +142,11 @@ def plane_height(points: Array, width: float) -> float:
 
 def add_legend(figure: Figure) -> None:
     """Draw one legend for all panels of a figure, below them."""
-    handles: dict[str, Artist] = {}
-    for axes in figure.axes:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(str(label), handle)
+    handles = {
+        str(label): handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(
         list(handles.values()),
         list(handles),

@@ -185,19 +185,22 @@ def label_points(axes: Axes, positions: Array, values: Array, obstacles: Array) 
         return
     figure = axes.get_figure(root=True)
     assert figure is not None
-    points_of = 72 / figure.dpi
-    here = axes.transData.transform(positions) * points_of
-    hidden = axes.transData.transform(obstacles[np.isfinite(obstacles).all(axis=1)]) * points_of
-    inside = np.array(axes.get_window_extent().extents) * points_of
-    boxes = np.zeros((0, 4))
+
+    def on_paper(points: Array) -> Array:
+        return np.asarray(axes.transData.transform(points)) * 72 / figure.dpi
+
+    here, hidden = on_paper(positions), on_paper(obstacles[np.isfinite(obstacles).all(axis=1)])
+    panel = np.reshape(axes.get_window_extent().extents, (2, 2)) * 72 / figure.dpi
+    placed = np.zeros((0, 2, 2))  # the middle and half the size of each text
     for k, text in enumerate(texts):
         half = np.array([4.6 * len(text), 9.0]) / 2  # of a text of 7 points
-        offsets, tried = _places(here[k], half)
-        cost = _DETOURS + _inside(tried, hidden) + 12 * _inside(tried, here)
-        cost += 60 * _overlaps(tried, boxes)
-        cost += 100 * ((tried[:, :2] < inside[:2]) | (tried[:, 2:] > inside[2:])).any(axis=1)
+        offsets = _DIRECTIONS * (half + 6 * _RINGS[:, None])
+        tried = here[k] + offsets
+        cost = 4 * _RINGS + _hits(tried, half, hidden) + 12 * _hits(tried, half, here)
+        cost += 60 * _hits(tried, half + placed[:, 1], placed[:, 0])
+        cost += 100 * (np.abs(tried - panel.mean(axis=0)) + half > np.ptp(panel, axis=0) / 2).any(1)
         best = int(cost.argmin())
-        boxes = np.vstack((boxes, tried[best]))
+        placed = np.append(placed, [[tried[best], half]], axis=0)
         axes.annotate(
             text,
             tuple(positions[k]),
@@ -212,25 +215,11 @@ def label_points(axes: Axes, positions: Array, values: Array, obstacles: Array) 
         )
 
 
-#: Where a text is tried, in twelve directions and ever farther away, and what the way costs.
+#: Where a text is tried: in twelve directions, ever farther away.
 _RINGS, _TURNS = np.repeat([1.0, 1.7, 2.6, 4.0, 6.0], 12), np.tile(np.arange(12) * math.pi / 6, 5)
 _DIRECTIONS = np.column_stack((np.cos(_TURNS), np.sin(_TURNS)))
-_DETOURS = 4 * _RINGS
 
 
-def _places(here: Array, half: Array) -> tuple[Array, Array]:
-    """Return the offsets (n, 2) of the middle of a text, and its boxes (n, 4), in points."""
-    offsets = _DIRECTIONS * (half + 6 * _RINGS[:, None])
-    return offsets, np.hstack((here + offsets - half, here + offsets + half))
-
-
-def _inside(boxes: Array, points: Array) -> NDArray[np.int64]:
-    """Return how many of some points lie in each box (left, bottom, right, top)."""
-    inside = (points > boxes[:, None, :2]) & (points < boxes[:, None, 2:])
-    return np.asarray(inside.all(axis=2).sum(axis=1))
-
-
-def _overlaps(boxes: Array, others: Array) -> NDArray[np.int64]:
-    """Return how many of some other boxes each box overlaps."""
-    apart = (boxes[:, None, :2] >= others[:, 2:]) | (others[:, :2] >= boxes[:, None, 2:])
-    return np.asarray((~apart.any(axis=2)).sum(axis=1))
+def _hits(middles: Array, half: Array, points: Array) -> NDArray[np.int64]:
+    """Return how many of some points lie in the box about each middle, of half this size."""
+    return np.asarray((np.abs(middles[:, None] - points) < half).all(axis=2).sum(axis=1))

@@ -53,16 +53,7 @@ class Markers:
         return np.vstack([self.segments.reshape(-1, 2), self.corners, self.edges, circles])
 
     def arc_strips(self) -> list[Array]:
-        """Make strips of vertices (n, 2), one an arc, at least 48 to a turn.
-
-        Examples
-        --------
-        >>> nothing = np.zeros((0, 2))
-        >>> arcs = np.array([[1.0, 0.0, 0.5, 0.0, math.pi / 2]])
-        >>> quarter = Markers(nothing.reshape(0, 2, 2), nothing, nothing, arcs, np.zeros((0, 5)))
-        >>> quarter.arc_strips()[0][[0, -1]].round(3).tolist()
-        [[1.5, 0.0], [1.0, 0.5]]
-        """
+        """Make strips of vertices (n, 2), one an arc, at least 48 to a turn."""
         strips = []
         for x, y, radius, first, last in self.arcs:
             n = max(math.ceil(TURN * (last - first) / (2 * math.pi)), 2) + 1

@@ -18,15 +18,7 @@ SCAN_TOPIC = "/scan"
 
 
 class McapWriter(Writer):
-    """Writes the messages of each scan, as `SceneMessages` makes them.
-
-    Parameters
-    ----------
-    path, topics
-        As of all writers.
-    scene : SceneMessages
-        Makes the messages.
-    """
+    """Writes the messages of each scan, as a `SceneMessages` makes them."""
 
     needs_scan = True
 

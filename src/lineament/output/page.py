@@ -52,7 +52,7 @@ _NUMBER = ' class="number"'
 def write_parts(path: str | os.PathLike[str], title: str, parts: Iterable[str]) -> None:
     """Write one HTML file of parts, such as those that the functions below make.
 
-    It needs no network. Empty parts are left out.
+    It needs no network.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def write_parts(path: str | os.PathLike[str], title: str, parts: Iterable[str]) 
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>",
         f"<h1>{escape(title)}</h1>",
-        *filter(None, parts),
+        *parts,
         "</body>\n</html>\n",
     ]
     write_text(path, "\n".join(lines))

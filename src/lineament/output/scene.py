@@ -22,18 +22,9 @@ _NOTHING = np.zeros((0, 2))
 class Layer(NamedTuple):
     """Marks of one kind that are drawn alike.
 
-    Attributes
-    ----------
-    name : str
-        Name of the entity, or namespace of the marker.
-    color : tuple
-        Red, green, blue and opacity, 0 to 1.
-    size : float
-        Width of the lines, or diameter of the spheres [m].
-    strips : sequence of float64 arrays, shape (n, 2), or one array, shape (m, n, 2)
-        Vertices that are joined by lines [m]; in one array where all strips have as many.
-    points : float64 array, shape (m, 2)
-        Centres of spheres [m].
+    A name; red, green, blue and opacity, 0 to 1; the width of lines or diameter of spheres [m];
+    vertices that are joined by lines [m], of shape (n, 2) each, or in one array (m, n, 2) where all
+    strips have as many; and centres of spheres [m], of shape (m, 2).
     """
 
     name: str
@@ -127,17 +118,11 @@ class Moment(NamedTuple):
 
 
 class SceneMessages(ABC):
-    """Makes the messages of one family: those of ROS or of Foxglove.
+    """Makes the messages of one family: those of ROS or of Foxglove."""
 
-    Attributes
-    ----------
-    encoding : str
-        Serialisation of the messages: ``cdr``, ``ros1`` or ``protobuf``.
-    profile : str
-        Profile of an MCAP file with these messages: ``ros2``, ``ros1`` or none.
-    """
-
+    #: Serialisation of the messages: ``cdr``, ``ros1`` or ``protobuf``.
     encoding: str
+    #: Profile of an MCAP file with these messages: ``ros2``, ``ros1`` or "".
     profile: str
 
     def messages(

@@ -91,7 +91,7 @@ class Wall:
 
     def _count(self, ends: NDArray[np.int64], views: int) -> None:
         begin, end = ends.tolist()
-        for cell, change in ((begin, views), (max(end, begin + 1), -views)):
+        for cell, change in ((begin, views), (end, -views)):
             self.changes[cell] = self.changes.get(cell, 0) + change
 
     def at(self, cells: NDArray[np.int64]) -> Array:

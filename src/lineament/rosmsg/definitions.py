@@ -7,19 +7,7 @@ _SEPARATOR = f"{'=' * 80}\nMSG: "
 
 
 def definition(kind: str, version: int) -> str:
-    """Return the text of a definition and, behind it, of all types in it, as bags hold it.
-
-    Parameters
-    ----------
-    kind : str
-        Name of the type, ``sensor_msgs/LaserScan``.
-    version : {1, 2}
-        Version of ROS.
-
-    Raises
-    ------
-    KeyError
-        If the type is not among those that are written.
+    """Return the text of a type and, behind it, of all types in it, for a version of ROS.
 
     Examples
     --------

@@ -33,16 +33,8 @@ class StampedPose(NamedTuple):
 class Odometry(NamedTuple):
     """A ``nav_msgs/Odometry`` in the plane, without covariances.
 
-    Attributes
-    ----------
-    stamp : float
-        Its time [s].
-    twist : (v_x, v_y, omega)
-        Velocity in the frame of what moves [m/s, m/s, rad/s].
-    pose : (x, y, theta)
-        Pose of what moves [m, m, rad].
-    frame, child_frame : str
-        Names of the frames of the pose and of what moves.
+    The time [s]; the velocity in the frame of what moves [m/s, m/s, rad/s]; its pose [m, m, rad];
+    and the names of the frames of the pose and of what moves.
     """
 
     stamp: float
@@ -67,13 +59,6 @@ def stamped_poses(data: Buffer, encoding: str, kind: str) -> Iterator[StampedPos
 
 def odometry(data: Buffer, encoding: str) -> Odometry:
     r"""Decode a ``nav_msgs/Odometry``.
-
-    Parameters
-    ----------
-    data : bytes-like
-        The message.
-    encoding : {"ros1", "cdr"}
-        How it is serialised.
 
     Raises
     ------

@@ -36,13 +36,6 @@ def laser_scan(data: Buffer, encoding: str) -> LaserScan:
     bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
     `time_increment`.
 
-    Parameters
-    ----------
-    data : bytes-like
-        The message.
-    encoding : {"ros1", "cdr"}
-        How it is serialised.
-
     Raises
     ------
     ValueError
@@ -72,7 +65,7 @@ def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserSc
     Parameters
     ----------
     data, encoding
-        As for :func:`laser_scan`.
+        As for `WireReader`.
     echo : {"first", "last", "strongest"}
         Which one: the nearest, the farthest (echoes come in that order), or the one with the
         greatest intensity, the first where there are no intensities. A beam without echo is NaN.
@@ -112,16 +105,9 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     """Decode one ring of a ``sensor_msgs/PointCloud2`` as a scan with irregular bearings.
 
     The ring is the points whose field `ring` has that number or, in an organised cloud without
-    that field, the points of that row. A point (x, y, z) becomes a beam with its bearing and
-    horizontal distance; z is left out. Beams are sorted by bearing; of points with the same
+    that field, the points of that row, from 0. A point (x, y, z) becomes a beam with its bearing
+    and horizontal distance; z is left out. Beams are sorted by bearing; of points with the same
     bearing the nearest stays; points that are not finite are left out.
-
-    Parameters
-    ----------
-    data, encoding
-        As for :func:`laser_scan`.
-    ring : int
-        Number of the ring, from 0.
 
     Raises
     ------

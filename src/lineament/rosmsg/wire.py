@@ -45,13 +45,8 @@ _CDR_READ = {(0, 0): _Form(True, ">"), (0, 1): _CDR}
 class WireReader:
     r"""Takes the fields of one serialised message, one after the other.
 
-    Parameters
-    ----------
-    data : bytes-like
-        The message.
-    encoding : {"ros1", "cdr"}
-        Packed and little-endian, or XCDR1: the first four bytes say the byte order, and numbers
-        are aligned to their size, counted from behind these bytes.
+    The encoding is ``ros1``, packed and little-endian, or ``cdr`` (XCDR1), whose first four bytes
+    say the byte order, and whose numbers are aligned to their size, counted from behind these.
 
     Raises
     ------
@@ -89,7 +84,8 @@ class WireReader:
         """Take numbers of one size, by the letters of `struct`: B, iI, 7d; or "header"."""
         unpack, _, size, alignment = self._form[code]
         at = self._at
-        at += (4 - at) % alignment
+        if alignment > 1:
+            at += (4 - at) % alignment
         self._at = at + size
         if self._at > self._size:
             raise self._too_short(size, at)
@@ -142,12 +138,7 @@ class WireReader:
 
 
 class WireWriter:
-    r"""Puts the fields of one message one after the other; the twin of `WireReader`.
-
-    Parameters
-    ----------
-    encoding : {"ros1", "cdr"}
-        As of `WireReader`; always little-endian.
+    r"""Puts the fields of one message one after the other, little-endian: twin of `WireReader`.
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """The local server: the page's own files, the answers of the API, and nothing else."""
 
-from __future__ import annotations
-
 import ipaddress
 import json
 import socket
@@ -22,30 +20,26 @@ from .session import Session
 
 __all__ = ["ViewServer", "serve"]
 
-#: The files of the page, all that is ever served, by what they are.
+#: The files of the page, by their endings.
 _TYPES = {
-    "index.html": "text/html; charset=utf-8",
-    "style.css": "text/css; charset=utf-8",
-    "icon.svg": "image/svg+xml",
-    **dict.fromkeys(
-        ("main.js", "api.js", "plane.js", "drawing.js", "panel.js", "timeline.js", "details.js"),
-        "text/javascript; charset=utf-8",
-    ),
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
 }
 _JSON = "application/json; charset=utf-8"
-_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
 _HEADERS = {
-    "Content-Security-Policy": _POLICY,
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
 _LOOPBACK = ("localhost", "127.0.0.1", "::1")
-#: Seconds after which a connection that says nothing is closed.
+#: Seconds after which a silent connection is closed.
 _PATIENCE = 60
 
 
@@ -53,7 +47,7 @@ class ViewServer(ThreadingHTTPServer):
     """Serves the page of a session.
 
     It answers only requests that name it as loopback or by the host that it was bound to: a page
-    from elsewhere cannot read the log through a name of its own (DNS rebinding).
+    from elsewhere cannot read the log by rebinding its own name (DNS rebinding).
 
     Parameters
     ----------
@@ -74,8 +68,8 @@ class ViewServer(ThreadingHTTPServer):
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 0) -> None:
         self.session, self.host = session, host
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        folder = files(__package__) / "static"
-        self.page = {f"/{name}": (folder / name).read_bytes() for name in _TYPES}
+        found = [file for file in (files(__package__) / "static").iterdir() if file.is_file()]
+        self.page = {f"/{file.name}": file.read_bytes() for file in found}
         self.page["/"] = self.page["/index.html"]
         try:
             super().__init__((host, port), _Handler)
@@ -84,7 +78,7 @@ class ViewServer(ThreadingHTTPServer):
             raise LineamentError(f"{host}:{port}: cannot listen there: {reason}") from None
 
     def server_bind(self) -> None:
-        """Bind, without the look-up of a name that HTTPServer adds, which may take seconds."""
+        """Bind, without HTTPServer's look-up of the host name, which may take seconds."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = self.host, self.server_address[1]
 
@@ -102,11 +96,11 @@ class ViewServer(ThreadingHTTPServer):
             return False
         if name in _LOOPBACK or name == self.host.lower():
             return True
-        # Listening everywhere it has many addresses; none of them is a name that could be rebound.
+        # Where it listens everywhere it has many addresses; none is a name that could be rebound.
         return _is_wildcard(self.host) and _is_address(name)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: the other side has gone."""
+        """Ignore it: the other side has gone."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -132,11 +126,12 @@ class _Handler(BaseHTTPRequestHandler):
             raise RequestError(403, f"the request is for another host, expected {_LOOPBACK[0]}")
         path = self.path.partition("?")[0]
         if path in self.server.page:
-            return _TYPES[path[1:] or "index.html"], self.server.page[path]
+            ending = path[path.rindex(".") :] if path != "/" else ".html"
+            return _TYPES[ending], self.server.page[path]
         return _JSON, answer(self.server.session, self.path)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Send what is wrong as JSON, whatever found it."""
+        """Send what is wrong as JSON."""
         self.close_connection = True
         problem = message or explain or "the request makes no sense"
         self._send(code, _JSON, json.dumps({"error": problem}).encode())
@@ -145,10 +140,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(body)))
-        for name, value in _HEADERS.items():
+        closing = {"Connection": "close"} if self.close_connection else {}
+        for name, value in {**_HEADERS, **closing}.items():
             self.send_header(name, value)
-        if self.close_connection:
-            self.send_header("Connection", "close")
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(body)
@@ -163,7 +157,7 @@ def serve(
     port: int = 0,
     *,
     browser: bool = True,
-    tell: Callable[[str], None] = print,
+    write: Callable[[str], None] = print,
 ) -> None:
     """Serve the page of a session until interrupted, and open it in the browser.
 
@@ -174,8 +168,8 @@ def serve(
         As in `ViewServer`.
     browser : bool
         Whether to open the page.
-    tell : callable
-        Is told the address.
+    write : callable
+        Called with a line that has the address.
 
     Raises
     ------
@@ -184,9 +178,9 @@ def serve(
     """
     with session, ViewServer(session, host, port) as server:
         if not _is_loopback(host):
-            warning = f"{host} is not loopback: everybody who can reach it can look at this log"
+            warning = f"{host} is not loopback: anybody who can reach it can look at this log"
             print(f"lineament: {warning}", file=sys.stderr, flush=True)
-        tell(f"{session.name}: look at {server.address} (Ctrl-C ends it)")
+        write(f"{session.name}: look at {server.address} (Ctrl-C ends it)")
         if browser:
             # A browser of the terminal would keep its caller waiting.
             opening = partial(webbrowser.open, server.address)

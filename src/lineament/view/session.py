@@ -1,4 +1,4 @@
-"""What the page asks for: a log, its scans, and what methods make of them."""
+"""What the page asks for: a log, its scans, and what methods find in them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from ..logs import open_log
 from ..scan import LaserScan
 from .store import ScanStore
 
-__all__ = ["Session", "plain"]
+__all__ = ["Session"]
 
 
 class Session:
-    """A log that is looked at, with one extractor a method.
+    """A log that is looked at, with one extractor for each method.
 
     Parameters
     ----------
@@ -41,10 +41,7 @@ class Session:
     """
 
     def __init__(
-        self,
-        path: str | os.PathLike[str],
-        extractors: Mapping[str, Extractor],
-        **reading: Any,
+        self, path: str | os.PathLike[str], extractors: Mapping[str, Extractor], **reading: Any
     ) -> None:
         self.extractors = dict(extractors)
         self._busy = {name: threading.Lock() for name in self.extractors}
@@ -53,7 +50,7 @@ class Session:
         self.name = self._log.name
         self._total: int | None = None
         self._error = ""
-        # A log of its own, as each iteration counts its faults anew.
+        # Another log, as each iteration counts its faults anew.
         self._store = ScanStore(lambda: open_log(path, **reading).items())
         self._reader = threading.Thread(target=self._fill, name="reader of the log", daemon=True)
 
@@ -65,12 +62,12 @@ class Session:
         self._store.close()
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Wait until the log is read; tell whether it is."""
+        """Wait until the log is read; return whether it is."""
         self._reader.join(seconds)
         return not self._reader.is_alive()
 
     def facts(self) -> dict[str, Any]:
-        """Tell what is known of the log, and how far it has been read."""
+        """Return what is known of the log, and how far it has been read."""
         return {
             "name": Path(self.name).name,
             "format": self._log.format,
@@ -84,11 +81,11 @@ class Session:
         }
 
     def stamps(self, first: int, count: int) -> dict[str, Any]:
-        """List the stamps of some scans [s]."""
-        return {"first": first, "stamps": plain(self._store.stamps(first, count))}
+        """Return the stamps of some scans [s]."""
+        return {"first": first, "stamps": _plain(self._store.stamps(first, count))}
 
     def scan(self, index: int, method: str) -> dict[str, Any]:
-        """Give a scan and the features that a method finds in it, for JSON.
+        """Return a scan and the features that a method finds in it, for JSON.
 
         Raises
         ------
@@ -97,13 +94,12 @@ class Session:
         """
         topic, scan = self._store.item(index)
         with self._busy[method]:
-            features = self.extractors[method](scan)
+            features = self.extractors[method](scan).to_dict()
         asked = {"index": index, "method": method, "topic": topic}
-        found = {**asked, **_beams(scan), **features.to_dict()}
-        return {name: plain(value) for name, value in found.items()}
+        return {name: _plain(value) for name, value in (asked | _beams(scan) | features).items()}
 
     def trace(self, index: int, method: str, beam: int) -> dict[str, Any]:
-        """Tell what became of a beam, for JSON.
+        """Return what became of a beam, for JSON.
 
         Raises
         ------
@@ -123,39 +119,30 @@ class Session:
             self._store.fill(self._log.items())
         except LineamentError as error:
             self._error = str(error)
-        except Exception as error:  # Nobody is there to catch it: the page tells it.
+        except Exception as error:  # Nobody else could report it: the page does.
             self._error = f"reading ended: {type(error).__name__}: {error}"
 
 
 def _beams(scan: LaserScan) -> dict[str, Any]:
     """Beams of a scan; the range of an invalid one is None."""
-    ranges = np.where(scan.valid, scan.ranges, np.nan).tolist()
     bearings: dict[str, Any] = {"angles": scan.angles.tolist()}
     if scan.is_regular:
         bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
+    names = ("range_min", "range_max", "is_full_circle", "pose")
     return {
         "beams": len(scan),
-        "ranges": ranges,
+        "ranges": np.where(scan.valid, scan.ranges, np.nan).tolist(),
         **bearings,
-        "range_min": scan.range_min,
-        "range_max": scan.range_max,
-        "is_full_circle": scan.is_full_circle,
-        "pose": scan.pose,
+        **{name: getattr(scan, name) for name in names},
     }
 
 
-def plain(value: Any) -> Any:
-    """Make what JSON takes of nested lists and dicts: None in place of what is not finite.
-
-    Examples
-    --------
-    >>> plain({"a": [1.0, float("nan")]})
-    {'a': [1.0, None]}
-    """
+def _plain(value: Any) -> Any:
+    """Replace what is not finite by None, in nested lists and dicts, since JSON has no NaN."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
+        return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [_plain(item) for item in value]
     return value

@@ -1,11 +1,11 @@
-"""Any scan of a log at once: each is read once and kept, packed, in a temporary file."""
+"""Any scan of a log at once: each is read once and kept in a temporary file."""
 
 from __future__ import annotations
 
-import json
-import struct
+import pickle
 import tempfile
 import threading
+from array import array
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 
@@ -13,16 +13,13 @@ import numpy as np
 
 from ..scan import LaserScan
 
-__all__ = ["ScanStore", "pack", "unpack"]
+__all__ = ["ScanStore"]
 
 #: A scan with its topic.
 Item = tuple[str, LaserScan]
 
-#: By scan: where its packed form begins (-1: it was not kept), how long that is, its stamp.
-_ENTRY = struct.Struct("<qqd")
 _NOT_KEPT = -1
-_LENGTH = struct.Struct("<I")
-#: What the packed form holds besides the arrays; intensities are left out.
+#: What is kept of a scan besides ranges and bearings; intensities are not.
 _FIELDS = ("range_min", "range_max", "stamp", "scan_time", "time_increment", "frame_id", "pose")
 
 
@@ -30,16 +27,15 @@ class ScanStore:
     """The scans of a log with their topics, by index, while they are still being read.
 
     `fill` takes the items of a log, once. They go to a temporary file without a name, at most
-    `capacity` bytes of it, and 24 bytes a scan to another one: memory does not grow with the log.
-    Scans for which there is no room are read from the log again when they are asked for, which is
-    quick forwards, and from the start of the log otherwise.
+    `capacity` bytes of it; 16 bytes a scan stay in memory. Scans for which there is no room are
+    read from the log again, which is quick forwards, and from the start of the log otherwise.
 
     Parameters
     ----------
     read_again : callable
-        Gives the same items again, from the start.
+        Returns the same items again, from the start.
     capacity : int
-        Most bytes of packed scans that are kept.
+        Most bytes of scans that are kept.
 
     Examples
     --------
@@ -55,13 +51,12 @@ class ScanStore:
         self, read_again: Callable[[], Iterable[Item]], *, capacity: int = 1 << 30
     ) -> None:
         self._read_again, self._capacity = read_again, capacity
-        self._entries = tempfile.TemporaryFile()  # noqa: SIM115  # open until `close`
-        self._records = tempfile.TemporaryFile()  # noqa: SIM115
-        self._count, self._end = 0, 0
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115  # open until `close`
+        self._starts, self._stamps, self._end = array("q"), array("d"), 0
         self._closed = False
         self._lock, self._rereading = threading.Lock(), threading.Lock()
         self._ahead: Iterator[Item] = iter(())
-        self._at = 0  # which item `_ahead` gives next
+        self._at = 0  # index of the next item of `_ahead`
 
     def __enter__(self) -> ScanStore:
         return self
@@ -71,19 +66,20 @@ class ScanStore:
 
     def __len__(self) -> int:
         """Return the number of scans that were read so far."""
-        return self._count
+        return len(self._starts)
 
     def fill(self, items: Iterable[Item]) -> None:
-        """Take in items to their end, or until the store is closed."""
+        """Take items to their end, or until the store is closed."""
         for topic, scan in items:
-            record = pack(topic, scan)
+            record = _pack(topic, scan)
             with self._lock:
                 if self._closed:
                     return
-                self._append(record, scan.stamp)
+                self._stamps.append(scan.stamp)
+                self._starts.append(self._write(record))
 
     def item(self, index: int) -> Item:
-        """Give the topic of a scan that was read, and the scan without its intensities.
+        """Return the topic of a scan that was read, and the scan without its intensities.
 
         Raises
         ------
@@ -91,45 +87,38 @@ class ScanStore:
             If it was not read yet, or there is none.
         """
         with self._lock:
-            start, length, _ = self._entry(index)
-            if start != _NOT_KEPT:
-                self._records.seek(start)
-                return unpack(self._records.read(length))
+            if self._closed or not 0 <= index < len(self):
+                raise IndexError(f"scan {index} is not there")
+            if self._starts[index] != _NOT_KEPT:
+                self._file.seek(self._starts[index])
+                topic, fields = pickle.load(self._file)
+                return topic, LaserScan(**fields)
         return self._found_again(index)
 
     def stamps(self, first: int, count: int) -> list[float]:
-        """List the stamps [s] of scans that were read, at most `count` of them from `first` on."""
-        with self._lock:
-            last = min(first + count, self._count)
-            return [self._entry(i)[2] for i in range(first, last)]
+        """Return the stamps [s] of scans that were read, at most `count` from `first` on."""
+        return self._stamps[first : first + count].tolist()
 
     def close(self) -> None:
         """End `fill`, and remove what was kept."""
         with self._lock:
             self._closed = True
-            self._entries.close()
-            self._records.close()
+            self._file.close()
 
-    def _append(self, record: bytes, stamp: float) -> None:
-        start = self._end if self._end + len(record) <= self._capacity else _NOT_KEPT
-        if start != _NOT_KEPT:
-            try:
-                self._records.seek(start)
-                self._records.write(record)
-                self._records.flush()
-                self._end += len(record)
-            except OSError:  # The disk is full: that is all the room there is.
-                start, self._capacity = _NOT_KEPT, 0
-        self._entries.seek(self._count * _ENTRY.size)
-        self._entries.write(_ENTRY.pack(start, len(record), stamp))
-        self._count += 1
-
-    def _entry(self, index: int) -> tuple[int, int, float]:
-        if self._closed or not 0 <= index < self._count:
-            raise IndexError(f"scan {index} is not there")
-        self._entries.seek(index * _ENTRY.size)
-        start, length, stamp = _ENTRY.unpack(self._entries.read(_ENTRY.size))
-        return start, length, stamp
+    def _write(self, record: bytes) -> int:
+        """Write a record if there is room; return where."""
+        start = self._end
+        if start + len(record) > self._capacity:
+            return _NOT_KEPT
+        try:
+            self._file.seek(start)
+            self._file.write(record)
+            self._file.flush()
+        except OSError:  # The disk is full: that is all the room there is.
+            self._capacity = 0
+            return _NOT_KEPT
+        self._end += len(record)
+        return start
 
     def _found_again(self, index: int) -> Item:
         with self._rereading:
@@ -141,38 +130,14 @@ class ScanStore:
         raise IndexError(f"scan {index} is not there any more")
 
 
-def pack(topic: str, scan: LaserScan) -> bytes:
-    """Pack a scan and its topic, but for its intensities; nothing of the rest is lost."""
-    head = {"topic": topic, **{name: getattr(scan, name) for name in _FIELDS}}
-    if scan.is_regular:
-        head["angle_min"], head["angle_increment"] = scan.angle_min, scan.angle_increment
+def _pack(topic: str, scan: LaserScan) -> bytes:
+    """Serialise a scan and its topic, without intensities; nothing of the rest is lost."""
+    fields = {name: getattr(scan, name) for name in _FIELDS}
     # Most sensors report single precision.
     with np.errstate(over="ignore"):
         single = scan.ranges.astype(np.float32)
-    head["single"] = bool(np.array_equal(single, scan.ranges, equal_nan=True))
-    text = json.dumps(head).encode()
-    ranges = single if head["single"] else scan.ranges
-    angles = b"" if scan.is_regular else scan.angles.tobytes()
-    return _LENGTH.pack(len(text)) + text + angles + ranges.tobytes()
-
-
-def unpack(record: bytes) -> Item:
-    """Give the topic and the scan of a record.
-
-    Examples
-    --------
-    >>> scan = LaserScan([1.0, float("nan")], angles=[0.0, 0.3], frame_id="laser")
-    >>> topic, same = unpack(pack("scan", scan))
-    >>> topic, same.angles.tolist()
-    ('scan', [0.0, 0.3])
-    """
-    (length,) = _LENGTH.unpack_from(record)
-    start = _LENGTH.size + length
-    head = json.loads(record[_LENGTH.size : start])
-    topic: str = head.pop("topic")
-    kind = np.dtype(np.float32 if head.pop("single") else np.float64)
-    if "angle_min" not in head:
-        n = (len(record) - start) // (8 + kind.itemsize)
-        head["angles"] = np.frombuffer(record, np.float64, n, start)
-        start += 8 * n
-    return topic, LaserScan(np.frombuffer(record, kind, offset=start), **head)
+    is_single = np.array_equal(single, scan.ranges, equal_nan=True)
+    fields["ranges"] = single if is_single else scan.ranges
+    names = ("angle_min", "angle_increment") if scan.is_regular else ("angles",)
+    fields.update((name, getattr(scan, name)) for name in names)
+    return pickle.dumps((topic, fields))

@@ -55,12 +55,8 @@ def find_arcs(work, scan, lines):
 @sums
 def _noise_cost(points, first, end, a, b, noise):
     """χ² of a line at the scale of the noise."""
-    x, y, rho, total = (
-        points[at.X, first:end],
-        points[at.Y, first:end],
-        points[at.RHO, first:end],
-        0.0,
-    )
+    x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
+    total = 0.0
     for i in range(len(x)):
         square, off = rho[i] * rho[i], 1.0 - a * x[i] - b * y[i]
         total += off * off * square / (noise[0] + noise[1] * square)

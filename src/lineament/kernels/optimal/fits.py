@@ -43,9 +43,8 @@ def measure(work, surfaces, estimated):
         scale = _scatter_of_means(work, kept)
         for k in range(kept):
             if spans[at.KIND, k] == at.LINE:
-                pieces[k, at.OO], pieces[k, at.AA] = (
-                    scale * pieces[k, at.OO], scale * pieces[k, at.AA],
-                )  # fmt: skip
+                pieces[k, at.OO] *= scale
+                pieces[k, at.AA] *= scale
     _soften_borders(work, kept)
     return kept
 

@@ -5,7 +5,7 @@ Communications of the ACM 15 (1972).
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -15,28 +15,17 @@ from ..line_fit import range_variance
 from .stretches import is_piece, prepare, refined_run, take_run
 
 
-class Parameters(NamedTuple):
-    """As in `methods.hough.Hough`."""
-
-    resolution: float
-    min_points: int
-    min_length: float
-    max_misses: int
-    epsilon: float
-    sigmas: float
+Parameters = namedtuple("Parameters", "resolution min_points min_length max_misses epsilon sigmas")
 
 
 @kernel
 def find_by_votes(floats, ints, noise, parameters, votes, normals):
-    """Find the lines of a scan.
+    """Find the lines of a scan: from points and clusters, the ends of pieces.
 
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
-    noise : float64 array, shape (4,)
     parameters : tuple
-        See `Parameters`.
+        See `Parameters`, and `methods.hough.Hough`.
     votes : int32 array, shape (A, D)
         The accumulator; scratch.
     normals : float64 array, shape (A, 2)

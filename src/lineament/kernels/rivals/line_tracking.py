@@ -24,11 +24,10 @@ def track_lines(floats, ints, noise, threshold, noise_factor, max_misses, min_po
     in a row are not predicted; there the next line begins. A line of too few points is given up,
     and the search goes on at the point after its first.
 
+    From points and clusters, the ends of pieces.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
-    noise : float64 array, shape (4,)
     threshold : float
         Distance from its line that a point without noise may have [m].
     noise_factor : float

@@ -20,18 +20,14 @@ FIXED, DIETMAYER, SANTOS, LEE, BORGES_ALDON = range(5)
 def part_by_distance(floats, ints, bearings, sensor, noise, rule, max_missing, min_points):
     """Part the usable beams of a scan into clusters, by their distances alone.
 
+    From RANGE, FILTERED (the usable ranges, as measured), the points with their thresholds
+    (DENSITY_THRESHOLD is NaN), and the clusters. There are no pieces and no candidates.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. RANGE is read; FILTERED (the usable ranges, as measured), the
-        points, their thresholds (DENSITY_THRESHOLD is NaN) and the clusters are written. There are
-        no pieces and no candidates.
-    bearings : float64 array, shape (2, n)
-        Cosines and sines.
     sensor : tuple
         (range_min, range_max, step, circular); `circular`: whether the last cluster may go on in
         the first.
-    noise : float64 array, shape (4,)
     rule : tuple
         (rule, constant, angle), as in `distance_threshold`.
     max_missing : int
@@ -82,7 +78,6 @@ def distance_threshold(before, rho, cosine, sine, noise, rule):
         ρ_{i-1} and ρ_i [m].
     cosine, sine : float
         Of the angle Δφ between their beams.
-    noise : float64 array, shape (4,)
     rule : tuple
         (rule, constant, angle): D_0 or C_0 [m], r, or k; β or λ [rad].
 

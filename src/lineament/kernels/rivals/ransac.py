@@ -4,7 +4,7 @@ M. A. Fischler, R. C. Bolles, *Random sample consensus*, Communications of the A
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -16,30 +16,16 @@ from .stretches import is_piece, longest_run, prepare, refined_run, take_run
 PERIOD = 2147483647
 
 
-class Parameters(NamedTuple):
-    """As in `methods.ransac.Ransac`."""
-
-    trials: int
-    window: int
-    min_points: int
-    min_length: float
-    max_misses: int
-    epsilon: float
-    sigmas: float
-    seed: int
+Parameters = namedtuple(
+    "Parameters", "trials window min_points min_length max_misses epsilon sigmas seed"
+)
 
 
 @kernel
 def find_by_consensus(floats, ints, noise, parameters):
-    """Find the lines of a scan.
+    """Find the lines of a scan: from points and clusters, the ends of pieces.
 
-    Parameters
-    ----------
-    floats, ints
-        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
-    noise : float64 array, shape (4,)
-    parameters : tuple
-        See `Parameters`.
+    `parameters` are a tuple, see `Parameters`, and `methods.ransac.Ransac`.
     """
     work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
     prepare(work, moments, noise, p.epsilon, p.sigmas)

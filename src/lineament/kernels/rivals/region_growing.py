@@ -4,35 +4,22 @@ H. Gao, X. Zhang, Y. Fang, J. Yuan, *A line segment extraction algorithm using l
 seeded region growing*, International Journal of Advanced Robotic Systems 15 (2018).
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 from .. import helper, kernel
 from .. import layout as at
 from .stretches import is_piece, prepare, stretch_line
 
 
-class Parameters(NamedTuple):
-    """As in `methods.region_growing.RegionGrowing`."""
-
-    s_num: int
-    p_min: int
-    l_min: float
-    delta: float
-    epsilon: float
-    sigmas: float
+Parameters = namedtuple("Parameters", "s_num p_min l_min delta epsilon sigmas")
 
 
 @kernel
 def grow_regions(floats, ints, noise, parameters):
-    """Find the straight regions of a scan. They may overlap where walls meet.
+    """Find the straight regions of a scan, which may overlap where walls meet.
 
-    Parameters
-    ----------
-    floats, ints
-        The workspace, see `layout`. Points and clusters are read; the ends of pieces are written.
-    noise : float64 array, shape (4,)
-    parameters : tuple
-        See `Parameters`.
+    From points and clusters, the ends of pieces. `parameters` are a tuple, see `Parameters`, and
+    `methods.region_growing.RegionGrowing`.
     """
     work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
     prepare(work, moments, noise, p.epsilon, p.sigmas)

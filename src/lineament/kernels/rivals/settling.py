@@ -34,13 +34,11 @@ def settle(floats, ints, noise, epsilon, reach):
     goes to the nearer line, so far as the beams' order allows; and where their lines meet within
     `reach`, there is a corner.
 
+    From points, and the ends of pieces in beam order, which may overlap. The response of a corner
+    is the sine of the angle at which the lines meet.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points and pieces in beam order (FIRST, LAST), which may
-        overlap, are read; the pieces are written. Their response is the sine of the angle at which
-        the lines meet.
-    noise : float64 array, shape (4,)
     epsilon : float
         Misfit of surfaces [m].
     reach : float

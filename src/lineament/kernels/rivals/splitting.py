@@ -28,13 +28,12 @@ def split(floats, ints, noise, by_line, threshold, proportion, noise_factor, min
     is farthest from the line fitted to the two arms of an L is one of its ends, at which nothing
     can be split.
 
+    From points and clusters, candidates and pieces. The response of a candidate, and of the corner
+    that it becomes, is the distance that decided over its tolerance: the piece is split if that is
+    above 1.
+
     Parameters
     ----------
-    floats, ints
-        The workspace, see `layout`. Points and clusters are read; candidates and pieces are
-        written. The response of a candidate, and of the corner that it becomes, is the distance
-        that decided over its tolerance: the piece is split if that is above 1.
-    noise : float64 array, shape (4,)
     by_line : bool
     threshold, proportion, noise_factor : float
         The tolerance of a point at range ρ is threshold + proportion ρ + noise_factor σ_r [m].

@@ -54,11 +54,8 @@ def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantil
     scale, gradient, off = vectors
     state, covariance, directions = found[0, 0], found[1], found[2]
     count = len(pairs[0]) + len(pairs[1]) + len(pairs[2])
-    rows, squares, matched = (
-        np.empty((count, COLUMNS)),
-        np.empty(count),
-        np.zeros(len(now[0]), np.bool_),
-    )
+    rows, squares = np.empty((count, COLUMNS)), np.empty(count)
+    matched = np.zeros(len(now[0]), np.bool_)
     if not invert(spread, known):
         return NOT_POSITIVE
     if not _mark(before, now, pairs, matched):

@@ -62,10 +62,8 @@ def _of_segments(a, b, motion, c, s, roughness, row):
     the part that one of them saw alone.
     """
     tx, ty = math.cos(a[at.S_ANGLE]), math.sin(a[at.S_ANGLE])
-    px, py = (
-        c * b[at.S_CENTROID] - s * b[at.S_CENTROID + 1],
-        s * b[at.S_CENTROID] + c * b[at.S_CENTROID + 1],
-    )
+    px, py = b[at.S_CENTROID], b[at.S_CENTROID + 1]
+    px, py = c * px - s * py, s * px + c * py
     ax, ay = px + motion[0] - a[at.S_CENTROID], py + motion[1] - a[at.S_CENTROID + 1]
     length = segment_length(a)
     # Ends of the later segment along the earlier one.
@@ -88,10 +86,8 @@ def _of_segments(a, b, motion, c, s, roughness, row):
     determinant = oo * aa - oa * oa
     if aa > _DIRECTED * _DIRECTED or not determinant > 0.0:
         return
-    row[ERROR], row[ERROR + 1] = (
-        ay * tx - ax * ty,
-        turned(b[at.S_ANGLE] + motion[2] - a[at.S_ANGLE]),
-    )
+    turn = turned(b[at.S_ANGLE] + motion[2] - a[at.S_ANGLE])
+    row[ERROR], row[ERROR + 1] = ay * tx - ax * ty, turn
     row[JACOBIAN], row[JACOBIAN + 1], row[JACOBIAN + 2] = -ty, tx, tx * px + ty * py
     row[JACOBIAN + 5] = 1.0
     row[INFORMATION] = aa / determinant

@@ -1,0 +1,315 @@
+"""The methods of lines equal their slow twins; what is special to each, by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from naive_fit import range_variance
+from naive_partition import clusters_of, noise_of, parted, split, track, untied
+from naive_regions import assert_same_pieces, grow, sample, vote
+from worlds import NOISE, degenerate_scans, fan, random_scan, scan_of, vertex, wall
+
+from lineament import Extractor, LaserScan, RangeNoise
+from lineament.features import noise_row
+from lineament.kernels import layout as at
+from lineament.kernels.rivals.line_tracking import track_lines
+from lineament.methods import steps
+from lineament.methods.hough import Hough
+from lineament.methods.ransac import Ransac
+from lineament.methods.region_growing import RegionGrowing
+from lineament.methods.workspace import Block
+
+DEGENERATE = degenerate_scans()
+SENSOR = RangeNoise(0.01, 0.01, 0.002, 0.01)
+CHANGED = {"threshold": 0.02, "min_piece": 2, "noise": SENSOR}
+SPLITTERS = {
+    "iepf": Extractor("iepf", merge=False),
+    "iepf:paper": Extractor("iepf:paper"),
+    "iepf, changed": Extractor("iepf", merge=False, **CHANGED),
+    "split_and_merge": Extractor("split_and_merge"),
+    "split_and_merge, changed": Extractor("split_and_merge", **CHANGED),
+}
+TRACKERS = {
+    "line_tracking": Extractor("line_tracking"),
+    "line_tracking, changed": Extractor(
+        "line_tracking", **CHANGED | {"min_piece": 6}, noise_factor=2.0, max_misses=0
+    ),
+}
+SMALL_NOISE = RangeNoise(0.01, 0.002, 0.001, 0.01)
+FINDERS = {
+    "hough": (vote, Extractor(Hough())),
+    "hough, coarse": (
+        vote,
+        Extractor(Hough(angles=30, distances=16, min_length=0.3, max_misses=0)),
+    ),
+    "hough, bearings": (vote, Extractor(Hough(angles=60, min_points=8), noise=SMALL_NOISE)),
+    "ransac": (sample, Extractor(Ransac())),
+    "ransac, narrow": (
+        sample,
+        Extractor(Ransac(trials=7, window=6, min_length=0.3, max_misses=0, seed=12345)),
+    ),
+    "ransac, bearings": (sample, Extractor(Ransac(trials=5, min_points=8), noise=SMALL_NOISE)),
+    "region_growing": (grow, Extractor(RegionGrowing())),
+    "region_growing, metres": (
+        grow,
+        Extractor(RegionGrowing(sigmas=0.0, epsilon=0.03, p_min=10, l_min=0.3)),
+    ),
+    "region_growing, bearings": (grow, Extractor(RegionGrowing(s_num=4, p_min=5), noise=SENSOR)),
+}
+
+
+def assert_same_split(scan, extractor):
+    """Hold candidates equal to the twin's, and pieces if none are merged. Returns the cuts."""
+    method, noise = extractor.method, noise_of(scan, extractor)
+    by_line = method.name == "split_and_merge"
+
+    def tolerance(rho):
+        sigma = np.sqrt(range_variance(rho, noise))
+        growing = 0.0 if by_line else method.proportion * rho
+        return method.threshold + growing + method.noise_factor * sigma
+
+    found = parted(scan, clusters_of(method), noise)
+    candidates, pieces = split(
+        scan, found, noise, tolerance=tolerance, min_piece=method.min_piece, by_line=by_line
+    )
+    trace = extractor.trace(scan)
+    assert trace.candidates["beam"].tolist() == [beam for beam, _, _ in candidates]
+    for name, k in (("chord_distance", 1), ("response", 2)):
+        expected = [candidate[k] for candidate in candidates]
+        rtol, atol = (1e-6, 1e-7) if by_line else (1e-7, 1e-9)
+        np.testing.assert_allclose(trace.candidates[name], expected, rtol=rtol, atol=atol)
+    assert len(trace.cuts) == sum(excess > 1 for _, _, excess in candidates)
+    if not by_line:
+        segments, corners = trace.features.segments, trace.features.corners
+        ends = list(zip(segments["first_beam"], segments["last_beam"], strict=True))
+        assert ends == [(first, last) for first, last, _ in pieces]
+        assert corners["segments"].tolist() == [
+            [before, k] for k, (_, _, before) in enumerate(pieces) if before >= 0
+        ]
+    return len(trace.cuts)
+
+
+def tracked(scan, extractor):
+    """First and last beam of the lines that the kernel tracks, before they are merged."""
+    method, block = extractor.method, Block(scan, noise_row(extractor.noise), 1)
+    block.load(scan.ranges)
+    block.take(0)
+    steps.estimate_noise(block, 0)
+    method._part(block, 0, method.min_points)
+    track_lines(
+        block.floats, block.ints, block.noises[0], method.threshold, method.noise_factor,
+        method.max_misses, method.min_piece,
+    )  # fmt: skip
+    ends = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
+    return list(map(tuple, block.work.marks[at.BEAM][ends].T.tolist()))
+
+
+def assert_same_lines(scan, extractor):
+    noise = noise_of(scan, extractor)
+    lines = track(scan, parted(scan, clusters_of(extractor.method), noise), noise, extractor.method)
+    assert tracked(scan, extractor) == lines
+    return len(lines)
+
+
+def assert_same(name, scan):
+    """Hold a method equal to its twin on a scan. Returns how much was compared."""
+    if name in SPLITTERS:
+        return assert_same_split(scan, SPLITTERS[name])
+    if name in TRACKERS:
+        return assert_same_lines(scan, TRACKERS[name])
+    find, extractor = FINDERS[name]
+    return assert_same_pieces(extractor.method, scan, find, extractor.noise)
+
+
+QUICK = [*SPLITTERS, *TRACKERS, "ransac, bearings", "hough, coarse", "region_growing"]
+
+
+@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
+@pytest.mark.parametrize("name", QUICK)
+def test_degenerate_scans_equal_the_slow_twin(name, scan):
+    assert_same(name, untied(scan) if name in SPLITTERS else scan)
+
+
+@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS, *list(FINDERS)[-3:]])
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_random_scans_equal_the_slow_twin(name, seed):
+    assert_same(name, random_scan(seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS, *FINDERS])
+def test_many_random_scans_equal_the_slow_twin(name):
+    seeds = range(10) if name in FINDERS else range(100, 160)
+    assert sum(assert_same(name, random_scan(seed)) for seed in seeds) > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS])
+def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
+    assert sum(assert_same(name, scan) for scan in recorded_scans) > 50
+
+
+# The iterative end point fit, split-and-merge
+
+
+def test_tolerance_by_hand():
+    """A right angle 3 m ahead whose arms end 0.2 m off: split at a tolerance below its height."""
+    angles = fan(3, math.radians(0.25))
+    scan = scan_of(vertex(angles, 3.0, 90, convex=False), angles)
+    height = 3.0 - scan.points[[0, -1], 0].mean()
+    plain = {"proportion": 0.0, "noise_factor": 0.0}
+    for parts in ({"threshold": 1.0}, {"proportion": 1 / 3.0}, {"noise_factor": 100.0}):
+        for scale, corners in ((height * 0.999, 1), (height * 1.001, 0)):
+            own = plain | {name: value * scale for name, value in parts.items()}
+            extractor = Extractor("iepf", merge=False, noise=NOISE, **own)
+            assert len(extractor(scan).corners) == corners
+            candidate = extractor.trace(scan).candidates[0]
+            assert candidate["chord_distance"] == pytest.approx(height)
+            assert candidate["accepted"] == bool(corners)
+
+
+def test_paper_puts_corners_on_measurements():
+    angles = fan(25)
+    scan = scan_of(vertex(angles, 3.0, 100, convex=True), angles)
+    (corner,) = Extractor("iepf:paper", noise=NOISE)(scan).corners
+    np.testing.assert_allclose(corner["position"], scan.points[corner["beam"]], rtol=1e-12)
+    assert corner["beam"] == len(angles) // 2
+
+
+def test_merging_joins_what_was_split_by_noise():
+    """A tolerance of one σ splits a wall many times; the joint fit makes one of it again."""
+    angles = fan(40)
+    ranges = 2.0 / np.cos(angles) + 0.01 * np.random.default_rng(3).normal(size=len(angles))
+    scan, parameters = scan_of(ranges, angles), {"noise_factor": 1.0, "proportion": 0.0}
+    assert len(Extractor("iepf", merge=False, noise=NOISE, **parameters)(scan).segments) > 10
+    assert len(Extractor("iepf", noise_factor=3.0, noise=NOISE)(scan).segments) == 1
+
+
+@pytest.mark.parametrize(
+    ("off", "by", "factor", "is_cut"),
+    [
+        ([60], 0.07, 5.0, False),
+        ([60, 61], 0.07, 5.0, True),
+        ([60, 62], 0.07, 5.0, False),
+        ([60, 61], [0.045, -0.045], 4.0, False),
+    ],
+)
+def test_two_neighbours_off_one_side_of_their_line_split_it(off, by, factor, is_cut):
+    angles = fan(20)
+    ranges = wall(angles, 2.0, 0.0)
+    ranges[off] += by
+    extractor = Extractor("split_and_merge", noise=NOISE, noise_factor=factor)
+    trace = extractor.trace(scan_of(ranges, angles))
+    assert set(trace.clusters) == {0}
+    assert (len(trace.cuts) > 0) == is_cut
+
+
+# Line tracking
+
+
+@pytest.mark.parametrize("missed", [1, 2, 3])
+def test_a_line_passes_over_as_many_misses_as_it_may(missed):
+    angles = fan(20)
+    ranges = wall(angles, 2.0, 0.0)
+    ranges[60 : 60 + missed] += 0.06
+    for max_misses in range(4):
+        extractor = Extractor("line_tracking", max_misses=max_misses, noise=NOISE)
+        whole = tracked(scan_of(ranges, angles), extractor)[0] == (0, len(angles) - 1)
+        assert whole == (missed <= max_misses)
+
+
+def test_a_line_ends_about_the_vertex_and_the_next_begins_there():
+    angles = fan(20)
+    scan = scan_of(vertex(angles, 3.0, 90, convex=False), angles)
+    (_, end), (begin, last) = tracked(scan, Extractor("line_tracking", noise=NOISE))
+    assert begin == end + 1
+    assert last == len(angles) - 1
+    assert 0 <= end - len(angles) // 2 <= 4  # It runs past, where both walls are near.
+    # Merging moves the border to where it belongs.
+    (corner,) = Extractor("line_tracking", noise=NOISE)(scan).corners
+    assert abs(corner["beam"] - len(angles) // 2) <= 1
+
+
+# Hough transform
+
+
+@pytest.mark.parametrize("angles", [4, 45, 180])
+@pytest.mark.parametrize("normal", [0.0, 7.3, -33.0])
+def test_line_does_not_depend_on_the_directions_voted_for(angles, normal):
+    """The peak is only where the search begins; with four directions, up to 22° off."""
+    bearings = fan(30)
+    scan = scan_of(wall(bearings, 2.0, normal), bearings)
+    (line,) = Extractor(Hough(angles=angles, min_points=6), noise=NOISE)(scan).segments
+    assert line["n_points"] == len(bearings)
+    assert math.degrees(line["angle"]) == pytest.approx(90 + normal, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1e-6, 1e9, 1e60, 1e150, 1e200, 1.7e308])
+def test_clusters_of_any_size_stay_within_the_accumulator(size):
+    bearings = fan(30)
+    for ranges in (np.full(len(bearings), size), size * np.cos(bearings)):
+        features = Extractor(Hough(angles=36), noise=NOISE)(scan_of(ranges, bearings))
+        assert len(features.clusters) == len(bearings)
+
+
+# RANSAC
+
+
+def test_seed_is_all_that_changes_the_draws():
+    angles = fan(60)
+    ranges = np.minimum(wall(angles, 2.0, 0.0), wall(angles, 2.5, 60.0))
+    scan = scan_of(ranges + 0.03 * np.random.default_rng(1).normal(size=len(angles)), angles)
+    cuts = {
+        Extractor(Ransac(trials=1, seed=s), noise=NOISE)(scan).segments.tobytes()
+        for s in (1, 1, 7, 7, 99)
+    }
+    assert 1 < len(cuts) <= 3
+
+
+# Region growing, and what is too small
+
+
+def test_seed_takes_consecutive_points_near_their_line():
+    angles = fan(20)
+    ranges = wall(angles, 2.0, 0.0)
+    ranges[::5] += 0.2  # No six in a row are straight.
+    scan = scan_of(ranges, angles)
+    assert len(Extractor(RegionGrowing(), noise=NOISE)(scan).segments) == 0
+    assert len(Extractor(RegionGrowing(s_num=3, p_min=3), noise=NOISE)(scan).segments) > 0
+
+
+@pytest.mark.parametrize(("delta", "lost"), [(0.5, 0), (0.02, 1)])
+def test_predicted_point_stops_what_the_distance_lets_pass(delta, lost):
+    """On a wall at 70° incidence a point 2 cm off the line is 5 cm off along its beam."""
+    angles = math.radians(70) + fan(4)
+    ranges = wall(angles, 0.5, 0.0)
+    ranges[-1] += 0.05
+    method = RegionGrowing(epsilon=0.03, delta=delta)
+    found = Extractor(method, noise=RangeNoise(sigma=0.001))(scan_of(ranges, angles))
+    assert found.segments["n_points"].tolist() == [len(angles) - lost]
+
+
+@pytest.mark.parametrize(
+    ("name", "points", "length"),
+    [
+        ("region_growing", "p_min", "l_min"),
+        ("hough", "min_points", "min_length"),
+        ("ransac", "min_points", "min_length"),
+    ],
+)
+def test_pieces_of_few_points_and_short_ones_are_left_out(name, points, length):
+    angles = fan(3)  # 19 beams over 0.21 m.
+    scan = LaserScan(wall(angles, 2.0, 0.0), angles=angles)
+    for parameters, expected in (
+        ({points: 19}, 1),
+        ({points: 20}, 0),
+        ({length: 0.2}, 1),
+        ({length: 0.22}, 0),
+    ):
+        assert len(Extractor(name, noise=NOISE, **parameters)(scan).segments) == expected

@@ -1,0 +1,407 @@
+"""The codec of ROS messages: by hand, and as rosbags and LaserScan.from_message have them."""
+
+import math
+import struct
+from functools import partial
+
+import numpy as np
+import pytest
+import ros_bags
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lineament import LaserScan
+from lineament.rosmsg import definitions
+from lineament.rosmsg.poses import Odometry, odometry, stamped_poses
+from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
+from lineament.rosmsg.wire import WireReader, WireWriter
+
+both = pytest.mark.parametrize(("ros", "encoding"), [(1, "ros1"), (2, "cdr")])
+floats = st.floats(width=32)
+texts = st.text(st.characters(exclude_characters="\0", exclude_categories=("Cs",)), max_size=9)
+
+
+# --- the wire
+
+
+def packed(encoding, *fields):
+    """Bytes of calls (method, arguments ...), without the beginning of CDR."""
+    writer = WireWriter(encoding)
+    for name, *arguments in fields:
+        getattr(writer, name)(*arguments)
+    assert writer.data == {"cdr": b"\0\1\0\0", "ros1": b""}[encoding] + writer.body
+    return writer.body
+
+
+TABLE = np.arange(6, dtype="<f4").reshape(2, 3)
+ONE = b"\0\0\0\0\0\0\xf0\x3f"
+BYTE = ("numbers", "B", 7)
+
+
+@pytest.mark.parametrize(
+    ("fields", "cdr", "ros1"),
+    [
+        # Numbers are aligned to their size in CDR.
+        ([BYTE, ("numbers", "d", 1.0)], b"\7" + bytes(7) + ONE, b"\7" + ONE),
+        ([BYTE, ("numbers", "I", 2)], b"\7\0\0\0\2\0\0\0", b"\7\2\0\0\0"),
+        (
+            [("numbers", "iI", -1, 2), BYTE],
+            b"\xff" * 4 + b"\2\0\0\0\7",
+            b"\xff" * 4 + b"\2\0\0\0\7",
+        ),
+        # Strings end with a null byte that counts in CDR; half of a pair is no character.
+        ([("text", "hé")], b"\4\0\0\0h\xc3\xa9\0", b"\3\0\0\0h\xc3\xa9"),
+        ([("text", "")], b"\1\0\0\0\0", bytes(4)),
+        ([("text", "\ud800")], b"\2\0\0\0?\0", b"\1\0\0\0?"),
+        (
+            [("header", 7, 9, "ab")],
+            b"\7\0\0\0\t\0\0\0\3\0\0\0ab\0",
+            bytes(4) + b"\7\0\0\0\t\0\0\0\2\0\0\0ab",
+        ),
+        # Elements are aligned where there are some, and written row by row.
+        ([("sequence", np.ones((1, 1)))], b"\1" + bytes(7) + ONE, b"\1\0\0\0" + ONE),
+        ([("sequence", np.ones((0, 2)))], bytes(4), bytes(4)),
+        ([BYTE, ("raw", b"ab", 4)], b"\7\0\0\0ab", b"\7ab"),
+        ([BYTE, ("raw", b"", 4)], b"\7", b"\7"),
+        ([("array", TABLE)], TABLE.tobytes(), TABLE.tobytes()),
+        ([("array", TABLE[:, ::2])], TABLE[:, ::2].tobytes(), TABLE[:, ::2].tobytes()),
+    ],
+)
+def test_bytes_by_hand(fields, cdr, ros1):
+    assert packed("cdr", *fields) == cdr
+    assert packed("ros1", *fields) == ros1
+
+
+numbers = st.one_of(
+    st.tuples(st.just("B"), st.tuples(st.integers(0, 255))),
+    st.tuples(st.just("I"), st.tuples(st.integers(0, 2**32 - 1))),
+    st.tuples(st.just("II"), st.tuples(*[st.integers(0, 2**32 - 1)] * 2)),
+    st.tuples(st.just("7d"), st.tuples(*[st.floats(allow_nan=False)] * 7)),
+)
+lists = st.lists(st.floats(width=32, allow_nan=False), max_size=9)
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "ros1"])
+@given(st.integers(0, 2**31 - 1), st.lists(st.one_of(numbers, texts, lists), max_size=12))
+def test_what_is_written_is_read(encoding, stamp, fields):
+    writer = WireWriter(encoding)
+    writer.header(stamp, 5, "laser")
+    for field in fields:
+        if isinstance(field, str):
+            writer.text(field)
+        elif isinstance(field, list):
+            writer.sequence(np.array(field, "<f4"))
+        else:
+            writer.numbers(field[0], *field[1])
+    reader = WireReader(writer.data, encoding)
+    time, frame = reader.header()
+    assert (math.floor(time), frame) == (stamp, "laser")
+    for field in fields:
+        if isinstance(field, str):
+            assert reader.text() == field
+        elif isinstance(field, list):
+            assert reader.floats(reader.count()).tolist() == field
+        else:
+            assert reader.numbers(field[0]) == field[1]
+    reader.end()
+
+
+def test_unknown_encodings():
+    for make in (WireWriter, partial(WireReader, b""), partial(laser_scan, b"")):
+        with pytest.raises(ValueError, match="encoding is 'xcdr2', expected ros1 or cdr"):
+            make("xcdr2")
+    for data in (b"\0\7\0\0", b"\0\1\0"):
+        with pytest.raises(ValueError, match=f"begins with '{data.hex()}', expected plain CDR"):
+            WireReader(data, "cdr")
+
+
+# --- definitions
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_definitions_are_those_of_rosbags(ros):
+    kinds = definitions._types(ros)
+    assert {"sensor_msgs/LaserScan", "visualization_msgs/MarkerArray"} < kinds.keys()
+    for kind in kinds:
+        name = kind.replace("/", "/msg/")
+        text, _ = ros_bags.store(ros).generate_msgdef(name, ros_version=ros)
+        assert definitions.definition(kind, ros) == text
+
+
+# --- LaserScan
+
+
+def assert_same(scan: LaserScan, expected: LaserScan) -> None:
+    for name in ("angle_min", "angle_increment", "range_min", "range_max", "stamp", "frame_id"):
+        assert getattr(scan, name) == getattr(expected, name), name
+    for name in ("scan_time", "time_increment", "is_regular", "pose"):
+        assert getattr(scan, name) == getattr(expected, name), name
+    np.testing.assert_array_equal(scan.ranges, expected.ranges)
+    np.testing.assert_equal(scan.intensities, expected.intensities)
+
+
+@both
+@settings(max_examples=60)
+@given(st.lists(floats, min_size=1, max_size=20), texts, st.integers(0, 2**31 - 1), st.booleans())
+def test_laser_scan_is_what_rosbags_makes_of_it(
+    ros, encoding, ranges, frame, stamp, has_intensities
+):
+    intensities = ranges[::-1] if has_intensities else ()
+    fields = {"time_increment": 1e-5, "scan_time": 0.1}
+    message = ros_bags.Messages(ros).scan(stamp + 0.25, ranges, intensities, frame, **fields)
+    data = ros_bags.serialized(message, ros)
+    types = ros_bags.store(ros)
+    read = types.deserialize_ros1 if ros == 1 else types.deserialize_cdr
+    expected = LaserScan.from_message(read(data, message.__msgtype__))
+    assert_same(laser_scan(data, encoding), expected)
+    assert_same(laser_scan(memoryview(data), encoding), expected)
+
+
+def test_cdr_of_the_other_byte_order():
+    message = ros_bags.Messages(2).scan(7.5, [1.0, math.inf, 3.0], [9.0, 8.0, 7.0])
+    little, big = (
+        bytes(
+            ros_bags.store(2).serialize_cdr(message, message.__msgtype__, little_endian=is_little)
+        )
+        for is_little in (True, False)
+    )
+    assert little[:2] != big[:2]
+    assert_same(laser_scan(big, "cdr"), laser_scan(little, "cdr"))
+
+
+@both
+def test_a_scanner_that_turns_clockwise(ros, encoding):
+    fields = {"angle_min": 1.0, "angle_increment": -0.5, "time_increment": 0.25}
+    message = ros_bags.Messages(ros).scan(10.0, [1.0, 2.0, 4.0], [10.0, 20.0, 40.0], **fields)
+    scan = laser_scan(ros_bags.serialized(message, ros), encoding)
+    assert scan.ranges.tolist() == [4.0, 2.0, 1.0]
+    assert scan.intensities.tolist() == [40.0, 20.0, 10.0]
+    assert scan.angles.tolist() == [0.0, 0.5, 1.0]
+    # The beam at bearing 1 is the first in time: 10 s.
+    assert (scan.stamp, scan.time_increment) == (10.5, -0.25)
+
+
+def scan_bytes(ranges=(1.0, 2.0), **fields):
+    return ros_bags.serialized(ros_bags.Messages(2).scan(1.0, ranges, **fields), 2)
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"ranges": []}, "ranges is empty, expected at least one beam"),
+        ({"angle_increment": math.nan}, "angle_increment is nan"),
+        ({"angle_increment": 0.0}, "angle_increment is 0.0, expected > 0"),
+        ({"angle_min": math.inf}, "angle_min is inf"),
+        ({"angle_increment": 10.0}, "more than once around"),
+        ({"range_min": -1.0}, "range_min is -1.0"),
+        ({"range_max": math.nan}, "range_max is nan"),
+        ({"intensities": [1.0]}, "intensities has 1 values, expected 2"),
+    ],
+)
+def test_scans_that_make_no_sense(fields, problem):
+    with pytest.raises(ValueError, match=problem):
+        laser_scan(scan_bytes(**fields), "cdr")
+
+
+def test_oddities_of_bytes():
+    signalling = scan_bytes().replace(struct.pack("<f", 2.0), b"\x01\0\x80\x7f")
+    np.testing.assert_array_equal(laser_scan(signalling, "cdr").ranges, [1.0, math.nan])
+    assert len(laser_scan(scan_bytes() + b"\0\0\0", "cdr")) == 2
+    with pytest.raises(ValueError, match="has 4 bytes behind its last field"):
+        laser_scan(scan_bytes() + b"\0\0\0\0", "cdr")
+
+
+# --- damage
+
+
+def all_messages(ros):
+    """A message of each type with what decodes it, and how many bytes at its end are not read."""
+    messages = ros_bags.Messages(ros)
+    points = np.ones((2, 2), dtype=[("x", "f4"), ("y", "f4"), ("ring", "u2")])
+    points["x"] = [[1, 2], [3, 4]]
+    for message, read, unread in (
+        (messages.scan(1.0, [1.0, 2.0], [3.0, 4.0]), laser_scan, 0),
+        (messages.echoes(1.0, [[1.0], [2.0, 3.0]], [[1.0], [2.0, 3.0]]), multi_echo_scan, 0),
+        (messages.cloud(1.0, points), partial(ring_scan, ring=1), 4),
+        (messages.odometry(1.0, 1.0, 2.0, 3.0), odometry, 0),
+    ):
+        yield ros_bags.serialized(message, ros), read, unread
+
+
+@both
+def test_every_cut_of_a_message_is_refused(ros, encoding):
+    for data, read, unread in all_messages(ros):
+        read(data, encoding)
+        for end in range(len(data) - max(unread, 1)):
+            with pytest.raises(ValueError, match=r"ends early|expected plain CDR"):
+                read(data[:end], encoding)
+
+
+@both
+@settings(max_examples=150)
+@given(place=st.integers(0, 10_000), word=st.integers(0, 2**32 - 1))
+def test_any_word_may_be_wrong(ros, encoding, place, word):
+    """Nothing but ValueError, and no memory beyond the message, whatever the lengths say."""
+    for data, read, _ in all_messages(ros):
+        changed = bytearray(data)
+        struct.pack_into("<I", changed, place % (len(data) - 4), word)
+        try:
+            found = read(bytes(changed), encoding)
+        except ValueError as error:
+            assert "\n" not in str(error)  # noqa: PT017
+        else:
+            assert 1 <= len(found) <= len(data)
+
+
+# --- MultiEchoLaserScan
+
+
+ECHOES = [[1.0, 2.0, 3.0], [], [4.0], [6.0, 5.0]]
+STRENGTHS = [[10.0, 30.0, 20.0], [], [1.0], [7.0, 7.0]]
+
+
+@both
+@pytest.mark.parametrize(
+    ("echo", "ranges", "intensities"),
+    [
+        ("first", [1.0, math.nan, 4.0, 6.0], [10.0, math.nan, 1.0, 7.0]),
+        ("last", [3.0, math.nan, 4.0, 5.0], [20.0, math.nan, 1.0, 7.0]),
+        ("strongest", [2.0, math.nan, 4.0, 6.0], [30.0, math.nan, 1.0, 7.0]),
+    ],
+)
+def test_echoes(ros, encoding, echo, ranges, intensities):
+    messages = ros_bags.Messages(ros)
+    data = ros_bags.serialized(messages.echoes(5.5, ECHOES, STRENGTHS), ros)
+    scan = multi_echo_scan(data, encoding, echo)
+    np.testing.assert_array_equal(scan.ranges, ranges)
+    np.testing.assert_array_equal(scan.intensities, intensities)
+    assert scan.stamp == 5.5
+    scan = multi_echo_scan(ros_bags.serialized(messages.echoes(5.5, ECHOES), ros), encoding, echo)
+    chosen = [1.0, math.nan, 4.0, 6.0] if echo == "strongest" else ranges
+    np.testing.assert_array_equal(scan.ranges, chosen)
+    assert scan.intensities is None
+
+
+def read_echoes(*beams, echo="strongest"):
+    data = ros_bags.serialized(ros_bags.Messages(2).echoes(1.0, *beams), 2)
+    return multi_echo_scan(data, "cdr", echo)
+
+
+def test_echoes_that_are_strange():
+    assert np.isnan(read_echoes([[], []], echo="last").ranges).all()
+    with pytest.raises(ValueError, match="ranges is empty"):
+        read_echoes([])
+    with pytest.raises(ValueError, match="other numbers of echoes than ranges"):
+        read_echoes([[1.0], [2.0]], [[1.0, 2.0], []])
+    for strengths, expected in (([math.nan], 1.0), ([math.nan, -5.0], 2.0)):
+        beam = [1.0, 2.0][: len(strengths)]
+        assert read_echoes([beam], [strengths]).ranges.tolist() == [expected]
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.lists(st.tuples(st.integers(1, 99), st.integers(1, 5)), max_size=4),
+        min_size=1,
+        max_size=12,
+    )
+)
+def test_strongest_echo_is_that_of_a_loop(beams):
+    ranges, strengths = ([[float(e[i]) for e in beam] for beam in beams] for i in (0, 1))
+    expected = [max(beam, key=lambda echo: echo[1])[0] if beam else math.nan for beam in beams]
+    np.testing.assert_array_equal(read_echoes(ranges, strengths).ranges, expected)
+
+
+# --- PointCloud2
+
+
+def cloud(points, ros=2, big_endian=False):
+    return ros_bags.serialized(ros_bags.Messages(ros).cloud(3.5, points, big_endian), ros)
+
+
+@both
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_ring_of_a_cloud(ros, encoding, order):
+    points = np.array(
+        [[
+            (0.0, 2.0, 9.0, 50.0, 1),
+            (1.0, 0.0, 9.0, 60.0, 1),
+            (5.0, 5.0, 9.0, 70.0, 0),
+            (0.0, 1.0, 9.0, 80.0, 1),  # nearer at the same bearing
+            (math.nan, 1.0, 9.0, 90.0, 1),
+            (-3.0, -3.0, 9.0, 40.0, 1),
+        ]],
+        dtype=[(n, order + "f4") for n in ("x", "y", "z", "intensity")] + [("ring", order + "u2")],
+    )  # fmt: skip
+    data = cloud(points, ros, order == ">")
+    scan = ring_scan(data, encoding, 1)
+    np.testing.assert_allclose(scan.angles, [-0.75 * math.pi, 0.0, 0.5 * math.pi])
+    np.testing.assert_allclose(scan.ranges, [math.hypot(3, 3), 1.0, 1.0])
+    assert scan.intensities.tolist() == [40.0, 60.0, 80.0]
+    assert (scan.stamp, scan.frame_id, scan.is_regular) == (3.5, "laser", False)
+    with pytest.raises(ValueError, match="has no points in ring 7, its rings are 0 to 1"):
+        ring_scan(data, encoding, 7)
+
+
+def test_rows_of_an_organised_cloud_are_its_rings():
+    points = np.zeros((2, 3), dtype=[("x", "f8"), ("y", "f8")])
+    points["x"] = [[1, 2, 3], [4, 5, 6]]
+    points["y"] = [[-1, 0, 1], [-1, 0, 1]]
+    scan = ring_scan(cloud(points), "cdr", 1)
+    np.testing.assert_allclose(scan.ranges, np.hypot([4, 5, 6], [-1, 0, 1]))
+    with pytest.raises(ValueError, match="has no field ring and a single row"):
+        ring_scan(cloud(points[:1]), "cdr", 0)
+    with pytest.raises(ValueError, match=r"has no points in ring 2$"):
+        ring_scan(cloud(points), "cdr", 2)
+
+
+def test_clouds_without_what_is_needed():
+    points = np.ones((1, 2), dtype=[("x", "f4"), ("ring", "u1"), ("y", "f4")])
+    with pytest.raises(ValueError, match="has fields ring, expected x and y"):
+        ring_scan(cloud(points[["ring"]]), "cdr", 1)
+    with pytest.raises(ValueError, match="has 0 bytes in 1 rows"):
+        ring_scan(cloud(points[:, :0]), "cdr", 1)
+    message = ros_bags.Messages(2).cloud(3.5, points)
+    for name, value, problem in (
+        ("offset", 6, "field y reaches past the 9 bytes of a point"),
+        ("datatype", 9, "field y has type 9, expected 1 to 8"),
+        ("datatype", 0, "field y has type 0, expected 1 to 8"),
+    ):
+        good = getattr(message.fields[2], name)
+        object.__setattr__(message.fields[2], name, value)
+        with pytest.raises(ValueError, match=problem):
+            ring_scan(ros_bags.serialized(message, 2), "cdr", 1)
+        object.__setattr__(message.fields[2], name, good)
+
+
+# --- poses
+
+
+@both
+def test_poses_of_all_types(ros, encoding):
+    messages = ros_bags.Messages(ros)
+    for kind, maker, frame, child in (
+        ("geometry_msgs/PoseStamped", messages.pose_stamped, "map", ""),
+        ("geometry_msgs/PoseWithCovarianceStamped", messages.pose_with_covariance, "map", ""),
+        ("nav_msgs/Odometry", messages.odometry, "odom", "base_link"),
+    ):
+        data = ros_bags.serialized(maker(7.5, 1.0, 2.0, -3.0), ros)
+        (found,) = stamped_poses(data, encoding, kind)
+        assert found[:3] == (7.5, frame, child)
+        assert found.pose == pytest.approx((1.0, 2.0, -3.0))
+    links = [messages.transform(i, "a", f"b{i}", i, 0.0, 0.5) for i in range(3)]
+    data = ros_bags.serialized(messages.transforms(*links), ros)
+    found = list(stamped_poses(data, encoding, "tf2_msgs/TFMessage"))
+    assert [link[:3] for link in found] == [(i, "a", f"b{i}") for i in range(3)]
+    assert [link.pose for link in found] == [pytest.approx((i, 0.0, 0.5)) for i in range(3)]
+
+
+@both
+def test_odometry(ros, encoding):
+    messages = ros_bags.Messages(ros)
+    found = odometry(ros_bags.serialized(messages.odometry(7.5, 1.0, 2.0, 3.0), ros), encoding)
+    pose = pytest.approx((1.0, 2.0, 3.0))
+    assert found == Odometry(7.5, (1.5, -0.5, 0.25), pose, "odom", "base_link")
+    for x in (math.nan, -math.inf):
+        with pytest.raises(ValueError, match=r"has pose .* and twist .*, expected finite numbers"):
+            odometry(ros_bags.serialized(messages.odometry(7.5, x, 2.0, 3.0), ros), encoding)
