@@ -256,6 +256,13 @@ def test_limits(range_min, range_max):
     np.testing.assert_array_equal(ranges, np.where(within, truth, INF))
 
 
+def test_a_range_at_the_upper_limit_is_not_reported():
+    at_limit = (ring_sensor(range_min=low, range_max=high) for low, high in ((0, 2), (2, 3)))
+    near, far = (s.scan(drum(2), (0, 0, 0), np.random.default_rng(0)).ranges for s in at_limit)
+    assert np.isinf(near).all()
+    assert (far == 2).all()
+
+
 def test_mixed_pixels_only_across_occlusion_edges():
     divergence = 0.01
     sensor, pose = ring_sensor(mixed_pixel=divergence), (0.3, 0.2, 0.1)

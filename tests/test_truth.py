@@ -111,12 +111,12 @@ CASES = {
         lines(box(2, -0.5, 3, 0.5)), ORIGIN, fan(40),
         [(2, -0.5, 2, 0.5, 26, 53)], [], scan_ends(26, 53),
     ),
-    # Straight through (2, ±0.5), where both sides of the box are met.
+    # Straight through (2, 0), where the front and the hidden side of the block are met.
     **{
-        f"beams through the vertices of a box, {order}": (
-            lines(box(2, -0.5, 3, 0.5)[::order]), ORIGIN,
-            Sensor("through", 41, -20 * math.atan(0.25) / 8, math.atan(0.25) / 8, noise=NOISE),
-            [(2, -0.5, 2, 0.5, 12, 28)], [], scan_ends(12, 28),
+        f"a beam through the end of a hidden wall, {order}": (
+            lines([(2, 0), (2, 1), (3, 1), (3, 0.2), (2, 0)][::order]), ORIGIN,
+            Sensor("through", 81, -40 * STEP, STEP, noise=NOISE),
+            [(2, 0, 2, 1, 40, 66)], [], scan_ends(40, 66),
         )
         for order in (1, -1)
     },
