@@ -18,7 +18,7 @@ PAGES = [
 ]
 #: Words that a roboticist would have to translate; the glossary in CONTRIBUTING has the field's.
 PRIVATE = re.compile(
-    r"\b(tells?|told|telling|is none|of its own|of their own|made straight)\b", re.I
+    r"\b([Tt]ells?(?! apart)|[Tt]old|(?<!there )is none|of (its|their) own|made straight)\b"
 )
 
 

@@ -63,7 +63,7 @@ class FloorPlan:
         lengths = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
         offset, angle = covariance[:, 0, 0], covariance[:, 1, 1]
         is_sure = offset + (lengths / 2) ** 2 * angle <= OFFSET**2
-        good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN is none of these
+        good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN fails all of these
         self._add_lines(lines[good], 3 * np.sqrt(np.maximum(angle[good], (ANGLE / 3) ** 2)))
         corners = features.corners
         is_edge = corners["kind"] == "edge"
