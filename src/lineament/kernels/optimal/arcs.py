@@ -154,7 +154,7 @@ def is_on(points, arc, i, noise, scale):
 
 @sums
 def fit_arc(points, first, last, noise, steps, piece):
-    """Fit a circle to the measurements first … last. Returns its χ², inf where there is none.
+    """Fit a circle to the measurements first … last. Returns its χ², inf where no circle fits.
 
     From that of least squares of |p - c|² - r² (Kåsa 1976) to that of least Σ (|p - c| - r)²/v by
     Gauss and Newton. A range moves a point along the normal by its cos ψ, and no less than the
