@@ -78,6 +78,19 @@ def test_vertex_is_found_and_no_beam_lost(extractor, opening, convex, sigma):
     assert abs(corner["beam"] - len(angles) // 2) <= (1 if exact else 4)
 
 
+@pytest.mark.parametrize("name", ["iepf", "split_and_merge", "line_tracking"])
+def test_measurements_next_to_a_corner_are_left_out(name):
+    angles = fan(20)
+    ranges = vertex(angles, 3.0, 90, convex=False)
+    ranges[len(angles) // 2] += 0.02  # The vertex itself is a little off.
+    off = []
+    for trim in (0, 3):
+        extractor = Extractor(name, noise=NOISE, corner_trim=trim)
+        (corner,) = extractor(scan_of(ranges, angles)).corners
+        off.append(math.dist(corner["position"], (3.0, 0.0)))
+    assert off[1] < 1e-9 < 1e-4 < off[0]
+
+
 @pytest.mark.parametrize("arm", [6, 12, 24])
 def test_an_unequal_l_is_split(extractor, arm):
     """The point farthest from one line through all is the end of the shorter arm."""

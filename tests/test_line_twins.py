@@ -313,6 +313,13 @@ def test_seed_takes_consecutive_points_near_their_line():
     assert len(Extractor(RegionGrowing(s_num=3, p_min=3), noise=NOISE)(scan).segments) > 0
 
 
+@pytest.mark.parametrize("seed", [24, 129, 192])
+def test_a_region_grows_back_into_the_one_before_but_not_over_it(seed):
+    """Scenes in which the smallest regions would swallow those before them."""
+    method = RegionGrowing(s_num=3, p_min=3, sigmas=1.0, epsilon=0.003)
+    assert assert_same_pieces(method, random_scan(seed, 120), grow) > 0
+
+
 @pytest.mark.parametrize(("delta", "lost"), [(0.5, 0), (0.02, 1)])
 def test_predicted_point_stops_what_the_distance_lets_pass(delta, lost):
     """On a wall at 70° incidence a point 2 cm off the line is 5 cm off along its beam."""
