@@ -12,10 +12,8 @@ from handmade import corner, features
 import lineament as ln
 from lineament.evaluation import Counts, FeatureScores, Scores, SimilarityScores, evaluate
 from lineament.evaluation.consistency import NormalisedErrors
-from lineament.evaluation.tracking import motion_errors, track_scores
 from lineament.logs import save_npz
 from lineament.methods import METHODS
-from lineament.motion import Tracker
 from lineament.output import canvas, drawing
 from lineament.reproduce import (
     EXPERIMENTS,
@@ -444,10 +442,6 @@ class TestTexts:
         assert list(times.values()) == ["9.6 – 25.3", "1.0 – 3.0"]
         assert success._row("hough", 2, counts, "corners")["paper: success"] is None
 
-    def test_paper_is_compared_with_its_literal_pipeline_too(self):
-        assert similarity.PAPER[similarity.FILTERED] == similarity.PAPER[contenders.LIU_PAPER]
-        assert layers.PAPER["liu:paper"] == layers.PAPER["liu"]
-
 
 @pytest.mark.parametrize("errors", [[0.0, 0.02, np.nan], [3.0, 0.1, 0.1], [np.nan] * 3])
 def test_axis_of_errors_is_the_same_for_all_methods(errors):
@@ -483,17 +477,6 @@ class TestTracking:
             assert motions[name]["way_median"] < 0.01
         assert motions["features"]["unobserved"] == 0
         assert tracks["features"]["segments"]["kept"] > 0.95
-
-    @pytest.mark.slow
-    def test_a_recorded_arena_is_followed(self, data_dir):
-        file, skipped = tracking.LOGS["arena, moving"]
-        recording = tracking.load_recording(data_dir / file, 40, skipped)
-        extract, tracker = ln.Extractor(), Tracker()
-        frames = [extract(scan) for scan in recording.scans]
-        tracks = [tracker(found) for found in frames]
-        errors = motion_errors([t.motion.pose for t in tracks[1:]], recording.poses)
-        assert np.median(errors.ways) < 0.01
-        assert track_scores(frames, tracks, recording.poses)["segments"].summary()["kept"] > 0.85
 
 
 class TestReal:
@@ -553,8 +536,6 @@ class TestReal:
             *real.FREE_SPACE,
             "Standing still: segments, by measurements",
             "Standing still: corners, by measurements",
-            "Standing still: segments of optimal, by recording",
-            "Standing still: corners of optimal, by recording",
             "Wedge: repeated corners, ranked by quality",
             "Wedge: features but edges found again",
             "Corners of optimal found again [%], by their quality",
@@ -578,10 +559,3 @@ class TestReal:
         assert list(findings.numbers["repeats"]) == list(logs)
         assert list(findings.numbers["arena"]) == list(real.ARENAS)
         json.dumps(findings.to_dict(), allow_nan=False)
-
-
-def test_errors_of_ranges_do_not_depend_on_the_seed_of_another_frame():
-    """The same scene and number give the same frame."""
-    frames = [noise._frame(room(), (0.0, 0.0, 0.0), 3) for _ in range(2)]
-    assert np.array_equal(*(frame.scan.ranges for frame in frames))
-    assert replace(noise.SENSOR, outlier=0.0) == PAPER

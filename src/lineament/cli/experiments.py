@@ -1,6 +1,4 @@
-"""The commands that compare, measure and simulate. What they call is imported when they run."""
-
-from __future__ import annotations
+"""The commands that compare, measure and simulate. Each imports what it calls when it runs."""
 
 from pathlib import Path
 from typing import Any
@@ -9,37 +7,25 @@ import click
 
 from .options import KEEP_GOING, LOG, PATH, QUIET, SCAN, TOPIC, check_ending, wrong_usage
 
-__all__ = ["bench", "compare", "reproduce", "simulate"]
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 
 
 @click.command()
 @LOG
 @SCAN
-@click.option(
-    "-m", "--method", "methods", multiple=True, help="May be given again.  [default: all]"
-)
+@click.option("-m", "--method", "methods", multiple=True, help="Repeatable.  [default: all]")
 @click.option("-o", "--output", required=True, type=PATH, help="A picture (.png …) or .html.")
 @TOPIC
 @KEEP_GOING
 @QUIET
-def compare(
-    log: Path,
-    index: int,
-    methods: tuple[str, ...],
-    output: Path,
-    topic: str | None,
-    keep_going: bool,
-    quiet: bool,
-) -> None:
+def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) -> None:
     """Put methods side by side on a scan of LOG."""
     from ..reproduce.compare import ENDINGS, compare_log, write_comparison
     from .progress import tracker
 
     check_ending(output, ENDINGS)
     with wrong_usage():
-        comparison = compare_log(
-            log, index, methods, topic=topic, keep_going=keep_going, track=tracker(quiet)
-        )
+        comparison = compare_log(log, index, **options, track=tracker(quiet))
     write_comparison(comparison, output)
     if not quiet:
         click.echo(str(comparison.table()))
@@ -48,20 +34,15 @@ def compare(
 @click.command()
 @click.option("-o", "--output", required=True, type=PATH, help="Folder to write to.")
 @click.option(
-    "--only",
-    "names",
+    *("--only", "names"),
     metavar="NAME...",
     multiple=True,
-    help="An experiment, or a figure or table of the paper: fig9, table3; may be given again.",
+    help="An experiment, or a figure or table of the paper: fig9, table3. Repeatable.",
 )
 @click.option(
-    "--frames",
-    type=click.IntRange(min=1),
-    default=10,
-    show_default=True,
-    help="Scans of each kind.",
+    "--frames", type=click.IntRange(min=1), default=10, show_default=True, help="Scans a kind."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@SEED
 @click.option(
     "--data",
     envvar="LINEAMENT_DATA",
@@ -72,7 +53,7 @@ def compare(
 def reproduce(
     output: Path, names: tuple[str, ...], frames: int, seed: int, data: Path | None, quiet: bool
 ) -> None:
-    """Make the paper's experiments again: a page and all figures as JSON."""
+    """Run the paper's experiments: a page, and all numbers as JSON."""
     from ..reproduce import Setting, experiment_names
     from ..reproduce.report import reproduce
     from .progress import status
@@ -92,7 +73,7 @@ def bench() -> None:
 
 @bench.command()
 @click.option("--data", required=True, type=PATH, help="Half a benchmark, .npz.")
-@click.option("-m", "--method", "methods", required=True, multiple=True, help="May be given again.")
+@click.option("-m", "--method", "methods", required=True, multiple=True, help="Repeatable.")
 @click.option("--sparing", is_flag=True, help="As many vertices as there is evidence for, up to J.")
 @click.option("--json", "output", type=PATH, help="File for all scores, of one method.")
 @QUIET
@@ -126,7 +107,7 @@ def ple(
 @click.option("-o", "--output", required=True, type=PATH, help="Log to write: .npz, .log, .log.gz.")
 @click.option("--sensor", "name", default="utm30lx", show_default=True, help="Preset of a scanner.")
 @click.option("--scans", type=click.IntRange(min=1), help="[default: the whole drive, or 100]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@SEED
 @click.option("--speed", type=float, default=0.6, show_default=True, help="Of the drive [m/s].")
 @click.option("--rate", type=float, help="Scans a second.  [default: the sensor's]")
 @click.option("--moving", is_flag=True, help="Move while the scanner sweeps.")

@@ -81,18 +81,10 @@ def compare_scan(
     title: str = "Methods side by side",
     track: Track = untracked,
 ) -> Comparison:
-    """Compare methods on a scan.
+    """Compare methods on a scan: extractors, or any functions from a scan to features, by name.
 
-    Parameters
-    ----------
-    scan : LaserScan
-    extractors : mapping of str to callable
-        What to compare, by name: an `Extractor`, or any function from a scan to features.
-    timed : iterable of LaserScan
-        Scans to time them on; none: the scan itself.
-    title : str
-    track : callable
-        ``track(methods, about, total)`` iterates over the methods and shows the progress.
+    They are timed on the scans `timed`, or on the scan itself; ``track(methods, about, total)``
+    iterates over the methods and shows the progress.
 
     Examples
     --------

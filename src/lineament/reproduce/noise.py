@@ -34,7 +34,7 @@ Mask = NDArray[np.bool_]
 
 _NAMES = {
     "planes": "on planes",
-    "edges": "two beams on either side of an edge",
+    "edges": "two on either side of an edge",
     "corners": "nearest to a corner",
 }
 _RANGES = {

@@ -27,7 +27,7 @@ from .contenders import feature_methods
 from .findings import NO_RECORDINGS, Columns, Findings, Progress, Setting, Table, each
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
-#: Method of the tables by recording.
+#: Method whose quality is compared with the repeats.
 SHOWN = "optimal"
 #: Logs with corrected poses, in which corners are looked for again.
 LOGS = {
@@ -227,26 +227,19 @@ def _free_space_tables(scored: Scored[FreeSpaceScores]) -> list[Table]:
 
 
 def _standing_tables(scored: Scored[StandingScores]) -> list[Table]:
-    """Make tables of all methods on all recordings, and of one method by recording."""
-    together = _totals(scored, StandingScores)
-    mine = {log: found[SHOWN] for log, found in scored.items() if SHOWN in found}
-    few = {label: _STANDING[label] for label in ("NEES", "pairs")}
-    tables = []
-    for title, rows, first, shown in (
-        ("{}, by measurements", together, "method", _STANDING),
-        (f"{{}} of {SHOWN}, by recording", mine, "recording", few),
-    ):
-        for kind in ("segments", "corners") if rows else ():
-            records = [
-                {first: name}
-                | {
-                    f"{bin_}: {label}": factor * of[key]
-                    for bin_, of in getattr(scores, kind).bins().items()
-                    for label, (key, factor) in shown.items()
-                }
-                for name, scores in rows.items()
-            ]
-            tables.append(Table.of_records(f"Standing still: {title.format(kind)}", records))
+    """Make tables of all methods on all recordings together, by kind of feature."""
+    totals, tables = _totals(scored, StandingScores), []
+    for kind in ("segments", "corners") if totals else ():
+        records = [
+            {"method": name}
+            | {
+                f"{bin_}: {label}": factor * of[key]
+                for bin_, of in getattr(scores, kind).bins().items()
+                for label, (key, factor) in _STANDING.items()
+            }
+            for name, scores in totals.items()
+        ]
+        tables.append(Table.of_records(f"Standing still: {kind}, by measurements", records))
     return tables
 
 

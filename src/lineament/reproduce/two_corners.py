@@ -39,13 +39,8 @@ def _pose(x: float, y: float, past: float) -> Pose:
 
 
 #: The five places.
-POSES = (
-    _pose(0.7, 0.9, 0.5),
-    _pose(2.0, 0.6, -0.4),
-    _pose(2.9, 1.3, 0.2),
-    _pose(1.4, 2.3, -0.6),
-    _pose(2.6, 2.4, 0.1),
-)
+_PLACES = ((0.7, 0.9, 0.5), (2.0, 0.6, -0.4), (2.9, 1.3, 0.2), (1.4, 2.3, -0.6), (2.6, 2.4, 0.1))
+POSES = tuple(_pose(*place) for place in _PLACES)
 
 #: Distances found from each place [m], by method.
 Distances = Mapping[str, list[Array]]
@@ -84,15 +79,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         {
             "bound": bounds,
             "places": {
-                name: [
-                    {
-                        "mean": float(np.mean(d)) if len(d) else None,
-                        "standard_deviation": _deviation(d),
-                        "found": len(d) / count,
-                    }
-                    for d in distances
-                ]
-                for name, distances in found.items()
+                name: [_numbers(d, count) for d in distances] for name, distances in found.items()
             },
         },
     )
@@ -126,6 +113,12 @@ def found_distances(views: list[Features], pose: Pose) -> Array:
         if all((a <= GATE).any() for a in away):
             distances.append(math.dist(*(positions[a.argmin()] for a in away)))
     return np.array(distances)
+
+
+def _numbers(distances: Array, count: int) -> dict[str, float | None]:
+    mean = float(np.mean(distances)) if len(distances) else None
+    found = len(distances) / count
+    return {"mean": mean, "standard_deviation": _deviation(distances), "found": found}
 
 
 def _deviation(distances: Array) -> float | None:

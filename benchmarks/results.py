@@ -1,0 +1,418 @@
+"""Measures the tables of docs/results.md again and writes them between its marks: make results.
+
+The stamp of the file has a hash of the code that is measured, kernels and methods without comments
+and docstrings: a test compares it, so that no table is older than the code. Recordings come from
+LINEAMENT_DATA.
+"""
+
+import argparse
+import ast
+import hashlib
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = ROOT / "docs" / "results.md", ROOT / "README.md"
+DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
+SEEDS = range(5)
+MEASURED = "kernels", "methods"
+
+Rows = Iterable[Sequence[object]]
+
+
+# What is measured --------------------------------------------------------------------------------
+
+
+def source_hash() -> str:
+    """Return a hash of the syntax of all kernels and methods."""
+    folders = (ROOT / "src" / "lineament" / name for name in MEASURED)
+    files = sorted(path for folder in folders for path in folder.rglob("*.py"))
+    trees = [(path.name, shape(ast.parse(path.read_text(encoding="utf-8")))) for path in files]
+    return hashlib.sha256(repr(trees).encode()).hexdigest()[:16]
+
+
+def shape(node: object) -> object:
+    """Return what a syntax tree means: without docstrings, places in the text, empty fields."""
+    if isinstance(node, list):
+        return [shape(item) for item in node if not is_text(item)]
+    if isinstance(node, ast.AST):
+        fields = [(name, shape(value)) for name, value in ast.iter_fields(node)]
+        return type(node).__name__, [(n, v) for n, v in fields if v is not None and v != []]
+    return repr(node) if node is not None else None
+
+
+def is_text(node: object) -> bool:
+    """Return whether a statement is a mere string: a docstring."""
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def stamp(seconds: float, frames: int) -> str:
+    """Return commit, date, machine, versions and seeds, and the hash of what was measured."""
+    from lineament.reproduce.report import machine
+
+    git = ["git", "-C", str(ROOT)]
+    commit = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
+    dirty = subprocess.run([*git, "status", "--porcelain", "src"], capture_output=True, text=True)
+    return (
+        f"Commit {commit.stdout.strip()}{' with changes' * bool(dirty.stdout.strip())}, "
+        f"{datetime.now(UTC):%Y-%m-%d}, in {seconds / 60:.0f} min on {machine()}, "
+        f"numba {version('numba')}, numpy {version('numpy')}. Seeds {SEEDS[0]} to {SEEDS[-1]}, "
+        f"{frames} frames of each kind. "
+        f"Code measured: `{source_hash()}`."
+    )
+
+
+# Tables ------------------------------------------------------------------------------------------
+
+
+def markdown(columns: Sequence[str], rows: Rows) -> str:
+    """Return a table in Markdown, compact; numbers with three digits."""
+    from lineament.reproduce.findings import cell_text
+
+    lines = [columns, ["---"] * len(columns), *([cell_text(cell) for cell in row] for row in rows)]
+    return "\n".join(f"|{'|'.join(map(str, line))}|" for line in lines)
+
+
+def of_seeds(values: Sequence[float], digits: int = 2) -> str:
+    """Return median and range over the seeds."""
+    numbers = (f"{v:.{digits}f}" for v in (median(values), min(values), max(values)))
+    return "{} ({}–{})".format(*numbers)
+
+
+class Results:
+    """Runs experiments once each, and makes the tables of their numbers."""
+
+    def __init__(self, frames: int) -> None:
+        from lineament.reproduce import Setting
+
+        data = DATA if DATA.is_dir() else None
+        self.settings = [Setting(frames, seed, data) for seed in SEEDS]
+        self.found: dict[tuple[str, int], Any] = {}
+
+    def numbers(self, name: str, seed: int = 0) -> Any:
+        """Return all numbers of an experiment."""
+        if (name, seed) not in self.found:
+            print(f"{name}, seed {seed}", file=sys.stderr, flush=True)
+            module = import_module(f"lineament.reproduce.{name}")
+            findings = module.run(self.settings[seed], str)
+            self.found[name, seed] = findings.numbers
+        return self.found[name, seed]
+
+    def simulation(self) -> str:
+        """All methods with the paper's sensor."""
+        seeds = [self.numbers("all_methods", seed)["paper"] for seed in SEEDS]
+        columns = {
+            "corner F1": "corner_f1_0.10",
+            "error ÷ bound": "corner_over_bound_median",
+            "segment F1": "segment_f1",
+            "clusters right": "partition_success",
+        }
+        rows = [
+            (
+                method,
+                *(
+                    of_seeds([seed[method].get(key, math.nan) for seed in seeds])
+                    for key in columns.values()
+                ),
+            )
+            for method in seeds[0]
+            if method != "pdbs"
+        ]
+        return markdown(("method", *columns), rows)
+
+    def sensors(self) -> str:
+        """F1 of corners of all methods with each sensor, median over the seeds."""
+        seeds = [self.numbers("all_methods", seed) for seed in SEEDS]
+        methods = [method for method in seeds[0]["paper"] if method != "pdbs"]
+        rows = [
+            (
+                m,
+                *(
+                    median(seed[name][m].get("corner_f1_0.10", math.nan) for seed in seeds)
+                    for name in seeds[0]
+                ),
+            )
+            for m in methods
+        ]
+        return markdown(("method", *seeds[0]), rows)
+
+    def optimal(self) -> str:
+        """More numbers of the default method, by sensor."""
+        seeds = [self.numbers("all_methods", seed) for seed in SEEDS]
+        shown = {
+            "corner error ÷ bound, RMS": "corner_over_bound",
+            "corner NEES, mean": "corner_nees",
+            "corner NEES, median": "corner_nees_median",
+            "line offset ÷ bound": "segment_offset_over_bound_median",
+            "line angle ÷ bound": "segment_angle_over_bound_median",
+            "segment NEES, mean": "segment_nees",
+            "segment NEES, median": "segment_nees_median",
+            "arc F1": "arc_f1",
+        }
+        rows = [
+            (
+                label,
+                *(
+                    median(seed[name]["optimal"].get(key, math.nan) for seed in seeds)
+                    for name in seeds[0]
+                ),
+            )
+            for label, key in shown.items()
+        ]
+        return markdown(("optimal", *seeds[0]), rows)
+
+    @staticmethod
+    def middle_of(seeds: Sequence[Any], sensor: str, method: str, key: str) -> float:
+        """Return the median of a number over the seeds."""
+        return median(seed[sensor][method].get(key, math.nan) for seed in seeds)
+
+    def real(self) -> str:
+        """All methods on all recordings, by measures that need no truth."""
+        found = self.numbers("real")
+        free, standing, repeats = (found[k] for k in ("free_space", "standing", "repeats"))
+        rows = [
+            (
+                method,
+                self.total(free, method, "phantom_in_100m"),
+                100 * self.total(free, method, "covered"),
+                *(self.middle(standing, method, kind) for kind in ("segments", "corners")),
+                sum(of[method]["count"] for of in repeats.values()),
+                sum(of[method]["count_without_edges"] for of in repeats.values()),
+            )
+            for method in next(iter(free.values()))
+        ]
+        columns = (
+            *("method", "phantom m in 100 m", "covered [%]", "segment NEES, still"),
+            *("corner NEES, still", "corners repeated", "without edges"),
+        )
+        return markdown(columns, rows)
+
+    @staticmethod
+    def total(found: Mapping[str, Any], method: str, key: str) -> float:
+        """Return the mean of a number over the recordings."""
+        values = [of[method][key] for of in found.values() if key in of[method]]
+        return sum(values) / len(values)
+
+    @staticmethod
+    def middle(found: Mapping[str, Any], method: str, kind: str) -> float:
+        """Return the median NEES of features of 30 to 99 measurements over the recordings."""
+        bins = [of[method][kind]["30-99"] for of in found.values()]
+        return median(of["nees_median"] for of in bins if of["pairs"] >= 10)
+
+    def arena(self) -> str:
+        """Corners of a real arena, at rest and moving."""
+        arenas = self.numbers("real")["arena"]
+        shown = {"recall": ("recall", 1), "error [mm]": ("median_error", 1e3)}
+        rows = [
+            (m, *(f * of[m][key] for of in arenas.values() for key, f in shown.values()))
+            for m in next(iter(arenas.values()))
+        ]
+        return markdown(("method", *(f"{a}: {s}" for a in arenas for s in shown)), rows)
+
+    def tracking(self) -> str:
+        """Motion from features and by ICP, and tracks."""
+        rows = []
+        for log, of in self.numbers("tracking").items():
+            for source in ("features", "ICP"):
+                motion, tracks = of["motion"][source], of["tracks"].get(source, {})
+                kept = (100 * tracks[kind]["kept"] for kind in tracks)
+                errors = (1e3 * motion[key] for key in ("way_median", "way_rmse", "turn_median"))
+                rows.append((log, source, *errors, *(kept if tracks else (None, None))))
+        columns = ("log", "motion from", "way, median [mm]", "RMSE", "turn, median [mrad]")
+        return markdown((*columns, "segments kept [%]", "corners kept [%]"), rows)
+
+    def maps(self) -> str:
+        """The public benchmark of polylines."""
+        from lineament.evaluation.ple import load_benchmark, run_benchmark
+
+        methods = "optimal", "iepf", "line_tracking"
+        rows: dict[str, list[object]] = {name: [name] for name in methods}
+        authors = {"ple+": "*PLE+*", "ple": "*PLE*"}
+        rows |= {name: [label] for name, label in authors.items()}
+        columns = ["map"]
+        for half, scores in (("real", ("rmse", "f")), ("sim", ("area_error",))):
+            benchmark = load_benchmark(DATA / "benchmark" / f"ple_{half}.npz")
+            given = benchmark.means()
+            for name in methods:
+                print(f"benchmark {half}: {name}", file=sys.stderr, flush=True)
+                means = run_benchmark(benchmark, name).means()
+                rows[name] += [means[s][k] for s in scores for k in (0, 2, 4)]
+            for name in authors:
+                rows[name] += [given[s][name][k] for s in scores for k in (0, 2, 4)]
+            columns += [f"{s}, J = {benchmark.max_vertices[k]}" for s in scores for k in (0, 2, 4)]
+        return markdown(columns, rows.values())
+
+    def claims(self) -> str:
+        """The paper's claims, and what is found here, over the seeds."""
+        return markdown(
+            ("paper", "here"),
+            [(claim, re.sub(r"{(.*?)}", self._value, here)) for claim, here in CLAIMS],
+        )
+
+    def _value(self, match: re.Match[str]) -> str:
+        """Return "path", "path ÷ path" or "path|factor|digits" of `CLAIMS` over the seeds."""
+        paths, factor, digits = (*match[1].split("|"), "100", "0")[:3]
+
+        def at(seed: int, path: str) -> float:
+            experiment, *keys = path.split("/")
+            found = self.numbers(experiment, seed)
+            for key in keys:
+                found = found[int(key) if isinstance(found, list) else key]
+            if hasattr(found, "__len__"):
+                return float(median(found))
+            return math.nan if found is None else float(found)
+
+        values = []
+        for seed in SEEDS:
+            part, *whole = (at(seed, path) for path in paths.split(" ÷ "))
+            values.append(float(factor) * part / math.prod(whole))
+        return of_seeds(values, int(digits))
+
+    def speed(self) -> str:
+        """Times of methods in turns in one run, as ratios to that of `liu`."""
+        import numpy as np
+
+        from lineament import Extractor
+        from lineament.methods import METHODS
+        from lineament.reproduce.scans import INDOORS, frame_times, scene_numbers, simulated_frames
+        from lineament.simulation import SENSORS
+
+        rows: dict[str, list[object]] = {name: [name] for name in METHODS}
+        for sensor in ("paper", "utm30lx"):
+            frames = simulated_frames(SENSORS[sensor], INDOORS, scene_numbers(30, 0))
+            scans = [frame.scan for frame in frames]
+            times: dict[str, list[float]] = {name: [] for name in METHODS}
+            for _ in range(5):
+                for name, taken in times.items():
+                    taken.append(float(np.median(frame_times(Extractor(name), scans))))
+            for name, taken in times.items():
+                each = [a / b for a, b in zip(taken, times["liu"], strict=True)]
+                rows[name] += [1e6 * median(taken), of_seeds(each, 1)]
+        columns = [f"{beams} beams{what}" for beams in (481, 1081) for what in (" [µs]", " ÷ liu")]
+        return markdown(("method", *columns), rows.values())
+
+    def process(self) -> str:
+        """What a process costs: starts, threads, and the sizes of the code."""
+        sys.path.insert(0, str(Path(__file__).parent))
+        import speed
+
+        lines = {
+            name: sum(len(p.read_text("utf-8").splitlines()) for p in (ROOT / name).rglob("*.py"))
+            for name in ("src/lineament", "src/lineament/kernels", "tests")
+        }
+        gains = (f"{speed.speed_of_method(m, 'utm30lx')[3]:.2f}" for m in ("optimal", "liu"))
+        rows = [
+            ("two threads ÷ one, 1081 beams: optimal, liu", ", ".join(gains)),
+            ("pure arithmetic, the same", f"{speed.gain_of_the_machine():.2f}"),
+            *((name.replace("`", ""), value) for name, value in speed.start_up()),
+            *speed.throughput(),
+            *((f"lines of Python in {name}", count) for name, count in lines.items()),
+        ]
+        return markdown(("what", "measured"), rows)
+
+
+#: Claims of the paper, and what to say of them: paths are into the numbers of experiments.
+CLAIMS = (
+    (
+        "Fig. 2, 3: noise points are filtered away",
+        "points off by 0.1–0.3 m that stay off: {noise/ranges/0.1–0.3 m/off_after} %; off by "
+        "0.6–1.2 m: {noise/ranges/0.6–1.2 m/off_after} %",
+    ),
+    (
+        "Fig. 5: clusters 95 %, PDBS 84 %",
+        "its scanner: {layers/paper/liu/success} %, PDBS {layers/paper/pdbs, fixed/success} %; "
+        "mixed pixels: {layers/utm30lx/liu/success} %, PDBS {layers/utm30lx/pdbs, fixed/success} %",
+    ),
+    (
+        "Fig. 9: AR is largest at radius 6, threshold 0.66",
+        "of actual corners, over all forms: at radius {repetition/best/support_radius|1|0}, "
+        "threshold {repetition/best/threshold|1|2}",
+    ),
+    (
+        "Fig. 12: errors up to 0.01 m, IEPF 0.25 m",
+        "liu {similarity/simulated rooms, corridors and halls/liu, paper’s numbers/"
+        "similarity_maximum|1|2} m, IEPF {similarity/simulated rooms, corridors and halls/iepf/"
+        "similarity_maximum|1|2} m",
+    ),
+    (
+        "Table 2: two corners 2.302 m apart",
+        "both found with its numbers: {two_corners/places/liu, paper’s numbers/0/found} %; with "
+        "the best of Figure 9 {two_corners/places/liu, best of Figure 9/0/mean|1|3} m, IEPF "
+        "{two_corners/places/iepf/0/mean|1|3} m",
+    ),
+    (
+        "Table 3: partition 95 %, PDBS 84 %",
+        "{success/liu:paper, no corners/many/partition_success} %, PDBS "
+        "{success/pdbs, fixed 0.3 m/many/partition_success} %",
+    ),
+    (
+        "Table 3: corners 93 %, IEPF 73 %",
+        "its numbers {success/liu:paper, paper’s numbers/many/corner_recall_0.10} %; best of "
+        "Figure 9 {success/liu:paper, best of Figure 9/many/corner_recall_0.10} % at precision "
+        "{success/liu:paper, best of Figure 9/many/corner_precision_0.10} %; IEPF "
+        "{success/iepf:paper/many/corner_recall_0.10} % at "
+        "{success/iepf:paper/many/corner_precision_0.10} %",
+    ),
+    (
+        "half the time of PDBS; of IEPF",
+        "{success/liu:paper, no corners/seconds ÷ success/pdbs, fixed 0.3 m/seconds|1|2}; "
+        "{success/liu:paper, paper’s numbers/seconds ÷ success/iepf:paper/seconds|1|2}",
+    ),
+)
+
+
+TABLES = (
+    *("speed", "process", "maps", "tracking", "real", "arena"),
+    *("simulation", "sensors", "optimal", "claims"),
+)
+#: Tables of recordings.
+RECORDED = ("maps", "tracking", "real", "arena")
+
+
+# The document ------------------------------------------------------------------------------------
+
+
+def written(text: str, tables: Mapping[str, str]) -> str:
+    """Put tables between the marks of their names."""
+    for name, table in tables.items():
+        mark = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        text = mark.sub(lambda found, new=table: f"{found[1]}{new}\n{found[2]}", text)
+    return text
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=10, help="fewer to try it out")
+    parser.add_argument("--print", nargs="+", metavar="TABLE", help="print these, write nothing")
+    given = parser.parse_args()
+    started, results = datetime.now(UTC), Results(given.frames)
+    missing = RECORDED if results.settings[0].data is None else ()
+    tables = {
+        name: "Not measured: no recordings." if name in missing else getattr(results, name)()
+        for name in given.print or TABLES
+    }
+    if given.print:
+        print("\n\n".join(tables.values()))
+        return
+    tables["stamp"] = stamp((datetime.now(UTC) - started).total_seconds(), given.frames)
+    for path in DOCUMENTS:
+        text = path.read_text(encoding="utf-8")
+        path.write_text(written(text, tables), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
