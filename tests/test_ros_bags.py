@@ -8,6 +8,7 @@ import sqlite3
 import numpy as np
 import pytest
 import ros_bags
+from mcap.writer import Writer
 from ros_bags import every_kind, ranges_of, write
 
 from lineament import LogError
@@ -73,8 +74,8 @@ def test_a_bag_of_nothing(tmp_path, kind):
 
 def test_an_error_lists_twenty_topics(tmp_path):
     odometry = ros_bags.Messages(2).odometry(1.0, 0.0, 0.0, 0.0)
-    path = write(tmp_path, "mcap", [(f"/odom{i:02}", i, odometry) for i in range(23)])
-    with pytest.raises(LogError, match=r"/odom19 \(nav_msgs/Odometry, 1\), 3 more$"):
+    path = write(tmp_path, "mcap", [(f"/odom{i:02}", i, odometry) for i in range(21)])
+    with pytest.raises(LogError, match=r"/odom19 \(nav_msgs/Odometry, 1\), 1 more$"):
         open_log(path)
 
 
@@ -128,6 +129,22 @@ def test_two_publishers_of_a_ros_1_topic(tmp_path):
     assert stamps_of(log) == [0.0, 1.0]
     (topic,) = log.contents()
     assert (topic.count, topic.publishers) == (2, 2)
+
+
+def test_a_channel_without_a_schema(tmp_path):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.add_message(writer.register_channel("/notes", "json", 0), 0, b"{}", 0)
+        schema = writer.register_schema("sensor_msgs/msg/LaserScan", "ros2msg", b"")
+        channel = writer.register_channel("/scan", "cdr", schema)
+        scan = ros_bags.serialized(ros_bags.Messages(2).scan(1.0, [1.0]), 2)
+        writer.add_message(channel, 0, scan, 0)
+        writer.finish()
+    log = open_log(path)
+    assert [topic.type for topic in log.contents()] == ["", "sensor_msgs/LaserScan"]
+    assert stamps_of(log) == [1.0]
 
 
 def test_a_topic_of_two_types(tmp_path):

@@ -170,6 +170,9 @@ def test_topics_keep_their_names(tmp_path, name, read):
     scans = [(FOUND, scan_of(stamp=float(i)), topics[i % 2]) for i in range(4)]
     found = [topic for topic, _, _ in read(write(tmp_path / name, *scans, topics=topics))]
     assert found == ["/tf", "/front", "/front/features", "/tf", "/rear", "/rear/features"] * 2
+    with (tmp_path / name).open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert (len(summary.schemas), len(summary.channels)) == (3, 5)
 
 
 @pytest.mark.parametrize(
