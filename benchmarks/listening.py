@@ -1,4 +1,4 @@
-"""Topics of ROS 2 as another program hears them: by hand-written types, each message as it came."""
+"""Topics of ROS 2 as another program hears them, each message as it came."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-import dds_types
 from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
-from dds_peer import CONFIGURATION
+from dds_peer import CONFIGURATION, KINDS, idl, made
 
-__all__ = ["Listener", "take_part"]
+__all__ = ["Listener", "idl", "made", "take_part"]
 
 
 def take_part(domain: int) -> tuple[Domain, DomainParticipant]:
@@ -33,7 +32,8 @@ class Listener:
         qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(1000))
         self._waiting, self._readers = WaitSet(participant), {}
         for topic, kind in topics.items():
-            known = getattr(dds_types, kind.rpartition("/")[2])
+            name = kind.rpartition("/")[2]
+            known = idl(f"{KINDS[name]}/msg/{name}")
             known.deserialize = classmethod(_kept)
             reader = DataReader(participant, Topic(participant, f"rt{topic}", known), qos)
             state = ViewState.Any | SampleState.NotRead | InstanceState.Any

@@ -176,18 +176,19 @@ def publish(rate: float, count: int, out: Path) -> None:
     from cyclonedds.pub import DataWriter
     from cyclonedds.qos import Policy, Qos
     from cyclonedds.topic import Topic
-    from listening import dds_types, take_part
+    from listening import idl, take_part
 
-    scans = [bytearray(scan.serialize()) for scan in simulated(dds_types)]
+    kind = idl("sensor_msgs/msg/LaserScan")
+    scans = [bytearray(scan.serialize()) for scan in simulated(kind)]
     # They are serialised already: only the stamp changes.
-    dds_types.LaserScan.serialize = lambda self, **_: self.data
+    kind.serialize = lambda self, **_: self.data
     domain, entity = take_part(DOMAIN)
     qos = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(10))
-    writer = DataWriter(entity, Topic(entity, "rt/scan", dds_types.LaserScan), qos)
+    writer = DataWriter(entity, Topic(entity, "rt/scan", kind), qos)
     out.with_name(out.name + ".ready").touch()
     wait_until(lambda: writer.get_publication_matched_status().current_count > 0)
     sent = np.zeros(count, np.int64)
-    message = dds_types.LaserScan.__new__(dds_types.LaserScan)
+    message = kind.__new__(kind)
     out.with_name(out.name + ".begun").touch()
     begun = time.monotonic()
     for i in range(count):
@@ -204,19 +205,22 @@ def publish(rate: float, count: int, out: Path) -> None:
     del domain
 
 
-def simulated(types: Any) -> list[Any]:
+def simulated(kind: Any) -> list[Any]:
     """Scans along a drive through a building."""
+    from listening import made
+
     from lineament.simulation import SENSORS, building, drive
 
-    made = []
+    scans = []
     world, walk = building()
     for scan in drive(world, walk[:3], SENSORS["utm30lx"], speed=1.0, rate=40.0):
-        header = types.Header(types.Time(0, 0), "laser")
+        message = {"angle_min": scan.angle_min, "angle_max": -scan.angle_min, "scan_time": 0.025}
+        message |= {"angle_increment": scan.angle_increment, "range_min": 0.1, "range_max": 30.0}
         ranges = np.where(np.isfinite(scan.ranges), scan.ranges, np.inf).tolist()
-        geometry = [scan.angle_min, -scan.angle_min, scan.angle_increment, 0.0, 0.025]
-        made.append(types.LaserScan(header, *geometry, 0.1, 30.0, ranges, []))
-    assert len(made[0].ranges) == BEAMS
-    return made
+        header = {"frame_id": "laser"}
+        scans.append(made(kind, {**message, "header": header, "ranges": ranges}))
+    assert len(scans[0].ranges) == BEAMS
+    return scans
 
 
 def listen(topics: list[str], out: Path) -> None:

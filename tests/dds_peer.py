@@ -92,11 +92,11 @@ class Peer:
         if isinstance(message, bytes):
             assert writer.write_raw(message)
         else:
-            writer.write(_made(writer.data_type, message))
+            writer.write(made(writer.data_type, message))
 
     def write_scans(self, topic: str, n: int, rate: float, scan: dict[str, Any]) -> None:
         """Write a scan `n` times, its number as its stamp."""
-        message = _made(self._writers[topic].data_type, scan)
+        message = made(self._writers[topic].data_type, scan)
         start = time.perf_counter()
         for i in range(n):
             message.header.stamp.sec = i
@@ -129,14 +129,14 @@ def _qos(reliable: bool, depth: int = 10) -> Qos:
     return Qos(reliability, Policy.Durability.Volatile, Policy.History.KeepLast(depth))
 
 
-def _made(kind: Any, value: Any) -> Any:
+def made(kind: Any, value: Any) -> Any:
     """Make a message from dictionaries and lists; what is missing is 0 or empty."""
     if isinstance(kind, type) and issubclass(kind, IdlStruct):
         given = value or {}
-        return kind(**{name: _made(t, given.get(name)) for name, t in kind.__annotations__.items()})
+        return kind(**{name: made(t, given.get(name)) for name, t in kind.__annotations__.items()})
     base, form = (get_args(kind) or (kind, None))[:2]
     if isinstance(form, types.sequence):
-        return [_made(form.subtype, item) for item in value or ()]
+        return [made(form.subtype, item) for item in value or ()]
     if isinstance(form, types.array):
         return value or [0.0] * form.length
     return base() if value is None else value

@@ -10,16 +10,15 @@ from __future__ import annotations
 import argparse
 import faulthandler
 import gc
+import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from random import Random
@@ -119,8 +118,28 @@ def check_scan(scan: LaserScan) -> None:
 # The long run: processes that may be slow, large or killed, and one that counts
 
 
-def run_round(seed: int, deadline: float, work: Path, kept: Path) -> Counter[tuple[str, str]]:
-    """Try inputs in this process until the deadline; by kind and outcome, how many there were."""
+def scratch(work: Path) -> tuple[Path, Path]:
+    """Make a folder for inputs, and one for temporary files, which readers then use."""
+    folders = work / "input", work / "temporary"
+    for folder in folders:
+        folder.mkdir(exist_ok=True)
+    tempfile.tempdir = str(folders[1])
+    return folders
+
+
+def chosen(samples: list[Sample], chance: Random) -> Sample:
+    """Choose a format, then one of its samples."""
+    kind = chance.choice(sorted({sample.kind for sample in samples}))
+    return chance.choice([sample for sample in samples if sample.kind == kind])
+
+
+def check_nothing_left(temporary: Path) -> None:
+    """Check that temporary files went with their logs, and do not wait for the collector."""
+    assert not list(temporary.iterdir()), list(temporary.iterdir())
+
+
+def run_round(seed: int, deadline: float, work: Path, kept: Path, counts: Any) -> None:
+    """Try inputs in this process until the deadline, and put its counts into a queue."""
     import resource  # There is none on Windows.
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -128,12 +147,14 @@ def run_round(seed: int, deadline: float, work: Path, kept: Path) -> Counter[tup
     unraisable: list[Any] = []
     sys.unraisablehook = unraisable.append
     signal.signal(signal.SIGPROF, _too_slow)
+    with tempfile.TemporaryDirectory() as own:
+        samples = own_samples(Path(own))
+    if "LINEAMENT_DATA" in os.environ:
+        samples += recorded_samples(Path(os.environ["LINEAMENT_DATA"]))
     folder, temporary = scratch(work)
-    samples = corpus(temporary)
     # What only the collector would remove shows, as it comes only now and then.
     gc.disable()
-    chance = Random(seed)
-    counts: Counter[tuple[str, str]] = Counter()
+    chance, found = Random(seed), Counter[tuple[str, str]]()
     for number in range(ROUND):
         if time.time() > deadline:
             break
@@ -157,37 +178,9 @@ def run_round(seed: int, deadline: float, work: Path, kept: Path) -> Counter[tup
                 path.unlink()
         if outcome == "FAULT" or number % 100 == 0:
             gc.collect()
-        counts[sample.kind, outcome] += 1
+        found[sample.kind, outcome] += 1
     faulthandler.cancel_dump_traceback_later()
-    return counts
-
-
-def scratch(work: Path) -> tuple[Path, Path]:
-    """Make a folder for inputs, and one for temporary files, which readers then use."""
-    folders = work / "input", work / "temporary"
-    for folder in folders:
-        folder.mkdir(exist_ok=True)
-    tempfile.tempdir = str(folders[1])
-    return folders
-
-
-def corpus(empty: Path) -> list[Sample]:
-    """Collect the samples; recordings are in the folder LINEAMENT_DATA, where there is one."""
-    with tempfile.TemporaryDirectory(dir=empty) as folder:
-        samples = own_samples(Path(folder))
-    data = os.environ.get("LINEAMENT_DATA")
-    return samples + (recorded_samples(Path(data)) if data else [])
-
-
-def chosen(samples: list[Sample], chance: Random) -> Sample:
-    """Choose a format, then one of its samples."""
-    kind = chance.choice(sorted({sample.kind for sample in samples}))
-    return chance.choice([sample for sample in samples if sample.kind == kind])
-
-
-def check_nothing_left(temporary: Path) -> None:
-    """Check that temporary files went with their logs, and do not wait for the collector."""
-    assert not list(temporary.iterdir()), list(temporary.iterdir())
+    counts.put(found)
 
 
 def keep(sample: Sample, place: Path, options: dict[str, Any]) -> None:
@@ -203,54 +196,36 @@ def _too_slow(*_: object) -> None:
     raise TimeoutError(f"took more than {SECONDS} s of processor time")
 
 
-def run(seconds: float, seed: int, kept: Path) -> int:
-    """Start one process after the other, and print a table of what came of the inputs."""
-    deadline = time.time() + seconds
-    total: Counter[tuple[str, str]] = Counter()
-    deaths = 0
-    while time.time() < deadline:
-        with tempfile.TemporaryDirectory() as work:
-            command = [sys.executable, __file__, "--round", str(seed), work]
-            more = ["--deadline", str(deadline), "--kept", str(kept)]
-            done = subprocess.run([*command, *more], stdout=subprocess.PIPE, text=True)
-            for line in done.stdout.splitlines():
-                kind, outcome, count = line.split()
-                total[kind, outcome] += int(count)
-            if done.returncode:
-                deaths += 1
-                with suppress(OSError):
-                    Path(work, "input").rename(kept / f"died-{seed}")
-        seed += 1
-    print_table(total)
-    faults = sum(count for (_, outcome), count in total.items() if outcome == "FAULT")
-    print(f"\n{total.total()} inputs, {faults} faults, {deaths} processes died; see {kept}")
-    return faults + deaths
-
-
-def print_table(total: Counter[tuple[str, str]]) -> None:
-    outcomes = ("read", "refused", "FAULT")
-    print(f"{'format':<16}" + "".join(f"{name:>10}" for name in outcomes))
-    for kind in sorted({kind for kind, _ in total}):
-        print(f"{kind:<16}" + "".join(f"{total[kind, name]:>10}" for name in outcomes))
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kept", type=Path, help="folder for inputs that break the promise")
-    parser.add_argument("--round", nargs=2, help=argparse.SUPPRESS)
-    parser.add_argument("--deadline", type=float, help=argparse.SUPPRESS)
-    given = parser.parse_args(arguments)
+    given = parser.parse_args()
     kept = given.kept or Path(tempfile.mkdtemp(prefix="fuzzing-"))
-    if given.round:
-        seed, work = given.round
-        for (kind, outcome), count in run_round(
-            int(seed), given.deadline, Path(work), kept
-        ).items():
-            print(kind, outcome, count)
-        return 0
-    return min(run(given.seconds, given.seed, kept), 1)
+    deadline, seed, deaths = time.time() + given.seconds, given.seed, 0
+    total: Counter[tuple[str, str]] = Counter()
+    processes = multiprocessing.get_context("spawn")
+    while time.time() < deadline:
+        with tempfile.TemporaryDirectory() as work:
+            counts = processes.SimpleQueue()
+            child = processes.Process(
+                target=run_round, args=(seed, deadline, Path(work), kept, counts)
+            )
+            child.start()
+            child.join()
+            if child.exitcode == 0:
+                total += counts.get()
+            else:
+                deaths += 1
+                with suppress(OSError):
+                    Path(work, "input").rename(kept / f"died-{seed}")
+        seed += 1
+    for (kind, outcome), count in sorted(total.items()):
+        print(f"{kind:<16}{outcome:>10}{count:>10}")
+    faults = sum(count for (_, outcome), count in total.items() if outcome == "FAULT")
+    print(f"\n{total.total()} inputs, {faults} faults, {deaths} processes died; see {kept}")
+    return min(faults + deaths, 1)
 
 
 if __name__ == "__main__":

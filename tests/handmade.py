@@ -15,7 +15,7 @@ def segment(start, end, first, last, *, sigma=(0.01, 0.01), n_points=None):
     (x1, y1), (x2, y2) = start, end
     row = np.zeros((), SEGMENT)
     row["start"], row["end"], row["centroid"] = start, end, ((x1 + x2) / 2, (y1 + y2) / 2)
-    row["angle"] = math.atan2(y2 - y1, x2 - x1)
+    row["angle"], row["length"] = math.atan2(y2 - y1, x2 - x1), math.dist(start, end)
     row["covariance"] = np.diag(np.square(sigma))
     row["first_beam"], row["last_beam"] = first, last
     row["n_points"] = last - first + 1 if n_points is None else n_points

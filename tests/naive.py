@@ -72,9 +72,9 @@ def sigma(scan):
 
 @dataclass
 class Clusters:
-    """Classes as lists of beams; the one class of a closed ring ends with its first beam."""
+    """Clusters as lists of beams; the one of a closed ring ends with its first beam."""
 
-    classes: list[list[int]] = field(default_factory=list)
+    groups: list[list[int]] = field(default_factory=list)
     closed: bool = False
     spacing: dict[int, float] = field(default_factory=dict)
     distance_threshold: dict[int, float] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class Clusters:
 
     def labels(self, n: int) -> np.ndarray:
         labels = np.full(n, -1, np.int32)
-        for k, members in enumerate(self.classes):
+        for k, members in enumerate(self.groups):
             labels[members] = k
         return labels
 
@@ -104,25 +104,25 @@ def clusters(scan, ranges, noise_sigma, *, scale, floor, density_k, min_points) 
         out.density_threshold[b] = np.mean(inner) + density_k * np.std(inner)
         return d <= out.density_threshold[b]
 
-    classes, inner = [], []
+    groups, inner = [], []
     for before, b in zip([None, *beams], beams, strict=False):
         if before is not None and joins(before, b, inner):
-            classes[-1].append(b)
+            groups[-1].append(b)
             inner.append(out.spacing[b])
         else:
-            classes.append([b])
+            groups.append([b])
             inner = []
     if scan.is_full_circle and beams:
         over_seam = joins(beams[-1], beams[0], inner)
         if over_seam and len(beams) >= 3:
-            if len(classes) == 1:
+            if len(groups) == 1:
                 out.closed = True
             else:
-                classes = [classes[-1] + classes[0], *classes[1:-1]]
-    out.classes = [members for members in classes if len(members) >= min_points]
-    if out.closed and out.classes:
+                groups = [groups[-1] + groups[0], *groups[1:-1]]
+    out.groups = [members for members in groups if len(members) >= min_points]
+    if out.closed and out.groups:
         turn = int(np.argmax(np.asarray(ranges)[beams]))
-        out.classes = [beams[turn:] + beams[: turn + 1]]
+        out.groups = [beams[turn:] + beams[: turn + 1]]
     return out
 
 
@@ -140,7 +140,7 @@ def chord_distances(points):
 
 
 def response(points, i, radius, reading, closed=False):
-    """Equations 15-22 at one point of a class; that of a closed class ends with its first."""
+    """Equations 15-22 at one point of a cluster; that of a closed cluster ends with its first."""
     m = len(points)
     if closed:
         ring = m - 1
@@ -207,7 +207,7 @@ def primary_corners(points, closed, *, radius, threshold, reading, min_points):
 
 
 def pieces_of(n_points, corners, closed):
-    """(first, last, whether a corner stands at the first) of the pieces of one class."""
+    """(first, last, whether a corner stands at the first) of the pieces of one cluster."""
     inner = sorted(c for c in corners if 0 < c < n_points - 1)
     if closed and not inner:
         return []
@@ -244,7 +244,7 @@ def liu(scan, method, noise=None, filtered=None):
     points = polar(measured, scan.angles)
     seen = polar(filtered, scan.angles)
     segments, corners, candidates = [], [], []
-    for label, beams in enumerate(found.classes):
+    for label, beams in enumerate(found.groups):
         examined = primary_corners(
             seen[beams],
             found.closed,

@@ -101,7 +101,7 @@ def along(line, point):
 
 
 def jacobian_covariance(bearings, rho, noise, fit):
-    """Covariance of (offset, angle) by moving each range and each bearing, and fitting anew."""
+    """Covariance of (offset, angle) by moving each range and each bearing, and fitting again."""
     range_noise = np.sqrt(range_variance(rho, noise))
 
     def line(phi, r):
@@ -161,9 +161,9 @@ def opening_and_side(before, after):
 
 def breakpoints(scan, found, rho, points, gap):
     """(beams, position, kind, occluder) where surfaces end."""
-    if not found.classes:
+    if not found.groups:
         return []
-    ends = [(members[0], members[-1]) for members in found.classes]
+    ends = [(members[0], members[-1]) for members in found.groups]
     breaks = []
     is_open = scan.is_full_circle and not found.closed
     following = ends[1:] + (ends[:1] if is_open else [])

@@ -113,8 +113,7 @@ def measured(scan: LaserScan, beams: list[int], noise, max_missing) -> Measured:
 def chi_square(xy, rho, noise):
     """χ² of a x + b y = 1 of least squares, at the scale of the surface, through points."""
     weight = rho / np.sqrt(variance_of(rho, noise) + SURFACE**2)
-    line = np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
-    return float(np.sum((weight - weight * (xy @ line)) ** 2))
+    return float(np.sum((weight - weight * (xy @ surface_line(xy, rho, noise))) ** 2))
 
 
 def least_energies(points: Measured, noise, evidence) -> np.ndarray:
@@ -157,10 +156,32 @@ def energy_of(points: Measured, lines, noise, evidence) -> float:
 # Fits
 
 
+def surface_line(xy, rho, noise):
+    """Line a x + b y = 1 of least squares of ρ, at the scale of the surface."""
+    weight = rho / np.sqrt(variance_of(rho, noise) + SURFACE**2)
+    return np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
+
+
+def border_covariance(xy, rho, noise, segment, without, more):
+    """What comes to a segment's covariance as its border lies anywhere between two measurements.
+
+    By the lines of `without` and of `more` measurements than it has, by one at that border.
+    """
+    along = np.array([math.cos(segment["angle"]), math.sin(segment["angle"])])
+    places = []
+    for own in (without, more):
+        line = surface_line(xy[own], rho[own], noise)
+        across = line @ (-along[1], along[0])
+        places.append(
+            ((1 - line @ segment["centroid"]) / across, -math.atan(line @ along / across))
+        )
+    change = np.subtract(*places) * 0.5 / math.sqrt(12)
+    return np.outer(change, change)
+
+
 def fitted_line(xy, rho, noise):
     """Centroid, direction, variances of offset and angle, rms, misfit, number of what counts."""
-    weight = rho / np.sqrt(variance_of(rho, noise) + SURFACE**2)
-    normal = np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
+    normal = surface_line(xy, rho, noise)
     distance = 1 / np.linalg.norm(normal)
     normal = normal * distance
     share = (xy @ normal / rho) ** 2

@@ -42,7 +42,7 @@ def clusters_of(method) -> PDBS:
 
 
 def threshold(rule, before, rho, step, noise, method):
-    """Distance up to which two readings, `step` apart in bearing, lie on one surface."""
+    """Distance up to which two measurements, `step` apart in bearing, lie on one surface."""
     if rule == "fixed":
         return method.distance
     c1 = math.sqrt(2 * (1 - math.cos(step)))
@@ -61,7 +61,7 @@ def threshold(rule, before, rho, step, noise, method):
 
 
 def parted(scan, method: PDBS, noise) -> Clusters:
-    """Classes of neighbours by a rule, Lee's by its ratio."""
+    """Clusters of neighbours by a rule, Lee's by its ratio."""
     rule = method.rule
     out, ok, rho, n = Clusters(), valid(scan), scan.ranges, len(scan)
     points = polar(rho, scan.angles)
@@ -83,21 +83,21 @@ def parted(scan, method: PDBS, noise) -> Clusters:
         out.distance_threshold[b] = threshold(rule, rho[before], rho[b], step, noise, method)
         return d <= out.distance_threshold[b]
 
-    classes = [[beams[0]]] if beams else []
+    groups = [[beams[0]]] if beams else []
     for before, b in pairwise(beams):
         if joins(before, b):
-            classes[-1].append(b)
+            groups[-1].append(b)
         else:
-            classes.append([b])
+            groups.append([b])
     if scan.is_full_circle and beams and joins(beams[-1], beams[0]) and len(beams) >= 3:
-        if len(classes) == 1:
+        if len(groups) == 1:
             out.closed = True
         else:
-            classes = [classes[-1] + classes[0], *classes[1:-1]]
-    out.classes = [members for members in classes if len(members) >= method.min_points]
-    if out.closed and out.classes:
+            groups = [groups[-1] + groups[0], *groups[1:-1]]
+    out.groups = [members for members in groups if len(members) >= method.min_points]
+    if out.closed and out.groups:
         turn = int(np.argmax(rho[beams]))
-        out.classes = [beams[turn:] + beams[: turn + 1]]
+        out.groups = [beams[turn:] + beams[: turn + 1]]
     return out
 
 
@@ -107,11 +107,11 @@ def parted(scan, method: PDBS, noise) -> Clusters:
 def split(scan, found, noise, *, tolerance, min_piece, by_line):
     """Candidates (beam, distance, excess), and pieces (first beam, last beam, piece before).
 
-    `tolerance` tells that of a range; `by_line` whether the fitted line decides.
+    `tolerance` returns that of a range; `by_line` whether the fitted line decides.
     """
     points = polar(scan.ranges, scan.angles)
     candidates, pieces = [], []
-    for beams in found.classes:
+    for beams in found.groups:
         own, rho = points[beams], scan.ranges[beams]
         allowed = tolerance(rho)
         cuts = {}
@@ -150,7 +150,7 @@ def split(scan, found, noise, *, tolerance, min_piece, by_line):
 
 
 def off_line(points, bearings, rho, noise, allowed):
-    """Tell by how much of their tolerances two neighbours are off one side of the fitted line."""
+    """Return by how much of their tolerances two neighbours are off one side of the fitted line."""
     if not np.ptp(points, axis=0).any():
         return 0.0
     centroid, angle = principal_line(points, np.ones(len(points)))
@@ -166,10 +166,10 @@ def off_line(points, bearings, rho, noise, allowed):
 
 
 def track(scan, found, noise, method):
-    """First and last beam of the lines that grow along the classes."""
+    """First and last beam of the lines that grow along the clusters."""
     points = polar(scan.ranges, scan.angles)
     lines = []
-    for beams in found.classes:
+    for beams in found.groups:
         begin = 0
         while begin < len(beams):
             gained, missed = [], 0

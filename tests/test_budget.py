@@ -159,7 +159,7 @@ def test_an_end_left_out_takes_its_corner_along():
 @pytest.mark.parametrize(
     ("gap", "silent", "joined"), [(0.4, False, True), (1.2, False, False), (0.4, True, False)]
 )
-def test_classes_become_one_across_a_small_gap_that_all_beams_see(gap, silent, joined):
+def test_clusters_become_one_across_a_small_gap_that_all_beams_see(gap, silent, joined):
     y = np.concatenate((np.linspace(-1.0, 0.0, 12), np.linspace(gap, gap + 1.0, 11)))
     if silent:
         y = np.insert(y, 12, gap / 2)

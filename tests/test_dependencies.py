@@ -63,7 +63,7 @@ for package in (*EXTRAS, "rosbags"):
     sys.modules[package] = None
 log = "log.npz"
 assert run(["simulate", "room", "-o", log, "--scans", "3", "-q"]) == 0
-for ending in ("parquet", "csv", "jsonl", "svg"):
+for ending in ("parquet", "csv", "jsonl", "svg", "ros2.mcap"):
     assert run(["extract", log, "-o", f"a.{ending}", "-q"]) == 0, ending
 assert run(["info", log, "-q"]) == 0
 assert run(["plot", log, "-o", "a.png"]) == 0

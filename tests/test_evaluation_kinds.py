@@ -77,6 +77,7 @@ def test_corner_with_a_small_side_is_neither_demanded_nor_punished(sides):
         ([(0.01, 2)], Counts(1, 1, 1)),  # nearer to the small one, and yet the large one's
         ([(0.01, 2), (0.08, 2)], Counts(1, 1, 1)),
         ([(0.01, 2), (0.08, 2), (0.04, 2)], Counts(1, 2, 1)),
+        ([(0.05, 2), (-0.08, 2)], Counts(1, 1, 1)),  # the second is the small one's
     ],
 )
 def test_demanded_corners_come_first(found, counts):
@@ -264,14 +265,15 @@ def test_a_segment_may_be_three_deviations_of_the_bound_off(sigma, offset, turn,
 @pytest.mark.parametrize(
     ("sigma", "center", "radius", "right"),
     [
-        (0.04, 0.16, 0.0, 1),  # 3 √2 · 4 cm = 17 cm
-        (0.03, 0.16, 0.0, 0),
-        (0.04, 0.0, 0.11, 1),  # 3 · 4 cm = 12 cm
-        (0.03, 0.0, 0.11, 0),
+        ((0.04, 0.04, 0.01), 0.16, 0.0, 1),  # 3 √2 · 4 cm = 17 cm
+        ((0.03, 0.03, 0.09), 0.16, 0.0, 0),
+        ((0.01, 0.01, 0.04), 0.0, 0.11, 1),  # 3 · 4 cm = 12 cm
+        ((0.09, 0.09, 0.03), 0.0, 0.11, 0),
     ],
 )
 def test_an_arc_may_be_three_deviations_of_the_bound_off(sigma, center, radius, right):
-    true, found = arc(2, 0, 0.5, 0, 9, sigma=sigma), arc(2 + center, 0, 0.5 + radius, 0, 9)
+    true, found = arc(2, 0, 0.5, 0, 9), arc(2 + center, 0, 0.5 + radius, 0, 9)
+    true["covariance"] = np.diag(np.square(sigma))
     assert arc_scores(arcs(found), arcs(true)).counts == Counts(right, 1, 1)
 
 

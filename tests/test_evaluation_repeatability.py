@@ -118,6 +118,14 @@ def test_pieces_of_one_wall_are_found_again_once():
     np.testing.assert_allclose(found.segments.distances, [0], atol=1e-12)  # the nearer one
 
 
+def test_the_distance_of_a_segment_is_that_of_its_places_in_sight():
+    """Above y = 1 it is behind the pillar, and goes on beyond the segment that is found here."""
+    here = features(segments=[segment((3, -2), (3, 1), 0, 50)])
+    there = features(segments=[segment((3.04, -2), (3.04, 2), 0, 50)])
+    found = repeatability(SCAN, here, OTHER, seen_from(THERE, there))
+    assert found.segments.rmse == pytest.approx(0.04)
+
+
 def test_a_scan_repeats_itself():
     scan = SENSORS["paper"].scan(room(), (0.2, 0.1, 1.0), np.random.default_rng(5))
     found = ln.extract(scan, method="liu:scale_free")

@@ -49,6 +49,9 @@ POST = walls(*[3.0] * 5, 1.0, *[3.0] * 5)
         *((walls(*[3.0] * 5, no, *[3.0] * 5), across(1.0, -0.4, 0.4), 0.8, 0.48, 0.24)
           for no in (NAN, math.inf, 0.0)),
         (walls(3.0), across(1.0, -0.4, 0.4), 0.8, 0.8, 0.8),
+        # Both at once: the longest stretch is that of the first.
+        (STEP, features(n=11, segments=[segment((3, -1.2), (3, 1.2), 0, 10),
+                                        segment((1, -0.4), (1, 0.4), 0, 10)]), 3.2, 1.28, 1.04),
         # The clearance, close to the x axis, where the cosine takes off less than 1 %.
         *((walls(x), across(1.0, -0.05, 0.05), 0.1, phantom, phantom)
           for x, phantom in ((1.19, 0.0), (1.21, 0.1), (0.81, 0.0), (0.79, 0.1))),

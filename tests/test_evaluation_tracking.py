@@ -80,6 +80,7 @@ def test_corners_are_the_same_within_10_cm(x, pairs):
         ((3, 2), (3, -2), 0),  # the other side
         ((2.93, -0.4), (3.07, 0.4), 1),  # turned by 9.9°
         ((2.92, -0.4), (3.08, 0.4), 0),  # turned by 11.3°
+        ((3.06, 1.4), (2.94, 2.2), 0),  # on the line, which is 27 cm from it
     ],
 )
 def test_segments_are_the_same_if_they_lie_side_by_side(start, end, pairs):

@@ -227,7 +227,7 @@ def test_hostile_scans_give_sound_features(ranges, name, full, limited, given):
     limits = {"range_min": 0.05, "range_max": 30.0} if limited else {}
     step = 2 * math.pi / max(len(ranges), 1) if full else 0.01
     scan = LaserScan(ranges, -math.pi, step, **limits)
-    assert_sound(Extractor(name, noise=NOISE if given else None)(scan), scan)
+    assert_sound(Extractor(name, noise=NOISE if given else None)(scan), scan, name)
 
 
 @pytest.mark.slow
@@ -236,11 +236,11 @@ def test_many_random_scans_give_sound_features(name):
     extractor = Extractor(name)
     for seed in range(1000, 1150):
         scan = random_scan(seed)
-        assert_sound(extractor(scan), scan)
+        assert_sound(extractor(scan), scan, name)
 
 
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("noise", [None, NOISE])
 def test_degenerate_scans_give_sound_features(name, noise):
     for scan in [*DEGENERATE.values(), *map(random_scan, range(12))]:
-        assert_sound(Extractor(name, noise=noise)(scan), scan)
+        assert_sound(Extractor(name, noise=noise)(scan), scan, name)

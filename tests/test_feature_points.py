@@ -29,7 +29,7 @@ def named(names, *values):
 
 
 def test_all_fields_are_words_without_gaps():
-    assert FEATURE_POINT.itemsize == 4 * len(FEATURE_POINT.names) == 112
+    assert FEATURE_POINT.itemsize == 4 * len(FEATURE_POINT.names) == 116
     for name in FEATURE_POINT.names:
         assert FEATURE_POINT[name].str in {"<f4", "<i4", "<u4"}
 
@@ -39,12 +39,12 @@ def test_segment():
     row["start"], row["end"], row["centroid"], row["angle"] = (1, 2), (4, 6), (2.5, 4.25), 0.75
     row["covariance"] = [[4, 1], [1, 2]]
     row["first_beam"], row["last_beam"], row["n_points"], row["rms"] = 90, 3, 14, 0.5
-    row["misfit"] = 0.25
+    row["misfit"], row["length"] = 0.25, 5.0
     (point,) = feature_points(features(segments=[row]))
     assert filled(point) == (
         named("x y z kind", 2.5, 4.25, 0, 0)
         | named("start_x start_y end_x end_y angle", 1, 2, 4, 6, 0.75)
-        | named("c00 c01 c11 rms misfit", 4, 1, 2, 0.5, 0.25)
+        | named("c00 c01 c11 rms misfit length", 4, 1, 2, 0.5, 0.25, 5)
         | named("first_beam last_beam n_points", 90, 3, 14)
     )
 

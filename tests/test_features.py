@@ -132,17 +132,17 @@ def test_layout_of_the_records_is_the_one_that_others_read():
     """Sizes and offsets, of which files and other programs know."""
     offsets = {name: [dtype.fields[f][1] for f in dtype.names] for name, dtype in TABLES.items()}
     assert offsets == {
-        "segments": [0, 16, 32, 48, 56, 88, 92, 96, 104, 112, 120],
+        "segments": [0, 16, 32, 48, 56, 88, 92, 96, 104, 112, 120, 128],
         "corners": [0, 16, 48, 56, 60, 64, 72, 80, 88],
         "arcs": [0, 16, 24, 96, 100, 104, 112],
         "breakpoints": [0, 8, 24, 56],
     }
-    assert [dtype.itemsize for dtype in TABLES.values()] == [128, 112, 120, 64]
+    assert [dtype.itemsize for dtype in TABLES.values()] == [136, 112, 120, 64]
 
 
 def test_columns_of_the_kernels_are_where_the_fields_are():
     for prefix, table, names in (
-        ("S", "segments", "start end centroid angle covariance rms misfit cluster"),
+        ("S", "segments", "start end centroid angle covariance rms misfit cluster length"),
         ("C", "corners", "position covariance opening response quality convex beam segments kind"),
         ("A", "arcs", "center radius covariance rms"),
         ("B", "breakpoints", "position beam kind occluder"),

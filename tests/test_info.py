@@ -1,7 +1,5 @@
 """The summary of a log, against a slow obvious twin."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs of JSON, CSM and RPLIDAR: known values, faults, what is broken or without end."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
@@ -47,6 +45,10 @@ def test_csm_bearings(write):
     (scan,) = open_log(write(json.dumps(csm_scan(theta=None, timestamp=None))))
     assert scan.angles.tolist() == pytest.approx([-math.pi / 2, 0, math.pi / 2])
     assert scan.stamp == 0
+    (scan,) = open_log(write(json.dumps(csm_scan(theta=[], readings=[], valid=[]))))
+    assert len(scan) == 0
+    (scan,) = open_log(write(json.dumps(csm_scan(readings=[1, 2, 3], valid=[1, None, 0]))))
+    np.testing.assert_array_equal(scan.ranges, [1, np.nan, np.nan])
 
 
 @pytest.mark.parametrize(

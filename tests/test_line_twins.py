@@ -11,7 +11,18 @@ from hypothesis import strategies as st
 from naive_fit import range_variance
 from naive_partition import clusters_of, noise_of, parted, split, track, untied
 from naive_regions import assert_same_pieces, grow, sample, vote
-from worlds import NOISE, degenerate_scans, fan, random_scan, scan_of, vertex, wall
+from worlds import (
+    BOX,
+    NOISE,
+    degenerate_scans,
+    fan,
+    full_circle,
+    random_scan,
+    room,
+    scan_of,
+    vertex,
+    wall,
+)
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.features import noise_row
@@ -207,6 +218,24 @@ def test_two_neighbours_off_one_side_of_their_line_split_it(off, by, factor, is_
     trace = extractor.trace(scan_of(ranges, angles))
     assert set(trace.clusters) == {0}
     assert (len(trace.cuts) > 0) == is_cut
+
+
+# Settling
+
+
+@pytest.mark.parametrize(("off", "corners"), [(0, 4), (6, 4), (4, 3)])
+def test_a_ring_is_joined_over_a_few_points_without_a_piece(off, corners):
+    """Points off the walls where it was opened, at its farthest: from 4 points on it stays open."""
+    ring = full_circle(360)
+    ranges = room(ring, BOX)
+    opened = int(np.argmax(ranges)) - off // 2 + np.arange(off)
+    ranges[opened] += np.where(np.arange(off) % 2, 0.05, 0.11)
+    extractor = Extractor("hough", noise=NOISE)
+    assert len(extractor(scan_of(ranges, ring)).corners) == corners
+    block = extractor._block
+    first, last = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
+    apart = first[0] + block.counts[at.POINTS] - 1 - last[-1]
+    assert apart == {0: 1, 6: 4, 4: 5}[off]
 
 
 # Line tracking

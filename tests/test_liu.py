@@ -104,7 +104,7 @@ def test_recorded_scans_equal_the_slow_twin(data_dir, name):
     assert sum(len(twin["segments"]) for twin in twins) > 300
 
 
-# The table of the four readings at a true vertex: r = 6, Δφ = 1/3°.
+# The responses at a true vertex: r = 6, Δφ = 1/3°.
 
 TABLE = [
     (90, 1, 0.24, 0.05, 0.69),
@@ -120,11 +120,11 @@ def test_response_at_a_true_vertex(opening, distance, tangent, product, relative
     angles = fan(10)
     points = naive.polar(vertex(angles, distance, opening, convex=False), angles)
     at = len(points) // 2
-    for reading, expected in (("tangent", tangent), ("product", product), ("relative", relative)):
-        found = stages.corner_response(points, response=reading)
+    for kind, expected in (("tangent", tangent), ("product", product), ("relative", relative)):
+        found = stages.corner_response(points, response=kind)
         assert found[at] == pytest.approx(expected, rel=0.07)
         assert found.argmax() == at
-        assert found[at] == pytest.approx(naive.response(points, at, 6, reading), rel=1e-9)
+        assert found[at] == pytest.approx(naive.response(points, at, 6, kind), rel=1e-9)
     # By hand: the tangent lies across the bisector, so d/s is cos of half the opening.
     assert found[at] == pytest.approx(math.cos(math.radians(opening / 2)), rel=1e-3)
 
@@ -149,7 +149,7 @@ def test_vertex_is_found_with_its_side_and_opening(opening, convex):
     assert first["last_beam"] == second["first_beam"] == corner["beam"]
 
 
-def test_breakpoints_tell_who_occludes():
+def test_breakpoints_name_the_side_that_occludes():
     ranges = np.array([2.0] * 20 + [4.0] * 20 + [3.0] * 20)
     scan = LaserScan(ranges, 0.0, 0.01)
     features = Extractor("liu", noise=NOISE, sigma_d=0.5)(scan)

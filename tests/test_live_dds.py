@@ -157,6 +157,16 @@ def test_two_publishers_of_which_one_is_killed_and_comes_again(participant, peer
         assert receive(source)[0].time[0] == 3
 
 
+def test_the_end_of_the_only_publisher_is_no_message(participant, remote):
+    source = source_of(participant)
+    connected(remote, source)
+    remote.write("/scan", scan_message(1))
+    receive(source)
+    remote.close()
+    eventually(lambda: source.publishers == 0)
+    assert source.receive(0.0) == []
+
+
 @pytest.mark.parametrize("reliability", ["best-effort", "reliable"])
 def test_a_burst_is_accounted_for(participant, remote, reliability):
     source, n = source_of(participant, depth=8, reliability=reliability), 50
@@ -208,18 +218,22 @@ def test_publisher_is_known_by_the_hash_of_its_type(participant, peer):
         assert peer.user_data(topic) == [f"typehash={type_hash(full)};"]
 
 
-def test_a_message_serialised_by_others_is_read_by_others(participant, peer):
+def test_a_message_serialised_by_others_is_read_by_others(participant, remote):
     # What lineament itself makes of each type is read in test_live_command.
-    types, kind = store(2).types, "geometry_msgs/msg/PoseArray"
-    time = types["builtin_interfaces/msg/Time"](7, 5)
-    message = types[kind](types["std_msgs/msg/Header"](time, "läser"), [])
+    types, kind = store(2).types, "diagnostic_msgs/msg/DiagnosticArray"
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](7, 5), "läser")
+    pair = types["diagnostic_msgs/msg/KeyValue"]("rate", "9 Hz!")
+    status = types["diagnostic_msgs/msg/DiagnosticStatus"](1, "n", "m", "h", [pair])
+    data = bytes(store(2).serialize_cdr(types[kind](header, [status]), kind))
+    assert len(data) % 4 != 0
     publisher = DdsPublisher(participant)
     publisher.advertise("/made", kind)
-    peer.listen("/made", "PoseArray")
+    remote.listen("/made", "DiagnosticArray")
     eventually(lambda: publisher.listeners("/made") == 1)
-    publisher.publish(Message("/made", kind, bytes(store(2).serialize_cdr(message, kind))))
-    (came,) = eventually(lambda: peer.take("/made"))
+    publisher.publish(Message("/made", kind, data))
+    (came,) = eventually(lambda: remote.take("/made"))
     assert came["header"] == {"stamp": {"sec": 7, "nanosec": 5}, "frame_id": "läser"}
+    assert came["status"][0]["values"] == [{"key": "rate", "value": "9 Hz!"}]
     assert publisher.unsent == 0
     with pytest.raises(ValueError, match="message begins with '07070707', expected CDR"):
         publisher.publish(Message("/made", kind, b"\7\7\7\7"))

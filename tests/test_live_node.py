@@ -27,7 +27,7 @@ from lineament.live import (
 )
 from lineament.live.counters import Counters
 from lineament.live.pipeline import MOST_BEAMS, check_beams, time_of, twist_of_laser
-from lineament.live.received import received_odometry, received_scan
+from lineament.live.received import Inbox, received_odometry, received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message, Moment
@@ -53,6 +53,23 @@ def moving(*twist: float, stamp: float = 1.0) -> Odometry:
 
 def heard(odometry: Odometry) -> Received:
     return Received("o", lambda: odometry, 0.0, is_odometry=True)
+
+
+class Clock:
+    """The time of a node, which passes only when it is changed."""
+
+    now = 0.0
+    time_ns = staticmethod(time.time_ns)
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("lineament.live.node.time", clock)
+    return clock
 
 
 class Given:
@@ -166,14 +183,12 @@ def test_what_was_skipped_in_a_log_is_written_at_its_end(tmp_path):
     assert lines[0].startswith(f"skipped: {path}:1: FLASER")
 
 
-def test_publishers_problems_and_reports_second_by_second(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+def test_publishers_problems_and_reports_second_by_second(clock):
     source, sink, lines, shown = Given(), Kept(), [], []
 
     def after(publishers: int, *problems: str, seconds: float = 1.0):
         def batch() -> list[Received]:
-            now[0] += seconds
+            clock.now += seconds
             source.publishers, source.lines = publishers, list(problems)
             return []
 
@@ -200,14 +215,12 @@ def test_publishers_problems_and_reports_second_by_second(monkeypatch):
     assert {report.level for report in shown} == {3}
 
 
-def test_a_publisher_that_comes_again_may_be_reported_again(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
     bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
 
     def batch(publishers: int) -> list[Received]:
-        now[0] += 3.0
+        clock.now += 3.0
         source.publishers = publishers
         return [bad]
 
@@ -225,7 +238,9 @@ def test_a_stop_ends_it():
 class Taken(Publisher):
     """Takes messages as a transport does, and checks that they are bytes on an open topic."""
 
-    n = 0
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: list[str] = []
 
     def _open(self, topic: str, kind: str) -> str:
         assert topic.startswith("/")
@@ -235,7 +250,7 @@ class Taken(Publisher):
     def _send(self, topic: str, message: Message) -> None:
         assert topic == message.topic
         assert isinstance(message.data, bytes)
-        self.n += 1
+        self.sent.append(topic)
 
     def _count(self, topic: str) -> int:
         return int(bool(topic))
@@ -326,29 +341,49 @@ def test_no_message_ends_a_node(options):
     total = Node(Given(*[batch] * n), pipeline, sinks, write=lines.append).run().total
     assert n // 4 < total.scans <= n
     assert total.malformed > n // 10
-    assert taken.n >= 3 * total.scans
+    assert len(taken.sent) >= 3 * total.scans
     faults = [line.partition(" makes no sense: ")[0] for line in lines if "sense" in line]
     assert sorted(faults) == ["a scan of a", "a scan of b", "an odometry of o"]
     assert not any("\n" in line for line in lines)
 
 
+class Choosy(Taken):
+    """Only some topics have listeners."""
+
+    heard: tuple[str, ...] = ()
+
+    def _count(self, topic: str) -> int:
+        return int(topic in self.heard)
+
+
 def test_messages_that_have_no_listeners_are_not_made():
-    class Alone(Taken):
-        def _count(self, topic: str) -> int:
-            return int(topic in self.heard)
-
-        heard = ()
-
-    publisher = Alone()
+    publisher = Choosy()
     sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log="a.npz"))
-    scan = sweep(pose=(1.0, 2.0, 0.5))
-    frame = Pipeline(LiveConfig())("a", scan)
-    sink.publish(frame)
-    assert publisher.n == 0
-    for n, below in enumerate(("/features", "/corners", "/markers", ""), 1):
-        publisher.heard = (f"/scan{below}",)
+    frame = Pipeline(LiveConfig())("a", sweep(pose=(1.0, 2.0, 0.5)))
+    for topic in ("/scan/features", "/scan/corners", "/scan/markers", "/tf", "/scan"):
+        publisher.heard = ()
         sink.publish(frame)
-        assert publisher.n == n
+        publisher.heard = (topic,)
+        sink.publish(frame)
+        assert publisher.sent.pop() == topic
+        assert publisher.sent == []
+
+
+@pytest.mark.parametrize("log", ["a.npz", None])
+def test_a_scan_of_a_log_is_published_with_its_pose_or_by_its_points(log):
+    publisher = Taken()
+    sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log=log))
+    regular, bent = sweep(), ln.LaserScan(WALL, angles=BEARINGS**3)
+    placed = sweep(pose=(1.0, 2.0, 0.5))
+    features = [f"/scan/{below}" for below in ("features", "corners", "markers")]
+    for scan, topics in [
+        (placed, ["/tf", "/scan"]),
+        (regular, ["/scan"]),
+        (bent, ["/scan/points"]),
+    ]:
+        publisher.sent.clear()
+        sink.publish(Pipeline(LiveConfig())("a", scan))
+        assert publisher.sent == [*features, *(topics if log else ())]
 
 
 # The pipeline.
@@ -493,7 +528,9 @@ def test_reports_worked_by_hand():
     assert (report.since, report.level) == ((1, 0, 0, 0, 0), 0)
     assert report.total == (4, 2, 4, 1, 5)
     assert report.totals == "4 scans, 2 dropped, 4 lost, 1 malformed messages"
-    report = counters.report(13.5, publishers=0, lost=4, unsent=5)
+    counters.add(scan, features, 0.001)
+    assert counters.report(13.0, publishers=1, lost=4, unsent=6).level == 1
+    report = counters.report(13.5, publishers=0, lost=4, unsent=6)
     assert (report.level, str(report)) == (3, "no scans, 0 publishers")
     assert np.isnan(report.invalid)
     assert counters.report(13.5, publishers=1).rate == 0.0
@@ -505,3 +542,16 @@ def test_a_message_is_read_when_it_is_processed():
     assert len(scan.read()) == 5
     with pytest.raises(ValueError, match="type of scans is 'Image', expected one of sensor_msgs/"):
         received_scan("a", b"", "cdr", "Image")
+
+
+def test_an_inbox_keeps_the_newest_of_each_publisher():
+    inbox = Inbox(depth=2)
+    for arrived, name in enumerate("aabaa"):
+        inbox.put(Received(name, list, float(arrived), is_odometry=False), missing=arrived == 2)
+    for arrived in (0.5, 3.5, 9.0):
+        inbox.put(Received("a", list, arrived, is_odometry=True))
+    assert [one.arrived for one in inbox.take(0)] == [2.0, 3.0, 3.5, 4.0, 9.0]
+    assert (inbox.lost, inbox.take(0)) == (3, [])
+    for number in range(100):
+        inbox.put(Received(f"{number}", list, 0.0))
+    assert (len(inbox.take(0)), inbox.lost) == (64, 39)

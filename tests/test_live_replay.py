@@ -77,6 +77,13 @@ def test_what_is_due_comes_together(played, clock):
     assert source.receive(1.0)[0].arrived == pytest.approx(170.4)
 
 
+def test_a_scan_in_time_is_returned_alone(played, clock):
+    source = played([0.0, 0.1, 0.2, 0.3], rate=100.0)
+    assert len(source.receive(0.0)) == 1
+    clock.now += 0.0035  # all are due, none is late
+    assert [len(source.receive(0.0)) for _ in range(3)] == [1, 1, 1]
+
+
 def test_a_loop_starts_again(played, clock):
     source = played([0.0, 0.5], loop=True)
     came = times(source, clock, most=26)

@@ -39,11 +39,14 @@ def test_what_an_interrupted_start_fails_with_is_not_told():
 
 
 def test_later_signals_do_not_disturb_the_end():
+    reached = []
     with stopping():
         try:
             signal.raise_signal(signal.SIGINT)
         finally:
             signal.raise_signal(signal.SIGINT)
+            reached.append("end")
+    assert reached == ["end"]
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -1,7 +1,5 @@
 """open_log: formats by content, one clear line for what is wrong, bounded memory, recordings."""
 
-from __future__ import annotations
-
 import gc
 import gzip
 import json
@@ -41,6 +39,7 @@ def at_most(megabytes):
     [
         ("carmen", 12, ["FLASER"]),
         ("graph", 9, ["ROBOTLASER1"]),
+        ("player", 9, ["laser 1:1"]),
         ("dpslam", 12, ["Laser"]),
         ("csm", 9, ["scan"]),
         ("rplidar", 4, ["dev0", "dev1", "dev2", "dev3"]),

@@ -245,3 +245,20 @@ def test_response_is_the_rise_of_chi_square(opening):
     joint = naive.chi_square(scan.points[both], scan.ranges[both], noise)
     assert corner["response"] == pytest.approx(joint - sum(cost), rel=1e-8)
     assert corner["response"] > EVIDENCE
+
+
+def test_a_border_makes_both_of_its_lines_less_certain():
+    angles, noise = fan(20), (NOISE.sigma**2, 0.0)
+    ranges = vertex(angles, 3.0, 120, convex=True)
+    scan = scan_of(ranges + 0.01 * np.random.default_rng(1).normal(size=len(angles)), angles)
+    first, second = Extractor("optimal", noise=NOISE)(scan).segments
+    border, n = second["first_beam"], len(angles)
+    for line, own, without, more in (
+        (first, slice(0, border), slice(0, border - 1), slice(0, border + 1)),
+        (second, slice(border, n), slice(border - 1, n), slice(border + 1, n)),
+    ):
+        xy, rho = scan.points, scan.ranges
+        fit = np.diag(naive.fitted_line(xy[own], rho[own], noise)[2])
+        softened = naive.border_covariance(xy, rho, noise, line, without, more)
+        np.testing.assert_allclose(line["covariance"], fit + softened, rtol=1e-6, atol=1e-12)
+        assert abs(line["covariance"][0, 1]) > 1e-10

@@ -60,6 +60,8 @@ def assert_sound(scan, features, extractor):
         assert scan.valid[last].all()
     assert (features.clusters[segments["first_beam"]] == segments["cluster"]).all()
     assert (segments["misfit"] >= 0).all()
+    lengths = np.hypot(*(segments["end"] - segments["start"]).T)
+    np.testing.assert_allclose(segments["length"], lengths, rtol=1e-12)
     assert (arcs["radius"] > 0).all()
     beams = features.breakpoints["beam"]
     assert ((beams >= -1) & (beams < n)).all()

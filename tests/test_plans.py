@@ -391,6 +391,8 @@ def test_odd_features_are_drawn_or_left_out(target):
     drawn = shapes(target)
     assert [len(drawn[name]) for name in ("walls", "corners", "arcs")] == [1, 2, 1]
     assert all(np.isfinite(row).all() for rows in drawn.values() for row in rows)
+    ratios = re.findall(r"AcDbEllipse[^A]*?\n 40\n(\S+)", target.read_text())  # as it is written
+    assert [float(ratio) for ratio in ratios] == [1e-6, 1] * (target.suffix == ".dxf")
 
 
 @pytest.mark.slow

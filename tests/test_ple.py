@@ -165,6 +165,8 @@ NEAR, FAR = (np.array([[x, -1.0], [x, 1.0]]) for x in (1.0, 3.0))
         ([np.concatenate((FAR, NEAR[::-1]))], 0.0, 1.0),
         ([np.array([[2.0, 0.0], [2.0, 1.0]])], -0.9e-3, 2.0),  # by a milliradian past its end
         ([np.array([[2.0, 0.0], [2.0, 1.0]])], -1.1e-3, math.nan),
+        ([np.array([[2.0, 0.0], [2.0, -1.0]])], 0.9e-3, 2.0),
+        ([np.array([[2.0, 0.0], [2.0, -1.0]])], 1.1e-3, math.nan),
         ([np.array([[1.0, 0.0], [2.0, 0.0]])], 0.0, math.nan),  # along the ray
     ],
 )

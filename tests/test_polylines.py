@@ -124,7 +124,7 @@ def test_one_vertex_makes_no_line():
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.3, 0.5, 0.8])
-def test_a_corner_beside_a_reading_is_placed_exactly(turn):
+def test_a_corner_beside_a_measurement_is_placed_exactly(turn):
     angles = fan() + turn * (fan()[1] - fan()[0])
     (polyline,) = mapped(vertex(angles, 2.0, 90.0, convex=True), angles, 3)
     assert len(polyline) == 3
@@ -161,7 +161,7 @@ def test_the_least_vertices_that_will_do_are_used():
     assert [len(polyline) for polyline in mapped(2.0 / np.cos(fan()), fan(), 50)] == [2]
 
 
-def test_a_reading_that_is_off_is_left_out_if_there_are_vertices():
+def test_a_measurement_that_is_off_is_left_out_if_there_are_vertices():
     ranges = 2.0 / np.cos(fan())
     ranges[60] -= 0.9
     assert [len(polyline) for polyline in mapped(ranges, fan(), 4)] == [2, 2]

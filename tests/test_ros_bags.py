@@ -65,6 +65,12 @@ def test_no_scans(tmp_path, kind):
         open_log(path, "/odom")
 
 
+@pytest.mark.parametrize("kind", ["mcap", "mcap-bare", "sqlite3"])
+def test_a_bag_of_nothing(tmp_path, kind):
+    _, problem = ros_bags.read(write(tmp_path, kind, []))
+    assert problem.endswith("topics there are: none")
+
+
 def test_an_error_lists_twenty_topics(tmp_path):
     odometry = ros_bags.Messages(2).odometry(1.0, 0.0, 0.0, 0.0)
     path = write(tmp_path, "mcap", [(f"/odom{i:02}", i, odometry) for i in range(23)])

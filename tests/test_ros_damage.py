@@ -223,12 +223,17 @@ def rosbag1_bomb(path, codec, data, size):
     path.write_bytes(b"#ROSBAG V2.0\n" + record(start, b"") + chunk)
 
 
-def mcap_bomb(path, codec, data, size):
+def mcap_bomb(path, codec, data, size, shorter=0):
     """A chunk that says how large it becomes, in a file without index."""
     with path.open("wb") as file:
         Writer(file, use_chunking=False).start("ros2")
         name = struct.pack("<I", len(codec)) + codec
-        body = struct.pack("<QQQI", 0, 0, size, 0) + name + struct.pack("<Q", len(data)) + data
+        body = (
+            struct.pack("<QQQI", 0, 0, size, 0)
+            + name
+            + struct.pack("<Q", len(data) - shorter)
+            + data
+        )
         file.write(b"\6" + struct.pack("<Q", len(body)) + body)
 
 
@@ -267,11 +272,17 @@ def test_chunks_that_cannot_be_read(tmp_path, bomb):
         assert re.search(problem, read(tmp_path / "bag")[1])
 
 
+def test_a_chunk_that_is_shorter_than_its_record(tmp_path):
+    mcap_bomb(tmp_path / "bag", b"none", b"12345", 5, shorter=1)
+    assert "chunk of 4 bytes in a record with 5 left for it" in read(tmp_path / "bag")[1]
+
+
 @pytest.mark.parametrize("kind", ["rosbag1", "mcap-plain"])
 def test_the_largest_record(bags, kind, monkeypatch):
     """A larger one is refused before memory is taken for it."""
     monkeypatch.setattr(ros_bag, "MAX_PIECE", 100)
     assert "expected at most 0 MiB" in read(bags[kind])[1]
+    assert ros_bag.decompress("", bytes(100), 100) == bytes(100)
     reader = ros_bag.RecordReader
     monkeypatch.setattr(reader, "__abstractmethods__", frozenset())
     with reader(bags[kind]) as source:
@@ -290,6 +301,7 @@ def test_the_largest_record(bags, kind, monkeypatch):
         (b"#ROSBAG V2.0\n", "ends without an index: it is cut off, or still recorded"),
         (b"#ROSBAG V", "begins with b'#ROSBAG V', expected a bag"),
         (b"#ROSBAG V2.0\n\4\0\0\0nono", "header of a record has a broken field"),
+        (b"#ROSBAG V2.0\n\6\0\0\0\3\0\0\0a=", "header of a record has a broken field"),
         (b"#ROSBAG V2.0\n\2\0\0\0no", "header of a record ends within the length of a field"),
         (b"#ROSBAG V2.0\n\0\0\0\0\0\0\0\0", "record without a right field op"),
         (b"\x89MCAP0\r\n", "ends without a footer: it is cut off, or still recorded"),

@@ -83,6 +83,39 @@ def test_a_chain_of_transforms(tmp_path, kind):
     assert poses(path, "/tf:map->laser") == [None, None]
 
 
+def test_a_static_link_holds_at_all_times(tmp_path):
+    """Before and after its stamp, and though it was sent twice."""
+
+    def make(messages):
+        for stamp, x in ((5.0, 1.0), (9.0, 2.0)):
+            link = messages.transform(stamp, "base_link", "laser", x, 0.0, 0.0)
+            yield "/tf_static", 0.0, messages.transforms(link)
+        later = messages.transform(50.0, "base_link", "laser", 3.0, 0.0, 0.0)
+        yield "/tf", 0.0, messages.transforms(later)
+        yield from scans(messages, 1.0, 7.0, 20.0, time=1.0)
+
+    found = poses(write(tmp_path, "mcap", make), "/tf:base_link->laser")
+    assert found == [(2.0, 0.0, 0.0)] * 3
+
+
+def test_a_scan_with_the_stamp_of_a_pose_does_not_wait(tmp_path, monkeypatch):
+    learned = []
+
+    class Finder(ros_poses.PoseFinder):
+        def wait(self, topic, scan):
+            learned.append(len(super().wait(topic, scan)))
+            return []
+
+    monkeypatch.setattr("lineament.logs.ros.PoseFinder", Finder)
+
+    def make(messages):
+        yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)
+        yield from scans(messages, 1.0, 1.5)
+
+    poses(write(tmp_path, "mcap", make), "/odom")
+    assert learned == [1, 0]
+
+
 def test_stamps_that_run_backwards_find_their_poses(tmp_path):
     def make(messages):
         for stamp in (1.0, 2.0, 3.0):
@@ -102,12 +135,12 @@ def test_scans_do_not_wait_for_ever(tmp_path, monkeypatch):
         yield from scans(messages, *(0.1 * i for i in range(5)))
         for i in range(20):
             yield "/odom", 1 + i, messages.odometry(0.05 * i, i, 0.0, 0.0)
-        yield from scans(messages, 0.2, time=50.0)
+        yield from scans(messages, 0.2, 0.7, time=50.0)
 
     found = poses(write(tmp_path, "mcap-plain", make), "/odom")
     assert found[:3] == [None] * 3  # Given up when the next two came.
     assert [pose and pose[0] for pose in found[3:5]] == pytest.approx([6.0, 8.0])
-    assert found[5] is None  # Of the poses, only the newest are kept.
+    assert found[5:] == [None, None]  # Of the poses, only the newest are kept.
 
 
 @pytest.mark.parametrize("x", [math.nan, math.inf, -1e308, 1e100])

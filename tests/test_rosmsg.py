@@ -113,6 +113,7 @@ def test_unknown_encodings():
     for data in (b"\0\7\0\0", b"\0\1\0"):
         with pytest.raises(ValueError, match=f"begins with '{data.hex()}', expected plain CDR"):
             WireReader(data, "cdr")
+    WireReader(b"\0\1\0\0", "cdr").end()
 
 
 # --- definitions
@@ -179,6 +180,10 @@ def test_a_scanner_that_turns_clockwise(ros, encoding):
     assert scan.angles.tolist() == [0.0, 0.5, 1.0]
     # The beam at bearing 1 is the first in time: 10 s.
     assert (scan.stamp, scan.time_increment) == (10.5, -0.25)
+    message = ros_bags.Messages(ros).scan(10.0, [1.0, 2.0], **fields)
+    assert laser_scan(ros_bags.serialized(message, ros), encoding).ranges.tolist() == [2.0, 1.0]
+    message = ros_bags.Messages(ros).scan(10.0, [1.0], **fields)
+    assert laser_scan(ros_bags.serialized(message, ros), encoding).time_increment == 0.25
 
 
 def scan_bytes(ranges=(1.0, 2.0), **fields):
@@ -287,6 +292,24 @@ def read_echoes(*beams, echo="strongest"):
     return multi_echo_scan(data, "cdr", echo)
 
 
+@both
+def test_lengths_of_echoes_that_reach_past_the_message(ros, encoding):
+    """The number of beams, and that of the last beam's echoes, one too large."""
+    data = ros_bags.serialized(ros_bags.Messages(ros).echoes(1.0, [[1.0]]), ros)
+    at = len(data) - 16  # of the number of beams: echoes and its one, and no intensities
+    assert struct.unpack_from("<IIfI", data, at) == (1, 1, 1.0, 0)
+    for place, value, problem in (
+        (at, 4, "4 beams expected in 12 bytes"),
+        (at, 3, "beam 2 of 3 reaches past its end|ends early"),
+        (at + 4, 3, "beam 0 of 1 reaches past its end"),
+        (at + 4, 2, "ends early"),
+    ):
+        changed = bytearray(data)
+        struct.pack_into("<I", changed, place, value)
+        with pytest.raises(ValueError, match=problem):
+            multi_echo_scan(bytes(changed), encoding)
+
+
 def test_echoes_that_are_strange():
     assert np.isnan(read_echoes([[], []], echo="last").ranges).all()
     with pytest.raises(ValueError, match="ranges is empty"):
@@ -341,6 +364,13 @@ def test_ring_of_a_cloud(ros, encoding, order):
     assert (scan.stamp, scan.frame_id, scan.is_regular) == (3.5, "laser", False)
     with pytest.raises(ValueError, match="has no points in ring 7, its rings are 0 to 1"):
         ring_scan(data, encoding, 7)
+
+
+def test_a_cloud_of_one_row_may_leave_the_length_of_rows_unset():
+    points = np.ones((1, 2), dtype=[("x", "f4"), ("y", "f4"), ("ring", "u2")])
+    message = ros_bags.Messages(2).cloud(3.5, points)
+    object.__setattr__(message, "row_step", 0)
+    assert len(ring_scan(ros_bags.serialized(message, 2), "cdr", 1)) == 1
 
 
 def test_rows_of_an_organised_cloud_are_its_rings():
@@ -402,6 +432,9 @@ def test_odometry(ros, encoding):
     found = odometry(ros_bags.serialized(messages.odometry(7.5, 1.0, 2.0, 3.0), ros), encoding)
     pose = pytest.approx((1.0, 2.0, 3.0))
     assert found == Odometry(7.5, (1.5, -0.5, 0.25), pose, "odom", "base_link")
+    data = ros_bags.serialized(messages.odometry(7.5, 1.0, 2.0, 3.0), ros)
+    with pytest.raises(ValueError, match="has 4 bytes behind its last field"):
+        odometry(data + bytes(4), encoding)
     for x in (math.nan, -math.inf):
         with pytest.raises(ValueError, match=r"has pose .* and twist .*, expected finite numbers"):
             odometry(ros_bags.serialized(messages.odometry(7.5, x, 2.0, 3.0), ros), encoding)

@@ -1,7 +1,5 @@
 """Scans saved as npz and CARMEN logs, and npz logs read: round trips, keys, shapes, damage."""
 
-from __future__ import annotations
-
 import contextlib
 import gzip
 import math
@@ -125,6 +123,7 @@ def test_the_same_scans_give_the_same_compressed_file(tmp_path):
     first, second, plain = ((tmp_path / name).read_bytes() for name in sorted(names(tmp_path)))
     assert first == second
     assert gzip.decompress(first) == plain
+    assert first[4:8] == bytes(4)  # The time.
 
 
 # npz

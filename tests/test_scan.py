@@ -107,6 +107,12 @@ def test_refusals_of_bearings(angles, message):
         LaserScan(np.ones(3), angles=angles)
 
 
+def test_steps_must_be_seen_in_the_bearings():
+    assert len(LaserScan(np.ones(2), 1.0, 2.0**-51)) == 2
+    with pytest.raises(ValueError, match=r"angle_increment .* too small for bearings from 1\.0"):
+        LaserScan(np.ones(2), 1.0, 2.0**-52)
+
+
 def test_irregular_bearings():
     scan = LaserScan(np.ones(4), angles=[0.0, 0.1, 0.4, 0.5])
     assert not scan.is_regular

@@ -75,6 +75,13 @@ def test_each_kind_holds_what_it_is_for():
         assert np.mean([len(getattr(scan, name)) for scan in scans]) > least
 
 
+def test_a_star_has_no_flat_corners():
+    for seed in range(200):
+        ends = scene("star", seed)[0].segments.reshape(-1, 2, 2)
+        bearings = np.unwrap(np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1]))
+        assert abs(np.diff(bearings, append=bearings[0] + 2 * math.pi)).min() >= math.radians(20)
+
+
 def test_thin_walls_are_met_at_grazing_incidence():
     incidences = []
     for seed in SEEDS:

@@ -9,7 +9,7 @@ import pytest
 from naive_world import INF, distance_to_walls, drum, naive_cast, ring_sensor
 
 from lineament.scan import RangeNoise
-from lineament.simulation import SENSORS, Sensor, World, building, cast_rays, room
+from lineament.simulation import SENSORS, Sensor, World, building, cast_rays, drive_poses, room
 
 #: Statistics are held to this many standard deviations of their own: a chance of 7e-6 each.
 SIGMAS = 4.5
@@ -79,6 +79,12 @@ def test_building_encloses_its_way():
         ranges, _ = cast_rays(world, (x, y, 0), np.linspace(-3.1, 3.1, 400))
         assert np.isfinite(ranges).all()
     assert distance_to_walls(world, waypoints).min() > 0.3
+
+
+def test_a_drive_ends_with_a_scan_in_spite_of_rounding():
+    """0.3/0.1 · 10 is below 30 by rounding."""
+    stamps, poses = drive_poses([(0, 0), (0.3, 0)], speed=0.1, rate=10.0)
+    assert (len(stamps), stamps[-1], poses[-1].tolist()) == (31, 3.0, [0.3, 0.0, 0.0])
 
 
 # Ray casting
@@ -248,6 +254,13 @@ def test_limits(range_min, range_max):
     assert within.any()
     assert not within.all()
     np.testing.assert_array_equal(ranges, np.where(within, truth, INF))
+
+
+def test_a_range_at_the_upper_limit_is_not_reported():
+    at_limit = (ring_sensor(range_min=low, range_max=high) for low, high in ((0, 2), (2, 3)))
+    near, far = (s.scan(drum(2), (0, 0, 0), np.random.default_rng(0)).ranges for s in at_limit)
+    assert np.isinf(near).all()
+    assert (far == 2).all()
 
 
 def test_mixed_pixels_only_across_occlusion_edges():

@@ -1,7 +1,5 @@
 """Where logs are: folders, patterns, addresses, archives and what hostile ones must not do."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os
@@ -194,6 +192,8 @@ def test_npz_logs_in_gzip_and_zip(write, tmp_path, temporary):
     for path in (packed, write(zipped(**{"inside.npz": data}), "b.zip")):
         log = open_log(path)
         assert (log.format, next(iter(log)).stamp) == ("npz", 7.5)
+    made = open_log(tmp_path / "made.npz")
+    assert made.path == tmp_path / "made.npz"  # Itself, no copy.
     # Cut off, it still says so.
     packed.write_bytes(gzip.compress(data)[:-200])
     for keep_going, problem in ((True, "is no whole npz"), (False, "gzip data ends early")):

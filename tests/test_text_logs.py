@@ -1,14 +1,12 @@
 """Logs of text lines, CARMEN, graphs, DP-SLAM, tinySLAM and CSV: known values and faults."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from text_logs import flaser, robotlaser, tinyslam_line
+from text_logs import flaser, player_line, player_scan, robotlaser, tinyslam_line
 
 from lineament import LogError
 from lineament.logs import open_log
@@ -210,6 +208,39 @@ def test_one_vertex_before_several_scans_is_that_of_all(write):
 def test_a_graph_without_scans(write):
     with pytest.raises(LogError, match=r"holds VERTEX2 \(1\), EDGE2 \(1\), expected ROBOTLASER1"):
         open_log(write("VERTEX2 0 1 2 3\nEDGE2 0 1 1 0 0 1 0 1 1 0 0\n"))
+
+
+# Player
+
+
+def test_player_fields(write):
+    text = (
+        player_scan(1, [(1.5, 0), (8, 0)])
+        + player_line(2, "position2d", "001 +10.000 +20.000 +1.000 0 0 0 0")
+        + player_line(2, "sonar", "001 2 1.0 2.0")
+        + player_scan(1262304000.125, [(1.5, 7), (7.999, 9)])
+        + player_scan(4, [(1, 0), (2, 0)], pose="+1.000 +2.000 +0.500")
+    )
+    first, second, third = log = open_log(write(text, "a.log"))
+    assert (first.angle_min, first.angle_increment) == (-1.5708, math.radians(0.5))
+    assert (first.valid.tolist(), first.intensities, first.frame_id) == ([1, 0], None, "laser:0")
+    assert (second.ranges.tolist(), second.intensities.tolist()) == ([1.5, 7.999], [7, 9])
+    assert [scan.pose for scan in (first, second, third)] == [None, (10, 20, 1), (1, 2, 0.5)]
+    assert (second.stamp, log.topics) == (1262304000.125, ["laser 1:1", "laser 1:2"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        (" 2.000  0", " 2.000", "says 2 ranges,intensities and has 1.5 of them"),
+        ("laser 00 001 001", "position2d 00 001 001 x", "position2d x is 'x'"),
+    ],
+)
+def test_faulty_player_lines(write, old, new, problem):
+    scan = player_scan(2, [(1, 0), (2, 0)])
+    path = write(player_line(1, "position2d", "001 8 0 0") + scan + scan.replace(old, new) + scan)
+    poses = [scan.pose for scan in check_fault(path, 3, problem, good=2)]
+    assert poses == [(8, 0, 0), None]  # Behind a fault it is not known.
 
 
 # DP-SLAM

@@ -62,16 +62,26 @@ def edges(*kinds):
         # The back of the wall; 0.1 rad with deviations of 0.01 rad.
         ({"segments": [segment((2.0, 1), (2.0, -1), 10, 30)]}, {}, 0),
         ({"segments": [segment((1.9, -1), (2.1, 1), 10, 30)]}, {}, 0),
-        # A part of it; 0.6 of 1.1 m beside it, and 0.5.
+        # A part of it; 0.6 of 1.1 m beside it, and 0.48.
         ({"segments": [segment((2.0, -0.2), (2.0, 0.2), 10, 30)]}, {}, 1),
         ({"segments": [segment((2.0, 0.4), (2.0, 1.5), 10, 30)]}, {}, 1),
-        ({"segments": [segment((2.0, 0.6), (2.0, 1.7), 10, 30)]}, {}, 0),
+        ({"segments": [segment((2.0, 0.52), (2.0, 1.62), 10, 30)]}, {}, 0),
     ],
 )
 def test_a_pair_is_within_its_gate(now, settings, found):
     assert len(associate(FRAME, features(**now), **settings)) == found
     twin = naive.associate(FRAME, features(**now), **settings)
     assert len(twin) == found
+
+
+@pytest.mark.parametrize(("misfit", "found"), [(0.016, 1), (0.013, 0)])
+def test_a_corner_of_uneven_walls_may_be_farther_off(misfit, found):
+    # Seen twice, of two walls: (10 cm)² over 2 cm² and four misfits is 8.2, and 11.4.
+    rows = [row.copy() for row in WALLS]
+    for row in rows:
+        row["misfit"] = misfit
+    now = features(segments=rows, corners=[corner(2.1, 1, segments=(0, 1))])
+    assert len(associate(FRAME, now).corners) == found
 
 
 @pytest.mark.parametrize("kinds", [("edge", "edge"), ("corner", "edge"), ("edge", "slit")])

@@ -155,6 +155,22 @@ def test_one_wall_leaves_its_own_direction_to_the_prior():
     assert motion.covariance[1, 1] == pytest.approx(0.01, rel=0.1)
 
 
+@pytest.mark.parametrize(("sigma", "lost"), [(0.095, 0), (0.105, 3)])
+def test_what_is_known_to_ten_centimetres_is_observed(sigma, lost):
+    # As in the covariance by hand: each direction is known as well as a point is.
+    points = [corner(x, 0.0, segments=(-1, -1), sigma=sigma) for x in (1, -1)]
+    assert len(estimate_motion(moved_by((0.0, 0.0, 0.0), corners=points)).unobserved) == lost
+
+
+@pytest.mark.parametrize(("turn", "lost"), [(0.0075, 1), (0.0095, 0)])
+def test_walls_that_are_parallel_but_for_their_errors_leave_a_direction_open(turn, lost):
+    # Directions known to 1 mrad, twice, of two walls: 3 · √(2 · 2 · 2) mrad may be feigned.
+    x, y = math.cos(turn), math.sin(turn)
+    ends = ((-1, -1), (1, -1)), ((x, 1 + y), (-x, 1 - y))
+    walls = [segment(*pair, 0, 9, sigma=(0.0001, 0.001)) for pair in ends]
+    assert len(estimate_motion(moved_by((0.0, 0.0, 0.0), segments=walls)).unobserved) == lost
+
+
 def test_the_misfit_of_a_wall_counts_where_one_frame_saw_it_alone():
     # Two directions known to 1 mrad each, and two misfits of 1 cm over 2 m: 12 (2 · 0.01²)/2².
     noise, bow = 2e-6, 6e-4

@@ -57,7 +57,8 @@ def server(session):
 
 def ask(server, target, method="GET", **headers):
     """Status, headers and body of the answer to one request."""
-    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
+    host = "127.0.0.1" if server.host == "0.0.0.0" else server.host
+    connection = http.client.HTTPConnection(host, server.server_port, timeout=30)
     try:
         connection.request(method, target, headers=headers)
         reply = connection.getresponse()
@@ -226,6 +227,12 @@ def test_colours_are_those_of_the_figures(server):
 def test_requests_by_another_name_are_refused(server, host, status):
     for target in ("/api/log", "/"):
         assert ask(server, target, Host=host)[0] == status
+
+
+def test_the_host_that_was_given_is_known(session):
+    with served(session, "127.0.0.2") as server:
+        assert ask(server, "/")[0] == 200
+        assert ask(server, "/", Host="127.0.0.3")[0] == 403
 
 
 def test_listening_everywhere_takes_addresses_but_no_names(session):

@@ -78,6 +78,7 @@ def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
             assert topic == f"scan{index}"
             assert_scans_equal(scan, scans[index])
         assert (len(kept._starts), -1 in kept._starts) == (len(scans), capacity < 1 << 20)
+        assert kept._end <= capacity
         for index in (-1, len(scans)):
             with pytest.raises(IndexError):
                 kept.item(index)

@@ -199,7 +199,7 @@ def test_hovering_tells_the_numbers_of_a_feature(page, log):
     segment = found(log, 0).segments[0]
     page.point(page.run(PLACE, segment["centroid"].tolist()))
     page.wait("document.querySelector('.card').innerText.includes('segment 0')")
-    assert f"{segment['n_points']} readings" in page.text(".card")
+    assert f"{segment['n_points']} measurements" in page.text(".card")
 
 
 def test_a_click_pins_a_feature_once_and_it_can_be_removed(page, log):

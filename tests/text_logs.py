@@ -1,7 +1,5 @@
 """Small logs of text, written by hand, that several test files share."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile
@@ -40,6 +38,16 @@ def csm_scan(stamp=7, **changes):
     }
 
 
+def player_line(stamp, interface, message):
+    return f"{stamp:014.3f} 16777343 6665 {interface} 00 001 {message} \n"
+
+
+def player_scan(stamp, pairs, pose=""):
+    beams = " ".join(f"{distance:.3f} {intensity:2d}" for distance, intensity in pairs)
+    header = f"{'002' if pose else '001'} 0007 {pose} -01.5708 +01.5708 +0.00872665 +08.0000"
+    return player_line(stamp, "laser", f"{header} {len(pairs):04d} {beams}")
+
+
 def tinyslam_line(stamp, ranges=range(500, 1182)):
     return " ".join(map(str, [stamp, *range(24), *ranges])) + " \n"
 
@@ -55,6 +63,7 @@ def scan_texts():
             f"VERTEX2 {i} {i} 2 0.5\n" + robotlaser(laser=pose, robot=pose, stamp=i)
             for i, pose in enumerate(poses)
         ),
+        "player": "".join(player_scan(i, [(1.5, 0), (2.5, 1), (8, 0)]) for i in range(9)),
         "dpslam": "".join(f"Odometry {i}.25 2.0 0.5 \nLaser 3 1.5 2.5 8.191\n" for i in range(12)),
         "csm": "\n".join(json.dumps(csm_scan(stamp=i)) for i in range(9)),
         "rplidar": json.dumps(units, indent=1),

@@ -28,7 +28,6 @@ A wall 2 m ahead, seen over 30° by 91 beams with noise of 1 cm, is known to 1.0
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,16 +69,7 @@ class LineBound:
         """Bound of (offset, angle) where the line passes `point`.
 
         With t the distance from the centroid along the line, offset(t) = offset + t angle, so
-        that var(offset at t) ≥ 1/W + t²/S.
-
-        Parameters
-        ----------
-        point : array_like, shape (2,)
-            A point [m]; only where it lies along the line matters.
-
-        Returns
-        -------
-        ndarray, shape (2, 2)
+        that var(offset at t) ≥ 1/W + t²/S. Of `point` [m] only its place along the line matters.
 
         Examples
         --------
@@ -172,7 +162,7 @@ def corner_bound(before: LineBound, after: LineBound) -> Array:
     corner = inverse @ [n @ line.centroid for n, line in zip(normals, lines, strict=True)]
     offsets = np.diag([line.at(corner)[0, 0] for line in lines])
     covariance: Array = inverse @ offsets @ inverse.T
-    return _symmetric(covariance)
+    return (covariance + covariance.T) / 2
 
 
 def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: RangeNoise) -> Array:
@@ -228,7 +218,8 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Rang
     gradient = np.column_stack((normals, np.ones(len(beams))))
     variance = _offset_variance(ranges, half_chord / radius, noise)
     information = gradient.T @ (gradient / variance[:, np.newaxis])
-    return _symmetric(np.linalg.inv(information))
+    covariance: Array = np.asarray(np.linalg.inv(information), np.float64)
+    return (covariance + covariance.T) / 2
 
 
 def wall_end_bound(end: ArrayLike, angle: float, increment: float) -> float:
@@ -267,12 +258,6 @@ def wall_end_bound(end: ArrayLike, angle: float, increment: float) -> float:
     if not distance > 0:
         raise ValueError(f"a wall through ({x:g}, {y:g}) at {angle:g} rad points at the scanner")
     return (square / distance * increment) ** 2 / 12  # cos ψ = distance/ρ
-
-
-def _symmetric(covariance: NDArray[np.floating[Any]]) -> Array:
-    """Leave out what rounding makes of symmetry."""
-    symmetric: Array = (covariance + covariance.T) / 2
-    return symmetric
 
 
 def _offset_variance(ranges: Array, cosine: Array, noise: RangeNoise) -> Array:

@@ -172,17 +172,7 @@ def extract(
     noise: RangeNoise | None = None,
     **parameters: Any,
 ) -> Features:
-    """Extract the features of one scan; for many, keep an `Extractor`.
-
-    Parameters
-    ----------
-    scan : LaserScan
-    method : str
-        Name of the method.
-    noise : RangeNoise, optional
-        Noise of the sensor; estimated from the scan if it is not given.
-    **parameters
-        Parameters of the method that differ from its defaults.
+    """Extract the features of one scan; for many, keep an `Extractor`, which has its parameters.
 
     Examples
     --------

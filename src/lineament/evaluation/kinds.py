@@ -150,7 +150,7 @@ def segment_scores(found: Features, truth: Features) -> FeatureScores:
     surfaces too small to be demanded, is left out of the count.
 
     A true segment is fragmented if several found ones each have more than half of their beams
-    in it, and together more than half of its own; a found one is merged if that holds the
+    in it, and together more than half of its beams; a found one is merged if that holds the
     other way round. These are over- and under-segmentation in Hoover et al., *An experimental
     comparison of range image segmentation algorithms*, PAMI 1996, with a tolerance of one half.
 

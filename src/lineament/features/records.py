@@ -60,6 +60,7 @@ FIELDS = tuple(
         ("segments", "misfit", "f8", "m", "rms distance of its surface from a straight line",
          "misfit", "misfit"),
         ("segments", "cluster", "i4", "", "index of its cluster", "cluster", ""),
+        ("segments", "length", "f8", "m", "distance from start to end", "length", "length"),
         ("corners", "position", "(2,)f8", "m", "position", "x y", "x y"),
         ("corners", "covariance", "(2,2)f8", "m²", "of x and y", "cov_00 cov_01 cov_11",
          "c00 c01 c11"),
@@ -174,8 +175,8 @@ def _at(dtype: np.dtype[np.void], names: str) -> list[int]:
     return [offset // (8 if form.base.kind == "f" else 4) for form, offset, *_ in fields]
 
 
-S_START, S_END, S_CENTROID, S_ANGLE, S_COVARIANCE, S_RMS, S_MISFIT = _at(
-    SEGMENT, "start end centroid angle covariance rms misfit"
+S_START, S_END, S_CENTROID, S_ANGLE, S_COVARIANCE, S_RMS, S_MISFIT, S_LENGTH = _at(
+    SEGMENT, "start end centroid angle covariance rms misfit length"
 )
 S_FIRST, S_LAST, S_POINTS, S_CLUSTER = _at(SEGMENT, "first_beam last_beam n_points cluster")
 C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE, C_QUALITY = _at(

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from .._version import __version__
-from .features import FeatureBatch, Features
 from .records import COLUMNS, FIELDS, KINDS, SHARED_COLUMNS, TABLES, Field, kind_codes, numbers
+
+if TYPE_CHECKING:
+    from .features import FeatureBatch, Features
 
 __all__ = ["SCHEMA", "batch_table", "features_table"]
 

@@ -12,35 +12,24 @@ from numba import njit
 #: Compiled on first use, cached on disk, without the GIL. No fastmath: NaN means something here.
 kernel = njit(cache=True, nogil=True, error_model="numpy")
 
+_INTERNAL = {
+    "nogil": True,
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+
 #: For what only kernels call: without the wrappers for Python and C, which take time to compile.
-helper = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+helper = njit(**_INTERNAL)
 
 #: For what takes tuples of arrays: to hand them over takes a tenth of a microsecond and more.
-inlined = njit(
-    nogil=True,
-    error_model="numpy",
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-    forceinline=True,
-)
+inlined = njit(forceinline=True, **_INTERNAL)
 
 #: For what adds up many numbers: the order may change, so that four are added at once.
-sums = njit(
-    nogil=True,
-    error_model="numpy",
-    fastmath={"reassoc"},
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-)
+sums = njit(fastmath={"reassoc"}, **_INTERNAL)
 
 #: For arithmetic whose last digit does not matter: a product and a sum are rounded at once.
-contracted = njit(
-    nogil=True,
-    error_model="numpy",
-    fastmath={"contract"},
-    no_cpython_wrapper=True,
-    no_cfunc_wrapper=True,
-)
+contracted = njit(fastmath={"contract"}, **_INTERNAL)
 
 #: The least number above 0: no range is 0.
 LEAST_RANGE = 5e-324

@@ -13,8 +13,8 @@ from . import layout as at
 from .writing import write_end
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
-#: its ray; or they are free to meet beside it, and its reading is on neither as long as it is open
-#: on which, or on the line after it, or on that before.
+#: its ray; or they are free to meet beside it, and its measurement is on neither as long as it is
+#: open on which, or on the line after it, or on that before.
 BEGIN, HELD, _OPEN, _AFTER, _BEFORE = 0, 1, 2, 3, 4
 #: Points between the vertices of a line that is free.
 _ENOUGH = 3

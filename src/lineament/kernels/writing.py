@@ -34,8 +34,11 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
 
 @helper
 def write_end(segments, k, end, x, y):
-    """Write where a segment starts or ends: `S_START` or `S_END`."""
-    segments[k, end], segments[k, end + 1] = x, y
+    """Write where a segment starts or ends: `S_START` or `S_END`. Its length follows."""
+    row = segments[k]
+    row[end], row[end + 1] = x, y
+    dx, dy = row[at.S_END] - row[at.S_START], row[at.S_END + 1] - row[at.S_START + 1]
+    row[at.S_LENGTH] = math.hypot(dx, dy)
 
 
 @helper

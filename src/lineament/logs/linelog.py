@@ -128,6 +128,7 @@ class Fields:
 
     In the pattern ``x`` is a number, ``_`` a word that is not read, and ``ranges*`` a count and as
     many numbers. Words behind a pattern without such a list are not read.
+    ``ranges,intensities*`` is a count and as many pairs.
 
     Examples
     --------
@@ -164,13 +165,17 @@ class Fields:
                 count = words[at - 1]
                 if not count.isdigit() or len(count) > 9:
                     raise _no_number(f"{kind}: the number of {name}", count, "a whole number")
-                n, left = int(count), len(words) - at - behind
+                lists = name.split(",")
+                n, left = int(count), (len(words) - at - behind) / len(lists)
                 # Behind the last list are as many words as the pattern has.
                 if n > left or (n < left and i == len(self._pieces) - 2):
                     where = f" before its last {behind} values" if behind else ""
-                    raise ValueError(f"{kind} says {n} {name} and has {left} of them{where}")
-                values[name] = numbers(name.removesuffix("s"), words[at : at + n], number)
-                at += n
+                    raise ValueError(f"{kind} says {n} {name} and has {left:g} of them{where}")
+                end = at + n * len(lists)
+                for k, each in enumerate(lists):
+                    given = words[at + k : end : len(lists)]
+                    values[each] = numbers(each.removesuffix("s"), given, number)
+                at = end
         return values
 
 
@@ -188,7 +193,7 @@ def _plain_float(word: bytes) -> float:
 def numbers(
     what: str, words: list[bytes], number: Callable[[bytes], float] = _plain_float
 ) -> NDArray[np.float64]:
-    """Return words as numbers; ValueError, which names the first that is none, if not.
+    """Return words as numbers; ValueError names the first that is not one.
 
     Examples
     --------
@@ -205,7 +210,7 @@ def numbers(
 
 
 def scalar(what: str, word: bytes, number: Callable[[bytes], float] = _plain_float) -> float:
-    """Return a word as a number; ValueError if it is none."""
+    """Return a word as a number; ValueError if it is not one."""
     try:
         return number(word)
     except ValueError:

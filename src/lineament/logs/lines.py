@@ -15,6 +15,11 @@ BOM = b"\xef\xbb\xbf"
 #: Length of a line above which a file is no text [bytes].
 MAX_LINE = 1 << 24
 
+_PROBLEMS: dict[type[OSError], str] = {
+    FileNotFoundError: "there is no such file, expected a log",
+    PermissionError: "no permission to read it",
+    IsADirectoryError: "is a directory, expected a log file",
+}
 _COMPRESSED = 1 << 16
 _PLAIN = 1 << 20
 
@@ -24,14 +29,9 @@ def reading(path: object) -> Iterator[None]:
     """Turn what the operating system reports into a LogError of one line."""
     try:
         yield
-    except FileNotFoundError:
-        raise LogError(path, "there is no such file, expected a log") from None
-    except PermissionError:
-        raise LogError(path, "no permission to read it") from None
-    except IsADirectoryError:
-        raise LogError(path, "is a directory, expected a log file") from None
     except OSError as error:
-        raise LogError(path, f"cannot be read: {error.strerror or error}") from None
+        problem = _PROBLEMS.get(type(error), f"cannot be read: {error.strerror or error}")
+        raise LogError(path, problem) from None
     except ValueError as error:  # A path with a null byte.
         raise LogError(path, f"is no path of a file: {error}") from None
 

@@ -17,11 +17,17 @@ from .sources import ZIP, check_growth
 
 #: One number for the log, or one for each scan.
 SCALARS = ("range_min", "range_max", "scan_time", "time_increment")
-#: The arrays of a log.
-KEYS = (
-    *("ranges", "angle_min", "angle_increment", "angles", "stamps", "poses", "frame_id"),
-    *("intensities", *SCALARS),
-)
+#: The arrays of a log, and their shapes for n scans of m beams.
+SHAPES = {
+    "ranges": ("nm",),
+    "angle_min": ("",),
+    "angle_increment": ("",),
+    "angles": ("m",),
+    "stamps": ("n",),
+    "poses": ("n3",),
+    "intensities": ("nm",),
+    **dict.fromkeys((*SCALARS, "frame_id"), ("", "n")),
+}
 
 
 class NpzLog(Log):
@@ -93,7 +99,7 @@ def _load(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
                 found = list(archive.files)
                 size = sum(member.file_size for member in archive.zip.infolist())
                 check_growth(path, size, Path(path).stat().st_size)
-                arrays = {key: np.asarray(archive[key]) for key in KEYS if key in found}
+                arrays = {key: np.asarray(archive[key]) for key in SHAPES if key in found}
         except LogError:
             raise
         # A damaged archive fails in a dozen ways, in zipfile, zlib, struct and numpy's parser.
@@ -123,19 +129,11 @@ def _check(arrays: dict[str, NDArray[Any]], found: list[str]) -> None:
         raise ValueError("ranges has no scans, expected at least one row")
     if m == 0:  # Any number of scans would fit into no space.
         raise ValueError("ranges has no beams, expected at least one column")
-    expected: dict[str, tuple[tuple[int, ...], ...]] = {
-        "ranges": ((n, m),),
-        "angle_min": ((),),
-        "angle_increment": ((),),
-        "angles": ((m,),),
-        "stamps": ((n,),),
-        "poses": ((n, 3),),
-        "intensities": ((n, m),),
-        **dict.fromkeys((*SCALARS, "frame_id"), ((), (n,))),
-    }
+    sizes = {"n": n, "m": m, "3": 3}
     for key, array in arrays.items():
-        if array.shape not in expected[key]:
-            wanted = " or ".join(map(str, expected[key]))
+        expected = [tuple(sizes[axis] for axis in shape) for shape in SHAPES[key]]
+        if array.shape not in expected:
+            wanted = " or ".join(map(str, expected))
             raise ValueError(f"{key} has shape {array.shape}, expected {wanted}")
         kinds = "U" if key == "frame_id" else "fiu"
         if array.dtype.kind not in kinds:

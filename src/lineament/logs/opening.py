@@ -19,6 +19,7 @@ READERS = (
     ("npz", "NpzLog"),
     ("graph", "GraphLog"),
     ("carmen", "CarmenLog"),
+    ("player", "PlayerLog"),
     ("dpslam", "DpslamLog"),
     ("csm", "CsmLog"),
     ("rplidar", "RplidarLog"),
@@ -85,7 +86,7 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring` or `pose_topic` is none of these.
+        If `echo`, `ring` or `pose_topic` is not a value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, or has no such
         topic. While the log is iterated: if a scan in it is faulty, unless `keep_going`.

@@ -45,7 +45,7 @@ class _Reader(RecordReader):
     """Reads a bag; version 1 has neither chunks nor connections."""
 
     def records(self) -> Iterator[tuple[int, _Header, Buffer]]:
-        # Only the index of version 2 is made of its own records.
+        # Only the index of version 2 consists of separate records.
         has_index = self._magic() != _MAGICS[0]
         while self.left:
             at = self.at

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan
-from .npz import KEYS, SCALARS
+from .npz import SCALARS, SHAPES
 
 _CARMEN_HEADER = """\
 # CARMEN Logfile
@@ -90,7 +90,7 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
     """
     arrays = _pack(list(scans))
     for key, value in extra.items():
-        if key in KEYS:
+        if key in SHAPES:
             raise ValueError(f"extra key {key} is one of the log's own")
         arrays[key] = np.asarray(value)
         if arrays[key].dtype.hasobject:

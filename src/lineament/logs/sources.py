@@ -35,7 +35,7 @@ _PIECE = 1 << 20
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
-    """Return the beginning of a file; LogError if there is none, as in pipes and devices."""
+    """Return the beginning of a file; LogError if it is missing, empty, a pipe or a device."""
     try:
         where = Path(path)
     except TypeError:
@@ -76,7 +76,7 @@ class LocalCopy(os.PathLike[str]):
     """
 
     def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
-        # A folder of its own: what a reader looks for beside its log is not there.
+        # In a separate folder: what a reader looks for beside its log is not there.
         folder = tempfile.mkdtemp(prefix="lineament-")
         self.remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._name, self._path = name, str(Path(folder, "log"))

@@ -1,4 +1,4 @@
-"""The methods, by name. A method is one frozen dataclass of its own parameters, in its own file."""
+"""The methods, by name: each a frozen dataclass of its parameters, in one file."""
 
 from __future__ import annotations
 

@@ -30,38 +30,28 @@ class Batch:
 
 
 def block_capacity(beams: int) -> int:
-    """Tell how many scans of so many beams go into a block of a batch."""
+    """Return how many scans of so many beams go into a block of a batch."""
     return max(1, _BLOCK_VALUES // max(beams, 1))
 
 
 def run_batch(
     rows: NDArray[np.float64], blocks: Sequence[Block], run: Callable[[Block], None]
 ) -> Batch:
-    """Run a method over rows of ranges, with a thread for each block.
-
-    Parameters
-    ----------
-    rows : float64 array, shape (m, n)
-        One scan a row [m].
-    blocks : sequence of Block
-        Where the scans of a share go through; one share each.
-    run : callable
-        The method.
-    """
+    """Run a method over rows of ranges, shape (m, n), with a thread for each block."""
     m, n = rows.shape
     batch = Batch(
         np.empty((m, len(TABLES)), np.int64), np.empty((m, n), np.int32), np.empty((m, 4))
     )
     shares = [range(m * k // len(blocks), m * (k + 1) // len(blocks)) for k in range(len(blocks))]
+
+    def run_share(k: int) -> list[list[bytes]]:
+        return _run_share(rows, shares[k], blocks[k], run, batch)
+
     if len(blocks) == 1:
-        written = [_run_share(rows, shares[0], blocks[0], run, batch)]
+        written = [run_share(0)]
     else:
         with ThreadPoolExecutor(len(blocks)) as pool:
-            written = list(
-                pool.map(
-                    lambda k: _run_share(rows, shares[k], blocks[k], run, batch), range(len(blocks))
-                )
-            )
+            written = list(pool.map(run_share, range(len(blocks))))
     for k, (name, dtype) in enumerate(TABLES.items()):
         parts = [raw[k] for of_share in written for raw in of_share]
         batch.records[name] = np.frombuffer(b"".join(parts), dtype)

@@ -47,12 +47,8 @@ def bilateral_filter(
     Parameters
     ----------
     scan : LaserScan
-    sigma_d : float
-        Width along the scan [beams].
-    sigma_r : float
-        Width in range [m].
-    half_width : int
-        Beams on either side that are taken in.
+    sigma_d, sigma_r, half_width
+        As in `Liu`.
 
     Returns
     -------
@@ -114,12 +110,8 @@ def adaptive_clusters(
     scan : LaserScan
     ranges : array_like, shape (n,), optional
         Ranges to use in place of the scan's own, such as filtered ones [m].
-    spacing_scale, density_k : float
-        λ and k.
-    noise_floor : float
-        Added to T_d, in units of √2 σ.
-    min_points : int
-        Clusters of fewer points are noise.
+    spacing_scale, noise_floor, density_k, min_points
+        As in `Liu`.
     noise : RangeNoise, optional
         σ of the noise floor; estimated from the scan if it is not given.
 
@@ -165,10 +157,8 @@ def corner_response(
     ----------
     points : array_like, shape (m, 2)
         Points of the cluster in beam order [m].
-    support_radius : int
-        Points on either side, truncated at the ends of the cluster.
-    response : {"relative", "tangent", "product"}
-        Σd to the tangent over Σ|s| [-], Σd to the tangent [m], or that times Σd to the chord [m²].
+    support_radius, response
+        As in `Liu`.
 
     Returns
     -------
@@ -205,12 +195,8 @@ def primary_corners(
     ----------
     points : array_like, shape (m, 2)
         Points of the cluster in beam order [m].
-    support_radius, response
-        As in `corner_response`.
-    threshold : float
-        In the unit of the response.
-    min_points : int
-        No piece gets shorter.
+    support_radius, threshold, response, min_points
+        As in `Liu`.
 
     Returns
     -------
@@ -247,9 +233,8 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
         Points in beam order, in the frame of the sensor [m]; m ≥ 2.
     noise : RangeNoise, optional
         Noise of the ranges, for the covariance and the weights; 1 m (unit variance) if not given.
-    fit : {"total", "y_of_x", "weighted"}
-        Orthogonal least squares, the paper's y = kx + b (x = ky + b where it is steeper than
-        45°), or maximum likelihood by Pfister's weights.
+    fit
+        As in `Liu`; y = kx + b is x = ky + b where it is steeper than 45°.
 
     Returns
     -------

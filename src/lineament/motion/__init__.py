@@ -1,4 +1,4 @@
-"""How the sensor moves: poses, scans without its motion, features followed from scan to scan.
+"""How the sensor moves: scans without its motion, features followed from scan to scan.
 
 >>> import lineament as ln
 >>> from lineament.motion import Tracker
@@ -11,27 +11,11 @@ The world is taken to stand still, and corners of kind "edge" are ignored. The v
 sensor, `Tracker.twist`, is what :func:`lineament.deskew` needs for the next scan.
 """
 
-from typing import TYPE_CHECKING
-
-from .._lazy import lazily
 from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_between
-
-if TYPE_CHECKING:
-    from .association import Matches, associate
-    from .deskew import beam_times, deskew
-    from .estimate import Motion, estimate_motion
-    from .tracker import Tracker, Tracks
-
-_HOME = {
-    "Matches": "association",
-    "Motion": "estimate",
-    "Tracker": "tracker",
-    "Tracks": "tracker",
-    "associate": "association",
-    "beam_times": "deskew",
-    "deskew": "deskew",
-    "estimate_motion": "estimate",
-}
+from .association import Matches, associate
+from .deskew import beam_times, deskew
+from .estimate import Motion, estimate_motion
+from .tracker import Tracker, Tracks
 
 __all__ = [
     "Matches",
@@ -49,5 +33,3 @@ __all__ = [
     "relative",
     "twist_between",
 ]
-
-__getattr__ = lazily(__name__, _HOME)

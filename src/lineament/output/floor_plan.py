@@ -35,9 +35,7 @@ CORNER_RADIUS, ARC_RADIUS = 0.15, 0.1
 
 
 class FloorPlan:
-    """Walls, corners and arcs that the scans of a log have in common, merged as they come.
-
-    Memory grows with what the plan shows, not with the number of scans, and is bounded.
+    """Walls, corners and arcs that the scans of a log have in common, in bounded memory.
 
     Examples
     --------
@@ -65,7 +63,7 @@ class FloorPlan:
         lengths = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
         offset, angle = covariance[:, 0, 0], covariance[:, 1, 1]
         is_sure = offset + (lengths / 2) ** 2 * angle <= OFFSET**2
-        good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN is none of these
+        good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN fails all of these
         self._add_lines(lines[good], 3 * np.sqrt(np.maximum(angle[good], (ANGLE / 3) ** 2)))
         corners = features.corners
         is_edge = corners["kind"] == "edge"
@@ -151,14 +149,6 @@ class Averages:
     """Means of the points that lie near each other.
 
     A point joins the nearest mean within a radius [m], or begins a new one.
-
-    Examples
-    --------
-    >>> means = Averages(2, radius=0.1)
-    >>> means.add(np.array([[0.0, 0.0], [1.0, 0.0]]))
-    >>> means.add(np.array([[0.0, 0.05]]))
-    >>> means.seen(2).tolist()
-    [[0.0, 0.025]]
     """
 
     def __init__(self, dimensions: int, radius: float) -> None:

@@ -79,7 +79,7 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
     features : Features
         In the frame of the scan, or moved since.
     scan : LaserScan, optional
-        What they were found in: only its points tell which part of a circle was seen. The
+        What they were found in: only its points show which part of a circle was seen. The
         features must then be in its frame.
 
     Returns

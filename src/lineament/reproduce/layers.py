@@ -17,7 +17,7 @@ from .findings import Figure, Findings, Progress, Setting, Table
 from .scans import scene_numbers, simulated_frames
 from .scenes import RED_NUMBERS, picture
 
-#: What the paper reports of ten frames of its own recording [%].
+#: What the paper reports of ten frames of its recording [%].
 PAPER = {"liu": 95.11, "liu:paper": 95.11, "pdbs, fixed": 83.55}
 _COLUMNS = {
     "success, paper [%]": ("paper", 1),
@@ -54,7 +54,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     found = {name: e(example.scan) for name, e in drawn_methods(setting, progress).items()}
     caption = (
         "The same scan by all methods. Figure 10 of the paper shows 11 clusters and 5 corners of a "
-        f"scene of its own. {RED_NUMBERS}"
+        f"separate scene. {RED_NUMBERS}"
     )
     return Findings(
         "Layered obstacles (Figures 5 and 10)",

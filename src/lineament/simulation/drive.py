@@ -116,14 +116,13 @@ def _course(
     stamps = np.arange(n) / rate
     poses = np.column_stack([np.interp(stamps, times, keys[:, k]) for k in range(3)])
     poses[:, 2] = math.pi - np.mod(math.pi - poses[:, 2], 2 * math.pi)
-    # Legs begin at the even keys, turns at the odd ones; at the last key the drive is over.
+    # Legs begin at the even keys, turns at the odd ones; the last, when the drive is over, is by 0.
     key = np.searchsorted(times, stamps, side="right") - 1
-    is_over, is_turn = key == len(times) - 1, key % 2 == 1
+    is_turn = key % 2 == 1
     twists = np.zeros((n, 3))
     twists[~is_turn, 0] = speed
     turns = np.sign(np.diff(keys[:, 2], append=keys[-1, 2]))
     twists[is_turn, 2] = turn_rate * turns[key[is_turn]]
-    twists[is_over] = 0.0
     return stamps, poses, twists
 
 

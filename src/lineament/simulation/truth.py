@@ -142,9 +142,11 @@ def _line_bound(view: View, run: _Run, noise: RangeNoise) -> LineBound:
 
 
 def _segment(view: View, run: _Run, bound: LineBound, label: NDArray[np.int32]) -> Record:
+    start, end = _extent(view, run, 0), _extent(view, run, 1)
     return run.beams() | {
-        "start": _extent(view, run, 0),
-        "end": _extent(view, run, 1),
+        "start": start,
+        "end": end,
+        "length": math.dist(start, end),
         "centroid": bound.centroid,
         "angle": bound.angle,
         "covariance": bound.covariance,

@@ -20,7 +20,7 @@ def assign(cost):
     least, done = np.empty(columns + 1), np.empty(columns + 1, np.bool_)
     for i in range(rows):
         least[:], done[:] = math.inf, False
-        # The row begins from a column that is none; from each next one, its owner looks further.
+        # The row begins from a virtual column; from each next one, its owner looks further.
         last = columns
         owner[last] = i
         while owner[last] >= 0:

@@ -26,7 +26,7 @@ def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantil
     Parameters
     ----------
     before, now : (segments, corners, arcs)
-        Words of the features (see `records`), each in the frame of its own sensor.
+        Words of the features (see `records`), each in the frame of its sensor.
     sides : int32 array, shape (number of later corners, 2)
         Indices of the segments between which the later corners are.
     pairs : (segments, corners, arcs)

@@ -1,6 +1,6 @@
 // Questions to the server.
 
-/** Ask for `path` with parameters; an Error with the server's own words where that fails. */
+/** Ask for `path` with parameters; an Error with the server's own message where that fails. */
 export async function ask(path, parameters = {}) {
   const query = new URLSearchParams(parameters).toString();
   let response;

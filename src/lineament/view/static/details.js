@@ -1,38 +1,36 @@
 // Features in numbers: the card at the pointer, the pinned table, the answer to "why?".
 
-import { ellipseOf } from "./drawing.js";
+import { ellipseOf, isKnown } from "./drawing.js";
 
 const degrees = (radians) => (radians * 180) / Math.PI;
 const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–");
 const millimetres = (metres) => fixed(metres === null ? NaN : 1000 * metres, 1);
 const place = ([x, y]) => `${fixed(x, 3)}, ${fixed(y, 3)}`;
 const root = (variance) => (variance === null ? NaN : Math.sqrt(Math.max(variance, 0)));
-const isKnown = (covariance) => covariance.flat().every(Number.isFinite);
 
 /** Numbers of a feature: title, rows for the card, and cells for the table. */
 export function describe({ kind, index, feature }, scan) {
-  const title = kind === "reading" ? `beam ${index}` : `${kind} ${index}`;
+  const title = kind === "measurement" ? `beam ${index}` : `${kind} ${index}`;
   return { title, ...WORDS[kind](feature, scan) };
 }
 
 const WORDS = {
   segment(s) {
-    const length = Math.hypot(s.end[0] - s.start[0], s.end[1] - s.start[1]);
     const offset = root(s.covariance[0][0]), turn = degrees(root(s.covariance[1][1]));
     return {
       rows: [
         ["start", `${place(s.start)} m`],
         ["end", `${place(s.end)} m`],
-        ["length", `${fixed(length, 3)} m`],
+        ["length", `${fixed(s.length, 3)} m`],
         ["angle", `${fixed(degrees(s.angle), 2)}° ± ${fixed(turn, 2)}°`],
         ["offset", `± ${millimetres(offset)} mm at ${place(s.centroid)} m`],
-        ["beams", `${s.first_beam} to ${s.last_beam}, ${s.n_points} readings`],
+        ["beams", `${s.first_beam} to ${s.last_beam}, ${s.n_points} measurements`],
         ["rms", `${millimetres(s.rms)} mm`],
         ["misfit", `${millimetres(s.misfit)} mm`],
         ["cluster", s.cluster],
       ],
       cells: [
-        place(s.centroid), fixed(length, 3), `${fixed(degrees(s.angle), 2)} ±\u00a0${fixed(turn, 2)}`,
+        place(s.centroid), fixed(s.length, 3), `${fixed(degrees(s.angle), 2)} ±\u00a0${fixed(turn, 2)}`,
         millimetres(offset), millimetres(s.rms),
       ],
     };
@@ -62,7 +60,7 @@ const WORDS = {
       rows: [
         ["centre", `${place(a.center)} m`],
         ["radius", `${fixed(a.radius, 3)} m ± ${millimetres(sigma)} mm`],
-        ["beams", `${a.first_beam} to ${a.last_beam}, ${a.n_points} readings`],
+        ["beams", `${a.first_beam} to ${a.last_beam}, ${a.n_points} measurements`],
         ["rms", `${millimetres(a.rms)} mm`],
       ],
       cells: [place(a.center), fixed(a.radius, 3), "", millimetres(sigma), millimetres(a.rms)],
@@ -79,7 +77,7 @@ const WORDS = {
       cells: [place(b.position), "", "", "", ""],
     };
   },
-  reading({ beam }, scan) {
+  measurement({ beam }, scan) {
     const cluster = scan.clusters[beam];
     return {
       rows: [
@@ -92,16 +90,21 @@ const WORDS = {
   },
 };
 
-function element(tag, text, className = "") {
+export function element(tag, text = "", className = "") {
   return Object.assign(document.createElement(tag), { textContent: text, className });
+}
+
+/** A list of names and values. */
+export function listOf(rows) {
+  const list = element("dl");
+  for (const [name, value] of rows) list.append(element("dt", name), element("dd", value));
+  return list;
 }
 
 /** Show what became of a beam. */
 export function showWhy(box, { index, method, beam, summary, steps }) {
-  const list = element("dl", "");
-  for (const [stage, text] of steps) list.append(element("dt", stage), element("dd", text));
   const title = element("h3", `beam ${beam}, scan ${index}, ${method}`);
-  box.replaceChildren(title, element("p", summary, "summary"), list);
+  box.replaceChildren(title, element("p", summary, "summary"), listOf(steps));
 }
 
 /** Features that were clicked on, in a table. */
@@ -116,11 +119,11 @@ export class Pins {
 
   add(picked, scan) {
     const { title, cells } = describe(picked, scan);
-    const row = element("tr", ""), name = element("td", title);
+    const row = element("tr"), name = element("td", title);
     row.dataset.key = `${title} ${scan.index} ${scan.method}`;
     if ([...this.body.rows].some((other) => other.dataset.key === row.dataset.key)) return;
     name.append(element("small", `scan ${scan.index}, ${scan.method}`));
-    const remove = element("button", "×"), last = element("td", "");
+    const remove = element("button", "×"), last = element("td");
     remove.setAttribute("aria-label", `Remove ${title} of scan ${scan.index}`);
     remove.addEventListener("click", () => {
       row.remove();

@@ -22,8 +22,11 @@ export function placeBeams(scan) {
     const r = scan.ranges[i];
     return r === null ? null : [r * Math.cos(a), r * Math.sin(a)];
   });
-  scan.reach = Math.max(0, ...scan.ranges); // of the farthest reading [m]
+  scan.reach = Math.max(0, ...scan.ranges); // of the farthest measurement [m]
 }
+
+/** Whether all numbers of a position or a covariance are known. */
+export const isKnown = (numbers) => numbers.flat().every(Number.isFinite);
 
 /** The layer in which a row of the corners is shown. */
 export const layerOf = (corner) => (corner.kind === "edge" ? "edges" : "corners");
@@ -45,7 +48,7 @@ export function ellipseOf([[xx, xy], [, yy]]) {
   };
 }
 
-/** First and last direction [rad] from the centre of an arc to its readings. */
+/** First and last direction [rad] from the centre of an arc to its measurements. */
 function seenOf(arc, scan) {
   const [cx, cy] = arc.center;
   const turns = beamsOf(arc, scan).map((i) => {
@@ -101,9 +104,7 @@ export class Drawing {
       this.#circle(feature, ...seenOf(feature, scan));
     } else {
       ctx.lineWidth = 3;
-      ctx.beginPath();
-      ctx.arc(...this.at(feature.position ?? scan.points[feature.beam]), 9, 0, 7);
-      ctx.stroke();
+      this.#ring(feature.position ?? scan.points[feature.beam], 9);
     }
     ctx.restore();
   }
@@ -120,9 +121,7 @@ export class Drawing {
     if (scan.points[i]) {
       ctx.setLineDash([]);
       ctx.lineWidth = 2;
-      ctx.beginPath();
-      ctx.arc(...this.at(scan.points[i]), 7, 0, 7);
-      ctx.stroke();
+      this.#ring(scan.points[i], 7);
     }
     ctx.restore();
   }
@@ -151,7 +150,7 @@ export class Drawing {
 
   #segment({ start, end }) {
     const { ctx, theme } = this;
-    if (![...start, ...end].every(Number.isFinite)) return;
+    if (!isKnown([start, end])) return;
     ctx.strokeStyle = theme.ink;
     ctx.lineWidth = 1.2;
     this.#stroke([start, end]);
@@ -163,7 +162,7 @@ export class Drawing {
 
   // Standard deviations of the line's place along it: offset and angle, and what they share.
   #band({ start, end, centroid, angle, covariance }, sigmas) {
-    if (!covariance.flat().every(Number.isFinite) || !sigmas) return;
+    if (!isKnown(covariance) || !sigmas) return;
     const [c, s] = [Math.cos(angle), Math.sin(angle)];
     const along = ([x, y]) => c * (x - centroid[0]) + s * (y - centroid[1]);
     const [t0, t1] = [along(start), along(end)], upper = [], lower = [];
@@ -183,13 +182,13 @@ export class Drawing {
   // A diamond; of an edge a square, smaller and lighter.
   #corner({ kind, position, covariance }, sigmas, reach) {
     const { ctx, theme, plane } = this, isEdge = kind === "edge";
-    if (!position.every(Number.isFinite)) return;
+    if (!isKnown(position)) return;
     const [u, v] = this.at(position), color = isEdge ? theme.edge : theme.corner;
     ctx.strokeStyle = color;
     ctx.lineWidth = isEdge ? 1.2 : 1.6;
     if (isEdge) ctx.strokeRect(u - 3, v - 3, 6, 6);
     else this.#path([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
-    if (!sigmas || !covariance.flat().every(Number.isFinite)) return;
+    if (!sigmas || !isKnown(covariance)) return;
     const { major, minor, direction } = ellipseOf(covariance);
     const [a, b] = [major, minor].map((sigma) => sigmas * sigma * plane.scale);
     // Hidden by the marker, or no knowledge at all: then the numbers say so.
@@ -206,7 +205,7 @@ export class Drawing {
 
   #arc(arc, scan) {
     const { ctx, theme } = this;
-    if (![...arc.center, arc.radius].every(Number.isFinite)) return;
+    if (!isKnown([arc.center, arc.radius])) return;
     ctx.save();
     ctx.strokeStyle = theme.arc;
     ctx.lineWidth = 0.8;
@@ -226,14 +225,12 @@ export class Drawing {
 
   #breakpoint({ position }) {
     const { ctx, theme } = this;
-    if (!position.every(Number.isFinite)) return;
+    if (!isKnown(position)) return;
     ctx.fillStyle = theme.page;
     ctx.strokeStyle = theme.break;
     ctx.lineWidth = 1.2;
-    ctx.beginPath();
-    ctx.arc(...this.at(position), 3.4, 0, 7);
-    ctx.fill();
-    ctx.stroke();
+    this.#disc(position, 3.4);
+    this.#ring(position, 3.4);
   }
 
   // A triangle at the origin that looks along the x axis.
@@ -248,6 +245,12 @@ export class Drawing {
     this.ctx.beginPath();
     this.ctx.arc(...this.at(point), radius, 0, 7);
     this.ctx.fill();
+  }
+
+  #ring(point, radius) {
+    this.ctx.beginPath();
+    this.ctx.arc(...this.at(point), radius, 0, 7);
+    this.ctx.stroke();
   }
 
   #cross(point, half) {

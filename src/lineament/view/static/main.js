@@ -1,4 +1,4 @@
-// The page: what it knows, and who is told when something changes.
+// The page: its state, and what happens when something changes.
 
 import { Latest, ask } from "./api.js";
 import { Pins, showWhy } from "./details.js";
@@ -11,6 +11,7 @@ const $ = (id) => document.getElementById(id);
 const LAYERS = ["clusters", "segments", "corners", "edges", "arcs", "breakpoints"];
 const NARROW = "(max-width: 60rem)"; // where the answers stand below the panels
 const PATIENCE = 700; // milliseconds after which the page says what it waits for
+const WAITING = "working: the first time, a method is compiled, which takes up to half a minute";
 
 class App {
   plane = new Plane();
@@ -91,13 +92,13 @@ class App {
   /** Load a scan into all panels; of several that are asked for at once, the last. */
   load(index) {
     return this.#loader.run(async () => {
-      const waiting = setTimeout(() => this.#tellWaiting(), PATIENCE);
+      const panels = [...this.panels];
+      const waiting = setTimeout(() => {
+        for (const panel of panels) panel.caption.textContent = WAITING;
+      }, PATIENCE);
       try {
-        const panels = [...this.panels];
-        const scans = await Promise.all(
-          panels.map((panel) => ask("scan", { i: index, method: panel.method })),
-        );
-        scans.forEach((scan, k) => {
+        const asked = panels.map((panel) => ask("scan", { i: index, method: panel.method }));
+        (await Promise.all(asked)).forEach((scan, k) => {
           placeBeams(scan);
           panels[k].show(scan);
         });
@@ -106,11 +107,6 @@ class App {
         clearTimeout(waiting);
       }
     });
-  }
-
-  #tellWaiting() {
-    const text = "working: the first time, a method is compiled, which takes up to half a minute";
-    for (const panel of this.panels) panel.caption.textContent = text;
   }
 
   #loaded(index) {
@@ -130,7 +126,7 @@ class App {
     const [panel] = this.panels;
     if (!panel.scan || !panel.size.width) return;
     this.#fitted = true;
-    // Lone readings may lie anywhere.
+    // Lone measurements may lie anywhere.
     const { points, clusters } = panel.scan;
     const clustered = points.filter((point, i) => point && clusters[i] >= 0);
     this.plane.fit(clustered.length ? clustered : points.filter(Boolean), panel.size);
@@ -155,10 +151,6 @@ class App {
     });
   }
 
-  pin(panel, picked) {
-    this.pins.add(picked, panel.scan);
-  }
-
   async explain(panel, beam) {
     const { index, method } = panel.scan;
     try {
@@ -175,16 +167,20 @@ class App {
   }
 
   #listen() {
-    for (const name of LAYERS) $(`show-${name}`).addEventListener("change", () => this.redraw());
-    $("sigmas").addEventListener("change", () => this.redraw());
+    for (const id of [...LAYERS.map((name) => `show-${name}`), "sigmas"]) {
+      $(id).addEventListener("change", () => this.redraw());
+    }
     $("ask").addEventListener("submit", (event) => {
       event.preventDefault();
       if (this.panels[0].scan) this.explain(this.panels[0], $("beam").valueAsNumber);
     });
-    $("compare").addEventListener("click", () => this.compare());
-    $("fit").addEventListener("click", () => this.fit());
-    $("zoom-in").addEventListener("click", () => this.zoom(1.3));
-    $("zoom-out").addEventListener("click", () => this.zoom(1 / 1.3));
+    const clicks = {
+      compare: () => this.compare(),
+      fit: () => this.fit(),
+      "zoom-in": () => this.zoom(1.3),
+      "zoom-out": () => this.zoom(1 / 1.3),
+    };
+    for (const [id, click] of Object.entries(clicks)) $(id).addEventListener("click", click);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       this.theme = readTheme();
       this.redraw();
@@ -202,7 +198,7 @@ class App {
 
   #key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    // What takes keys itself keeps them; buttons and boxes know but the space bar.
+    // What takes keys itself keeps them; buttons and boxes take the space bar only.
     if (event.target.closest("select, input[type=number]")) return;
     if (event.key === " " && event.target.closest("button, summary, input[type=checkbox]")) return;
     const { timeline } = this, step = event.shiftKey ? 10 : 1;

@@ -1,6 +1,6 @@
 // One panel: a method's choice, its canvas, and what the pointer does there.
 
-import { describe } from "./details.js";
+import { describe, element, listOf } from "./details.js";
 import { Drawing, layerOf } from "./drawing.js";
 import { drawGrid, drawScaleBar } from "./plane.js";
 
@@ -15,8 +15,7 @@ export class Panel {
 
   constructor(app, method) {
     this.app = app;
-    this.element = document.createElement("section");
-    this.element.className = "panel";
+    this.element = element("section", "", "panel");
     this.element.innerHTML =
       '<div class="bar"><select aria-label="Method"></select><span></span></div>' +
       '<canvas tabindex="0" role="img"></canvas><div class="card" role="tooltip" hidden></div>';
@@ -81,28 +80,28 @@ export class Panel {
 
   #listen() {
     const { canvas, app } = this;
-    canvas.addEventListener("wheel", (event) => {
+    const on = (name, handle) => canvas.addEventListener(name, handle, { passive: false });
+    on("wheel", (event) => {
       event.preventDefault();
       const steps = Math.max(-3, Math.min(3, event.deltaY / (event.deltaMode ? 3 : 100)));
       app.plane.zoom(1.25 ** -steps, this.#pixel(event), this.size);
       app.redraw();
-    }, { passive: false });
-    canvas.addEventListener("pointerdown", (event) => {
+    });
+    on("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       this.#pointers.set(event.pointerId, this.#pixel(event));
       if (this.#pointers.size === 1) this.#moved = 0;
     });
-    canvas.addEventListener("pointermove", (event) => {
+    on("pointermove", (event) => {
       if (this.#pointers.has(event.pointerId)) this.#drag(event);
       else this.#hover(this.#pixel(event));
     });
-    canvas.addEventListener("pointerup", (event) => {
-      if (this.#pointers.delete(event.pointerId) && this.#moved <= STILL) {
-        this.#click(this.#pixel(event));
-      }
+    on("pointerup", (event) => {
+      const isClick = this.#pointers.delete(event.pointerId) && this.#moved <= STILL;
+      if (isClick) this.#click(this.#pixel(event));
     });
-    canvas.addEventListener("pointercancel", (event) => this.#pointers.delete(event.pointerId));
-    canvas.addEventListener("pointerleave", () => this.#leave());
+    on("pointercancel", (event) => this.#pointers.delete(event.pointerId));
+    on("pointerleave", () => this.#leave());
   }
 
   #pixel(event) {
@@ -142,23 +141,16 @@ export class Panel {
   #click(pixel) {
     if (!this.scan) return;
     const picked = this.pick(pixel);
-    if (picked && picked.kind !== "reading") this.app.pin(this, picked);
+    if (picked && picked.kind !== "measurement") this.app.pins.add(picked, this.scan);
     const beam = picked?.kind === "corner" ? picked.feature.beam : this.#beamAt(pixel);
-    if (beam !== null) this.app.explain(this, beam);
+    if (beam >= 0) this.app.explain(this, beam);
   }
 
   #placeCard([u, v]) {
     this.card.hidden = !this.hovered;
     if (!this.hovered) return;
     const { title, rows } = describe(this.hovered, this.scan);
-    const heading = document.createElement("h3");
-    heading.textContent = title;
-    const list = document.createElement("dl");
-    for (const [name, value] of rows) {
-      list.append(Object.assign(document.createElement("dt"), { textContent: name }));
-      list.append(Object.assign(document.createElement("dd"), { textContent: value }));
-    }
-    this.card.replaceChildren(heading, list);
+    this.card.replaceChildren(element("h3", title), listOf(rows));
     const { width, height } = this.size, top = this.canvas.offsetTop;
     const [w, h] = [this.card.offsetWidth, this.card.offsetHeight];
     const left = u + 16 + w < width ? u + 16 : Math.max(u - 16 - w, 4);
@@ -167,55 +159,44 @@ export class Panel {
     this.card.style.top = `${top + below}px`;
   }
 
-  /** What is under a pixel: { kind, index, feature }, corners before lines before readings. */
+  /** What is under a pixel: { kind, index, feature }, corners before lines before measurements. */
   pick(pixel) {
     const { scan } = this, { shown } = this.app;
     if (!scan) return null;
-    const away = (p) => (p ? this.#distance(pixel, p) : Infinity);
-    const nearest = (kind, list, distance, near = NEAR) => {
-      let best = null, least = near;
-      list.forEach((feature, index) => {
-        const d = distance(feature);
-        if (d < least) [best, least] = [{ kind, index, feature }, d];
-      });
-      return best;
+    const pick = (kind, features, near, distance) => {
+      const index = nearest(features, near, distance);
+      return index < 0 ? null : { kind, index, feature: features[index] };
     };
-    const offCorner = (c) => (shown[layerOf(c)] ? away(c.position) : Infinity);
-    return nearest("corner", scan.corners, offCorner)
-      || (shown.breakpoints && nearest("breakpoint", scan.breakpoints, (b) => away(b.position), 6))
-      || (shown.arcs && nearest("arc", scan.arcs, (a) => this.#offArc(pixel, a), 7))
-      || (shown.segments && nearest("segment", scan.segments, (s) => this.#offLine(pixel, s), 7))
-      || this.#reading(pixel);
+    const away = (f) => this.#distance(pixel, f.position);
+    const corners = (c) => (shown[layerOf(c)] ? away(c) : Infinity);
+    return pick("corner", scan.corners, NEAR, corners)
+      || (shown.breakpoints && pick("breakpoint", scan.breakpoints, NEAR / 2, away))
+      || (shown.arcs && pick("arc", scan.arcs, 7, (arc) => this.#offArc(pixel, arc)))
+      || (shown.segments && pick("segment", scan.segments, 7, (s) => this.#offSegment(pixel, s)))
+      || this.#measurement(pixel);
   }
 
-  #reading(pixel) {
-    let beam = null, least = NEAR;
-    this.scan.points.forEach((point, i) => {
-      const d = point ? this.#distance(pixel, point) : Infinity;
-      if (d < least) [beam, least] = [i, d];
-    });
-    return beam === null ? null : { kind: "reading", index: beam, feature: { beam } };
+  #measurement(pixel) {
+    const beam = nearest(this.scan.points, NEAR, (point) => this.#distance(pixel, point));
+    return beam < 0 ? null : { kind: "measurement", index: beam, feature: { beam } };
   }
 
-  // The beam of the nearest reading; far from all of them, the one that goes nearest.
+  // The beam of the nearest measurement; far from all of them, the beam that passes nearest.
   #beamAt(pixel) {
-    const reading = this.#reading(pixel);
-    if (reading) return reading.index;
+    const measurement = this.#measurement(pixel);
+    if (measurement) return measurement.index;
     const [x, y] = this.app.plane.toMetres(pixel, this.size), turn = Math.atan2(y, x);
-    let beam = null, least = Infinity;
-    this.scan.bearings.forEach((bearing, i) => {
-      const off = Math.abs(Math.atan2(Math.sin(bearing - turn), Math.cos(bearing - turn)));
-      if (off < least) [beam, least] = [i, off];
-    });
-    return beam;
+    const off = (a) => Math.abs(Math.atan2(Math.sin(a - turn), Math.cos(a - turn)));
+    return nearest(this.scan.bearings, Infinity, off);
   }
 
   #distance([u, v], point) {
+    if (!point) return Infinity;
     const [pu, pv] = this.app.plane.toPixels(point, this.size);
     return Math.hypot(u - pu, v - pv);
   }
 
-  #offLine([u, v], { start, end }) {
+  #offSegment([u, v], { start, end }) {
     const [pu, pv] = this.app.plane.toPixels(start, this.size);
     const [qu, qv] = this.app.plane.toPixels(end, this.size);
     const [du, dv] = [qu - pu, qv - pv], square = du * du + dv * dv || 1;
@@ -226,4 +207,14 @@ export class Panel {
   #offArc(pixel, { center, radius }) {
     return Math.abs(this.#distance(pixel, center) - radius * this.app.plane.scale);
   }
+}
+
+/** Index of the item with the least distance below `near`; -1 if there is none. */
+function nearest(items, near, distance) {
+  let index = -1, least = near;
+  items.forEach((item, i) => {
+    const d = distance(item);
+    if (d < least) [index, least] = [i, d];
+  });
+  return index;
 }

@@ -46,24 +46,24 @@ export class Timeline {
   grow(count) {
     this.count = Math.max(count, 1);
     this.slider.max = this.count - 1;
-    this.tell();
+    this.#label();
   }
 
   async go(index) {
     this.index = Math.min(Math.max(index, 0), this.count - 1);
     this.slider.value = this.index;
-    this.tell();
+    this.#label();
     await this.show(this.index);
   }
 
-  async tell() {
+  async #label() {
     const { index, count } = this;
     let text = `scan ${index} / ${count - 1}`;
     try {
       const time = (await this.#stamps.at(index, count)) - (await this.#stamps.at(0, count));
       if (Number.isFinite(time)) text += `, ${time.toFixed(2)} s`;
     } catch {
-      // Who shows the scan tells what is wrong.
+      // Showing the scan reports what is wrong.
     }
     if (index !== this.index) return;
     this.position.textContent = text;

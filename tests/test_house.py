@@ -1,0 +1,55 @@
+"""The rules of the house that no linter knows: sizes, signatures, words."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "src" / "lineament").rglob("*.py"))
+PAGES = [
+    *SOURCES,
+    *sorted((ROOT / "src").rglob("*.js")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "README.md",
+]
+#: Words that a roboticist would have to translate; the glossary in CONTRIBUTING has the field's.
+PRIVATE = re.compile(
+    r"\b([Tt]ells?(?! apart)|[Tt]old|(?<!there )is none|of (its|their) own|made straight)\b"
+)
+
+
+def names(paths):
+    return [str(path.relative_to(ROOT)) for path in paths]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_files_and_signatures_are_of_a_size_to_read(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= 340
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            count = len(node.args.posonlyargs) + len(node.args.args) + len(node.args.kwonlyargs)
+            assert count <= 13, f"{node.name}: {count}"  # `self` included
+        if isinstance(node, ast.ImportFrom):
+            assert node.end_lineno - node.lineno <= 15, f"line {node.lineno}"
+
+
+def test_kernels_have_at_most_twelve_parameters():
+    found = [
+        f"{path.name}: {node.name} has {len(node.args.args)}"
+        for path in SOURCES
+        if "kernels" in path.parts
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef) and len(node.args.args) > 12
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=names(PAGES))
+def test_words_are_those_of_the_field(path):
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [f"{k}: {line.strip()}" for k, line in enumerate(lines, 1) if PRIVATE.search(line)] == []
