@@ -142,6 +142,8 @@ PINNED: dict[str, dict[str, float]] = {
     },
     "success": {
         "liu, no corners/many/partition_success": 1.0,
+        "liu, no corners/few/scans": 1,
+        "liu, no corners/many/scans": 2,
         "iepf/many/corner_f1_0.10": 1.0,
         "iepf:paper/few/corner_f1_0.10": 1.0,
     },
@@ -406,6 +408,13 @@ class TestTexts:
         text = similarity._text(true, liu)
         assert f"{largest:.2f} m: the claim {verdict} here" in text[-1]
         assert "50 % of the points are more than 0.01 m" in text[1]
+
+    def test_table_of_similarity(self):
+        scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
+        (row,) = similarity._table("x", {"iepf": scores}).rows
+        assert row[:3] == ("iepf", "up to 0.25 m", 0.03)
+        assert row[3:] == ("lost", pytest.approx(15), "lost", *row[6:])
+        assert row[6:] == pytest.approx((1e6 * scores.variance, 50, 80))
 
     def test_claims_of_table_3(self):
         frames = list(scans.simulated_frames(PAPER, ["room"], range(2)))
