@@ -21,8 +21,8 @@ with atheris.instrument_imports(include=["lineament.logs"]):
     lineament.logs.opening.readers()
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from fuzzing import OPTIONS, check, check_nothing_left, corpus, scratch
-from mutations import Sample, damaged
+from fuzzing import OPTIONS, check, scratch
+from mutations import Sample, damaged, own_samples
 
 
 def main() -> None:
@@ -31,8 +31,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     work = Path(tempfile.mkdtemp(prefix="fuzzing-"))
-    folder, temporary = scratch(work)
-    files = [data for sample in corpus(temporary) for data in sample.files.values()]
+    with tempfile.TemporaryDirectory() as own:
+        samples = own_samples(Path(own))
+    files = [data for sample in samples for data in sample.files.values()]
+    folders = scratch(work)
     start = work / "corpus"
     start.mkdir()
     for number, data in enumerate(files):
@@ -40,8 +42,7 @@ def main() -> None:
     warnings.simplefilter("error")
 
     def one_input(data: bytes) -> None:
-        check(Sample("any", {"log": data}, "log"), folder, OPTIONS[len(data) % len(OPTIONS)])
-        check_nothing_left(temporary)
+        check(Sample("any", {"log": data}, "log"), folders, OPTIONS[len(data) % len(OPTIONS)])
 
     def other_input(data: bytes, size: int, seed: int) -> bytes:
         chance = Random(seed)

@@ -203,7 +203,7 @@ def read_what_is_there(path, keep_going=True):
 
 @pytest.mark.parametrize("name", scan_texts())
 @pytest.mark.parametrize("pack", [bytes, gzip.compress])
-def test_cut_off_anywhere_and_flipped_bits(write, name, pack):
+def test_cut_off_anywhere(write, name, pack):
     data = pack(scan_texts()[name].encode())
     whole = [scan.ranges.tolist() for scan in open_log(write(data))]
     counts = []
@@ -215,12 +215,6 @@ def test_cut_off_anywhere_and_flipped_bits(write, name, pack):
     if name not in ("rplidar", "csv_beams"):  # One object, and one scan, of all.
         assert counts[-1] >= len(whole) - 2
         assert all(b >= a for a, b in pairwise(counts))
-    rng = np.random.default_rng(5)
-    for _ in range(60):
-        flipped = bytearray(data)
-        flipped[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
-        for keep_going in (True, False):
-            read_what_is_there(write(bytes(flipped)), keep_going)
 
 
 def test_cut_off_gzip_delivers_whole_scans_only(write):
@@ -300,7 +294,7 @@ def test_temporary_copies_do_not_wait_for_the_collector(write, temporary, member
 
 # Recordings
 
-#: Scans, beams of the first one, and a range of it or the pose.
+#: Scans by topic, their beams, and a range of the first one or its pose.
 RECORDINGS = {
     "carmen/acapulco-corrected.log.gz": (861, 181, (0.694727, 0.0963489, 0.402857)),
     "carmen/aces-corrected.log.gz": (440, 180, None),
@@ -308,12 +302,28 @@ RECORDINGS = {
     "carmen/intel-corrected.log.gz": (910, 180, None),
     "graph/intel-lab.log.gz": (2672, 180, (4.78, -5.84, -1.69)),
     "graph/killian.g2o.zip": (3873, 180, (1.96, 37.867, -2.01239)),
+    "mcap/scans_demo.mcap": ({"/front_scan": 331, "/rear_scan": 330}, 726, None),
+    "rosbag1/corridor_alternating_beams.bag": ({"/scan_filtered": 4752}, (179, 180), None),
+    "rosbag1/demo_stationary_simple_environment.bag": ({"/scan": 1265}, 512, None),
+    "rosbag1/jackal_mocap.bag": ({"/scan": 414}, 897, None),
+    "rosbag1/scans_demo.bag": ({"/front_scan": 331, "/rear_scan": 330}, 726, None),
+    "rosbag1/urg_handheld_v2_old.bag": ({"/scan": 360}, 681, None),
+    "rosbag1/urg_v1_2.bag": ({"scan": 123}, 512, None),
+    "rosbag2/jackal_mocap": ({"/scan": 189}, 897, None),
+    "rosbag2/ld19": ({"/scan": 436}, (452, 456), None),
+    "rosbag2/ld19/data1_nov1_0.db3": ({"/scan": 436}, (452, 456), None),
+    "rosbag2/two_publishers": ({"/scan": 507}, (82, 524), None),
     "text/csm_scans.json": (1, 181, 5.000762),
     "text/dpslam_loop5.log.gz": (551, 181, 0.642),
     "text/lidar01.csv": (1, 154, 0.5335),
     "text/tinyslam_exp1.dat.gz": (756, 682, 2.229),
-    "text/rplidar_kitchenette/scans_2025-09-04-16-43-09.json": (5, 603, 6.095749855041504),
-    "text/rplidar_kitchenette/scans_2025-09-04-16-51-11.json": (5, 598, 6.096749782562256),
+    "text/rplidar_kitchenette/scans_2025-09-04-16-43-09.json": (5, None, 6.095749855041504),
+    "text/rplidar_kitchenette/scans_2025-09-04-16-51-11.json": (5, None, 6.096749782562256),
+    "truth/fr079_graph.npz": (1464, 360, None),
+    "truth/intel_graph.npz": (2672, 180, None),
+    "truth/jackal_mocap_02171554.npz": (414, 897, None),
+    "truth/jackal_static_data.npz": (350, 897, None),
+    "truth/obstdet_front_scan.npz": (331, 726, None),
 }
 #: What opening says of all that is no log.
 NO_LOG = {
@@ -322,7 +332,8 @@ NO_LOG = {
     "benchmark/ple_real.npz": "expected the keys ranges, .*; found azimuth",
     "benchmark/ple_sim.npz": "expected the keys ranges, .*; found azimuth",
     "graph/intel-lab.relations": "is no log that lineament knows",
-    "mcap/nav2_turtlebot_no_scan.mcap": "has no LaserScan .*/amcl_pose",
+    "mcap/nav2_turtlebot_no_scan.mcap": "has no LaserScan or MultiEchoLaserScan; topics there "
+    r"are: /amcl_pose \(geometry_msgs/PoseWithCovarianceStamped, 135\), .*, /tf_static \(.*, 1\)$",
     "text/rplidar_kitchenette/circle1.json": "is no CSM log",
     "text/rplidar_kitchenette/circle2.json": "is no CSM log",
     "text/rplidar_kitchenette/transforms.json": "is no CSM log",
@@ -352,32 +363,33 @@ def test_each_recording_opens_or_says_why_not(data_dir):
 def check_log(path, expected):
     """Check every scan of a log, and its summary, at one reading."""
     log = open_log(path)
-    counts = dict.fromkeys(log.topics, 0)
-    scans = []
+    firsts = {}
 
     def checked():
         for topic, scan in log.items():
-            counts[topic] += 1
+            firsts.setdefault(topic, scan)
             assert math.isfinite(scan.stamp), path
             assert len(scan) > 50, path
             assert not np.isnan(scan.angles).any(), path
-            if expected is not None:
-                scans.append(scan)
+            if path.parent.name in ("carmen", "graph"):
+                step = math.radians(0.5 if len(scan) > 200 else 1)
+                given = scan.range_max, scan.angle_min, scan.angle_increment
+                assert given == (50.0, -math.pi / 2, step)
             yield topic, scan
 
     info = summarize(log, checked())
+    counts = {topic.name: topic.scans for topic in info.topics}
     assert sum(counts.values()) == len(log) > 0, path
-    assert all(counts.values()), path
-    assert {topic.name: topic.scans for topic in info.topics} == counts
+    assert counts.keys() == {*log.topics}
     assert all(topic.ranges is not None and topic.valid > 0.3 for topic in info.topics), path
     assert info.skipped == 0
     if expected is not None:
-        count, beams, first = expected
-        assert (len(scans), len(scans[0])) == (count, beams)
-        if isinstance(first, float):
-            assert np.abs(scans[0].ranges[scans[0].valid] - first).min() < 1e-12
+        count, beams, given = expected
+        assert count == (counts if isinstance(count, dict) else len(log)), path
+        fewest, most = beams if isinstance(beams, tuple) else (beams, beams)
+        assert beams is None or all(topic.beams == (fewest, most) for topic in info.topics), path
+        first = firsts[log.topics[0]]
+        if isinstance(given, float):
+            assert np.abs(first.ranges[first.valid] - given).min() < 1e-12
         else:
-            assert first is None or scans[0].pose == first
-            step = math.radians(0.5 if beams > 200 else 1)
-            given = {(one.range_max, one.angle_min, one.angle_increment) for one in scans}
-            assert given == {(50.0, -math.pi / 2, step)}
+            assert given is None or first.pose == given

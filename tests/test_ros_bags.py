@@ -336,45 +336,6 @@ def test_a_database_whose_damage_is_no_text(database):
 # --- recordings
 
 
-@pytest.mark.parametrize(
-    ("name", "counts", "beams"),
-    [
-        ("mcap/scans_demo.mcap", {"/front_scan": 331, "/rear_scan": 330}, (726, 726)),
-        ("rosbag1/scans_demo.bag", {"/front_scan": 331, "/rear_scan": 330}, (726, 726)),
-        ("rosbag1/demo_stationary_simple_environment.bag", {"/scan": 1265}, (512, 512)),
-        ("rosbag1/jackal_mocap.bag", {"/scan": 414}, (897, 897)),
-        ("rosbag1/corridor_alternating_beams.bag", {"/scan_filtered": 4752}, (179, 180)),
-        ("rosbag1/urg_handheld_v2_old.bag", {"/scan": 360}, (681, 681)),
-        ("rosbag1/urg_v1_2.bag", {"scan": 123}, (512, 512)),
-        ("rosbag2/jackal_mocap", {"/scan": 189}, (897, 897)),
-        ("rosbag2/ld19", {"/scan": 436}, (452, 456)),
-        ("rosbag2/ld19/data1_nov1_0.db3", {"/scan": 436}, (452, 456)),
-        ("rosbag2/two_publishers", {"/scan": 507}, (82, 524)),
-    ],
-)
-def test_recordings_open(data_dir, name, counts, beams):
-    log = open_log(data_dir / name)
-    form = name.partition("/")[0]
-    assert (log.format, log.topics, len(log)) == (form, list(counts), sum(counts.values()))
-    found = dict.fromkeys(counts, 0)
-    lengths = set()
-    for topic, scan in log.items():
-        found[topic] += 1
-        lengths.add(len(scan))
-    assert found == counts
-    assert (min(lengths), max(lengths)) == beams
-
-
-def test_a_recording_without_scans_lists_what_it_has(data_dir):
-    with pytest.raises(LogError) as caught:
-        open_log(data_dir / "mcap" / "nav2_turtlebot_no_scan.mcap")
-    assert caught.value.problem == (
-        "has no LaserScan or MultiEchoLaserScan; topics there are: "
-        "/amcl_pose (geometry_msgs/PoseWithCovarianceStamped, 135), /odom (nav_msgs/Odometry, "
-        "2639), /tf (tf2_msgs/TFMessage, 5422), /tf_static (tf2_msgs/TFMessage, 1)"
-    )
-
-
 def test_the_same_recording_in_two_containers(data_dir):
     names = "rosbag1/scans_demo.bag", "mcap/scans_demo.mcap"
     bag, mcap = (open_log(data_dir / name).items() for name in names)

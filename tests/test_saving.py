@@ -1,6 +1,5 @@
 """Scans saved as npz and CARMEN logs, and npz logs read: round trips, keys, shapes, damage."""
 
-import contextlib
 import gzip
 import math
 
@@ -225,42 +224,8 @@ def test_faulty_scans_and_topics(tmp_path):
         open_log(log.path, "scan")
 
 
-def test_cut_off_and_damaged_archives(tmp_path, write):
-    np.savez_compressed(tmp_path / "a.npz", **GOOD)
-    data = (tmp_path / "a.npz").read_bytes()
-    for cut in range(1, len(data), 17):
-        with pytest.raises(LogError, match=r"is no whole (npz|zip) archive|is no log"):
-            open_log(write(data[:cut], "b.npz"))
-    for at in range(0, len(data), 5):
-        damaged = data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :]
-        with contextlib.suppress(LogError):  # Some bytes matter to nobody.
-            list(open_log(write(damaged, "b.npz")))
-
-
 def test_an_archive_that_grows_too_much(tmp_path, monkeypatch):
     monkeypatch.setattr(sources, "SMALL_COPY", 1 << 20)
     np.savez_compressed(tmp_path / "a.npz", **{**GOOD, "ranges": np.zeros((1000, 2000))})
     with pytest.raises(LogError, match=r"a\.npz: unpacks to more than 300 times its size"):
         open_log(tmp_path / "a.npz")
-
-
-@pytest.mark.parametrize(
-    ("name", "shape"),
-    [
-        ("fr079_graph", (1464, 360)),
-        ("intel_graph", (2672, 180)),
-        ("jackal_mocap_02171554", (414, 897)),
-        ("jackal_static_data", (350, 897)),
-        ("obstdet_front_scan", (331, 726)),
-    ],
-)
-def test_recordings(data_dir, name, shape):
-    log = open_log(data_dir / "truth" / f"{name}.npz")
-    with np.load(log.path) as archive:
-        ranges, poses, stamps = archive["ranges"], archive["poses"], archive["stamps"]
-    assert (len(log), ranges.shape) == (shape[0], shape)
-    for i, one in enumerate(log):
-        np.testing.assert_array_equal(one.ranges, ranges[i].astype(float))
-        assert (one.pose, one.stamp) == (tuple(poses[i]), stamps[i])
-    assert i == shape[0] - 1
-    assert one.is_full_circle == name.startswith("jackal")
