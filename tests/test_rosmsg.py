@@ -3,6 +3,7 @@
 import math
 import struct
 from functools import partial
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -261,30 +262,29 @@ def test_any_word_may_be_wrong(ros, encoding, place, word):
 # --- MultiEchoLaserScan
 
 
-ECHOES = [[1.0, 2.0, 3.0], [], [4.0], [6.0, 5.0]]
-STRENGTHS = [[10.0, 30.0, 20.0], [], [1.0], [7.0, 7.0]]
+beams_of_echoes = st.lists(
+    st.lists(st.tuples(st.integers(1, 99), st.integers(1, 5)), max_size=4), min_size=1, max_size=12
+)
 
 
 @both
-@pytest.mark.parametrize(
-    ("echo", "ranges", "intensities"),
-    [
-        ("first", [1.0, math.nan, 4.0, 6.0], [10.0, math.nan, 1.0, 7.0]),
-        ("last", [3.0, math.nan, 4.0, 5.0], [20.0, math.nan, 1.0, 7.0]),
-        ("strongest", [2.0, math.nan, 4.0, 6.0], [30.0, math.nan, 1.0, 7.0]),
-    ],
-)
-def test_echoes(ros, encoding, echo, ranges, intensities):
-    messages = ros_bags.Messages(ros)
-    data = ros_bags.serialized(messages.echoes(5.5, ECHOES, STRENGTHS), ros)
+@pytest.mark.parametrize("echo", ["first", "last", "strongest"])
+@settings(max_examples=40)
+@given(beams_of_echoes, st.booleans())
+def test_echoes_are_those_of_a_loop(ros, encoding, echo, beams, is_strength_known):
+    key = itemgetter(1) if is_strength_known else lambda _: 0
+    choose = {"first": itemgetter(0), "last": itemgetter(-1), "strongest": partial(max, key=key)}
+    chosen = [choose[echo](beam) if beam else (math.nan, math.nan) for beam in beams]
+    ranges, strengths = ([[float(e[i]) for e in beam] for beam in beams] for i in (0, 1))
+    given = ranges, strengths if is_strength_known else []
+    data = ros_bags.serialized(ros_bags.Messages(ros).echoes(5.5, *given), ros)
     scan = multi_echo_scan(data, encoding, echo)
-    np.testing.assert_array_equal(scan.ranges, ranges)
-    np.testing.assert_array_equal(scan.intensities, intensities)
     assert scan.stamp == 5.5
-    scan = multi_echo_scan(ros_bags.serialized(messages.echoes(5.5, ECHOES), ros), encoding, echo)
-    chosen = [1.0, math.nan, 4.0, 6.0] if echo == "strongest" else ranges
-    np.testing.assert_array_equal(scan.ranges, chosen)
-    assert scan.intensities is None
+    np.testing.assert_array_equal(scan.ranges, [each[0] for each in chosen])
+    if is_strength_known:
+        np.testing.assert_array_equal(scan.intensities, [each[1] for each in chosen])
+    else:
+        assert scan.intensities is None
 
 
 def read_echoes(*beams, echo="strongest"):
@@ -319,20 +319,6 @@ def test_echoes_that_are_strange():
     for strengths, expected in (([math.nan], 1.0), ([math.nan, -5.0], 2.0)):
         beam = [1.0, 2.0][: len(strengths)]
         assert read_echoes([beam], [strengths]).ranges.tolist() == [expected]
-
-
-@settings(max_examples=60)
-@given(
-    st.lists(
-        st.lists(st.tuples(st.integers(1, 99), st.integers(1, 5)), max_size=4),
-        min_size=1,
-        max_size=12,
-    )
-)
-def test_strongest_echo_is_that_of_a_loop(beams):
-    ranges, strengths = ([[float(e[i]) for e in beam] for beam in beams] for i in (0, 1))
-    expected = [max(beam, key=lambda echo: echo[1])[0] if beam else math.nan for beam in beams]
-    np.testing.assert_array_equal(read_echoes(ranges, strengths).ranges, expected)
 
 
 # --- PointCloud2

@@ -19,13 +19,7 @@ _RADIANS = 2 * math.pi + 0.1
 
 
 def snap(angle: float) -> float:
-    """Return the multiple of 1/12° that was rounded to `angle` [rad], or `angle` itself.
-
-    Examples
-    --------
-    >>> math.degrees(snap(0.017453)), snap(0.0174)
-    (1.0, 0.0174)
-    """
+    """Return the multiple of 1/12° that was rounded to `angle` [rad], or `angle` itself."""
     if not abs(angle) < _FARTHEST:
         return angle
     exact = math.radians(round(math.degrees(angle) * _ANGLES_PER_DEGREE) / _ANGLES_PER_DEGREE)
@@ -33,20 +27,10 @@ def snap(angle: float) -> float:
 
 
 def sick_step(n: int) -> float:
-    """Return the step [rad] between `n` beams of a scanner that sees 180°.
-
-    Exactly 1° for 180 or 181 beams and 0.5° for 360 or 361, else π/(n - 1).
-
-    Examples
-    --------
-    >>> math.degrees(sick_step(180))
-    1.0
-    """
-    if n in (180, 181):
-        return math.radians(1.0)
-    if n in (360, 361):
-        return math.radians(0.5)
-    return math.pi / max(n - 1, 1)
+    """Return the step [rad] between `n` beams of a scanner that sees 180°."""
+    # Scanners of 1° and 0.5° may leave out the last beam.
+    steps = n if n in (180, 360) else max(n - 1, 1)
+    return math.pi / steps
 
 
 @np.errstate(over="ignore", invalid="ignore")  # Absurd bearings: `LaserScan` refuses them.
@@ -55,13 +39,6 @@ def bearing_fields(angles: NDArray[np.float64]) -> dict[str, Any]:
 
     They are ``angle_min`` and ``angle_increment`` where the steps are even but for the rounding,
     else ``angles``.
-
-    Examples
-    --------
-    >>> bearing_fields(np.array([0.0, 0.1, 0.2, 0.3]))
-    {'angle_min': 0.0, 'angle_increment': 0.09999999999999999}
-    >>> list(bearing_fields(np.array([0.0, 0.1, 0.3])))
-    ['angles']
     """
     n = len(angles)
     if n > 1 and np.isfinite(angles[[0, -1]]).all():
@@ -80,12 +57,6 @@ def by_bearing(
 
     Of several with one bearing, the first is kept. Bearings are degrees where asked for or, if
     that is None, where one is beyond ±2π; ValueError if one is not finite.
-
-    Examples
-    --------
-    >>> order, angles = by_bearing(np.array([90.0, 0.0, 90.0]))
-    >>> order.tolist(), angles.round(3).tolist()
-    ([1, 0], [0.0, 1.571])
     """
     bad = np.flatnonzero(~np.isfinite(angles))
     if len(bad):

@@ -26,20 +26,9 @@ _NEXT = re.compile(r"\n(?=\{)")
 def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogError]:
     """Yield each JSON object of a file, plain or gzip, or what is wrong with it.
 
-    Objects may follow each other with or without line breaks. After one that is broken, reading
-    goes on at the next line that begins with a brace; in a file that is broken all over, where that
-    would take much longer than to read it, it ends.
-
-    Memory holds one object and one piece of the file. A fault has the line on which what is broken
-    begins; LogError if the file cannot be opened.
-
-    Examples
-    --------
-    >>> import tempfile, pathlib
-    >>> path = pathlib.Path(tempfile.mkdtemp(), "two.json")
-    >>> _ = path.write_text('{"a": 1} {"a": 2}')
-    >>> list(json_objects(path))
-    [{'a': 1}, {'a': 2}]
+    After an object that is broken, reading goes on at the next line that begins with a brace; in a
+    file that is broken all over, where that would take much longer than to read it, it ends. A
+    fault has the line on which what is broken begins; LogError if the file cannot be opened.
     """
     text = _Text(path)
     while text.skip_space():

@@ -193,14 +193,7 @@ def _plain_float(word: bytes) -> float:
 def numbers(
     what: str, words: list[bytes], number: Callable[[bytes], float] = _plain_float
 ) -> NDArray[np.float64]:
-    """Return words as numbers; ValueError names the first that is not one.
-
-    Examples
-    --------
-    >>> numbers("range", [b"1.5", b"x"])
-    Traceback (most recent call last):
-    ValueError: range 2 of 2 is 'x', expected a number
-    """
+    """Return words as numbers; ValueError names the first that is not one."""
     try:
         return np.fromiter(map(number, words), np.float64, len(words))
     except ValueError:

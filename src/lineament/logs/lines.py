@@ -115,10 +115,9 @@ def _up_to_fault(stream: "zlib._Decompress", data: bytes) -> bytes:
 
 
 def numbered_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, bytes]]:
-    """Yield each line of a file with its number, from 1; memory holds one line and one piece.
+    """Yield each line of a file with its number, from 1; LogErrors have the number too.
 
-    A last line without an end is delivered, unless the stream broke within it. LogError as from
-    `chunks`, with the number of the line; and at a line of more than `MAX_LINE` bytes.
+    A last line without an end is delivered, unless the stream broke within it.
     """
     number, rest = 1, b""
     try:

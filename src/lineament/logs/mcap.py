@@ -41,8 +41,7 @@ _MANY = 1 << 40
 class McapLog(RosLog):
     """Scans of an MCAP file: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
 
-    Encodings ``cdr`` (ROS 2) and ``ros1``; chunks plain, lz4 or zstd, checked by their CRC. See
-    :class:`~lineament.logs.ros.RosLog` for parameters and errors.
+    Encodings ``cdr`` (ROS 2) and ``ros1``; chunks plain, lz4 or zstd, checked by their CRC.
     """
 
     format = "mcap"

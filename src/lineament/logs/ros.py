@@ -19,23 +19,11 @@ _LISTED = 20
 class RosLog(Log):
     """Scans of a bag: those of the topic that is asked for, or of all, in the order of the bag.
 
-    Parameters
-    ----------
-    path, topic, keep_going
-        As for :class:`~lineament.logs.base.Log`. Broken chunks are faults, and so are malformed
-        messages.
-    options : ReadOptions
-        Which echo of ``MultiEchoLaserScan``; which ring of ``PointCloud2``, whose topics carry
-        scans only where a ring is chosen; and the topic of poses, as
-        :class:`~lineament.logs.ros_poses.PoseFinder` takes it. Poses are those of the frame that
-        the topic is about, and never guessed: without a topic there are none.
+    Topics of ``PointCloud2`` carry scans only where a ring is chosen. Poses are those of the frame
+    that the topic of poses is about, and never guessed: without a topic there are none.
 
-    Raises
-    ------
-    LogError
-        If the bag cannot be read, or there is no such topic, or none with scans: the message lists
-        those there are. While it is iterated: at a message that is malformed, by its number from
-        0 among those of its topic; and where the bag is broken or cut off, after all that is whole.
+    Faults are broken chunks and malformed messages, by their number from 0 among those of their
+    topic; a bag that is broken or cut off raises a LogError after all that is whole.
     """
 
     needs_seek = True

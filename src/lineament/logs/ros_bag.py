@@ -210,17 +210,7 @@ class RecordBag(Bag):
 def decompress(codec: str, data: Buffer, size: int) -> Buffer:
     """Decompress a chunk that says how large it becomes [bytes], and never more than that.
 
-    Raises
-    ------
-    ValueError
-        If the codec is not none, bz2, lz4 or zstd, the data is broken, or its size is another one
-        or more than `MAX_PIECE`.
-
-    Examples
-    --------
-    >>> import bz2
-    >>> bytes(decompress("bz2", bz2.compress(b"scan"), 4))
-    b'scan'
+    ValueError if the codec is not known, the data is broken, or its size is another or too large.
     """
     if size > MAX_PIECE:
         raise ValueError(f"chunk of {size} bytes, expected at most {MAX_PIECE >> 20} MiB")
@@ -234,8 +224,7 @@ def decompress(codec: str, data: Buffer, size: int) -> Buffer:
         except Exception as error:
             raise ValueError(f"{codec} data is broken: {error}") from None
     else:
-        known = ", ".join(_CODECS)
-        raise ValueError(f"chunk compressed by {codec:.20}, expected none, {known}")
+        raise ValueError(f"chunk compressed by {codec:.20}, expected none, {', '.join(_CODECS)}")
     if len(plain) != size:
         raise ValueError(f"chunk holds other than {size} bytes once decompressed")
     return plain

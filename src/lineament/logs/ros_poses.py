@@ -25,22 +25,9 @@ class PoseFinder:
     scan after the last pose has that one, a scan before the first has none. Scans wait for a pose
     behind theirs, up to `MAX_WAITING` of them: what a recorder writes later is not looked for.
 
-    Parameters
-    ----------
-    wanted : str
-        A topic, ``/odom``, or one of transforms with frames: ``/tf:map->odom->base_link`` is the
-        pose of base_link in map, each link of the chain at the stamp of the scan. Links that
-        are on the topic with ``_static`` at its end hold at all times.
-
-    Raises
-    ------
-    ValueError
-        If there is a single frame.
-
-    Examples
-    --------
-    >>> PoseFinder("/tf:map->odom->base_link").topics
-    ('/tf', '/tf_static')
+    What is `wanted` is a topic, ``/odom``, or one of transforms with two frames or more:
+    ``/tf:map->odom->base_link`` is the pose of base_link in map, each link of the chain at the
+    stamp of the scan. Links that are on the topic with ``_static`` at its end hold at all times.
     """
 
     def __init__(self, wanted: str) -> None:
@@ -57,13 +44,7 @@ class PoseFinder:
         self._waiting: deque[tuple[str, LaserScan]] = deque()
 
     def learn(self, connection: Connection, data: Buffer) -> list[tuple[str, LaserScan]]:
-        """Take a message with poses, and return the scans, by topic, that waited for it.
-
-        Raises
-        ------
-        ValueError
-            If the message is malformed or its numbers are not finite.
-        """
+        """Take a message with poses, and return the scans, by topic, that waited for it."""
         is_chain, is_static = len(self.topics) > 1, connection.topic != self.topic
         for found in stamped_poses(data, connection.encoding, connection.type):
             edge = (_frame(found.frame), _frame(found.child_frame)) if is_chain else ("", "")

@@ -24,8 +24,7 @@ _Header = dict[bytes, bytes]
 class Rosbag1Log(RosLog):
     """Scans of a ROS 1 bag: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
 
-    Versions 2.0 (chunks plain, bz2 or lz4), 1.2 and 1.1. See
-    :class:`~lineament.logs.ros.RosLog` for parameters and errors.
+    Versions 2.0 (chunks plain, bz2 or lz4), 1.2 and 1.1.
     """
 
     format = "rosbag1"

@@ -50,7 +50,7 @@ class Rosbag2Log(RosLog):
     """Scans of a ROS 2 bag: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
 
     A folder with parts of sqlite3 or MCAP, or a single ``.db3``; messages may be compressed one
-    by one. See :class:`~lineament.logs.ros.RosLog` for parameters and errors.
+    by one.
     """
 
     format = "rosbag2"

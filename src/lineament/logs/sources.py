@@ -106,14 +106,7 @@ class LocalCopy(os.PathLike[str]):
 
 
 def check_growth(name: object, size: int, packed: int) -> None:
-    """Refuse with a LogError what is no log but a bomb, by its size after and before.
-
-    Examples
-    --------
-    >>> check_growth("a.zip", 1 << 40, 1 << 20)
-    Traceback (most recent call last):
-    lineament.errors.LogError: a.zip: unpacks to more than 300 times its size, expected a log
-    """
+    """Refuse with a LogError what is no log but a bomb, by its size after and before."""
     if size > max(SMALL_COPY, MAX_RATIO * packed):
         raise LogError(name, f"unpacks to more than {MAX_RATIO} times its size, expected a log")
 
@@ -194,13 +187,7 @@ def _archive(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
 
 
 def is_address(path: str | os.PathLike[str]) -> bool:
-    """Whether it is an address such as ``s3://bucket/key``, and no path.
-
-    Examples
-    --------
-    >>> is_address("memory://a.log"), is_address("a.log")
-    (True, False)
-    """
+    """Whether it is an address such as ``s3://bucket/key``, and no path."""
     return isinstance(path, str) and "://" in path
 
 

@@ -7,15 +7,7 @@ _SEPARATOR = f"{'=' * 80}\nMSG: "
 
 
 def definition(kind: str, version: int) -> str:
-    """Return the text of a type and, behind it, of all types in it, for a version of ROS.
-
-    Examples
-    --------
-    >>> print(definition("std_msgs/Header", 1))
-    uint32 seq
-    time stamp
-    string frame_id
-    """
+    """Return the text of a type and, behind it, of all types in it, for a version of ROS."""
     types = _types(version)
     found: list[str] = []
 

@@ -45,36 +45,14 @@ class Odometry(NamedTuple):
 
 
 def stamped_poses(data: Buffer, encoding: str, kind: str) -> Iterator[StampedPose]:
-    """Decode the poses in a message of one of the `POSE_TYPES` or `TRANSFORMS`.
-
-    Raises
-    ------
-    ValueError
-        If the message is malformed.
-    """
+    """Decode the poses in a message of a type that has some; ValueError if it is malformed."""
     reader = WireReader(data, encoding)
     for _ in range(reader.count() if kind in TRANSFORMS else 1):
         yield _stamped_pose(reader, POSE_TYPES.get(kind, True))
 
 
 def odometry(data: Buffer, encoding: str) -> Odometry:
-    r"""Decode a ``nav_msgs/Odometry``.
-
-    Raises
-    ------
-    ValueError
-        If the message is malformed, or its pose or twist is not finite.
-
-    Examples
-    --------
-    >>> import struct
-    >>> names = struct.pack("<4I4sI4s", 0, 7, 500_000_000, 4, b"odom", 4, b"base")
-    >>> pose = struct.pack("<7d", 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0) + bytes(288)
-    >>> twist = struct.pack("<6d", 0.5, 0.0, 0.0, 0.0, 0.0, 0.25) + bytes(288)
-    >>> odometry(names + pose + twist, "ros1")
-    Odometry(stamp=7.5, twist=(0.5, 0.0, 0.25), pose=(1.0, 2.0, 0.0),
-             frame='odom', child_frame='base')
-    """
+    """Decode a ``nav_msgs/Odometry``; ValueError if it is malformed or not finite."""
     reader = WireReader(data, encoding)
     stamp, frame, child_frame, pose = _stamped_pose(reader, True)
     reader.raw(_COVARIANCE_SIZE)

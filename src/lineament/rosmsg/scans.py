@@ -30,25 +30,12 @@ def decoders(echo: str, ring: int | None) -> dict[str, Decoder]:
 
 
 def laser_scan(data: Buffer, encoding: str) -> LaserScan:
-    r"""Decode a ``sensor_msgs/LaserScan``.
+    """Decode a ``sensor_msgs/LaserScan``.
 
     The beams of a scanner that turns clockwise (a negative increment) are reversed, so that
     bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
-    `time_increment`.
-
-    Raises
-    ------
-    ValueError
-        If the message is malformed, has no beams, or its fields make no sense together.
-
-    Examples
-    --------
-    >>> import struct
-    >>> header = struct.pack("<III5s", 0, 7, 500_000_000, b"\1\0\0\0l")
-    >>> fields = struct.pack("<7f", 0.0, 0.5, 0.5, 0.0, 0.1, 0.1, 30.0)
-    >>> scan = laser_scan(header + fields + struct.pack("<IffI", 2, 1.0, 2.0, 0), "ros1")
-    >>> scan.ranges.tolist(), scan.stamp, scan.frame_id
-    ([1.0, 2.0], 7.5, 'l')
+    `time_increment`. ValueError if the message is malformed, has no beams, or its fields make no
+    sense together.
     """
     reader = WireReader(data, encoding)
     stamp, frame_id = reader.header()
@@ -62,18 +49,9 @@ def laser_scan(data: Buffer, encoding: str) -> LaserScan:
 def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserScan:
     """Decode one echo of each beam of a ``sensor_msgs/MultiEchoLaserScan``.
 
-    Parameters
-    ----------
-    data, encoding
-        As for `WireReader`.
-    echo : {"first", "last", "strongest"}
-        Which one: the nearest, the farthest (echoes come in that order), or the one with the
-        greatest intensity, the first where there are no intensities. A beam without echo is NaN.
-
-    Raises
-    ------
-    ValueError
-        As for :func:`laser_scan`, or if ranges and intensities have different echoes.
+    The echo is the ``first``, which is the nearest, the ``last``, or the ``strongest``, which has
+    the greatest intensity, and is the first where there are no intensities. A beam without echo is
+    NaN. ValueError as for `laser_scan`, or if ranges and intensities have different echoes.
     """
     reader = WireReader(data, encoding)
     stamp, frame_id = reader.header()
@@ -107,12 +85,8 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     The ring is the points whose field `ring` has that number or, in an organised cloud without
     that field, the points of that row, from 0. A point (x, y, z) becomes a beam with its bearing
     and horizontal distance; z is left out. Beams are sorted by bearing; of points with the same
-    bearing the nearest stays; points that are not finite are left out.
-
-    Raises
-    ------
-    ValueError
-        If the message is malformed, has no fields x and y, no rings, or no such ring.
+    bearing the nearest stays; points that are not finite are left out. ValueError if the message is
+    malformed, has no fields x and y, no rings, or no such ring.
     """
     reader = WireReader(data, encoding)
     stamp, frame_id = reader.header()

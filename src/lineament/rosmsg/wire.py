@@ -43,21 +43,12 @@ _CDR_READ = {(0, 0): _Form(True, ">"), (0, 1): _CDR}
 
 
 class WireReader:
-    r"""Takes the fields of one serialised message, one after the other.
+    """Takes the fields of one serialised message, one after the other.
 
     The encoding is ``ros1``, packed and little-endian, or ``cdr`` (XCDR1), whose first four bytes
     say the byte order, and whose numbers are aligned to their size, counted from behind these.
 
-    Raises
-    ------
-    ValueError
-        If the encoding is another one; from the methods: if the message ends too early.
-
-    Examples
-    --------
-    >>> reader = WireReader(b"\x02\0\0\0hi\0\0\x80\x3f", "ros1")
-    >>> reader.text(), reader.floats(1).tolist()
-    ('hi', [1.0])
+    ValueError if the encoding is another one or, from the methods, if the message ends too early.
     """
 
     __slots__ = ("_at", "_data", "_form", "_size")
@@ -138,21 +129,7 @@ class WireReader:
 
 
 class WireWriter:
-    r"""Puts the fields of one message one after the other, little-endian: twin of `WireReader`.
-
-    Raises
-    ------
-    ValueError
-        If the encoding is another one.
-
-    Examples
-    --------
-    >>> writer = WireWriter("ros1")
-    >>> writer.text("hi")
-    >>> writer.numbers("f", 1.0)
-    >>> writer.data
-    b'\x02\x00\x00\x00hi\x00\x00\x80?'
-    """
+    """Puts the fields of one message one after the other, little-endian: twin of `WireReader`."""
 
     __slots__ = ("_form", "_out")
 
