@@ -67,7 +67,7 @@ def write(path: Path, scans: list[ln.LaserScan], repeat: int) -> Path:
             message = messages.scan(i / 40, scan.ranges, (), angle_increment=step)
             yield "/scan", i * 25_000_000, message
 
-    return ros_bags.write_bag(path, "mcap", items())
+    return ros_bags.write(path.parent, "mcap", items(), path.stem)
 
 
 def arithmetic(n: int) -> float:

@@ -4,8 +4,6 @@ Run: pip install atheris; python benchmarks/fuzz_by_coverage.py --seconds 600. I
 input that breaks the promise of the readers, which is kept in a folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -3,8 +3,6 @@
 Run: python benchmarks/readers.py [--recordings FOLDER]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
@@ -43,7 +41,7 @@ def write(folder: Path, kind: str, scans: int, beams: int, intensities: bool) ->
             scan = messages.scan(i / 40, distances, strengths, angle_increment=step)
             yield "/scan", i * 25_000_000, scan
 
-    return ros_bags.write_bag(folder / f"{kind}{ros_bags.ending(kind)}", kind, items())
+    return ros_bags.write(folder, kind, items(), kind)
 
 
 # Others, with our decoder: what differs is how they find the messages.

@@ -1,12 +1,9 @@
 """Small logs of every format, by the project's own writers, and ways to damage them."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import struct
 import zipfile
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -100,7 +97,7 @@ def _bag(folder: Path, kind: str) -> Sample:
             ("/tf", messages.transforms(link)),
         ):
             items.append((topic, i, message))
-    path = ros_bags.write_bag(folder / f"{kind}{ros_bags.ending(kind)}", kind, items)
+    path = ros_bags.write(folder, kind, items, kind)
     if not path.is_dir():
         return _single(kind, path.read_bytes())
     return Sample(kind, {file.name: file.read_bytes() for file in path.iterdir()}, ".")
@@ -116,8 +113,20 @@ _NUMBERS = b"nan inf -1 0 1e308 -1e308 1e-320 1e999 999999999 1_0 0x1 null [] {}
 _NUMBERS += [b"", b"\x1b[31m", b"\xd9\xa3", b'"', b"1" * 400, b"9" * 5000]
 
 
-def _cut(data: bytes, chance: Random, _: bytes) -> bytes:
-    return data[: chance.randrange(len(data))]
+def _moved(data: bytes, chance: Random, other: bytes) -> bytes:
+    """Cut off, drop, repeat, or put a piece of another log in, or all of it from some place on."""
+    at, from_ = chance.randrange(len(data)), chance.randrange(len(other) + 1)
+    before, behind = data[:at], data[at:]
+    size = chance.choice((1, 4, 8, 40, 400, 4000))
+    return chance.choice(
+        (
+            before,
+            before + behind[size:],
+            before + behind[:size] * chance.choice((2, 10, 1000)) + behind,
+            before + other[from_ : from_ + size] + behind,
+            before + other[from_:],
+        )
+    )
 
 
 def _flip(data: bytes, chance: Random, _: bytes) -> bytes:
@@ -134,26 +143,6 @@ def _overwrite(data: bytes, chance: Random, _: bytes) -> bytes:
     piece = struct.pack(chance.choice("<<<>") + form, word)
     at = chance.randrange(len(data))
     return data[:at] + piece + data[at + len(piece) :]
-
-
-def _splice(data: bytes, chance: Random, other: bytes) -> bytes:
-    return data[: chance.randrange(len(data))] + other[chance.randrange(len(other) + 1) :]
-
-
-def _insert(data: bytes, chance: Random, other: bytes) -> bytes:
-    at, start = chance.randrange(len(data)), chance.randrange(len(other) + 1)
-    return data[:at] + other[start : start + chance.choice((1, 4, 40, 400))] + data[at:]
-
-
-def _repeat(data: bytes, chance: Random, _: bytes) -> bytes:
-    start = chance.randrange(len(data))
-    piece = data[start : start + chance.choice((1, 4, 40, 400, 4000))]
-    return data[:start] + piece * chance.choice((2, 10, 1000)) + data[start:]
-
-
-def _drop(data: bytes, chance: Random, _: bytes) -> bytes:
-    start = chance.randrange(len(data))
-    return data[:start] + data[start + chance.choice((1, 4, 8, 40, 400)) :]
 
 
 def _number(data: bytes, chance: Random, _: bytes) -> bytes:
@@ -175,10 +164,7 @@ def _pack(data: bytes, chance: Random, other: bytes) -> bytes:
     return gzip.compress(data, 1) if chance.random() < 0.5 else zipped(**files)
 
 
-_WAYS: tuple[Callable[[bytes, Random, bytes], bytes], ...] = (
-    *(_cut, _flip, _flip, _overwrite, _overwrite, _splice, _insert, _repeat, _drop),
-    *(_number, _number, _pack),
-)
+_WAYS = (*(_moved,) * 5, *(_flip, _overwrite, _number) * 2, _pack)
 
 
 def damaged(data: bytes, chance: Random, other: bytes) -> bytes:

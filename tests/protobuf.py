@@ -1,7 +1,5 @@
 """A slow, obvious reader of Protobuf by the schema that an MCAP file carries."""
 
-from __future__ import annotations
-
 import struct
 
 #: Numbers of the fields of descriptor.proto that are needed here.

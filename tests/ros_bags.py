@@ -1,7 +1,5 @@
 """Bags of ROS messages for tests and benchmarks, by the writers of rosbags and mcap."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -28,6 +26,7 @@ every_kind = pytest.mark.parametrize("kind", KINDS)
 #: Size from which a chunk is written [bytes]; small, so that small bags have several.
 CHUNK = 4096
 _TRANSFORMS = "tf2_msgs/msg/TFMessage"
+_ENDINGS = {"rosbag1": ".bag", "sqlite3": "", "mcap": ".mcap"}
 _CODECS = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
 
 
@@ -42,10 +41,6 @@ def store(ros: int) -> Any:
 
 def ros_of(kind: str) -> int:
     return 1 if "1" in kind else 2
-
-
-def ending(kind: str) -> str:
-    return {"rosbag1": ".bag", "sqlite3": "", "mcap": ".mcap"}[kind.partition("-")[0]]
 
 
 class Messages:
@@ -155,8 +150,8 @@ def serialized(message: Any, ros: int) -> bytes:
 Item = tuple[str, int, Any]
 
 
-def write_bag(path: Path, kind: str, items: Iterable[Item]) -> Path:
-    """Write a bag of one of the `KINDS`; a folder for sqlite3. Messages come as the kind asks.
+def write(folder: Path, kind: str, items: Iterable[Item], name: str = "log") -> Path:
+    """Write a bag of one of the `KINDS` into a folder, with the usual ending; sqlite3 is a folder.
 
     An item's message may also be a pair of a type's name and bytes.
     """
@@ -168,16 +163,12 @@ def write_bag(path: Path, kind: str, items: Iterable[Item]) -> Path:
         for topic, time, message in items
     )
     container, _, codec = kind.partition("-")
+    path = folder / f"{name}{_ENDINGS[container]}"
     if container == "mcap":
         _write_mcap(path, codec, ros, packed)
     else:
         _write_rosbags(path, container, codec, ros, packed)
     return path
-
-
-def write(folder: Path, kind: str, items: Iterable[Item], name: str = "log") -> Path:
-    """Write a bag into a folder, with the usual ending."""
-    return write_bag(folder / f"{name}{ending(kind)}", kind, items)
 
 
 def _write_rosbags(path: Path, container: str, codec: str, ros: int, items: Any) -> None:
@@ -225,19 +216,8 @@ def _write_mcap(path: Path, codec: str, ros: int, items: Any) -> None:
 
 
 def ranges_of(stamp: float) -> np.ndarray:
-    """Ranges of the scan with a stamp, in `bags_of_scans`."""
+    """Ranges of the scan with a stamp."""
     return (1.0 + stamp + 0.01 * np.arange(40)).astype(np.float32)
-
-
-def bags_of_scans(folder: Path, n: int) -> dict[str, Path]:
-    """Write a bag of each kind with n scans, as a file: of a folder its database."""
-    found = {}
-    for kind in KINDS:
-        make = Messages(ros_of(kind))
-        items = (("/scan", i, make.scan(i, ranges_of(i))) for i in range(n))
-        path = write(folder, kind, items, kind)
-        found[kind] = next(path.glob("*.db3")) if path.is_dir() else path
-    return found
 
 
 def read(path: Path, **options: Any) -> tuple[list, str | None]:

@@ -30,7 +30,7 @@ def two_topics(tmp_path):
             topic = ("/front", "/rear")[k % 2]
             yield topic, k * 10**8, messages.scan(0.1 * k, walls[k % 2])
 
-    return ros_bags.write_bag(tmp_path / "two.mcap", "mcap", items())
+    return ros_bags.write(tmp_path, "mcap", items(), "two")
 
 
 def test_all_topics_go_into_one_table_with_a_column(two_topics, tmp_path):

@@ -7,7 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from text_logs import csm_scan
+from text_logs import check_fault, csm_scan
 
 from lineament import LogError
 from lineament.logs import json_stream, open_log
@@ -67,11 +67,8 @@ def test_csm_bearings(write):
 def test_faulty_csm_scans(write, changes, problem):
     texts = [json.dumps(scan) for scan in (csm_scan(1), csm_scan(**changes), csm_scan(3))]
     path = write("\n".join(texts))
-    with pytest.raises(LogError, match=f"scan 1: .*{problem}"):
-        list(open_log(path))
-    log = open_log(path, keep_going=True)
-    assert [scan.stamp for scan in log] == [1.25, 3.25]
-    assert (log.skipped, len(log)) == (1, 3)
+    assert [scan.stamp for scan in check_fault(path, f": scan 1: .*{problem}", 2)] == [1.25, 3.25]
+    assert len(open_log(path)) == 3
 
 
 @pytest.mark.parametrize(
@@ -85,11 +82,7 @@ def test_faulty_csm_scans(write, changes, problem):
     ],
 )
 def test_broken_json_between_scans(write, text, problem, scans, skipped):
-    path = write(text)
-    with pytest.raises(LogError, match=problem):
-        list(open_log(path))
-    log = open_log(path, keep_going=True)
-    assert (len(list(log)), log.skipped) == (scans, skipped)
+    check_fault(write(text), problem, scans, skipped)
 
 
 @pytest.mark.parametrize(
@@ -164,10 +157,8 @@ def test_rplidar_poses(write):
 
 def test_faulty_rplidar_units(write):
     path = write(json.dumps({"a": [[1.0, 0.0]], "b": [[1.0, 2.0], [3.0]], "c": 5}))
-    with pytest.raises(LogError, match="unit b: expected a list of pairs of numbers"):
-        list(open_log(path))
-    log = open_log(path, keep_going=True)
-    assert ([scan.frame_id for scan in log], log.skipped) == (["a"], 2)
+    (scan,) = check_fault(path, ": unit b: expected a list of pairs of numbers", 1, skipped=2)
+    assert scan.frame_id == "a"
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,14 @@ STAMPS = [float(i) for i in range(N)]
 
 @pytest.fixture(scope="module")
 def bags(tmp_path_factory):
-    return ros_bags.bags_of_scans(tmp_path_factory.mktemp("bags"), N)
+    """A bag of scans of each kind, as a file: of a folder its database."""
+    found = {}
+    for kind in ros_bags.KINDS:
+        make = ros_bags.Messages(ros_bags.ros_of(kind))
+        items = (("/scan", i, make.scan(i, ranges_of(i))) for i in range(N))
+        path = ros_bags.write(tmp_path_factory.mktemp("bags"), kind, items, kind)
+        found[kind] = next(path.glob("*.db3")) if path.is_dir() else path
+    return found
 
 
 @pytest.fixture
@@ -339,26 +346,15 @@ def test_whole_bags_in_archives(bags, tmp_path, temporary, kind):
         scans, problem = read(tmp_path / name)
         assert (stamps_of(scans), problem) == (STAMPS, None)
     assert open_log(tmp_path / "a.zip").name == f"{tmp_path / 'a.zip'}/{inside}"
-    assert list(temporary.iterdir()) == []
-
-
-@every_kind
-@pytest.mark.parametrize("pack", ["gzip", "zip"])
-def test_bags_in_archives_that_are_cut_off(altered, temporary, kind, pack):
-    """What a cut gzip file held before the cut is read only where that is asked for."""
-    most = 0
+    # What a cut gzip file held before the cut is read only where that is asked for.
+    packed, most = gzip.compress(data), 0
     for share in np.linspace(0.01, 0.9999, 20):
-        if pack == "gzip":
-            path = altered(kind, lambda d, s=share: (p := gzip.compress(d))[: int(s * len(p))])
-        else:
-            path = altered(kind, lambda d, s=share: zipped(bag=bytes(d[: int(s * len(d))])))
-        scans, problem = read(path)
-        assert problem or len(scans) == N
-        assert pack == "zip" or not scans
-        kept, problem = read(path, keep_going=True)
+        (tmp_path / "a.gz").write_bytes(packed[: int(share * len(packed))])
+        scans, problem = read(tmp_path / "a.gz")
+        assert problem
+        assert not scans
+        kept, _ = read(tmp_path / "a.gz", keep_going=True)
         assert stamps_of(kept) == STAMPS[: len(kept)]
-        assert len(kept) >= len(scans)
-        assert problem is None or not kept
         most = max(most, len(kept))
     assert most > 0.5 * N
     assert list(temporary.iterdir()) == []

@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
-from lineament.motion import Tracker
+from lineament.motion import Tracks
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
@@ -223,24 +223,15 @@ def test_corners_of_a_room_open_towards_the_scanner_between_their_sides():
 
 
 def test_feature_cloud(make):
-    cloud = read(make, make.cloud("/scan/features", MOMENT, FOUND))
-    points = columns_of(cloud)
-    assert points.dtype == FEATURE_POINT
-    assert points.tobytes() == feature_points(FOUND).tobytes()
-    assert not cloud.is_dense  # one corner is nowhere
-    assert len(columns_of(read(make, make.cloud("/f", MOMENT, features(6))))) == 0
-
-
-def test_feature_cloud_has_the_tracks():
-    make, tracker, extract = RosMessages(), Tracker(), ln.Extractor("liu:scale_free")
-    for scan in drive(room(), [(-2, 0), (-1.8, 0)], SENSORS["paper"], speed=1, rate=10):
-        found = extract(scan)
-        tracks = tracker(found)
-    cloud = read(make, make.cloud("/f", MOMENT, found, tracks))
-    assert cloud.is_dense
-    points = columns_of(cloud)
-    for kind, numbers in enumerate((tracks.segments, tracks.corners, tracks.arcs)):
-        assert points["track"][points["kind"] == kind].tolist() == numbers.tolist()
+    numbered = Tracks(*(np.arange(n) for n in (2, 4, 1, 0, 0)), None)
+    for tracks in (None, numbered):
+        cloud = read(make, make.cloud("/scan/features", MOMENT, FOUND, tracks))
+        points = columns_of(cloud)
+        assert points.dtype == FEATURE_POINT
+        assert points.tobytes() == feature_points(FOUND, tracks).tobytes()
+        assert not cloud.is_dense  # one corner is nowhere
+    nothing = read(make, make.cloud("/f", MOMENT, features(6)))
+    assert (len(columns_of(nothing)), nothing.is_dense) == (0, True)
 
 
 @pytest.mark.parametrize("level", range(4))

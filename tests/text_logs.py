@@ -2,7 +2,13 @@
 
 import io
 import json
+import re
 import zipfile
+
+import pytest
+
+from lineament import LogError
+from lineament.logs import open_log
 
 FLASER = b"FLASER 3 1.5 2.5 60 1 2 0.5 0 0 0 7.5 robot 0.1\n"
 BEAMS = b"0.1,2\n0.2,3\n"
@@ -80,3 +86,14 @@ def zipped(**files):
         for name, content in files.items():
             archive.writestr(name, content)
     return data.getvalue()
+
+
+def check_fault(path, problem, good, skipped=1):
+    """Return the scans around faults: the first is an error, all are skipped when asked for."""
+    with pytest.raises(LogError, match=f"^{re.escape(str(path))}{problem}"):
+        list(open_log(path))
+    log = open_log(path, keep_going=True)
+    for _ in range(2):
+        scans = list(log)
+        assert (len(scans), log.skipped, len(log.faults)) == (good, skipped, skipped)
+    return scans

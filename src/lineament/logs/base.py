@@ -144,15 +144,7 @@ class Log(ABC):
         return []
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:
-        """Read each scan with its topic, from the start.
-
-        Yields
-        ------
-        topic : str
-            The topic, one of `topics`.
-        scan : LaserScan
-            The scan.
-        """
+        """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
         yield from self._items()
 

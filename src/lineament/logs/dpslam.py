@@ -40,15 +40,15 @@ class DpslamLog(LineLog):
                 read = _ODOMETRY.read(line)
                 pose = read["x"], read["y"], read["theta"]
                 return None
-            scan = _scan(line, known)
+            ranges = _LASER.read(line)["ranges"]
+            is_millimetres = _MILLIMETRE_CODES <= ranges.max(initial=0.0) <= _MILLIMETRE_LARGEST
             pose = known
-            return scan
+            return LaserScan(
+                ranges,
+                -math.pi / 2,
+                sick_step(len(ranges)),
+                range_max=_MILLIMETRE_CODES if is_millimetres else SICK_RANGE_MAX,
+                pose=known,
+            )
 
         return parse
-
-
-def _scan(line: bytes, pose: Pose | None) -> LaserScan:
-    ranges = _LASER.read(line)["ranges"]
-    in_millimetres = _MILLIMETRE_CODES <= ranges.max(initial=0.0) <= _MILLIMETRE_LARGEST
-    range_max = _MILLIMETRE_CODES if in_millimetres else SICK_RANGE_MAX
-    return LaserScan(ranges, -math.pi / 2, sick_step(len(ranges)), range_max=range_max, pose=pose)
