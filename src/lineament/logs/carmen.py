@@ -5,6 +5,7 @@ The robots' logs and their SLAM-corrected versions. All other messages are passe
 
 import math
 import re
+from contextlib import suppress
 
 from ..scan import LaserScan, Pose
 from .bearings import SICK_RANGE_MAX, sick_step, snap
@@ -32,12 +33,7 @@ _FIELDS = {
 
 
 class CarmenLog(LineLog):
-    """A CARMEN log; front scans (FLASER, ROBOTLASER1) unless another topic is asked for.
-
-    `range_max` of FLASER and RLASER is that of the last ``PARAM`` ``…_laser_max`` before them, else
-    that from which SICK scanners report that they saw nothing (51.15, 81.83, 81.91). Poses are
-    those of the laser as logged, stamps the robot's (``ipc_timestamp``).
-    """
+    """A CARMEN log; front scans (FLASER, ROBOTLASER1) unless another topic is asked for."""
 
     format = "carmen"
     description = "CARMEN (FLASER, ROBOTLASER1)"
@@ -109,9 +105,7 @@ def _read_limit(line: bytes, range_max: dict[str, float]) -> None:
     match = _LASER_MAX.match(words[1]) if len(words) > 2 else None
     if match is None:
         return
-    try:
+    with suppress(ValueError):
         value = number_parser(line)(words[2])
-    except ValueError:
-        return
-    if 0 < value < math.inf:
-        range_max[_PARAM_TOPIC[match[1]]] = value
+        if 0 < value < math.inf:
+            range_max[_PARAM_TOPIC[match[1]]] = value

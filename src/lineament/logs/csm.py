@@ -21,12 +21,7 @@ _POSES = ("true_pose", "estimate", "odometry")
 
 
 class CsmLog(Log):
-    """JSON objects with ``readings`` [m] and ``theta`` [rad], or ``min_theta`` and ``max_theta``.
-
-    A reading is invalid where it is null or its ``valid`` is 0. Bearings that run clockwise are
-    reversed; even steps that were rounded are made exact. The pose is the first of ``true_pose``,
-    ``estimate`` and ``odometry`` that is given; ``timestamp`` is seconds and microseconds.
-    """
+    """JSON objects with ``readings`` [m] and ``theta`` [rad], or ``min_theta``, ``max_theta``."""
 
     format = "csm"
     description = "CSM JSON (readings, theta)"

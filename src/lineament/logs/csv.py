@@ -88,11 +88,7 @@ def _is_row(line: bytes) -> bool:
 
 
 class CsvLog(_Csv, LineLog):
-    """One scan a row, below a header that names the columns; see ``docs/logs.md``.
-
-    An empty range is a beam that returned nothing, any other empty cell a value that is not known.
-    A row with fewer beams than the header has names ends after its last one.
-    """
+    """One scan a row, below a header that names the columns."""
 
     description = "CSV (angle_min, angle_increment, r0, r1, … under a header)"
     scan_kinds = read_kinds = ("scan",)
@@ -128,11 +124,7 @@ def _scan(cells: list[bytes], ranges: list[int], others: dict[str, int], number:
 
 
 class CsvBeamsLog(_Csv):
-    """Rows ``angle,range`` of one scan, under a header or none; see ``docs/logs.md``.
-
-    Bearings are degrees where the header says so or, if it says nothing, where one is beyond ±2π.
-    Rows may come in any order; of several with one bearing the first is kept.
-    """
+    """Rows ``angle,range`` of one scan, under a header or none."""
 
     description = "CSV (angle,range)"
 

@@ -14,12 +14,7 @@ _MILLIMETRE_CODES, _MILLIMETRE_LARGEST = 8.183, 8.1915
 
 
 class DpslamLog(LineLog):
-    """A DP-SLAM log: ``Odometry x y theta``, then ``Laser n r1 … rn`` [m, rad], no stamps.
-
-    Beams are those of a SICK scanner, as in a CARMEN log: from -90°, in steps of 1° for 180 or
-    181. Poses are those of the robot's odometry. `range_max` is 8.183 m for a scan that goes just
-    as far as the codes of the scanner's millimetre mode, 8.183 to 8.191 m, else 50 m.
-    """
+    """A DP-SLAM log: ``Odometry x y theta``, then ``Laser n r1 … rn`` [m, rad], no stamps."""
 
     format = "dpslam"
     description = "DP-SLAM (Odometry, Laser)"

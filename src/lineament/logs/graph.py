@@ -19,13 +19,7 @@ _OTHERS = re.compile(rb"(?m)^[ \t]*(?:PARAM|ODOM|[FR]LASER)[ \t]")
 
 
 class GraphLog(LineLog):
-    """A graph of poses whose vertices have scans (ROBOTLASER1).
-
-    The pose of a scan is that of its vertex, moved from the robot to the laser as the two poses
-    in the scan's line say. Its vertex is the last one before it; where all vertices come first,
-    the k-th scan has the k-th vertex. A scan without a vertex keeps its pose. Stamps are the
-    robot's, bearings and `range_max` those of the line.
-    """
+    """A graph of poses whose vertices have scans (ROBOTLASER1)."""
 
     format = "graph"
     description = "TORO or g2o (VERTEX2, VERTEX_SE2 with ROBOTLASER1)"

@@ -39,8 +39,7 @@ def reading(path: object) -> Iterator[None]:
 def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
     """Yield the content of a file, decompressed where it is gzip, in pieces of up to 1 MiB.
 
-    What is appended while the file is read is left for the next time. LogError if it cannot be
-    read, or its gzip data is broken or ends early: after all that could be decompressed.
+    LogError if it is broken or ends early: after all that could be decompressed.
     """
     with opened(path) as read:
         yield from decompressed(path, read, read(_COMPRESSED))
@@ -48,7 +47,7 @@ def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
 
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Callable[[int], bytes]]:
-    """Give what reads pieces of a file, as long as it is now."""
+    """Give what reads pieces of a file, as long as it is now: what is appended is left."""
     # Only what the file does is guarded: what is done with its content is not.
     with reading(path):
         binary = Path(path).open("rb")  # noqa: SIM115

@@ -39,10 +39,7 @@ _MANY = 1 << 40
 
 
 class McapLog(RosLog):
-    """Scans of an MCAP file: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
-
-    Encodings ``cdr`` (ROS 2) and ``ros1``; chunks plain, lz4 or zstd, checked by their CRC.
-    """
+    """Scans of an MCAP file."""
 
     format = "mcap"
     description = "MCAP (sensor_msgs)"

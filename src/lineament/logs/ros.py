@@ -49,11 +49,8 @@ class RosLog(Log):
         return self._topics_of(self._decoders)
 
     def __len__(self) -> int:
-        return sum(
-            count
-            for connection, count in self._counts.items()
-            if connection.topic in self._wanted and connection.type in self._decoders
-        )
+        counts = self._counts.items()
+        return sum(n for c, n in counts if c.topic in self._wanted and c.type in self._decoders)
 
     def contents(self) -> list[Topic]:
         """Return all topics, with their types, messages and, in a ROS 1 bag, publishers."""

@@ -24,10 +24,7 @@ Fault = Callable[[LogError], None]
 
 
 class Connection(NamedTuple):
-    """Who wrote a message: topic, type as ROS 1 writes it, serialisation, node ("" if not known).
-
-    The serialisation is ``ros1``, ``cdr``, or another one that cannot be read here.
-    """
+    """Who wrote a message: topic, type as ROS 1 writes it, serialisation, node ("" if unknown)."""
 
     topic: str
     type: str
@@ -65,11 +62,7 @@ class Bag(ABC):
 
 
 class RecordReader(ABC):
-    """Reads a file of records once: those on `topics`, or all if None.
-
-    Each piece is checked against what is left of the file before it is taken. `at` is the place
-    that it has reached [bytes].
-    """
+    """Reads a file of records once, those on `topics` or all; it has reached byte `at`."""
 
     def __init__(self, path: str | os.PathLike[str], topics: Collection[str] | None = None) -> None:
         self.path, self.at, self._topics = path, 0, topics
@@ -102,8 +95,7 @@ class RecordReader(ABC):
 
     def wanted(self, connection: Connection) -> Connection | None:
         """Return a connection if its topic is wanted."""
-        is_wanted = self._topics is None or connection.topic in self._topics
-        return connection if is_wanted else None
+        return connection if self._topics is None or connection.topic in self._topics else None
 
     def note(self, number: int, connection: Connection) -> None:
         """Remember a connection by its number."""
@@ -164,11 +156,7 @@ class RecordReader(ABC):
 
 
 class RecordBag(Bag):
-    """A bag that is a chain of records, some of them chunks of records.
-
-    It is read from the start, record by record; its index is used for counts alone. So a bag
-    without an index, or with a wrong one, is read like any other.
-    """
+    """A bag that is a chain of records, some of them chunks; its index is used for counts alone."""
 
     def __init__(self, path: str | os.PathLike[str], reader: type[RecordReader]) -> None:
         super().__init__(path)

@@ -22,10 +22,7 @@ _Header = dict[bytes, bytes]
 
 
 class Rosbag1Log(RosLog):
-    """Scans of a ROS 1 bag: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
-
-    Versions 2.0 (chunks plain, bz2 or lz4), 1.2 and 1.1.
-    """
+    """Scans of a ROS 1 bag of version 2.0, 1.2 or 1.1."""
 
     format = "rosbag1"
     description = "ROS 1 bag (sensor_msgs)"

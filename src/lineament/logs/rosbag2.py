@@ -47,11 +47,7 @@ _MESSAGES = "SELECT topic_id, data FROM messages WHERE topic_id IN ({}) ORDER BY
 
 
 class Rosbag2Log(RosLog):
-    """Scans of a ROS 2 bag: LaserScan, MultiEchoLaserScan, a ring of PointCloud2.
-
-    A folder with parts of sqlite3 or MCAP, or a single ``.db3``; messages may be compressed one
-    by one.
-    """
+    """Scans of a ROS 2 bag: a folder with parts of sqlite3 or MCAP, or a single ``.db3``."""
 
     format = "rosbag2"
     description = "ROS 2 bag (sensor_msgs)"

@@ -25,16 +25,7 @@ _TRANSFORMS = "transforms.json"
 
 
 class RplidarLog(Log):
-    """A JSON object ``{"unit": [[a, b], …], …}``: one scan a unit, which is a topic.
-
-    Pairs are ranges and bearings [m, rad], or points x, y [m] in the frame of the unit, as some
-    recorders write them: points where a first number is negative or the second numbers do not
-    run one way around. Bearings over 2π are degrees. Beams are sorted by bearing, of several
-    with one bearing the first is kept; there are no stamps.
-
-    A file ``transforms.json`` in the same folder gives poses: ``{"a": {"b": 3 × 3 matrix}}`` takes
-    points of unit a to the frame of unit b. The world is the frame of the first unit.
-    """
+    """A JSON object ``{"unit": [[a, b], …], …}``: one scan a unit, which is a topic."""
 
     format = "rplidar"
     description = "RPLIDAR JSON ([range, angle] or [x, y] of units)"

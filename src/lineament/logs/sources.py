@@ -72,7 +72,6 @@ class LocalCopy(os.PathLike[str]):
     """A temporary file under the name that a person knows it by; it goes when this object does.
 
     ``str`` gives the name, ``os.fspath`` the path. `packed` is the size before it was unpacked.
-    LogError if it grows too large, or cannot be written.
     """
 
     def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
@@ -132,8 +131,7 @@ def unzip(path: str | os.PathLike[str], *, keep_going: bool = False) -> LocalCop
 def member_heads(path: str | os.PathLike[str]) -> Iterator[tuple[str, Head]]:
     """Yield the name and the beginning of each file in an archive, sorted by name.
 
-    Files that systems hide there are left out, as are those that cannot be read. LogError if the
-    archive is broken or has too many files.
+    Files that systems hide there are left out, as are those that cannot be read.
     """
     with _archive(path) as archive:
         names = sorted(info.filename for info in archive.infolist() if not info.is_dir())
@@ -198,10 +196,7 @@ def fetched(address: str) -> LocalCopy:
 
 
 def listed(address: str) -> list[str]:
-    """Return the files in the folder at an address, or those that match its pattern.
-
-    An address that is neither is returned alone, whether or not there is a file.
-    """
+    """Return the files in the folder at an address or of its pattern, else the address alone."""
     with _fsspec(address) as fsspec:
         system, root = fsspec.core.url_to_fs(address)
         if any(sign in root for sign in "*?["):

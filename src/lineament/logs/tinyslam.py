@@ -17,11 +17,7 @@ _SCAN_TIME = 0.1
 
 
 class TinyslamLog(LineLog):
-    """A tinySLAM log: 707 columns, the stamp [µs], 24 others and 682 ranges [mm].
-
-    The scanner is an URG-04LX: -119.53° to 119.88°, 20 mm (below are its error codes) to 5.6 m,
-    10 Hz. Wheel encoders are no poses and are left out.
-    """
+    """A tinySLAM log: 707 columns, the stamp [µs], 24 others and 682 ranges [mm]."""
 
     format = "tinyslam"
     description = "tinySLAM (707 columns, URG-04LX)"
