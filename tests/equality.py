@@ -72,6 +72,9 @@ def assert_same_features(features, twin, rtol=1e-7, atol=1e-9):
                 assert (abs(table["angle"]) <= math.pi).all()
             elif name == "covariance":
                 assert_same_covariances(table, records)
+            elif name == "length":
+                expected = [math.dist(record["start"], record["end"]) for record in records]
+                np.testing.assert_allclose(table[name], expected, rtol, atol)
             elif name == "convex":
                 # Arms that lie upon each other open to neither side.
                 opens = table["opening"] > 1e-9
