@@ -20,7 +20,7 @@ __all__ = ["MethodBase"]
 class MethodBase:
     """A method that calls its kernels one by one, for one scan after the other.
 
-    Methods inherit from this, declare their parameters (see `parameters.parameter`), and say in `find`
+    Methods inherit from this, declare their parameters (`parameters.parameter`), and say in `find`
     what they do.
     """
 
