@@ -43,10 +43,12 @@ OPTIONS: tuple[dict[str, Any], ...] = (
 def check(sample: Sample, folders: tuple[Path, Path], options: dict[str, Any]) -> bool:
     """Read a log in every way there is; True if a scan came out.
 
-    `folders` are those of `scratch`, empty before and after: temporary files must go with their
-    logs, and not wait for the collector.
+    `folders` are those of `scratch`: the input stays in the first one until the next, and from the
+    second one temporary files must go with their logs, and not wait for the collector.
     """
     folder, temporary = folders
+    for path in folder.iterdir():
+        path.unlink()
     for name, data in sample.files.items():
         (folder / name).write_bytes(data)
     path = folder / sample.opened
@@ -56,8 +58,6 @@ def check(sample: Sample, folders: tuple[Path, Path], options: dict[str, Any]) -
             count += one_line_or(folder, lambda f=found, k=keep: read(f, k, options), default=0)
     left = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert left == sample.files, f"files changed: {sorted(sample.files)} are {sorted(left)}"
-    for path in folder.iterdir():
-        path.unlink()
     assert not list(temporary.iterdir()), list(temporary.iterdir())
     return count > 0
 
