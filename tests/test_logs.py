@@ -7,29 +7,17 @@ import math
 import os
 import subprocess
 import sys
-import tracemalloc
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from text_logs import FLASER, check_fault, csm_scan, scan_texts, zipped
+from text_logs import FLASER, at_most, check_fault, csm_scan, scan_texts, zipped
 
 from lineament import LogError
 from lineament.logs import lines, open_log, summarize
 
 GZIPPED = gzip.compress(FLASER * 9)
-
-
-@contextmanager
-def at_most(megabytes):
-    """Memory that is allocated inside stays below a bound."""
-    tracemalloc.start()
-    try:
-        yield
-        assert tracemalloc.get_traced_memory()[1] < megabytes << 20
-    finally:
-        tracemalloc.stop()
 
 
 @pytest.mark.parametrize("name", ["a.log", "a.npz", "a"])

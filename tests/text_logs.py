@@ -3,7 +3,9 @@
 import io
 import json
 import re
+import tracemalloc
 import zipfile
+from contextlib import contextmanager
 
 import pytest
 
@@ -97,3 +99,14 @@ def check_fault(path, problem, good, skipped=1):
         scans = list(log)
         assert (len(scans), log.skipped, len(log.faults)) == (good, skipped, skipped)
     return scans
+
+
+@contextmanager
+def at_most(megabytes):
+    """Memory that is allocated inside stays below a bound."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < megabytes << 20
+    finally:
+        tracemalloc.stop()
