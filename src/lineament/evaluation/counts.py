@@ -67,14 +67,8 @@ class Counts(Summable):
     ) -> Self:
         """Count one scan.
 
-        Parameters
-        ----------
-        matched : ndarray of int
-            Found ones that are paired with a demanded one.
-        excused : ndarray of bool, shape (F,)
-            Found ones that are no mistake if they are not paired.
-        demanded : ndarray of bool, shape (T,)
-            Whether each true one is large enough to be demanded.
+        `matched` are found ones that are paired with a demanded one, `excused` (F,) those that are
+        no mistake if they are not paired, `demanded` (T,) which true ones are large enough.
         """
         judged = ~excused
         judged[matched] = True

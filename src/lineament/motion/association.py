@@ -13,8 +13,6 @@ from ..kernels.tracking.association import associate as kernel
 from ..kernels.tracking.association import move
 from ..scan import Array
 
-__all__ = ["KINDS", "Matches", "associate"]
-
 Pairs = NDArray[np.intp]
 
 #: The tables whose features are tracked.
