@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from naive_world import distance_to_walls, ring_sensor
+from worlds import ring_sensor
 
 import lineament as ln
 from lineament.evaluation import FeatureScores, corner_scores
@@ -15,6 +15,7 @@ from lineament.evaluation.counts import rms
 from lineament.motion.deskew import beam_times
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room, scene, truth
+from lineament.simulation.placing import clearance
 
 NAN = math.nan
 QUIET = replace(SENSORS["utm30lx"], noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0, rate=10.0)
@@ -64,7 +65,7 @@ def test_points_are_where_they_were_at_the_stamp():
         scan = QUIET.scan(room(), pose, np.random.default_rng(0), twist=twist)
         still = ln.deskew(scan, twist)
         points = still.points[still.valid] + pose[:2]
-        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-9)
+        np.testing.assert_allclose(clearance(room(), points), 0, atol=1e-9)
         assert scan.valid.sum() - still.valid.sum() <= 40
         # They are what a sensor at rest can see: nothing is in front of any of them.
         seen, _ = cast_rays(room(), pose, still.angles[still.valid])
@@ -103,7 +104,7 @@ def test_a_full_circle_that_turns_stays_within_one_turn():
         assert still.is_full_circle == (turn_rate > 0)
         assert still.angles[-1] - still.angles[0] < 2 * math.pi
         points = still.points[still.valid] + (0.0, 1.0)
-        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-6)
+        np.testing.assert_allclose(clearance(room(), points), 0, atol=1e-6)
 
 
 @given(

@@ -9,7 +9,6 @@ from handmade import corner, features, segment
 import lineament as ln
 from lineament.evaluation import RankedRepeats, Repeatability, ranked_repeats, repeatability
 from lineament.evaluation.repeatability import in_sight
-from lineament.logs import open_log
 from lineament.simulation import SENSORS, Sensor, World, room
 
 # A wall x = 3 and a pillar before its upper half, as the first scanner sees it.
@@ -145,18 +144,6 @@ def test_refusals():
     assert math.isnan(repeatability(ring(), nothing, ring(), nothing).corners.rate)
     assert len(ranked_repeats(ring(), nothing, ring(), nothing, none).scores) == 0
     assert Repeatability.total([]).segments.expected == 0
-
-
-def test_repeatability_of_a_real_log(data_dir):
-    """Neighbouring scans of the arena, whose poses are good to a centimetre."""
-    log = open_log(data_dir / "truth" / "jackal_static_data.npz")
-    scans = [scan for scan, _ in zip(log, range(6), strict=False)]
-    found = list(map(ln.Extractor("liu:scale_free"), scans))
-    total = Repeatability.total(
-        repeatability(scans[i], found[i], scans[i + 1], found[i + 1]) for i in range(5)
-    )
-    assert total.segments.expected > 10
-    assert total.segments.rate > 0.5
 
 
 def test_curve_with_chance_taken_off():

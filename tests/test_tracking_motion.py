@@ -171,24 +171,6 @@ def test_walls_that_are_parallel_but_for_their_errors_leave_a_direction_open(tur
     assert len(estimate_motion(moved_by((0.0, 0.0, 0.0), segments=walls)).unobserved) == lost
 
 
-def test_the_misfit_of_a_wall_counts_where_one_frame_saw_it_alone():
-    # Two directions known to 1 mrad each, and two misfits of 1 cm over 2 m: 12 (2 · 0.01²)/2².
-    noise, bow = 2e-6, 6e-4
-
-    def frame(start, end):
-        row = segment(start, end, 0, 99, sigma=(0.001, 0.001))
-        row["misfit"] = 0.01
-        return features(segments=[row])
-
-    wall = frame((2, -1), (2, 1))
-    # Of three metres that were seen in the last one, one is common.
-    for low, high, share in ((-1, 1, 0), (1, 3, 1), (0, 2, 2 / 3)):
-        pair = np.array([[0, 0]])
-        matches = Matches(wall, frame((2, low), (2, high)), pair, NONE, NONE)
-        found = estimate_motion(matches).covariance[2, 2]
-        assert found == pytest.approx(noise + share * bow, rel=1e-3)
-
-
 @pytest.mark.parametrize("covariance", [np.zeros((3, 3)), np.eye(2), np.full((3, 3), math.nan)])
 def test_covariance_refused(covariance):
     nothing = Matches(features(), features(), NONE, NONE, NONE)

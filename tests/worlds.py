@@ -1,12 +1,11 @@
 """Small scans by formulas: walls, vertices, rooms, and random scenes with every kind of fault."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from lineament import LaserScan, RangeNoise
+from lineament.simulation import Sensor, World
 
 STEP = math.radians(1 / 3)
 NOISE = RangeNoise(sigma=0.01)
@@ -49,6 +48,16 @@ def scan_of(ranges, angles, **fields) -> LaserScan:
 
 def full_circle(n: int = 720) -> np.ndarray:
     return -math.pi + 2 * math.pi / n * np.arange(n)
+
+
+def ring_sensor(n_beams=2000, **settings):
+    """Make a full turn without noise but that of `settings`."""
+    return Sensor("ring", n_beams, -math.pi, 2 * math.pi / n_beams, **settings)
+
+
+def drum(radius):
+    """Make a round room: every true range from its centre is the radius."""
+    return World([], [[0, 0, radius]])
 
 
 def random_scan(seed: int, n: int | None = None) -> LaserScan:
