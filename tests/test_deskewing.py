@@ -57,6 +57,10 @@ def test_a_turn_by_hand():
     assert (still.range_max, still.scan_time, still.time_increment) == (9.0, 0.0, 0.0)
     assert still.intensities.tolist() == [5, 6, 7]
     assert ln.deskew(still, (0.0, 0.0, 0.5)) is still
+    # As fast to the right as the beams go to the left: all are straight ahead, one after the other.
+    ahead = ln.deskew(ln.LaserScan([1.0, 2.0, 3.0], 0.0, 0.1, time_increment=0.1), (0, 0, -1.0))
+    np.testing.assert_allclose(ahead.angles, 0.0, atol=1e-8)
+    assert (np.diff(ahead.angles) > 1e-10).all()
 
 
 def test_points_are_where_they_were_at_the_stamp():

@@ -73,6 +73,14 @@ def test_a_pair_is_within_its_gate(now, settings, found):
     assert len(twin) == found
 
 
+@pytest.mark.parametrize(("misfit", "found"), [(0.016, 1), (0.013, 0)])
+def test_a_corner_of_uneven_walls_may_be_farther_off(misfit, found):
+    # Seen twice, of two walls: (10 cm)² over 2 cm² and four misfits is 8.2, and 11.4.
+    now = features(segments=WALLS, corners=[corner(2.1, 1, segments=(0, 1))])
+    now.segments["misfit"] = misfit
+    assert len(associate(FRAME, now).corners) == found
+
+
 @pytest.mark.parametrize("gate", [0, 1, math.nan])
 def test_a_gate_must_be_a_share(gate):
     with pytest.raises(ValueError, match=f"gate is {gate}, expected"):
