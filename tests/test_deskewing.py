@@ -17,7 +17,7 @@ from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room, scene, truth
 from lineament.simulation.placing import clearance
 
-NAN = math.nan
+NAN, MOVING = math.nan, (1.0, 2.0, 3.0)
 QUIET = replace(SENSORS["utm30lx"], noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0, rate=10.0)
 
 
@@ -29,19 +29,16 @@ def test_times_of_beams():
     np.testing.assert_allclose(beam_times(scan), [0, 0.1 / math.pi, 0.1])
 
 
-@pytest.mark.parametrize("twist", [None, (0.0, 0.0, 0.0)])
-def test_without_a_motion_the_scan_is_itself(twist):
-    scan = ln.LaserScan([1.0, 2.0], 0.0, 0.1, time_increment=0.01)
+@pytest.mark.parametrize(
+    ("ranges", "increment", "twist"),
+    [
+        *(([1.0, 2.0], 0.1, still) for still in (None, (0.0, 0.0, 0.0))),
+        *(([1.0, 2.0], 0.0, MOVING), ([NAN, 0.0], 0.1, MOVING), ([], 0.1, MOVING)),
+    ],
+)
+def test_without_motion_times_or_measurements_the_scan_is_itself(ranges, increment, twist):
+    scan = ln.LaserScan(ranges, 0.0, 0.1, time_increment=increment)
     assert ln.deskew(scan, twist) is scan
-
-
-def test_without_times_or_readings_the_scan_is_itself():
-    for scan in (
-        ln.LaserScan([1.0, 2.0], 0.0, 0.1),
-        ln.LaserScan([NAN, 0.0], 0.0, 0.1, time_increment=0.1),
-        ln.LaserScan([], 0.0, 0.1, time_increment=0.1),
-    ):
-        assert ln.deskew(scan, (1.0, 2.0, 3.0)) is scan
 
 
 def test_a_turn_by_hand():

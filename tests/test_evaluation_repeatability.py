@@ -9,7 +9,7 @@ from handmade import corner, features, segment
 import lineament as ln
 from lineament.evaluation import RankedRepeats, Repeatability, ranked_repeats, repeatability
 from lineament.evaluation.repeatability import in_sight
-from lineament.simulation import SENSORS, Sensor, World, room
+from lineament.simulation import Sensor, World
 
 # A wall x = 3 and a pillar before its upper half, as the first scanner sees it.
 WORLD = World([[3, -3, 3, 3], [1.5, 0.5, 1.5, 1.1]])
@@ -123,14 +123,6 @@ def test_the_distance_of_a_segment_is_that_of_its_places_in_sight():
     there = features(segments=[segment((3.04, -2), (3.04, 2), 0, 50)])
     found = repeatability(SCAN, here, OTHER, seen_from(THERE, there))
     assert found.segments.rmse == pytest.approx(0.04)
-
-
-def test_a_scan_repeats_itself():
-    scan = SENSORS["paper"].scan(room(), (0.2, 0.1, 1.0), np.random.default_rng(5))
-    found = ln.extract(scan, method="liu:scale_free")
-    again = repeatability(scan, found, scan, found)
-    assert again.corners.rate == again.segments.rate == 1
-    assert again.corners.rmse == pytest.approx(0, abs=1e-12)
 
 
 def test_refusals():

@@ -20,9 +20,6 @@ poses = st.tuples(lengths, lengths, st.floats(-3, 3))
 def test_a_motion_is_in_the_frame_of_the_pose():
     assert compose((1, 2, math.pi / 2), (3, 1, 0.5)) == pytest.approx((0, 5, math.pi / 2 + 0.5))
     assert relative((1, 2, math.pi / 2), (0, 5, 2.0)) == pytest.approx((3, 1, 2 - math.pi / 2))
-
-
-def test_turns_are_the_short_way_round():
     assert compose((0, 0, 3.0), (0, 0, 1.0))[2] == pytest.approx(4.0 - 2 * math.pi)
 
 

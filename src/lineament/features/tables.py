@@ -107,7 +107,11 @@ def _table(
     frames: list[str],
 ) -> pa.Table:
     """Put the rows of each kind straight to where they belong: by scan, then by kind."""
-    clusters, n_clusters = _cluster_columns(labels, beams, _has_ends(*parts["breakpoints"]))
+    # A scan that ends somewhere is no circle: nothing in it lies over a seam.
+    breakpoints, n_breakpoints = parts["breakpoints"]
+    ended = np.repeat(np.arange(len(beams)), n_breakpoints)[breakpoints["kind"] == "scan_end"]
+    has_ends = np.isin(np.arange(len(beams)), ended)
+    clusters, n_clusters = _cluster_columns(labels, beams, has_ends)
     columns = [*(_columns(name, parts[name][0]) for name in TABLES), clusters]
     # Rows of each kind in each scan, shape (scans, kinds): they begin at its running sum.
     counts = np.column_stack([*(parts[name][1] for name in TABLES), n_clusters])
@@ -174,14 +178,6 @@ def _codes(field: Field, kinds: NDArray[np.str_]) -> NDArray[np.int32]:
             f"expected one of {', '.join(KINDS[field.table])}"
         )
     return codes
-
-
-def _has_ends(breakpoints: NDArray[np.void], counts: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether each scan ends somewhere, so that nothing in it lies over the seam of a circle."""
-    scan = np.repeat(np.arange(len(counts)), counts)
-    has_ends = np.zeros(len(counts), dtype=np.bool_)
-    has_ends[scan[breakpoints["kind"] == "scan_end"]] = True
-    return has_ends
 
 
 def _cluster_columns(
