@@ -129,14 +129,9 @@ def test_turns_go_the_short_way_and_headings_are_wrapped():
 @pytest.mark.parametrize(
     ("waypoints", "settings"),
     [
-        ([(0, 0)], {}),
-        ([(1, 1), (1, 1)], {}),
-        ([(0, 0, 0), (1, 1, 1)], {}),
-        ([(0, 0), (1, INF)], {}),
-        ([(0, 0), (1, 0)], {"speed": 0}),
-        ([(0, 0), (1, 0)], {"turn_rate": -1}),
-        ([(0, 0), (1, 0)], {"rate": math.nan}),
-        ([(0, 0), (1, 0)], {"seed": -1}),
+        *((way, {}) for way in ([(0, 0)], [(1, 1)] * 2, [(0,) * 3, (1,) * 3], [(0, 0), (1, INF)])),
+        *(([(0, 0), (1, 0)], {"speed": 0}), ([(0, 0), (1, 0)], {"turn_rate": -1})),
+        *(([(0, 0), (1, 0)], {"rate": math.nan}), ([(0, 0), (1, 0)], {"seed": -1})),
     ],
 )
 def test_drive_refuses_at_once(waypoints, settings):

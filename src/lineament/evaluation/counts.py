@@ -115,13 +115,7 @@ def finite_figures(figures: dict[str, float]) -> dict[str, float]:
 
 
 def plain(value: object) -> Any:
-    """Convert numbers, arrays and containers of them to what JSON takes; not finite becomes None.
-
-    Examples
-    --------
-    >>> plain({"rms": np.float64(0.5), "errors": np.array([1.0, np.nan])})
-    {'rms': 0.5, 'errors': [1.0, None]}
-    """
+    """Convert numbers, arrays and containers to what JSON takes; not finite becomes None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

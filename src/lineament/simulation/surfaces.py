@@ -40,16 +40,7 @@ class Surfaces:
 
 @lru_cache(maxsize=16)
 def surfaces_of(world: World) -> Surfaces:
-    """Find the surfaces of a world.
-
-    Examples
-    --------
-    >>> surfaces = surfaces_of(World([[0, 0, 1, 0], [1, 0, 3, 0], [3, 0, 3, 2]]))
-    >>> surfaces.of_world.tolist(), surfaces.walls[0].tolist()
-    ([0, 0, 1], [[0.0, 0.0], [3.0, 0.0]])
-    >>> surfaces.joints[0, 1].tolist()
-    [[3.0, 0.0]]
-    """
+    """Find the surfaces of a world."""
     ends = world.segments.reshape(-1, 2, 2)
     meetings = _meetings(ends)
     label = np.arange(len(ends))
