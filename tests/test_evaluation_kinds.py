@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from handmade import SIDE, arc, corner, features, segment
 
-from lineament.evaluation import Counts, FeatureScores, arc_scores, corner_scores, segment_scores
+from lineament.evaluation import Counts, arc_scores, corner_scores, segment_scores
 from lineament.features import ARC
 
 SMALL = segment((5, 0), (5, 0.1), 70, 74)
@@ -239,14 +239,3 @@ def test_arc_by_hand():
     assert summary["radius_rmse"] == pytest.approx(0.03)
     assert summary["over_bound"] == pytest.approx(math.sqrt((1 + 4 + 9) / 3))
     assert summary["nees"] == pytest.approx((1 + 4 + 9) / 3 / 4)
-
-
-@pytest.mark.parametrize("kind", ["corners", "segments", "arcs"])
-def test_no_scan_adds_nothing(kind):
-    none = FeatureScores.none(kind)
-    found = features(segments=[WALL, SIDE], corners=[corner(2, 0)], arcs=[arc(2, 0, 0.3, 50, 60)])
-    score = {"corners": corner_scores, "segments": segment_scores, "arcs": arc_scores}[kind]
-    one = score(found, found)
-    assert one.counts.correct > 0
-    assert (none + one).summary() == one.summary()
-    assert (one + one).counts.correct == 2 * one.counts.correct

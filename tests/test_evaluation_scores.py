@@ -105,6 +105,7 @@ def test_scores_add_up():
     for k, counts in enumerate(counts_of(total)):
         assert counts == Counts.total(counts_of(part)[k] for part in parts)
     assert_same(sum(parts, Scores()), total)
+    assert all(counts.correct > 0 for counts in counts_of(total))
     squares = np.concatenate([part.corners.consistency.squares for part in parts])
     assert total.summary()["corner_nees"] == pytest.approx(squares.mean() / 2)
     assert 0 < total.summary()["corner_rmse"] < 0.1

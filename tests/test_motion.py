@@ -41,8 +41,9 @@ def test_poses_refused():
         twist_between((0, 0, 0), (1, 0, 0), 0)
     with pytest.raises(ValueError, match=r"poses are .*, expected finite"):
         twist_between((0, 0, 0), (math.nan, 0, 0), 1.0)
-    with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
-        poses_along((1.0, 2.0), [0.0])
+    for twist in ((1.0, 2.0), (1.0, INF, 0.0)):
+        with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
+            SENSORS["paper"].sweep((0, 0, 0), twist)
 
 
 # Sweeps
@@ -83,11 +84,6 @@ def test_a_sensor_at_rest_draws_the_same_numbers():
         for v in (0.0, 1e-15)
     )
     np.testing.assert_allclose(still, creeping, atol=1e-9)
-
-
-def test_twist_refused():
-    with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
-        SENSORS["paper"].sweep((0, 0, 0), (1.0, INF, 0.0))
 
 
 # Drives
