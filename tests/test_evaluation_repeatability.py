@@ -117,12 +117,21 @@ def test_pieces_of_one_wall_are_found_again_once():
     np.testing.assert_allclose(found.segments.distances, [0], atol=1e-12)  # the nearer one
 
 
-def test_the_distance_of_a_segment_is_that_of_its_places_in_sight():
-    """Above y = 1 it is behind the pillar, and goes on beyond the segment that is found here."""
+@pytest.mark.parametrize(
+    ("start", "end", "distance"),
+    [
+        # Above y = 1 it is behind the pillar, and goes on beyond the segment that is found here.
+        ((3.04, -2), (3.04, 2), 0.04),
+        # Of its 16 places, 10 cm apart, half are within the gate of the end: one at 5 cm, the
+        # others on the segment; the eight beyond count as the gate.
+        ((3, -2.9), (3, -1.3), (8 * 0.10 + 0.05) / 16),
+    ],
+)
+def test_the_distance_of_a_segment_is_that_of_its_places_in_sight(start, end, distance):
     here = features(segments=[segment((3, -2), (3, 1), 0, 50)])
-    there = features(segments=[segment((3.04, -2), (3.04, 2), 0, 50)])
+    there = features(segments=[segment(start, end, 0, 50)])
     found = repeatability(SCAN, here, OTHER, seen_from(THERE, there))
-    assert found.segments.rmse == pytest.approx(0.04)
+    assert found.segments.rmse == pytest.approx(distance)
 
 
 def test_refusals():
