@@ -1,7 +1,5 @@
 """Features written by hand, to be compared with each other."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -25,13 +23,14 @@ def segment(start, end, first, last, *, sigma=(0.01, 0.01), n_points=None):
 def corner(x, y, *, segments=(0, 0), sigma=0.01, kind="corner"):
     row = np.zeros((), CORNER)
     row["position"], row["segments"], row["kind"] = (x, y), segments, kind
-    row["covariance"] = sigma**2 * np.eye(2)
+    row["covariance"] = np.square(sigma) * np.eye(2)
     return row
 
 
 def arc(x, y, radius, first, last, *, sigma=0.01):
     row = np.zeros((), ARC)
-    row["center"], row["radius"], row["covariance"] = (x, y), radius, sigma**2 * np.eye(3)
+    row["center"], row["radius"] = (x, y), radius
+    row["covariance"] = np.square(sigma) * np.eye(3)
     row["first_beam"], row["last_beam"], row["n_points"] = first, last, last - first + 1
     return row
 

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from lineament import RangeNoise
-from lineament.bounds import (
-    _LEAST_SIGMA,
-    LineBound,
-    arc_bound,
-    corner_bound,
-    line_bound,
-    wall_end_bound,
-)
+from lineament.bounds import LineBound, arc_bound, corner_bound, line_bound, wall_end_bound
 
 NOISE = RangeNoise(sigma=0.01)
 STEP = math.radians(1 / 3)
@@ -28,14 +21,12 @@ def line_ranges(line, bearings, point):
 
 def corner_ranges(corner, bearings):
     """Ranges of the corner (x, y, angle before, angle after), of beams on either side."""
-    before, after = bearings[bearings < 0], bearings[bearings > 0]
-    vertex = corner[:2]
-    return np.concatenate(
-        [
-            line_ranges((0.0, angle), side + math.atan2(0.5, 2.0), vertex)
-            for angle, side in zip(corner[2:], (before, after), strict=True)
-        ]
-    )
+    sides = (bearings[bearings < 0], bearings[bearings > 0])
+    ranges = [
+        line_ranges((0.0, angle), side + math.atan2(0.5, 2.0), corner[:2])
+        for angle, side in zip(corner[2:], sides, strict=True)
+    ]
+    return np.concatenate(ranges)
 
 
 def circle_ranges(circle, bearings, side):
@@ -62,11 +53,8 @@ def least_covariance(model, parameters, bearings, noise):
 def assert_same(found, expected):
     """Equal, but for what differences leave, in deviations of the parameters."""
     deviations = np.sqrt(np.diag(expected))
-    np.testing.assert_allclose(
-        found / np.outer(deviations, deviations),
-        expected / np.outer(deviations, deviations),
-        atol=1e-5,
-    )
+    unit = np.outer(deviations, deviations)
+    np.testing.assert_allclose(found / unit, expected / unit, atol=1e-5)
 
 
 NOISES = {
@@ -125,12 +113,8 @@ ARCS = {
 @pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
 def test_arc(arc, noise):
     bearings, center, radius, side = arc
-    expected = least_covariance(
-        lambda circle, beams: circle_ranges(circle, beams, side),
-        (*center, radius),
-        bearings,
-        noise,
-    )
+    circle = (*center, radius)
+    expected = least_covariance(lambda c, b: circle_ranges(c, b, side), circle, bearings, noise)
     assert_same(arc_bound(bearings, center, radius, noise), expected)
 
 
@@ -168,6 +152,7 @@ def test_the_end_of_a_wall_is_uniform_over_a_spacing():
 
 
 def test_noiseless_ranges_have_the_least_noise_of_the_methods():
+    from lineament.bounds import _LEAST_SIGMA
     from lineament.kernels.noise import LEAST_SIGMA
 
     assert _LEAST_SIGMA == LEAST_SIGMA
@@ -189,10 +174,7 @@ def test_noiseless_ranges_have_the_least_noise_of_the_methods():
         (lambda: arc_bound([0, 0.1, 0.3], (2, 0), 0.5, NOISE), r"bearings\[2\] is 0.3 rad"),
         (lambda: arc_bound([0, 0.1, 3.1], (2, 0), 0.5, NOISE), r"bearings\[2\] is 3.1 rad"),
         (lambda: wall_end_bound((2, 0), 0.0, 0.01), "points at the scanner"),
-        (
-            lambda: corner_bound(*[LineBound(np.zeros(2), 0.5, np.eye(2))] * 2),
-            "are parallel: no corner",
-        ),
+        (lambda: corner_bound(*[LineBound(np.zeros(2), 0.5, np.eye(2))] * 2), "are parallel: no"),
     ],
 )
 def test_refused(call, message):

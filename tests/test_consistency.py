@@ -7,6 +7,8 @@ import pytest
 from worlds import NOISE, STEP, fan, room, vertex, wall
 
 from lineament import Extractor
+from lineament.bounds import line_bound
+from lineament.evaluation import NormalisedErrors
 
 SIGMA = NOISE.sigma
 #: Name: bearings, distance and normal [degrees] of the wall.
@@ -33,14 +35,11 @@ def line_errors(segments, distance, normal_deg):
     return np.column_stack((segments["centroid"] @ left + distance, turn))
 
 
-def nees(errors, covariances):
-    return np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors)
-
-
 def assert_consistent(errors, covariances):
     """The mean of n squares of k normal errors lies within k ± 1.96 √(2k/n)."""
     n, k = errors.shape
-    assert nees(errors, covariances).mean() == pytest.approx(k, abs=1.96 * math.sqrt(2 * k / n))
+    squares = NormalisedErrors.of(errors, covariances).squares
+    assert squares.mean() == pytest.approx(k, abs=1.96 * math.sqrt(2 * k / n))
 
 
 def the_corners(batch, least):
@@ -67,10 +66,9 @@ def test_covariance_of_lines(name, fit):
 
 def bound(angles, distance, normal_deg):
     """Cramér-Rao: standard deviations of the offset at the centroid, and of the angle."""
-    psi = angles - math.radians(normal_deg)
-    t, w = distance * np.tan(psi), 1 / (SIGMA * np.cos(psi)) ** 2
-    centred = t - np.average(t, weights=w)
-    return 1 / math.sqrt(w.sum()), 1 / math.sqrt(w @ centred**2)
+    alpha = math.radians(normal_deg)
+    foot = distance * np.array([math.cos(alpha), math.sin(alpha)])
+    return np.sqrt(np.diag(line_bound(angles, foot, alpha + math.pi / 2, NOISE).covariance))
 
 
 def rmse_of_lines(name, runs, seed, fit):
@@ -121,7 +119,7 @@ def test_covariance_of_a_corner_between_beams(fit, distances):
     directions = np.radians(normals)
     across = np.column_stack((np.cos(directions), np.sin(directions)))
     errors = corners["position"] - np.linalg.solve(across, distances)
-    squares = nees(errors, corners["covariance"])
+    squares = NormalisedErrors.of(errors, corners["covariance"]).squares
     # The median of χ² with 2 degrees of freedom. The mean is a little above 2: now and then the
     # cut is further off than the measurements that are left out.
     assert np.median(squares) == pytest.approx(2 * math.log(2), abs=0.15)

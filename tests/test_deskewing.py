@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from naive_world import distance_to_walls, ring_sensor
+from worlds import ring_sensor
 
 import lineament as ln
 from lineament.evaluation import FeatureScores, corner_scores
@@ -15,8 +15,9 @@ from lineament.evaluation.counts import rms
 from lineament.motion.deskew import beam_times
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room, scene, truth
+from lineament.simulation.placing import clearance
 
-NAN = math.nan
+NAN, MOVING = math.nan, (1.0, 2.0, 3.0)
 QUIET = replace(SENSORS["utm30lx"], noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0, rate=10.0)
 
 
@@ -28,19 +29,16 @@ def test_times_of_beams():
     np.testing.assert_allclose(beam_times(scan), [0, 0.1 / math.pi, 0.1])
 
 
-@pytest.mark.parametrize("twist", [None, (0.0, 0.0, 0.0)])
-def test_without_a_motion_the_scan_is_itself(twist):
-    scan = ln.LaserScan([1.0, 2.0], 0.0, 0.1, time_increment=0.01)
+@pytest.mark.parametrize(
+    ("ranges", "increment", "twist"),
+    [
+        *(([1.0, 2.0], 0.1, still) for still in (None, (0.0, 0.0, 0.0))),
+        *(([1.0, 2.0], 0.0, MOVING), ([NAN, 0.0], 0.1, MOVING), ([], 0.1, MOVING)),
+    ],
+)
+def test_without_motion_times_or_measurements_the_scan_is_itself(ranges, increment, twist):
+    scan = ln.LaserScan(ranges, 0.0, 0.1, time_increment=increment)
     assert ln.deskew(scan, twist) is scan
-
-
-def test_without_times_or_readings_the_scan_is_itself():
-    for scan in (
-        ln.LaserScan([1.0, 2.0], 0.0, 0.1),
-        ln.LaserScan([NAN, 0.0], 0.0, 0.1, time_increment=0.1),
-        ln.LaserScan([], 0.0, 0.1, time_increment=0.1),
-    ):
-        assert ln.deskew(scan, (1.0, 2.0, 3.0)) is scan
 
 
 def test_a_turn_by_hand():
@@ -56,6 +54,10 @@ def test_a_turn_by_hand():
     assert (still.range_max, still.scan_time, still.time_increment) == (9.0, 0.0, 0.0)
     assert still.intensities.tolist() == [5, 6, 7]
     assert ln.deskew(still, (0.0, 0.0, 0.5)) is still
+    # As fast to the right as the beams go to the left: all are straight ahead, one after the other.
+    ahead = ln.deskew(ln.LaserScan([1.0, 2.0, 3.0], 0.0, 0.1, time_increment=0.1), (0, 0, -1.0))
+    np.testing.assert_allclose(ahead.angles, 0.0, atol=1e-8)
+    assert (np.diff(ahead.angles) > 1e-10).all()
 
 
 def test_points_are_where_they_were_at_the_stamp():
@@ -64,7 +66,7 @@ def test_points_are_where_they_were_at_the_stamp():
         scan = QUIET.scan(room(), pose, np.random.default_rng(0), twist=twist)
         still = ln.deskew(scan, twist)
         points = still.points[still.valid] + pose[:2]
-        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-9)
+        np.testing.assert_allclose(clearance(room(), points), 0, atol=1e-9)
         assert scan.valid.sum() - still.valid.sum() <= 40
         # They are what a sensor at rest can see: nothing is in front of any of them.
         seen, _ = cast_rays(room(), pose, still.angles[still.valid])
@@ -103,7 +105,7 @@ def test_a_full_circle_that_turns_stays_within_one_turn():
         assert still.is_full_circle == (turn_rate > 0)
         assert still.angles[-1] - still.angles[0] < 2 * math.pi
         points = still.points[still.valid] + (0.0, 1.0)
-        np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-6)
+        np.testing.assert_allclose(clearance(room(), points), 0, atol=1e-6)
 
 
 @given(

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 from handmade import SIDE, arc, corner, features, segment
 
-from lineament.evaluation import (
-    Counts,
-    FeatureScores,
-    arc_scores,
-    corner_scores,
-    segment_scores,
-)
+from lineament.evaluation import Counts, arc_scores, corner_scores, segment_scores
+from lineament.features import ARC
 
 SMALL = segment((5, 0), (5, 0.1), 70, 74)
 NAN = math.nan
@@ -131,25 +126,50 @@ def test_segment_by_hand():
     assert {name: summary[name] for name in expected} == pytest.approx(expected)
 
 
+COLUMN = arc(2, 0, 0.3, 10, 29)
+
+
 @pytest.mark.parametrize(
-    ("found", "is_right"),
+    ("found", "true", "right"),
     [
-        (moved(10, 49, x=2.09), True),
-        (moved(10, 49, x=2.11), False),
-        (moved(10, 49, x=1.89), False),
-        (moved(10, 49, x=NAN), False),
-        (moved(10, 49, turn=math.radians(9.9)), True),
-        (moved(10, 49, turn=math.radians(-10.1)), False),
-        (moved(10, 49, turn=math.pi), False),  # the other side of the wall
-        (moved(10, 29), True),  # 20 of 40 beams
-        (moved(10, 28), False),
-        (moved(0, 89), False),  # 40 of 90
+        (moved(10, 49, x=2.09), WALL, 1),
+        (moved(10, 49, x=2.11), WALL, 0),
+        (moved(10, 49, x=1.89), WALL, 0),
+        (moved(10, 49, x=NAN), WALL, 0),
+        (moved(10, 49, turn=math.radians(9.9)), WALL, 1),
+        (moved(10, 49, turn=math.radians(-10.1)), WALL, 0),
+        (moved(10, 49, turn=math.pi), WALL, 0),  # the other side of the wall
+        (moved(10, 29), WALL, 1),  # 20 of 40 beams
+        (moved(10, 28), WALL, 0),
+        (moved(0, 89), WALL, 0),  # 40 of 90
+        (arc(2.07, 0.07, 0.3, 10, 29), COLUMN, 1),
+        (arc(2.08, 0.08, 0.3, 10, 29), COLUMN, 0),  # centre 11 cm off
+        (arc(2, 0, 0.39, 10, 29), COLUMN, 1),
+        (arc(2, 0, 0.41, 10, 29), COLUMN, 0),
+        (arc(2, 0, 0.3, 10, 19), COLUMN, 1),
+        (arc(2, 0, 0.3, 10, 18), COLUMN, 0),  # 9 of 20 beams
+        (arc(NAN, 0, 0.3, 10, 29), COLUMN, 0),
+        # Three deviations of the bound: of 5 and 4 cm; 11.5° of 13.8°; 3 √2 · 4 cm = 17 cm; 12 cm.
+        (moved(0, 19, x=2.14), moved(0, 19, sigma=(0.05, 0.01)), 1),
+        (moved(0, 19, x=2.14), moved(0, 19, sigma=(0.04, 0.01)), 0),
+        (moved(0, 19, turn=0.2), moved(0, 19, sigma=(0.01, 0.08)), 1),
+        (moved(0, 19, turn=0.2), moved(0, 19, sigma=(0.01, 0.06)), 0),
+        (arc(2.16, 0, 0.5, 0, 9), arc(2, 0, 0.5, 0, 9, sigma=(0.04, 0.04, 0.01)), 1),
+        (arc(2.16, 0, 0.5, 0, 9), arc(2, 0, 0.5, 0, 9, sigma=(0.03, 0.03, 0.09)), 0),
+        (arc(2, 0, 0.61, 0, 9), arc(2, 0, 0.5, 0, 9, sigma=(0.01, 0.01, 0.04)), 1),
+        (arc(2, 0, 0.61, 0, 9), arc(2, 0, 0.5, 0, 9, sigma=(0.09, 0.09, 0.03)), 0),
     ],
 )
-def test_segment_gates(found, is_right):
-    scores = segment_scores(walls(found), walls(WALL))
-    assert scores.counts == Counts(int(is_right), 1, 1)
-    assert len(scores.errors["offset"]) == is_right
+def test_segments_and_arcs_within_their_gates(found, true, right):
+    of_kind, score = (arcs, arc_scores) if true.dtype == ARC else (walls, segment_scores)
+    assert score(of_kind(found), of_kind(true)).counts == Counts(right, 1, 1)
+
+
+@pytest.mark.parametrize(("sigma", "right"), [(0.04, (0, 0, 1)), (0.05, (1, 1, 1))])
+def test_a_corner_may_be_three_deviations_of_the_bound_off(sigma, right):
+    """14 cm are more than 3 · 4 cm, and less than 3 · 5 cm, of the larger axis of the ellipse."""
+    by_gate = corner_scores(corners((2, 0.14)), corners((2, 0), sigma=(0.01, sigma))).by_gate
+    assert tuple(of.correct for of in by_gate.values()) == right
 
 
 def test_segments_are_matched_by_the_overlap_of_their_beams():
@@ -219,70 +239,3 @@ def test_arc_by_hand():
     assert summary["radius_rmse"] == pytest.approx(0.03)
     assert summary["over_bound"] == pytest.approx(math.sqrt((1 + 4 + 9) / 3))
     assert summary["nees"] == pytest.approx((1 + 4 + 9) / 3 / 4)
-
-
-@pytest.mark.parametrize(
-    ("found", "right"),
-    [
-        (arc(2.07, 0.07, 0.3, 10, 29), 1),
-        (arc(2.08, 0.08, 0.3, 10, 29), 0),  # centre 11 cm off
-        (arc(2, 0, 0.39, 10, 29), 1),
-        (arc(2, 0, 0.41, 10, 29), 0),
-        (arc(2, 0, 0.3, 10, 19), 1),
-        (arc(2, 0, 0.3, 10, 18), 0),  # 9 of 20 beams
-        (arc(NAN, 0, 0.3, 10, 29), 0),
-    ],
-)
-def test_arc_gates(found, right):
-    assert arc_scores(arcs(found), arcs(arc(2, 0, 0.3, 10, 29))).counts == Counts(right, 1, 1)
-
-
-@pytest.mark.parametrize(("sigma", "right"), [(0.04, (0, 0, 1)), (0.05, (1, 1, 1))])
-def test_a_corner_may_be_three_deviations_of_the_bound_off(sigma, right):
-    """14 cm are more than 3 · 4 cm, and less than 3 · 5 cm, of the larger axis of the ellipse."""
-    truth = corners((2, 0))
-    truth.corners["covariance"] = np.diag([0.01**2, sigma**2])
-    by_gate = corner_scores(corners((2, 0.14)), truth).by_gate
-    assert tuple(of.correct for of in by_gate.values()) == right
-
-
-@pytest.mark.parametrize(
-    ("sigma", "offset", "turn", "right"),
-    [
-        ((0.05, 0.01), 0.14, 0.0, 1),
-        ((0.04, 0.01), 0.14, 0.0, 0),
-        ((0.01, 0.08), 0.0, 0.2, 1),  # 11.5° of 13.8°
-        ((0.01, 0.06), 0.0, 0.2, 0),
-    ],
-)
-def test_a_segment_may_be_three_deviations_of_the_bound_off(sigma, offset, turn, right):
-    found = moved(0, 19, x=2 + offset)
-    found["angle"] += turn
-    counts = segment_scores(walls(found), walls(moved(0, 19, sigma=sigma))).counts
-    assert counts == Counts(right, 1, 1)
-
-
-@pytest.mark.parametrize(
-    ("sigma", "center", "radius", "right"),
-    [
-        ((0.04, 0.04, 0.01), 0.16, 0.0, 1),  # 3 √2 · 4 cm = 17 cm
-        ((0.03, 0.03, 0.09), 0.16, 0.0, 0),
-        ((0.01, 0.01, 0.04), 0.0, 0.11, 1),  # 3 · 4 cm = 12 cm
-        ((0.09, 0.09, 0.03), 0.0, 0.11, 0),
-    ],
-)
-def test_an_arc_may_be_three_deviations_of_the_bound_off(sigma, center, radius, right):
-    true, found = arc(2, 0, 0.5, 0, 9), arc(2 + center, 0, 0.5 + radius, 0, 9)
-    true["covariance"] = np.diag(np.square(sigma))
-    assert arc_scores(arcs(found), arcs(true)).counts == Counts(right, 1, 1)
-
-
-@pytest.mark.parametrize("kind", ["corners", "segments", "arcs"])
-def test_no_scan_adds_nothing(kind):
-    none = FeatureScores.none(kind)
-    found = features(segments=[WALL, SIDE], corners=[corner(2, 0)], arcs=[arc(2, 0, 0.3, 50, 60)])
-    score = {"corners": corner_scores, "segments": segment_scores, "arcs": arc_scores}[kind]
-    one = score(found, found)
-    assert one.counts.correct > 0
-    assert (none + one).summary() == one.summary()
-    assert (one + one).counts.correct == 2 * one.counts.correct

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from handmade import corner, features, segment
 
-from lineament.evaluation import StandingScores, standing_scores
+from lineament.evaluation import standing_scores
 
 #: The median of χ² with two degrees of freedom.
 MEDIAN = 2 * math.log(2)
@@ -123,10 +123,3 @@ def test_nothing_to_compare():
         assert math.isnan(scores.segments.bins()["3-4"]["nees_median"])
     with pytest.raises(ValueError, match="two scans have 9 and 8 beams, expected the same number"):
         standing_scores([features(n=9), features(n=8)])
-
-
-def test_scores_add_up():
-    one = standing_scores([features(segments=[wall(0, 9)])] * 3)
-    assert pairs(one.segments.bins()) == {"10-29": 2}
-    total = StandingScores.total([one, one])
-    assert total.segments.arms.tolist() == [10] * 4

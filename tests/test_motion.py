@@ -1,38 +1,57 @@
-"""Sensors that move while they sweep, and drives: by hand, by small steps, by what must hold."""
+"""Poses and twists, sensors that move while they sweep, drives: by hand, by what must hold."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from naive_world import INF, distance_to_walls, drum, ring_sensor
+from hypothesis import given
+from hypothesis import strategies as st
+from worlds import drum, ring_sensor
 
-from lineament.scan import RangeNoise
+from lineament.scan.poses import compose, inverse, poses_along, relative, twist_between
 from lineament.simulation import SENSORS, building, cast_rays, drive, drive_poses, room
+from lineament.simulation.placing import clearance
 
-# Motion
+INF = math.inf
+lengths = st.floats(-20, 20)
+poses = st.tuples(lengths, lengths, st.floats(-3, 3))
 
 
-def test_poses_of_a_sweep_by_hand():
-    # A full turn of the mirror in 0.1 s, at 1 m/s and a quarter turn: along a quarter of a circle.
-    sensor = ring_sensor(4, rate=10.0)
-    assert sensor.time_increment == pytest.approx(0.025)
-    turn_rate = math.pi / 2 / 0.1
-    poses = sensor.sweep((1.0, 2.0, math.pi / 2), (1.0, 0.0, turn_rate))
-    radius = 1.0 / turn_rate
-    turned = turn_rate * 0.025 * np.arange(4)
-    expected = np.column_stack(
-        (1 - radius * (1 - np.cos(turned)), 2 + radius * np.sin(turned), math.pi / 2 + turned)
-    )
-    np.testing.assert_allclose(poses, expected, atol=1e-12)
-    # To the left, without a turn.
-    np.testing.assert_allclose(
-        sensor.sweep((1.0, 2.0, math.pi / 2), (0.0, 2.0, 0.0))[3], (0.85, 2, math.pi / 2)
-    )
+def test_a_motion_is_in_the_frame_of_the_pose():
+    assert compose((1, 2, math.pi / 2), (3, 1, 0.5)) == pytest.approx((0, 5, math.pi / 2 + 0.5))
+    assert relative((1, 2, math.pi / 2), (0, 5, 2.0)) == pytest.approx((3, 1, 2 - math.pi / 2))
+    assert compose((0, 0, 3.0), (0, 0, 1.0))[2] == pytest.approx(4.0 - 2 * math.pi)
+
+
+@given(poses, poses)
+def test_relative_undoes_compose(pose, motion):
+    np.testing.assert_allclose(relative(pose, compose(pose, motion)), motion, atol=1e-9)
+    np.testing.assert_allclose(compose(pose, inverse(pose)), (0, 0, 0), atol=1e-9)
+
+
+@given(poses, st.floats(-2, 2).filter(lambda t: abs(t) > 0.01))
+def test_a_twist_leads_to_the_other_pose(motion, duration):
+    start = (1.0, -2.0, 0.7)
+    twist = twist_between(start, compose(start, motion), duration)
+    np.testing.assert_allclose(poses_along(twist, [duration])[0], motion, atol=1e-6)
+
+
+def test_poses_refused():
+    with pytest.raises(ValueError, match="duration is 0, expected"):
+        twist_between((0, 0, 0), (1, 0, 0), 0)
+    with pytest.raises(ValueError, match=r"poses are .*, expected finite"):
+        twist_between((0, 0, 0), (math.nan, 0, 0), 1.0)
+    for twist in ((1.0, 2.0), (1.0, INF, 0.0)):
+        with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
+            SENSORS["paper"].sweep((0, 0, 0), twist)
+
+
+# Sweeps
 
 
 def test_a_sweep_is_the_sum_of_small_steps():
     sensor, twist = ring_sensor(200, rate=1.0), np.array([0.7, -0.4, 1.9])
+    assert sensor.time_increment == pytest.approx(0.005)
     x, y, theta = 0.3, -0.2, 2.0
     n = 400
     for _ in range(199 * n):
@@ -58,16 +77,6 @@ def test_ranges_are_those_from_where_each_beam_was_taken():
     assert np.abs(scan.ranges - still.ranges).max() > 0.1
 
 
-def test_a_scan_is_undone_by_the_poses_of_its_beams():
-    sensor, twist, pose = SENSORS["utm30lx"], (2.0, 0.0, 3.0), (0.0, 1.0, 0.0)
-    quiet = replace(sensor, noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0)
-    scan = quiet.scan(room(), pose, np.random.default_rng(0), twist=twist)
-    x, y, theta = quiet.sweep(pose, twist)[scan.valid].T
-    bearings, ranges = scan.angles[scan.valid] + theta, scan.ranges[scan.valid]
-    points = np.column_stack((x + ranges * np.cos(bearings), y + ranges * np.sin(bearings)))
-    np.testing.assert_allclose(distance_to_walls(room(), points), 0, atol=1e-9)
-
-
 def test_a_sensor_at_rest_draws_the_same_numbers():
     sensor = SENSORS["rplidar"]
     still, creeping = (
@@ -77,18 +86,13 @@ def test_a_sensor_at_rest_draws_the_same_numbers():
     np.testing.assert_allclose(still, creeping, atol=1e-9)
 
 
-def test_twist_refused():
-    with pytest.raises(ValueError, match=r"twist is .*, expected three finite numbers"):
-        SENSORS["paper"].sweep((0, 0, 0), (1.0, INF, 0.0))
-
-
 # Drives
 
 
 def test_building_drive_is_free_of_collisions_and_passes_the_waypoints():
     world, waypoints = building()
     stamps, poses = drive_poses(waypoints, speed=0.6, rate=20)
-    assert distance_to_walls(world, poses[:, :2]).min() > 0.25
+    assert clearance(world, poses[:, :2]).min() > 0.25
     step = 0.6 / 20
     for waypoint in waypoints:
         assert np.hypot(*(poses[:, :2] - waypoint).T).min() <= step / 2 + 1e-9
@@ -121,14 +125,9 @@ def test_turns_go_the_short_way_and_headings_are_wrapped():
 @pytest.mark.parametrize(
     ("waypoints", "settings"),
     [
-        ([(0, 0)], {}),
-        ([(1, 1), (1, 1)], {}),
-        ([(0, 0, 0), (1, 1, 1)], {}),
-        ([(0, 0), (1, INF)], {}),
-        ([(0, 0), (1, 0)], {"speed": 0}),
-        ([(0, 0), (1, 0)], {"turn_rate": -1}),
-        ([(0, 0), (1, 0)], {"rate": math.nan}),
-        ([(0, 0), (1, 0)], {"seed": -1}),
+        *((way, {}) for way in ([(0, 0)], [(1, 1)] * 2, [(0,) * 3, (1,) * 3], [(0, 0), (1, INF)])),
+        *(([(0, 0), (1, 0)], {"speed": 0}), ([(0, 0), (1, 0)], {"turn_rate": -1})),
+        *(([(0, 0), (1, 0)], {"rate": math.nan}), ([(0, 0), (1, 0)], {"seed": -1})),
     ],
 )
 def test_drive_refuses_at_once(waypoints, settings):
@@ -175,14 +174,3 @@ def test_a_drive_stands_still_for_its_scans_unless_it_is_to_move():
     way = [(-2, 0), (0, 0), (0, 1)]
     for scan in drive(room(), way, ring_sensor(60), rate=2):
         np.testing.assert_array_equal(scan.ranges, ring_sensor(60).ideal(room(), scan.pose)[0])
-
-
-def test_walls_seen_on_a_drive_stay_in_place():
-    world, waypoints = building()
-    scans = drive(world, waypoints, SENSORS["utm30lx"], speed=2, turn_rate=4, rate=1)
-    for scan in scans:
-        x, y, theta = scan.pose
-        c, s = math.cos(theta), math.sin(theta)
-        points = scan.points[scan.valid] @ np.array([[c, s], [-s, c]]) + (x, y)
-        off = distance_to_walls(world, points) > 5 * 0.01
-        assert off.mean() < 0.03  # mixed pixels and outliers

@@ -10,7 +10,7 @@ from handmade import arc, corner, features, segment
 
 import lineament as ln
 from lineament.kernels import kernel
-from lineament.kernels.tracking.symmetric import diagonalise, invert
+from lineament.kernels.tracking.symmetric import diagonalise
 from lineament.motion import Matches, associate, estimate_motion
 from lineament.motion.association import KINDS
 from lineament.scan.poses import compose, inverse
@@ -20,11 +20,6 @@ APART = (segment((2, -1), (2, 1), 10, 30), segment((2, 3), (-1, 3), 31, 60))
 NONE = np.empty((0, 2), np.intp)
 #: A motion that is known to 0.1 m and 0.1 rad.
 WIDE = np.diag((0.1, 0.1, 0.1)) ** 2
-
-
-@kernel
-def _invert(matrix, inverse):
-    return invert(matrix, inverse)
 
 
 @kernel
@@ -58,22 +53,6 @@ def test_eigenvectors_are_those_of_numpy():
         np.testing.assert_allclose(
             vectors @ np.diag(np.diag(matrix)) @ vectors.T, given, atol=1e-11 * scale
         )
-
-
-def test_inverse_is_that_of_numpy_or_refused():
-    inverse = np.empty((3, 3))
-    for factor in np.random.default_rng(4).normal(size=(50, 3, 3)):
-        given = factor @ factor.T + 0.01 * np.eye(3)
-        assert _invert(given, inverse)
-        np.testing.assert_allclose(inverse, np.linalg.inv(given), rtol=1e-8)
-    for bad in (
-        np.zeros((3, 3)),
-        np.diag((1.0, -1.0, 1.0)),
-        np.diag((1.0, 1.0, 0.0)),
-        np.ones((3, 3)),
-    ):
-        assert not _invert(bad, inverse)
-        assert not _invert(np.where(bad == 1, math.nan, bad), inverse)
 
 
 def moved_by(motion, **rows):
@@ -171,25 +150,13 @@ def test_walls_that_are_parallel_but_for_their_errors_leave_a_direction_open(tur
     assert len(estimate_motion(moved_by((0.0, 0.0, 0.0), segments=walls)).unobserved) == lost
 
 
-def test_the_misfit_of_a_wall_counts_where_one_frame_saw_it_alone():
-    # Two directions known to 1 mrad each, and two misfits of 1 cm over 2 m: 12 (2 · 0.01²)/2².
-    noise, bow = 2e-6, 6e-4
-
-    def frame(start, end):
-        row = segment(start, end, 0, 99, sigma=(0.001, 0.001))
-        row["misfit"] = 0.01
-        return features(segments=[row])
-
-    wall = frame((2, -1), (2, 1))
-    # Of three metres that were seen in the last one, one is common.
-    for low, high, share in ((-1, 1, 0), (1, 3, 1), (0, 2, 2 / 3)):
-        pair = np.array([[0, 0]])
-        matches = Matches(wall, frame((2, low), (2, high)), pair, NONE, NONE)
-        found = estimate_motion(matches).covariance[2, 2]
-        assert found == pytest.approx(noise + share * bow, rel=1e-3)
-
-
-@pytest.mark.parametrize("covariance", [np.zeros((3, 3)), np.eye(2), np.full((3, 3), math.nan)])
+@pytest.mark.parametrize(
+    "covariance",
+    [
+        *(np.zeros((3, 3)), np.eye(2), np.full((3, 3), math.nan), np.ones((3, 3))),
+        *(np.diag(diagonal) for diagonal in ((1, -1, 1), (1, 1, 0), (-1, 1, 1), (1, 1, math.nan))),
+    ],
+)
 def test_covariance_refused(covariance):
     nothing = Matches(features(), features(), NONE, NONE, NONE)
     with pytest.raises(ValueError, match=r"covariance (of the prior )?is .* expected \(3, 3\)"):

@@ -1,12 +1,11 @@
 """Small scans by formulas: walls, vertices, rooms, and random scenes with every kind of fault."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from lineament import LaserScan, RangeNoise
+from lineament.simulation import Sensor, World
 
 STEP = math.radians(1 / 3)
 NOISE = RangeNoise(sigma=0.01)
@@ -51,6 +50,16 @@ def full_circle(n: int = 720) -> np.ndarray:
     return -math.pi + 2 * math.pi / n * np.arange(n)
 
 
+def ring_sensor(n_beams=2000, **settings):
+    """Make a full turn without noise but that of `settings`."""
+    return Sensor("ring", n_beams, -math.pi, 2 * math.pi / n_beams, **settings)
+
+
+def drum(radius):
+    """Make a round room: every true range from its centre is the radius."""
+    return World([], [[0, 0, radius]])
+
+
 def random_scan(seed: int, n: int | None = None) -> LaserScan:
     """Walls, vertices, arcs and clutter with jumps, noise, lattice, faults; some wrap."""
     rng = np.random.default_rng(seed)
@@ -87,10 +96,6 @@ def random_scan(seed: int, n: int | None = None) -> LaserScan:
     return LaserScan(ranges, float(angles[0]), float(angles[1] - angles[0]), **limits)
 
 
-def _whole_numbers(n: int, value: float) -> LaserScan:
-    return LaserScan(np.full(n, value), 0.0, 0.01)
-
-
 def degenerate_scans() -> dict[str, LaserScan]:
     """Scans at the edge of what a scan can be, by name."""
     angles, ring = fan(30), full_circle(360)
@@ -110,10 +115,10 @@ def degenerate_scans() -> dict[str, LaserScan]:
         "two of nothing": LaserScan([np.nan, 0.0], 0.0, 0.1),
         "all invalid": LaserScan([np.nan] * 50, 0.0, 0.01),
         "one valid": LaserScan([np.nan] * 9 + [2.0] + [np.inf] * 9, 0.0, 0.01),
-        "all equal": _whole_numbers(50, 2.0),
+        "all equal": LaserScan([2.0] * 50, 0.0, 0.01),
         "five": LaserScan(x, 0.0, 0.01),
-        "huge": _whole_numbers(50, 1e9),
-        "tiny": _whole_numbers(50, 1e-6),
+        "huge": LaserScan([1e9] * 50, 0.0, 0.01),
+        "tiny": LaserScan([1e-6] * 50, 0.0, 0.01),
         "x = const": scan_of(wall(angles, 2.0, 0.0), angles),
         "y = const": scan_of(wall(angles + math.pi / 2, 2.0, 90.0), angles + math.pi / 2),
         "grazing": scan_of(wall(angles, 0.3, 80.0), angles, range_max=30.0),

@@ -30,13 +30,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .scan import RangeNoise
-
-__all__ = ["LineBound", "arc_bound", "corner_bound", "line_bound", "wall_end_bound"]
-
-Array = NDArray[np.float64]
+from .scan import Array, RangeNoise
 
 #: No scanner is better than this [m]; keeps bounds positive where ranges are noiseless. As in
 #: `lineament.kernels.noise`, which cannot be imported without numba.
@@ -79,8 +75,7 @@ class LineBound:
         """
         x, y = np.asarray(point, dtype=np.float64) - self.centroid
         lever = np.array([[1.0, math.cos(self.angle) * x + math.sin(self.angle) * y], [0.0, 1.0]])
-        moved: Array = lever @ self.covariance @ lever.T
-        return moved
+        return np.asarray(lever @ self.covariance @ lever.T)
 
 
 def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: RangeNoise) -> LineBound:
@@ -132,20 +127,8 @@ def corner_bound(before: LineBound, after: LineBound) -> Array:
     With n₁, n₂ the normals and s₁², s₂² the variances of the offsets at the corner, it is
     A⁻¹ diag(s₁², s₂²) A⁻ᵀ, A = [n₁ᵀ; n₂ᵀ].
 
-    Parameters
-    ----------
-    before, after : LineBound
-        Its two sides.
-
-    Returns
-    -------
-    ndarray, shape (2, 2)
-        Covariance of (x, y) [m²], as in `lineament.features.CORNER`.
-
-    Raises
-    ------
-    ValueError
-        If the lines are parallel.
+    Returns the covariance of (x, y) [m²], shape (2, 2), as in `lineament.features.CORNER`. Raises
+    ValueError if the lines are parallel.
 
     Examples
     --------
@@ -161,8 +144,8 @@ def corner_bound(before: LineBound, after: LineBound) -> Array:
     inverse = np.linalg.inv(normals)
     corner = inverse @ [n @ line.centroid for n, line in zip(normals, lines, strict=True)]
     offsets = np.diag([line.at(corner)[0, 0] for line in lines])
-    covariance: Array = inverse @ offsets @ inverse.T
-    return (covariance + covariance.T) / 2
+    covariance = inverse @ offsets @ inverse.T
+    return np.asarray((covariance + covariance.T) / 2)
 
 
 def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: RangeNoise) -> Array:
@@ -218,7 +201,7 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Rang
     gradient = np.column_stack((normals, np.ones(len(beams))))
     variance = _offset_variance(ranges, half_chord / radius, noise)
     information = gradient.T @ (gradient / variance[:, np.newaxis])
-    covariance: Array = np.asarray(np.linalg.inv(information), np.float64)
+    covariance = np.linalg.inv(information)
     return (covariance + covariance.T) / 2
 
 
@@ -240,12 +223,7 @@ def wall_end_bound(end: ArrayLike, angle: float, increment: float) -> float:
     Returns
     -------
     float
-        Variance along the wall [m²].
-
-    Raises
-    ------
-    ValueError
-        If the wall points at the scanner: its spacing has no limit.
+        Variance along the wall [m²]. ValueError if the wall points at the scanner.
 
     Examples
     --------
@@ -265,8 +243,7 @@ def _offset_variance(ranges: Array, cosine: Array, noise: RangeNoise) -> Array:
     square = np.maximum(cosine**2, _LEAST_COSINE**2)
     along_beam = np.maximum(noise.range_variance(ranges), _LEAST_SIGMA**2)
     across_beam = (ranges * noise.bearing) ** 2
-    variance: Array = along_beam * square + across_beam * (1 - square)
-    return variance
+    return np.asarray(along_beam * square + across_beam * (1 - square))
 
 
 def _bearings(bearings: ArrayLike, least: int) -> Array:

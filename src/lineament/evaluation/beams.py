@@ -30,14 +30,7 @@ def check_beams(scan: LaserScan, features: Features) -> None:
 
 
 def beam_masks(first: NDArray[np.int32], last: NDArray[np.int32], n: int) -> Masks:
-    """Which of n beams lie from each first to each last beam, over the seam if first > last.
-
-    Examples
-    --------
-    >>> beam_masks(np.array([1, 3]), np.array([2, 0]), 4).astype(int)
-    array([[0, 1, 1, 0],
-           [1, 0, 0, 1]])
-    """
+    """Which of n beams lie from each first to each last beam, over the seam if first > last."""
     ahead = (np.arange(n) - first[:, np.newaxis]) % n
     return np.asarray(ahead <= ((last - first) % n)[:, np.newaxis])
 
@@ -53,14 +46,7 @@ def shared_beams(masks: Masks, others: Masks) -> Array:
 
 
 def overlap_ratios(masks: Masks, others: Masks) -> Array:
-    """Beams in both over beams in either (intersection over union), shape (F, T).
-
-    Examples
-    --------
-    >>> masks = beam_masks(np.array([0, 1]), np.array([2, 3]), 4)
-    >>> overlap_ratios(masks[:1], masks)
-    array([[1. , 0.5]])
-    """
+    """Beams in both over beams in either (intersection over union), shape (F, T)."""
     shared = shared_beams(masks, others)
     either = masks.sum(axis=1)[:, np.newaxis] + others.sum(axis=1) - shared
     return np.asarray(shared / either)

@@ -96,7 +96,7 @@ class NormalisedErrors(Summable):
             return math.nan, math.nan
         return _chi_square(0.025, size) / size, _chi_square(0.975, size) / size
 
-    def bound_summary(self, prefix: str = "") -> dict[str, float]:
+    def bound_summary(self, prefix: str) -> dict[str, float]:
         """List the figures of errors over the bound."""
         return {
             f"{prefix}over_bound": self.over_bound,

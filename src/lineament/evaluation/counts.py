@@ -67,14 +67,8 @@ class Counts(Summable):
     ) -> Self:
         """Count one scan.
 
-        Parameters
-        ----------
-        matched : ndarray of int
-            Found ones that are paired with a demanded one.
-        excused : ndarray of bool, shape (F,)
-            Found ones that are no mistake if they are not paired.
-        demanded : ndarray of bool, shape (T,)
-            Whether each true one is large enough to be demanded.
+        `matched` are found ones that are paired with a demanded one, `excused` (F,) those that are
+        no mistake if they are not paired, `demanded` (T,) which true ones are large enough.
         """
         judged = ~excused
         judged[matched] = True
@@ -121,13 +115,7 @@ def finite_figures(figures: dict[str, float]) -> dict[str, float]:
 
 
 def plain(value: object) -> Any:
-    """Convert numbers, arrays and containers of them to what JSON takes; not finite becomes None.
-
-    Examples
-    --------
-    >>> plain({"rms": np.float64(0.5), "errors": np.array([1.0, np.nan])})
-    {'rms': 0.5, 'errors': [1.0, None]}
-    """
+    """Convert numbers, arrays and containers to what JSON takes; not finite becomes None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -96,14 +96,10 @@ def free_space_scores(scan: LaserScan, features: Features) -> FreeSpaceScores:
         is_phantom = (went_on | ended_before) & in_view
         drawn += spacing * count
         phantom += spacing * int(is_phantom.sum())
-        longest = max(longest, spacing * _longest_run(is_phantom))
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], is_phantom.view(np.int8), [0]))))
+        longest = max(longest, spacing * int((edges[1::2] - edges[::2]).max(initial=0)))
     covered, valid = int(_covered(scan, features).sum()), int(scan.valid.sum())
     return FreeSpaceScores(drawn, phantom, np.array([longest]), covered, valid)
-
-
-def _longest_run(marks: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], marks.view(np.int8), [0]))))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _covered(scan: LaserScan, features: Features) -> NDArray[np.bool_]:

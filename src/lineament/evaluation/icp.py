@@ -26,14 +26,6 @@ def icp(before: LaserScan, now: LaserScan, start: Pose = (0.0, 0.0, 0.0)) -> Pos
 
     Returns the pose (x, y, theta) of the later sensor in the frame of the earlier one [m, m, rad],
     by a search from `start`; the start if too few points can be paired.
-
-    Examples
-    --------
-    >>> from lineament.simulation import SENSORS, room
-    >>> rng, poses = np.random.default_rng(1), ((0, 0, 0), (0.1, 0, 0.05))
-    >>> before, now = (SENSORS["paper"].scan(room(), pose, rng) for pose in poses)
-    >>> [abs(round(value, 2)) for value in icp(before, now)]
-    [0.1, 0.0, 0.05]
     """
     with needed_by("evaluation"):
         from scipy.spatial import cKDTree

@@ -173,10 +173,7 @@ def segment_scores(found: Features, truth: Features) -> FeatureScores:
     ends = [np.hypot(*(one[end] - other[end]).T) for end in ("start", "end")]
     return FeatureScores(
         {GATE: counts},
-        {
-            "fragmentation": _in_pieces(true_masks, masks),
-            "merging": _in_pieces(masks, true_masks),
-        },
+        {"fragmentation": _in_pieces(true_masks, masks), "merging": _in_pieces(masks, true_masks)},
         {"offset": offset_there, "angle": turn, "end": np.concatenate(ends)},
         {
             "offset_": NormalisedErrors.of(offset_there[:, np.newaxis], bound[:, :1, :1]),

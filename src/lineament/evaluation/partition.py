@@ -69,15 +69,7 @@ def partition_scores(found: Features, truth: Features) -> PartitionScores:
     Not counted as mistakes are found clusters that have at least half of their beams in those or
     in none, and found breakpoints next to them or across them.
 
-    Parameters
-    ----------
-    found, truth : Features
-        Features of one scan.
-
-    Raises
-    ------
-    ValueError
-        If the two are of scans with different numbers of beams.
+    Raises ValueError if the two are of scans with different numbers of beams.
 
     Examples
     --------

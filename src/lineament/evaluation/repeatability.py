@@ -190,20 +190,9 @@ def ranked_repeats(
 ) -> RankedRepeats:
     """Look for the corners of another scan in this one, and for what chance finds.
 
-    As `repeatability`, corner by corner. By chance a corner is found if, turned about this sensor
-    to another bearing where it would be in sight too, there is one within the gate.
-
-    Parameters
-    ----------
-    scan, features, other_scan, other_features, gate
-        As for `repeatability`.
-    scores : ndarray, shape (K,)
-        Score of each of the other's corners.
-
-    Raises
-    ------
-    ValueError
-        If a scan has no pose.
+    As `repeatability`, corner by corner, each with its score (K,). By chance a corner is found if,
+    turned about this sensor to another bearing where it would be in sight too, there is one within
+    the gate. Raises ValueError if a scan has no pose.
     """
     others = other_features.transform(*_motion(scan, other_scan)).corners["position"]
     expected = in_sight(scan, others, gate)
@@ -255,14 +244,6 @@ def in_sight(scan: LaserScan, points: Array, margin: float) -> NDArray[np.bool_]
     """Whether a scan can have seen each point: in view, in range, and with nothing before it.
 
     A beam may be shorter than the way to the point by the margin [m].
-
-    Examples
-    --------
-    Behind the wall, on it, before it, and out of the field of view:
-
-    >>> wall = LaserScan([2.0] * 3, angle_min=-0.1, angle_increment=0.1)
-    >>> in_sight(wall, np.array([[3.0, 0.0], [2.05, 0.0], [1.0, 0.0], [0.0, 1.0]]), 0.1).tolist()
-    [False, True, True, False]
     """
     if not len(scan):
         return np.zeros(len(points), dtype=np.bool_)

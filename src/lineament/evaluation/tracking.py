@@ -21,17 +21,11 @@ _GATE, _OVERLAP = 0.10, 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionErrors(Summable):
-    """Relative pose errors: how far estimated motions are from the true ones.
+    """Relative pose errors: how far estimated motions are from the true ones."""
 
-    Attributes
-    ----------
-    ways : ndarray, shape (m,)
-        Length of the error of the way [m].
-    turns : ndarray, shape (m,)
-        Error of the turn, without its sign [rad].
-    """
-
+    #: Length of the error of the way [m], shape (m,).
     ways: Array = field(default_factory=lambda: np.empty(0))
+    #: Error of the turn, without its sign [rad], shape (m,).
     turns: Array = field(default_factory=lambda: np.empty(0))
 
     def summary(self) -> dict[str, float]:
@@ -45,22 +39,10 @@ class MotionErrors(Summable):
 
 
 def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1) -> MotionErrors:
-    """Compare motions between successive frames, composed over some, with those of the poses.
+    """Compare motions between successive frames, composed over `step` of them, with the true ones.
 
-    Parameters
-    ----------
-    motions : sequence of (x, y, theta)
-        Pose of each frame, from the second on, in the frame before [m, m, rad].
-    poses : sequence of (x, y, theta)
-        True pose of every frame: one more, else ValueError.
-    step : int
-        Over how many frames: 1 is from frame to frame.
-
-    Examples
-    --------
-    >>> errors = motion_errors([(1.0, 0.0, 0.0)], [(0.0, 0.0, 0.0), (1.0, 0.1, 0.0)])
-    >>> errors.ways.tolist(), errors.turns.tolist()
-    ([0.1], [0.0])
+    Motions are the pose of each frame, from the second on, in the frame before; there is one more
+    true pose, else ValueError.
     """
     if len(poses) != len(motions) + 1:
         raise ValueError(f"there are {len(poses)} poses, expected one more than motions")
@@ -78,23 +60,15 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackScores(Summable):
-    """How the tracks of one kind last.
+    """How the tracks of one kind last."""
 
-    Attributes
-    ----------
-    pairs : int
-        Features that are the same in two successive frames by the known poses.
-    switched : int
-        Of these, those whose number changes to one that was given before: an *id switch*.
-    lost : int
-        Of these, those that get a new number.
-    lengths : ndarray, shape (m,)
-        Frames in which each track is seen.
-    """
-
+    #: Features that are the same in two successive frames by the known poses.
     pairs: int = 0
+    #: Of these, those whose number changes to one that was given before: an *id switch*.
     switched: int = 0
+    #: Of these, those that get a new number.
     lost: int = 0
+    #: Frames in which each track is seen, shape (m,).
     lengths: Array = field(default_factory=lambda: np.empty(0))
 
     def summary(self) -> dict[str, float]:
@@ -118,14 +92,6 @@ def track_scores(
     the directions within 10°, and they lie side by side along half of the shorter one. They are
     matched one to one, without any of the tracker's own gates. Features without a track, the edges,
     are left out.
-
-    Parameters
-    ----------
-    frames : sequence of Features
-    tracks : sequence of Tracks
-        Those of each frame.
-    poses : sequence of (x, y, theta)
-        Known pose of each frame [m, m, rad].
     """
     scores = {}
     for kind, same in (("segments", _same_segments), ("corners", _same_corners)):

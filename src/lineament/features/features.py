@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +15,6 @@ from .records import TABLES
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-__all__ = ["COUNTED", "FeatureBatch", "Features"]
 
 #: What is counted: edges apart from the corners.
 COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
@@ -111,8 +109,8 @@ class Features:
         def moved(points: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.asarray(points @ rotation.T + shift)
 
-        segments, corners = self.segments.copy(), self.corners.copy()
-        arcs, breakpoints = self.arcs.copy(), self.breakpoints.copy()
+        tables = {name: getattr(self, name).copy() for name in TABLES}
+        segments, corners, arcs, breakpoints = tables.values()
         for name in ("start", "end", "centroid"):
             segments[name] = moved(segments[name])
         segments["angle"] = np.angle(np.exp(1j * (segments["angle"] + theta)))
@@ -123,16 +121,9 @@ class Features:
         arcs["center"] = moved(arcs["center"])
         arcs["covariance"] = with_radius @ arcs["covariance"] @ with_radius.T
         breakpoints["position"] = moved(breakpoints["position"])
-        for table in (segments, corners, arcs, breakpoints):
+        for table in tables.values():
             table.flags.writeable = False
-        return replace(
-            self,
-            segments=segments,
-            corners=corners,
-            arcs=arcs,
-            breakpoints=breakpoints,
-            frame_id=self.frame_id if frame_id is None else frame_id,
-        )
+        return replace(self, **tables, frame_id=self.frame_id if frame_id is None else frame_id)
 
     def to_arrow(self) -> pa.Table:
         """Make a table with one row a feature; its schema is described in ``docs/formats.md``.
@@ -158,13 +149,10 @@ class Features:
         >>> ln.extract(scan).to_dict()["clusters"]
         [0, 0, 0]
         """
-        noise = self.noise
         return {
             "stamp": self.stamp,
             "frame_id": self.frame_id,
-            "noise": None
-            if noise is None
-            else {name: getattr(noise, name) for name in RangeNoise.__dataclass_fields__},
+            "noise": None if self.noise is None else asdict(self.noise),
             **{name: _records(getattr(self, name)) for name in TABLES},
             "clusters": self.clusters.tolist(),
         }

@@ -13,8 +13,6 @@ from ..kernels.tracking.association import associate as kernel
 from ..kernels.tracking.association import move
 from ..scan import Array
 
-__all__ = ["KINDS", "Matches", "associate"]
-
 Pairs = NDArray[np.intp]
 
 #: The tables whose features are tracked.
@@ -151,22 +149,15 @@ def matrix_of(covariance: ArrayLike) -> Array:
 
 @lru_cache
 def chi_square(probability: float, degrees: int) -> float:
-    """Quantile of the χ² distribution of 2 or 3 degrees of freedom.
-
-    Raises
-    ------
-    ValueError
-        If `probability` is not between 0 and 1.
-    """
+    """Quantile of the χ² distribution of 2 or 3 degrees of freedom; ValueError outside (0, 1)."""
     if not 0 < probability < 1:
         raise ValueError(f"gate is {probability}, expected a share between 0 and 1")
     if degrees == 2:
         return -2.0 * math.log1p(-probability)
     low, high = 0.0, 100.0
     while low < (middle := 0.5 * (low + high)) < high:
-        beyond = math.erfc(math.sqrt(middle / 2)) + math.sqrt(2 * middle / math.pi) * math.exp(
-            -middle / 2
-        )
+        beyond = math.erfc(math.sqrt(middle / 2))
+        beyond += math.sqrt(2 * middle / math.pi) * math.exp(-middle / 2)
         low, high = (middle, high) if beyond > 1 - probability else (low, middle)
     return high
 

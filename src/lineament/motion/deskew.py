@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ..scan import Array, LaserScan
 from ..scan.poses import Twist, poses_along
 
-__all__ = ["beam_times", "deskew"]
-
 #: Bearings that fall on each other are set apart by so much [rad].
 _APART = 1e-9
 #: No sensor moves so far during a sweep [m, rad].
@@ -93,10 +91,15 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     order = np.argsort(bearings, kind="stable")
     ranges[_hidden(order, np.where(scan.valid, ranges, np.inf))] = np.nan
     # What lies once around or more is put between the first beams.
-    bearings, order = _within_a_turn(bearings, order)
+    if bearings[order[-1]] - bearings[order[0]] >= 2 * math.pi:
+        lowest = bearings[order[0]]
+        bearings = lowest + np.mod(bearings - lowest, 2 * math.pi)
+        order = np.argsort(bearings, kind="stable")
+    # Bearings that are the same are set apart.
+    apart = _APART * np.arange(len(scan))
     return LaserScan(
         ranges[order],
-        angles=_increasing(bearings[order]),
+        angles=np.maximum.accumulate(bearings[order] - apart) + apart,
         range_min=scan.range_min,
         range_max=scan.range_max,
         stamp=scan.stamp,
@@ -137,17 +140,3 @@ def _hidden(order: NDArray[np.intp], ranges: Array) -> NDArray[np.bool_]:
             between = cover[first + 1 : last]
             np.minimum(between, far + (far - near), out=between)
     return np.isfinite(ranges) & (ranges > cover[rank])
-
-
-def _within_a_turn(bearings: Array, order: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    lowest = bearings[order[0]]
-    if bearings[order[-1]] - lowest < 2 * math.pi:
-        return bearings, order
-    wrapped = lowest + np.mod(bearings - lowest, 2 * math.pi)
-    return wrapped, np.argsort(wrapped, kind="stable")
-
-
-def _increasing(bearings: Array) -> Array:
-    """Set bearings apart that are the same."""
-    apart = _APART * np.arange(len(bearings))
-    return np.asarray(np.maximum.accumulate(bearings - apart) + apart)

@@ -12,8 +12,6 @@ from ..scan import Array, Pose
 from ..scan.poses import Twist, twist_between
 from .association import KINDS, Matches, chi_square, matrix_of, words_of
 
-__all__ = ["Motion", "estimate_motion"]
-
 #: Without a prior, the motion is known this badly [m, m, rad].
 _UNKNOWN = np.diag((10.0, 10.0, math.pi)) ** 2
 #: Pairs beyond this quantile of χ² count less, the less the farther they are.

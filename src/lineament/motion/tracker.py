@@ -15,8 +15,6 @@ from ..scan.poses import Twist, inverse, poses_along, relative
 from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
 from .estimate import Motion, estimate_motion
 
-__all__ = ["Tracker", "Tracks"]
-
 Numbers = NDArray[np.int64]
 
 #: Deviations of the motion by odometry [m, rad], and their growth with way and turn.
@@ -170,14 +168,8 @@ class Tracker:
         """Find the tracks again, and the motion by them."""
         motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
-            found = associate(
-                self._seen,
-                features,
-                motion.pose,
-                motion.covariance,
-                gate=self.gate,
-                roughness=self.roughness,
-            )
+            gates = {"gate": self.gate, "roughness": self.roughness}
+            found = associate(self._seen, features, motion.pose, motion.covariance, **gates)
             if matches is not None and found.same_as(matches):
                 break
             matches = found
@@ -203,9 +195,9 @@ class Tracker:
 
     def _fresh(self, matches: Matches) -> Matches:
         """Keep the pairs whose track was seen in the very last frame."""
-        kept = {kind: getattr(matches, kind) for kind in KINDS}
-        fresh = {kind: pairs[self._missed[kind][pairs[:, 0]] == 0] for kind, pairs in kept.items()}
-        return Matches(matches.before, matches.now, **fresh)
+        pairs = {kind: getattr(matches, kind) for kind in KINDS}
+        fresh = {kind: of[self._missed[kind][of[:, 0]] == 0] for kind, of in pairs.items()}
+        return replace(matches, **fresh)
 
     def _renew(self, features: Features, matches: Matches, motion: Motion | None) -> Tracks:
         """Give the features their numbers, and keep them with the tracks that were missed."""

@@ -1,15 +1,11 @@
 """Poses and motions in the plane: composed, inverted, and spread over time as twists."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .fields import Array, Pose
-
-__all__ = ["Twist", "compose", "inverse", "poses_along", "relative", "twist_between"]
 
 #: Velocity in the sensor's own frame: forward, to the left [m/s], turn rate [rad/s].
 Twist = tuple[float, float, float]

@@ -110,7 +110,13 @@ def _course(
     for name, value in (("speed", speed), ("turn_rate", turn_rate), ("rate", rate)):
         if not 0 < value < math.inf:
             raise ValueError(f"{name} is {value}, expected a finite number > 0")
-    times, keys = _key_poses(_distinct(waypoints), speed, turn_rate)
+    points = np.asarray(waypoints, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ValueError(f"waypoints have shape {points.shape}, expected finite points (…, 2)")
+    moves = (points[1:] != points[:-1]).any(axis=1)
+    if not moves.any():
+        raise ValueError("waypoints hold fewer than two different points")
+    times, keys = _key_poses(points[np.concatenate(([True], moves))], speed, turn_rate)
     # A scan that is due at the very end is taken in spite of rounding.
     n = math.floor(times[-1] * rate + 1e-9) + 1
     stamps = np.arange(n) / rate
@@ -124,17 +130,6 @@ def _course(
     turns = np.sign(np.diff(keys[:, 2], append=keys[-1, 2]))
     twists[is_turn, 2] = turn_rate * turns[key[is_turn]]
     return stamps, poses, twists
-
-
-def _distinct(waypoints: ArrayLike) -> Array:
-    """Check the waypoints, and leave out those that repeat the one before."""
-    points = np.asarray(waypoints, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise ValueError(f"waypoints have shape {points.shape}, expected finite points (…, 2)")
-    moves = (points[1:] != points[:-1]).any(axis=1)
-    if not moves.any():
-        raise ValueError("waypoints hold fewer than two different points")
-    return points[np.concatenate(([True], moves))]
 
 
 def _key_poses(points: Array, speed: float, turn_rate: float) -> tuple[Array, Array]:

@@ -20,12 +20,6 @@ class Floor:
     """A closed outline (V, 2) [m], a scanner, and obstacles that are put where there is room.
 
     An obstacle is covered by circles; there is room if no surface lies within a gap of them.
-
-    Examples
-    --------
-    >>> floor = Floor(rectangle((0, 0), 6, 4), (1.0, 0.0, 0.0))
-    >>> floor.put_column((-1, 0), 0.4), floor.put_column((-0.5, 0.2), 0.2)
-    (True, False)
     """
 
     def __init__(self, outline: ArrayLike, pose: Pose) -> None:
@@ -62,13 +56,7 @@ class Floor:
 
 
 def clearance(world: World, points: ArrayLike) -> Array:
-    """Distance of points (n, 2) from the nearest surface [m], shape (n,); inf in an empty world.
-
-    Examples
-    --------
-    >>> clearance(World([[2, -1, 2, 1]], [[0, 3, 0.5]]), [(0, 0), (3, 2), (0, 3)]).round(3).tolist()
-    [2.0, 1.414, 0.5]
-    """
+    """Distance of points (n, 2) from the nearest surface [m], shape (n,); inf in an empty world."""
     at = np.asarray(points, dtype=np.float64)[:, np.newaxis]
     start, along = world.segments[:, :2], world.segments[:, 2:] - world.segments[:, :2]
     share = ((at - start) * along).sum(axis=2) / (along**2).sum(axis=1)
@@ -76,20 +64,13 @@ def clearance(world: World, points: ArrayLike) -> Array:
     to_walls = np.linalg.norm(at - feet, axis=2)
     to_centers = np.linalg.norm(at - world.circles[:, :2], axis=2)
     distances = np.hstack((to_walls, np.abs(to_centers - world.circles[:, 2])))
-    nearest: Array = distances.min(axis=1, initial=math.inf)
-    return nearest
+    return np.asarray(distances.min(axis=1, initial=math.inf))
 
 
 def is_free(world: World, points: ArrayLike) -> Array:
     """Whether points lie inside the outline of a world and outside its obstacles.
 
     They do if a ray meets an odd number of walls, all of which belong to closed outlines.
-
-    Examples
-    --------
-    >>> from lineament.simulation import room
-    >>> is_free(room(), [(0, 0), (1.8, -0.8), (0, 2.5)]).tolist()
-    [True, False, False]
     """
     at = np.asarray(points, dtype=np.float64)
     x, y = at[:, 0, np.newaxis], at[:, 1, np.newaxis]
@@ -99,5 +80,4 @@ def is_free(world: World, points: ArrayLike) -> Array:
     rise = np.where(py == qy, 1.0, qy - py)
     met = crosses & (x < px + (y - py) / rise * (qx - px))
     in_column = np.hypot(x - world.circles[:, 0], y - world.circles[:, 1]) < world.circles[:, 2]
-    free: Array = (met.sum(axis=1) % 2 == 1) & ~in_column.any(axis=1)
-    return free
+    return np.asarray((met.sum(axis=1) % 2 == 1) & ~in_column.any(axis=1))

@@ -100,16 +100,11 @@ def _star(rng: Rng) -> Floor:
         vertices = np.column_stack((ranges * np.cos(bearings), ranges * np.sin(bearings)))
         x, y = rng.uniform(-0.3, 0.3, 2).tolist()
         floor = Floor(vertices, (x, y, rng.uniform(-math.pi, math.pi)))
-        if _least_turn(vertices) >= _LEAST_TURN and clearance(floor.world, [(x, y)])[0] >= 0.3:
+        sides = np.roll(vertices, -1, axis=0) - vertices
+        directions = np.arctan2(sides[:, 1], sides[:, 0])
+        turns = abs(np.angle(np.exp(1j * (np.roll(directions, -1) - directions))))
+        if turns.min() >= _LEAST_TURN and clearance(floor.world, [(x, y)])[0] >= 0.3:
             return floor
-
-
-def _least_turn(vertices: Array) -> float:
-    """Return the least turn [rad] of a closed outline at its vertices."""
-    sides = np.roll(vertices, -1, axis=0) - vertices
-    directions = np.arctan2(sides[:, 1], sides[:, 0])
-    turns = np.angle(np.exp(1j * (np.roll(directions, -1) - directions)))
-    return float(np.abs(turns).min())
 
 
 def _corridor(rng: Rng) -> Floor:
@@ -143,7 +138,8 @@ def _side_of_corridor(length: float, rng: Rng) -> list[tuple[float, float]]:
 
 def _hall(rng: Rng) -> Floor:
     """Make a hall cluttered with boxes and round columns."""
-    floor = _empty_hall(rng)
+    outline = rectangle((0, 0), *rng.uniform(6, 12, 2))
+    floor = Floor(outline, _anywhere(outline, rng))
     reach = floor.world.segments[:, :2].max(axis=0)
     for _ in range(rng.integers(12, 30)):
         floor.put_box(rng.uniform(-reach, reach), *_box(rng), rng.uniform(0, math.pi))
@@ -183,11 +179,6 @@ def _layers(rng: Rng) -> Floor:
                 across = bearing + math.pi / 2 + rng.uniform(-0.9, 0.9)
                 floor.put_box(center, *_box(rng), across)
     return floor
-
-
-def _empty_hall(rng: Rng) -> Floor:
-    outline = rectangle((0, 0), *rng.uniform(6, 12, 2))
-    return Floor(outline, _anywhere(outline, rng))
 
 
 def _box(rng: Rng) -> tuple[float, float]:

@@ -22,41 +22,25 @@ _THROUGH_VERTEX = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """Straight surfaces, each of one wall or of several end to end, and circles.
+    """Straight surfaces, each of one wall or of several end to end, numbered from 0; then circles.
 
-    Surfaces are numbered: the straight ones from 0, then the circles.
-
-    Attributes
-    ----------
-    of_world : int64 array, shape (S + C,)
-        Surface to which each wall and circle of the world belongs.
-    walls : ndarray, shape (W, 2, 2)
-        Both ends of each straight surface, in the world frame [m].
-    circles : ndarray, shape (C, 3)
-        The circles ``x y r`` [m].
-    joints : dict of (int, int) to ndarray, shape (k, 2)
-        Vertices at which two straight surfaces meet, end to end or where one crosses or ends on
-        the other, in the world frame [m].
+    In the world frame [m].
     """
 
+    #: Surface to which each wall and circle of the world belongs, shape (S + C,).
     of_world: NDArray[np.int64]
+    #: Both ends of each straight surface, shape (W, 2, 2).
     walls: Array
+    #: ``x y r``, shape (C, 3).
     circles: Array
+    #: Vertices (k, 2) at which two straight surfaces meet, end to end, crossing, or one on the
+    #: other.
     joints: dict[tuple[int, int], Array]
 
 
 @lru_cache(maxsize=16)
 def surfaces_of(world: World) -> Surfaces:
-    """Find the surfaces of a world.
-
-    Examples
-    --------
-    >>> surfaces = surfaces_of(World([[0, 0, 1, 0], [1, 0, 3, 0], [3, 0, 3, 2]]))
-    >>> surfaces.of_world.tolist(), surfaces.walls[0].tolist()
-    ([0, 0, 1], [[0.0, 0.0], [3.0, 0.0]])
-    >>> surfaces.joints[0, 1].tolist()
-    [[3.0, 0.0]]
-    """
+    """Find the surfaces of a world."""
     ends = world.segments.reshape(-1, 2, 2)
     meetings = _meetings(ends)
     label = np.arange(len(ends))
@@ -128,42 +112,28 @@ def _extent(ends: Array) -> Array:
 
 
 class View:
-    """What the beams of a scanner at rest meet, without noise, in its own frame.
-
-    Attributes
-    ----------
-    bearings, ranges : ndarray, shape (n,)
-        Of the beams [rad, m]; ranges beyond the limits too.
-    surface : int64 array, shape (n,)
-        The surface that each beam meets within the limits, -1 for none.
-    walls : ndarray, shape (W, 2, 2)
-        Ends of the straight surfaces, that of the lesser bearing first [m].
-    circles : ndarray, shape (C, 3)
-        The circles ``x y r`` [m].
-    is_full_circle : bool
-        Whether the last beam neighbours the first, as in `LaserScan`.
-    steps : ndarray, shape (n,)
-        From each beam to the next [rad]: after the last of a full turn the first, else 0.
-    joints : ndarray, shape (n, 2)
-        Vertex between each beam and the next at which the surfaces of both meet; NaN for none.
-    goes_on : bool array, shape (n,)
-        Whether each beam and the next meet the same surface.
-    """
+    """What the beams of a scanner at rest meet, without noise, in its own frame."""
 
     def __init__(self, world: World, pose: Pose, sensor: Sensor) -> None:
         surfaces = surfaces_of(world)
         self.bearings = sensor.angles
+        #: Ranges beyond the limits too.
         self.ranges, met = sensor.ideal(world, pose)
         valid = (self.ranges >= sensor.range_min) & (self.ranges < sensor.range_max)
+        #: The surface that each beam meets within the limits, -1 for none.
         self.surface = np.full(len(met), -1)
         self.surface[valid] = surfaces.of_world[met[valid]]
         c, s = math.cos(pose[2]), math.sin(pose[2])
         self._rotation, self._origin = np.array([[c, -s], [s, c]]), np.array(pose[:2])
-        self.walls = _counter_clockwise(self._to_sensor(surfaces.walls))
+        walls = self._to_sensor(surfaces.walls)
+        backwards = _cross(walls[:, 0], walls[:, 1]) < 0
+        #: Ends of the straight surfaces, that of the lesser bearing first.
+        self.walls = np.where(backwards[:, np.newaxis, np.newaxis], walls[:, ::-1], walls)
         self.circles = surfaces.circles.copy()
         self.circles[:, :2] = self._to_sensor(surfaces.circles[:, :2])
         rest = 2 * math.pi - (sensor.n_beams - 1) * sensor.angle_increment
         self.is_full_circle = sensor.n_beams >= 3 and rest <= 2.5 * sensor.angle_increment
+        #: From each beam to the next: after the last of a full turn the first, else 0.
         self.steps = np.full(len(met), sensor.angle_increment)
         self.steps[-1] = rest if self.is_full_circle else 0.0
         self._joints_of = {pair: self._to_sensor(at) for pair, at in surfaces.joints.items()}
@@ -184,8 +154,7 @@ class View:
         return math.remainder(turn, 2 * math.pi)
 
     def _to_sensor(self, points: Array) -> Array:
-        moved: Array = (points - self._origin) @ self._rotation
-        return moved
+        return np.asarray((points - self._origin) @ self._rotation)
 
     def _settle_vertices(self) -> None:
         """Give a beam through the end of a wall to the wall that its neighbours meet.
@@ -207,7 +176,9 @@ class View:
         """Find what lies between each beam and the next."""
         after = np.roll(self.surface, -1)
         linked = (self.surface >= 0) & (after >= 0) & (self.steps > 0)
+        #: Whether each beam and the next meet the same surface.
         self.goes_on = linked & (self.surface == after)
+        #: Vertex between each beam and the next at which the surfaces of both meet; NaN for none.
         self.joints = np.full((len(after), 2), np.nan)
         for i in np.flatnonzero(linked & (self.surface != after)).tolist():
             pair = int(self.surface[i]), int(after[i])
@@ -216,9 +187,3 @@ class View:
                 slack = _SAME_VERTEX / math.hypot(*vertex)
                 if -slack <= turn <= self.steps[i] + slack:
                     self.joints[i] = vertex
-
-
-def _counter_clockwise(walls: Array) -> Array:
-    """Order the ends of walls by bearing, as seen from the origin."""
-    backwards = _cross(walls[:, 0], walls[:, 1]) < 0
-    return np.where(backwards[:, np.newaxis, np.newaxis], walls[:, ::-1], walls)

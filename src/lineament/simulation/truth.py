@@ -1,14 +1,13 @@
 """What there is to find in a simulated scan, each feature with the bound of its accuracy."""
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import LineBound, arc_bound, corner_bound, line_bound
-from ..features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
+from ..features import Features, make_records
 from ..scan import Array, Pose, RangeNoise
 from .sensor import Sensor
 from .surfaces import View
@@ -69,19 +68,20 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
         for beams in _parts(view.goes_on, turn)
         if view.surface[beams[0]] >= 0
     ]
-    label = _clusters(view, turn)
+    label = np.full(len(view.surface), -1, dtype=np.int32)
+    large = [part for part in _parts(_connected(view), turn) if len(part) >= _LEAST_CLUSTER]
+    for k, beams in enumerate(large):
+        label[beams] = k
     listed = [run for run in runs if run.n_beams >= 2]
     bounds = {r: _line_bound(view, r, sensor.noise) for r in listed if r.surface < n_walls}
-    arcs = [_arc(view, r, sensor.noise) for r in listed if r.surface >= n_walls]
-    return Features(
-        _table([_segment(view, r, bound, label) for r, bound in bounds.items()], SEGMENT),
-        _table(_corners(view, runs, bounds), CORNER),
-        _table(arcs, ARC),
-        label,
-        _table(_breakpoints(view, label, turn), BREAKPOINT),
-        frame_id="laser",
-        noise=sensor.noise,
-    )
+    tables = {
+        "segments": [_segment(view, r, bound, label) for r, bound in bounds.items()],
+        "corners": _corners(view, runs, bounds),
+        "arcs": [_arc(view, r, sensor.noise) for r in listed if r.surface >= n_walls],
+        "breakpoints": _breakpoints(view, label, turn),
+    }
+    records: dict[str, Any] = {name: make_records(name, rows) for name, rows in tables.items()}
+    return Features(**records, clusters=label, frame_id="laser", noise=sensor.noise)
 
 
 class _Run(NamedTuple):
@@ -117,22 +117,13 @@ def _seam(view: View) -> int:
 
 def _connected(view: View) -> NDArray[np.bool_]:
     """Whether each beam and the next lie on surfaces that are connected between them."""
-    connected: NDArray[np.bool_] = view.goes_on | ~np.isnan(view.joints[:, 0])
-    return connected
+    return np.asarray(view.goes_on | ~np.isnan(view.joints[:, 0]))
 
 
 def _parts(links: NDArray[np.bool_], turn: int) -> list[NDArray[np.int64]]:
     """Part all beams, from beam `turn` around, where one is not linked with the next."""
     order = np.roll(np.arange(len(links)), -turn)
     return np.split(order, np.flatnonzero(~links[order[:-1]]) + 1)
-
-
-def _clusters(view: View, turn: int) -> NDArray[np.int32]:
-    label = np.full(len(view.surface), -1, dtype=np.int32)
-    large = [part for part in _parts(_connected(view), turn) if len(part) >= _LEAST_CLUSTER]
-    for k, beams in enumerate(large):
-        label[beams] = k
-    return label
 
 
 def _line_bound(view: View, run: _Run, noise: RangeNoise) -> LineBound:
@@ -185,7 +176,9 @@ def _corners(view: View, runs: list[_Run], bounds: dict[_Run, LineBound]) -> lis
         if math.isnan(vertex[0]):
             continue
         known = before in bounds and after in bounds
-        turn = _turn(view, before.surface, after.surface)
+        walls = view.walls[[before.surface, after.surface]]
+        (ux, uy), (vx, vy) = walls[:, 1] - walls[:, 0]
+        turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
         nearest = view.bearing_from(before.last, vertex) <= view.steps[before.last] / 2
         corners.append(
             {
@@ -201,12 +194,6 @@ def _corners(view: View, runs: list[_Run], bounds: dict[_Run, LineBound]) -> lis
             }
         )
     return corners
-
-
-def _turn(view: View, before: int, after: int) -> float:
-    """Turn from one wall to the next, in the order of the beams, in (-π, π) [rad]."""
-    (ux, uy), (vx, vy) = (view.walls[k, 1] - view.walls[k, 0] for k in (before, after))
-    return math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
 def _breakpoints(view: View, label: NDArray[np.int32], turn: int) -> list[Record]:
@@ -238,13 +225,3 @@ def _break(view: View, before: int, after: int) -> Record:
 def _point(view: View, beam: int) -> tuple[float, float]:
     r, bearing = view.ranges[beam], view.bearings[beam]
     return r * math.cos(bearing), r * math.sin(bearing)
-
-
-def _table(records: Sequence[Record], dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """Make a read-only table of records; what they do not give is 0."""
-    table = np.zeros(len(records), dtype)
-    for row, record in zip(table, records, strict=True):
-        for name, value in record.items():
-            row[name] = value
-    table.flags.writeable = False
-    return table

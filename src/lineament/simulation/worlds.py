@@ -124,8 +124,7 @@ def rectangle(center: ArrayLike, width: float, depth: float, angle: float = 0.0)
     """Vertices (4, 2) of a rectangle, counter-clockwise, its width along `angle` [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     halves = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, depth / 2)
-    vertices: Array = np.asarray(center) + halves @ np.array([[c, s], [-s, c]])
-    return vertices
+    return np.asarray(np.asarray(center) + halves @ np.array([[c, s], [-s, c]]))
 
 
 def closed(vertices: ArrayLike) -> Array:
@@ -179,25 +178,14 @@ _NORTH_SIDE: Points = [
 _OUTLINE: Points = [*_SOUTH_SIDE, *_NORTH_SIDE]
 _PIER: Points = [(10.8, 5.9), (13.2, 5.9), (13.2, 6.05), (10.8, 6.05)]
 _FURNITURE = (
-    _box(3.3, 2.4, 0.8, 1.6),
-    _box(5.9, 1.5, 1.4, 0.7),
-    _box(9.0, 2.2, 0.4, 1.2),
-    _box(10.6, 2.9, 0.9, 0.6, degrees=25),
-    _box(14.4, 3.2, 0.5, 0.8),
-    _box(12.2, 8.3, 2.0, 0.9),
-    _box(2.1, 7.9, 1.4, 0.7, degrees=-30),
-    _box(4.9, 9.2, 0.4, 1.0),
-)
+    _box(3.3, 2.4, 0.8, 1.6), _box(5.9, 1.5, 1.4, 0.7), _box(9.0, 2.2, 0.4, 1.2),
+    _box(10.6, 2.9, 0.9, 0.6, degrees=25), _box(14.4, 3.2, 0.5, 0.8), _box(12.2, 8.3, 2.0, 0.9),
+    _box(2.1, 7.9, 1.4, 0.7, degrees=-30), _box(4.9, 9.2, 0.4, 1.0),
+)  # fmt: skip
 _COLUMNS = (
-    (0.85, 0.4, 0.15),
-    (5.7, 2.9, 0.2),
-    (10.6, 1.3, 0.25),
-    (13.3, 1.3, 0.25),
-    (9.9, 8.9, 0.2),
-    (14.2, 8.9, 0.2),
-    (4.85, 6.5, 0.15),
-    (0.6, 6.6, 0.2),
-)
+    (0.85, 0.4, 0.15), (5.7, 2.9, 0.2), (10.6, 1.3, 0.25), (13.3, 1.3, 0.25),
+    (9.9, 8.9, 0.2), (14.2, 8.9, 0.2), (4.85, 6.5, 0.15), (0.6, 6.6, 0.2),
+)  # fmt: skip
 _WAY: Points = [
     (0.7, 5.0),
     (1.65, 5.0), (1.65, 2.0), (1.65, 5.0),
