@@ -29,8 +29,8 @@ from dds_peer import KINDS, Peer
 
 from lineament.errors import LineamentError
 from lineament.live import LiveConfig
-from lineament.live.dds import DdsPublisher, DdsSource, Participant
-from lineament.live.participant import type_hash
+from lineament.live.dds import DdsPublisher, DdsSource
+from lineament.live.participant import Participant, type_hash
 from lineament.live.received import Received
 from lineament.output.scene import Message
 
@@ -287,7 +287,7 @@ def test_the_environment_gives_domain_and_configuration(monkeypatch, domain, cap
 
 PROGRAM = """
 from lineament.live import LiveConfig
-from lineament.live.dds import *
+from lineament.live.dds import DdsPublisher, DdsSource, Participant
 participant = Participant({domain}, localhost=True)
 source = DdsSource(participant, LiveConfig(deskew="/odom"))
 publisher = DdsPublisher(participant)

@@ -17,19 +17,11 @@ from .received import Time
 if TYPE_CHECKING:
     from ..output.foxglove import FoxgloveMessages
 
-__all__ = ["FoxgloveSink", "Publisher", "RosSink", "Sink"]
-
 DIAGNOSTICS = "/diagnostics"
 
 
 class Publisher(ABC):
-    """What carries messages: DDS, ROS 1, a WebSocket.
-
-    Attributes
-    ----------
-    unsent : int
-        Messages that could not be sent, as far as the transport reports it.
-    """
+    """What carries messages: DDS, ROS 1, a WebSocket; `unsent` counts those it could not send."""
 
     unsent = 0
 
@@ -37,13 +29,7 @@ class Publisher(ABC):
         self._topics: dict[str, Any] = {}
 
     def advertise(self, topic: str, kind: str) -> None:
-        """Announce a topic, so that others can subscribe before there is a message.
-
-        Raises
-        ------
-        LineamentError
-            If the transport does not have such a topic, or such a type.
-        """
+        """Announce a topic, so that others can subscribe before there is a message."""
         self._topics[topic] = self._open(topic, kind)
 
     def publish(self, message: Message) -> None:

@@ -138,14 +138,7 @@ def load_recording(path: Path, count: int, skipped: float = 0.0) -> Recording:
 
 
 def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
-    """Make a synthetic odometry: the known poses, with errors that accumulate.
-
-    Examples
-    --------
-    >>> way = stand_in_odometry([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], seed=1)
-    >>> way[0], round(way[1][0])
-    ((0.0, 0.0, 0.0), 1)
-    """
+    """Make a synthetic odometry: the known poses, with errors that accumulate."""
     rng = np.random.default_rng(seed)
     way = [poses[0]]
     for pose, following in pairwise(poses):

@@ -18,8 +18,6 @@ from ..errors import LineamentError
 from .api import RequestError, answer
 from .session import Session
 
-__all__ = ["ViewServer", "serve"]
-
 #: The files of the page, by their endings.
 _TYPES = {
     ".html": "text/html; charset=utf-8",
