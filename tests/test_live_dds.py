@@ -96,15 +96,6 @@ def test_scan(participant, peer):
     eventually(lambda: peer.listeners("/scan") == 0)
 
 
-def test_multi_echo(participant, peer):
-    source = source_of(participant, type="MultiEchoLaserScan", echo="last")
-    connected(peer, source, "MultiEchoLaserScan")
-    echoes = [{"echoes": [1.0, 4.0]}, {"echoes": []}, {"echoes": [2.0]}]
-    peer.write("/scan", {**scan_message(), "ranges": echoes})
-    scan = receive(source)[0].read()
-    np.testing.assert_array_equal(scan.ranges, [4.0, math.nan, 2.0])
-
-
 def test_odometry_comes_before_the_scan(participant, peer):
     source = source_of(participant, namespace="robot", deskew="odom", topic="/scan")
     connected(peer, source)
