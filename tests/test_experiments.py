@@ -474,10 +474,10 @@ class TestTracking:
     def test_a_small_log(self, tmp_path):
         path = tmp_path / "small.npz"
         save_npz(path, list(drive(room(), [(-2, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)))
-        recording = tracking.load_recording(path, 12, 0.5)
-        every = tracking.load_recording(path, 99).scans
-        assert recording.scans[0].stamp == every[len(every) // 2].stamp
-        motions, tracks = tracking.measure("small", recording, 0, silent)
+        found = tracking.load_recording(path, 12, 0.5)
+        every = tracking.load_recording(path, 99)
+        assert found[0].stamp == every[len(every) // 2].stamp
+        motions, tracks = tracking.measure("small", found, 0, silent)
         assert list(motions) == [
             *("odometry, synthetic", "features", "ICP"),
             *("features, no odometry", "ICP, no odometry"),
