@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import re
 import signal
-import socket
 import sys
 import time
 from contextlib import closing
@@ -284,16 +283,6 @@ def test_a_package_that_is_missing_is_one_line(monkeypatch, log, capfd, package)
         f"pip install 'lineament[{extra}]'\n"
     )
     assert capfd.readouterr() == ("", message)
-
-
-def test_a_port_that_is_taken_is_one_line(log, capfd):
-    pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = str(taken.getsockname()[1])
-        assert run(["live", "--from", log, "--ros", "0", "--foxglove", port]) == 1
-    _, err = capfd.readouterr()
-    assert err.startswith(f"lineament: Foxglove cannot be served at 127.0.0.1, port {port}: ")
-    assert err.count("\n") == 1
 
 
 # Processes.
