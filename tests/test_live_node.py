@@ -410,9 +410,11 @@ def test_poses_give_the_motion_between_scans():
         (1.5, (0.5, 0.0, 0.0), True),
         (9.0, (0.7, 0.0, 0.0), False),  # too long ago
         (8.0, (0.9, 0.0, 0.0), False),  # time runs backwards
+        (8.0, (0.9, 0.0, 0.0), False),  # or stands still
         (8.1, None, False),
         (8.2, (0.9, 0.0, 0.0), False),
         (9.19, (1.0, 0.0, 0.0), True),
+        (10.24, (1.1, 0.0, 0.0), False),
     ]
     for stamp, pose, moves in poses:
         assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
