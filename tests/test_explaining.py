@@ -118,6 +118,21 @@ def test_a_reading_on_a_column_is_part_of_an_arc():
     assert "lines in its place would cost" in text
 
 
+@pytest.mark.parametrize(("beam", "is_cut"), [(3, False), (4, True), (57, True), (58, False)])
+def test_a_cut_is_weighed_where_both_sides_have_four_measurements(beam, is_cut):
+    ranges, bearings = wall()
+    _, text = explained(LaserScan(ranges, angles=bearings), beam)
+    assert ("cut in two here" in text) == is_cut
+
+
+@pytest.mark.parametrize(("distance", "words"), [(1.05, "1.05 m"), (0.9, "899.7 mm")])
+def test_lengths_below_a_metre_are_in_millimetres(distance, words):
+    ranges, bearings = wall()
+    ranges[30] += distance
+    _, text = explained(LaserScan(ranges, angles=bearings), 30)
+    assert f"by +{words}" in text
+
+
 def test_pdbs_finds_clusters_alone():
     ranges, bearings = wall()
     assert explained(LaserScan(ranges, angles=bearings), 5, "pdbs")[0].outcome == "clustered"
