@@ -1,7 +1,5 @@
 """Driving live nodes: as a process, as a thread of this one, and with peers in other processes."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import random

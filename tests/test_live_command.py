@@ -1,7 +1,5 @@
 """`lineament live` as a whole: what others hear of it, its options, and how it ends."""
 
-from __future__ import annotations
-
 import gc
 import re
 import signal

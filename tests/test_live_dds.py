@@ -1,7 +1,5 @@
 """Topics of ROS 2 over DDS, against another participant that has types of its own."""
 
-from __future__ import annotations
-
 import math
 import random
 import signal

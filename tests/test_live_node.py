@@ -1,7 +1,5 @@
 """The loop of a node over messages in memory, its pipeline, and its counters."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

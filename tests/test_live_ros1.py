@@ -1,7 +1,5 @@
 """ROS 1 against a real master and rospy's own nodes; skipped where rospy is not installed."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import os

@@ -1,7 +1,5 @@
 """`view` but its page: the server and its answers, the log that is kept, the command."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import signal

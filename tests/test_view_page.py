@@ -1,7 +1,5 @@
 """The page of `view` in headless Chromium: it shows, plays, switches, tells numbers and answers."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Iterator

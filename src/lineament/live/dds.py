@@ -1,7 +1,5 @@
 """ROS 2 without ROS: its topics over DDS, by Cyclone DDS."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
