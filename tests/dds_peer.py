@@ -4,8 +4,6 @@ Its types are made from the definitions that rosbags has. `live_driving.Remote` 
 process, where one is to be killed or stopped.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
 from functools import cache

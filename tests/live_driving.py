@@ -1,7 +1,5 @@
 """Driving live nodes: as a process, as a thread of this one, and with peers in other processes."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import random
@@ -123,14 +121,10 @@ class Running:
     def __init__(self, config: LiveConfig) -> None:
         self.lines: list[str] = []
         self.reports: list[Report] = []
-        self._config, self._stopped = config, threading.Event()
-        self._thread = threading.Thread(target=self._run)
+        self._stopped = threading.Event()
+        to, kept = self._stopped.is_set, {"write": self.lines.append, "show": self.reports.append}
+        self._thread = threading.Thread(target=run_live, args=(config, to), kwargs=kept)
         self._thread.start()
-
-    def _run(self) -> None:
-        stop = self._stopped.is_set
-        write, show = self.lines.append, self.reports.append
-        run_live(self._config, stop, write=write, show=show)
 
     def stop(self) -> Report:
         """Stop it; return its last report."""

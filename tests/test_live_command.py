@@ -1,12 +1,8 @@
 """`lineament live` as a whole: what others hear of it, its options, and how it ends."""
 
-from __future__ import annotations
-
 import gc
-import os
 import re
 import signal
-import socket
 import sys
 import time
 from contextlib import closing
@@ -15,11 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_driving import (
-    Remote,
     eventually,
-    garbage,
     heard,
-    odometry_message,
     points_of,
     running,
     scan_message,
@@ -30,7 +23,6 @@ from live_driving import (
 import lineament as ln
 from lineament.cli import run
 from lineament.live import Counts, LiveConfig, Report, run_live
-from lineament.live.pipeline import twist_of_laser
 from lineament.logs import save_npz
 from lineament.output.feature_points import feature_points
 from lineament.simulation import SENSORS, drive, room
@@ -131,28 +123,6 @@ def test_one_echo_a_namespace_and_tracks(peer, domain):
     assert numbers == points_of(later)["track"].tolist()
 
 
-def test_a_moving_scanner_is_deskewed_by_its_odometry(peer, domain):
-    for topic, kind in (("/robot/scan", "LaserScan"), ("/robot/odom", "Odometry")):
-        peer.publish(topic, kind)
-    peer.listen("/robot/scan/features", "PointCloud2")
-    message, laser_pose = scan_message(5, scene(), time_increment=1e-4), (0.2, 0.1, 0.5)
-    bent = scan_of(message)
-    twist = twist_of_laser((1.5, -1.0, 0.25), laser_pose)
-    expected = ln.extract(ln.deskew(bent, twist))
-    x = feature_points(expected)["x"].tolist()
-    assert x != feature_points(ln.extract(bent))["x"].tolist()
-
-    def publish() -> None:
-        peer.write("/robot/odom", odometry_message(1.5, 5))
-        peer.write("/robot/scan", message)
-
-    with running(domain=domain, deskew="odom", namespace="robot", laser_pose=laser_pose):
-        # The first scans may come before the first odometry.
-        while points_of(cloud := heard(peer, "/robot/scan/features", publish))["x"].tolist() != x:
-            assert_same(cloud, ln.extract(bent))
-    assert_same(cloud, expected)
-
-
 def test_a_log_is_played_until_its_end(peer, domain, log):
     kinds = {"/scan": "LaserScan", "/tf": "TFMessage", "/scan/features": "PointCloud2"}
     for topic, kind in kinds.items():
@@ -200,28 +170,6 @@ def test_a_log_is_shown_in_foxglove(log):
             entities = viewer.take_decoded("/scan/features")["entities"]
             names = ["segments", "arcs", "corners", "edges", "ellipses"]
             assert [entity["id"] for entity in entities] == names
-
-
-def test_malformed_messages_are_counted_and_survived(peer, domain):
-    peer.garble("/scan", "LaserScan")
-    peer.publish("/sound", "LaserScan")
-    peer.listen("/scan/features", "PointCloud2")
-    with closing(Remote("dds_peer", domain)) as sound:
-        sound.publish("/scan", "LaserScan")
-        with running(domain=domain) as node:
-            eventually(lambda: peer.listeners("/scan") == sound.listeners("/scan") == 1)
-            for number, data in enumerate(garbage().values(), 1):
-                peer.write("/scan", data)
-
-                def publish(number: int = number) -> None:
-                    sound.write("/scan", scan_message(number))
-
-                while heard(peer, "/scan/features", publish)["header"]["stamp"]["sec"] < number:
-                    pass
-            report = node.stop()
-    assert report.total.malformed == len(garbage())
-    (line,) = [line for line in node.lines if "makes no sense" in line]
-    assert re.fullmatch("a scan of [0-9a-f]+ makes no sense: .*", line)
 
 
 def test_garbage_collection_is_as_before_after_a_run(tmp_path, log):
@@ -294,14 +242,10 @@ min_points = 6
 @pytest.mark.parametrize(
     ("arguments", "status", "text"),
     [
-        ("--topic a+b", 2, "topic is 'a+b', expected a name"),
         ("--topic 1a", 1, "topic is '/1a', expected a name as in ROS 2"),
         ("--ros 3", 2, "'--ros': 3 is not in the range"),
         ("--ros 0", 2, "ros is 0, which leaves nothing to listen to"),
-        ("--rate nan", 2, "rate is nan, expected 0 to"),
         ("--laser-pose nan 0 0", 2, "laser_pose is (nan, 0.0, 0.0), expected three"),
-        ("--deskew poses", 2, "which only a log has"),
-        ("--from a.log --deskew /odom", 2, "but a log is played"),
         ("-m hough2", 2, "method 'hough2' is unknown"),
         ("--set evidence", 2, "expected NAME=VALUE"),
         ("--set evidence=x", 2, "evidence is 'x', expected a number"),
@@ -339,16 +283,6 @@ def test_a_package_that_is_missing_is_one_line(monkeypatch, log, capfd, package)
     assert capfd.readouterr() == ("", message)
 
 
-def test_a_port_that_is_taken_is_one_line(log, capfd):
-    pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = str(taken.getsockname()[1])
-        assert run(["live", "--from", log, "--ros", "0", "--foxglove", port]) == 1
-    _, err = capfd.readouterr()
-    assert err.startswith(f"lineament: Foxglove cannot be served at 127.0.0.1, port {port}: ")
-    assert err.count("\n") == 1
-
-
 # Processes.
 
 
@@ -377,20 +311,6 @@ def test_a_signal_ends_it(started, stage, number):
 
 
 @pytest.mark.slow
-def test_it_is_heard_again_after_it_was_killed_and_misses_who_is_killed(started, peer, domain):
-    peer.listen("/scan/features", "PointCloud2")
-    started().kill()
-    node = started()
-    with closing(Remote("dds_peer", domain, "1s")) as talker:
-        talker.publish("/scan", "LaserScan")
-        heard(peer, "/scan/features", lambda: talker.write("/scan", scan_message(1)))
-        node.until_it_writes("1 publisher of scans")
-        talker.close()
-        node.until_it_writes("no publisher of scans: waiting for one")
-    node.stop()
-
-
-@pytest.mark.slow
 def test_a_burst_is_accounted_for_and_leaves_no_memory(started, peer):
     n, bursts = 1000, 3
     node = started("--depth", 1000)
@@ -412,27 +332,3 @@ def test_a_burst_is_accounted_for_and_leaves_no_memory(started, peer):
     assert 0 < sum(total) <= bursts * n
     assert 0 < len(peer.take("/scan/features")) <= total[0]
     assert max(memory[1:]) - memory[0] < 10
-
-
-@pytest.mark.slow
-def test_a_listener_that_stands_still_delays_nobody(started, peer, domain):
-    node = started()
-    peer.publish("/scan", "LaserScan")
-    with closing(Remote("dds_peer", domain)) as still:
-        for one in (still, peer):
-            one.listen("/scan/features", "PointCloud2")
-            one.listen("/scan/markers", "MarkerArray")
-            heard(one, "/scan/features", lambda: peer.write("/scan", scan_message(0)))
-        still.signal(signal.SIGSTOP)
-        for number in range(1, 300):
-            peer.write("/scan", scan_message(number))
-        message = scan_message(300)
-
-        def publish() -> None:
-            peer.write("/scan", message)
-
-        while heard(peer, "/scan/features", publish)["header"]["stamp"]["sec"] < 300:
-            pass
-        heard(peer, "/scan/markers", publish)
-        node.stop()
-        os.kill(still.process.pid, signal.SIGCONT)

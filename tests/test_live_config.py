@@ -1,3 +1,4 @@
+import math
 import re
 
 import pytest
@@ -60,6 +61,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"laser_pose": (1.0, 2.0)}, "laser_pose is (1.0, 2.0), expected three finite numbers"),
         ({"laser_pose": (1, 2, "x")}, "laser_pose is (1, 2, 'x'), expected three finite numbers"),
         ({"laser_pose": (10**400, 0, 0)}, "0, 0, 0), expected three finite numbers"),
+        ({"laser_pose": (-math.inf, 0, 0)}, "laser_pose is (-inf, 0, 0), expected three finite"),
         ({"track": 1}, "track is 1, expected true or false"),
         ({"parameters": 3}, "parameters is 3, expected a table"),
     ],

@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 import lineament as ln
@@ -102,16 +101,6 @@ def test_a_log_that_breaks_says_where(tmp_path, clock):
     source = ReplaySource(path, clock=clock, keep_going=True)
     assert len(times(source, clock)) == 3
     assert len(source.problems()) == 1
-
-
-def test_a_real_bag_is_played(data_dir, clock):
-    source = ReplaySource(data_dir / "mcap" / "scans_demo.mcap", rate=10.0, clock=clock)
-    came = times(source, clock, most=100)
-    gaps = np.diff([time for time, _ in came]) * 10
-    steps = np.diff([stamp for _, stamp in came])
-    ordinary = steps > 0
-    assert len(came) > 20
-    np.testing.assert_allclose(gaps[ordinary], steps[ordinary], atol=1e-4)
 
 
 def test_a_rate_beyond_reading_does_not_hold_the_node(played, clock):

@@ -18,7 +18,6 @@ from lineament.reproduce import (
     Setting,
     Table,
     experiment_names,
-    run_experiments,
 )
 from lineament.reproduce.findings import cell_text, dot_chart
 from lineament.reproduce.report import benchmark_tables, reproduce, write_report
@@ -136,29 +135,3 @@ def test_benchmark_table_tells_the_authors_method_of_the_same_name():
         ("ple (authors)", 0.5),
         ("iepf (authors)", 0.75),
     )
-
-
-@pytest.mark.slow
-def test_noise_can_be_repeated_and_shows_what_the_filter_does():
-    reports = []
-    first, again = (
-        run_experiments(["fig3"], Setting(frames=1), reports.append)["noise"] for _ in range(2)
-    )
-    assert json.dumps(first.to_dict(), allow_nan=False) == json.dumps(again.to_dict())
-    assert reports[0] == "noise (1/1): starting"
-    ranges = first.numbers["ranges"]
-    assert ranges["planes"]["raw"] == pytest.approx(0.01, rel=0.1)
-    assert ranges["planes"]["filtered"] < 0.6 * ranges["planes"]["raw"]
-    assert ranges["edges"]["filtered"] > 2 * ranges["edges"]["raw"]
-    assert ranges["more than 1.2 m"]["off_after"] == 1.0
-
-
-@pytest.mark.slow
-def test_true_lines_have_the_noise_as_similarity_error():
-    found = run_experiments(["fig12"], Setting(frames=1), lambda _: None)["similarity"]
-    (scores,) = found.numbers.values()
-    true, pdbs = scores["the true lines"], scores["pdbs, fitted"]
-    # The distance to the line is the error of the range, shortened by the incidence.
-    assert 0.004 < true["similarity_mean"] < 0.01 * np.sqrt(2 / np.pi)
-    assert true["similarity_maximum"] < 0.06
-    assert pdbs["similarity_mean"] > scores["iepf"]["similarity_mean"]

@@ -3,8 +3,6 @@
 It shows that the node can be imported, configured, run and ended; what rclpy does it cannot show.
 """
 
-from __future__ import annotations
-
 import importlib
 import signal
 import struct

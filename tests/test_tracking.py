@@ -184,9 +184,9 @@ def test_tracker_of_random_features(seed):
 @pytest.mark.slow
 def test_tracker_of_a_real_log(data_dir, log):
     file, skipped = LOGS[log]
-    recording, extract = load_recording(data_dir / file, 12, skipped), ln.Extractor()
-    frames = [extract(scan) for scan in recording.scans]
-    odometry = stand_in_odometry(recording.poses, seed=1)
+    scans, extract = load_recording(data_dir / file, 12, skipped), ln.Extractor()
+    frames = [extract(scan) for scan in scans]
+    odometry = stand_in_odometry([scan.pose for scan in scans], seed=1)
     for poses in (odometry, [None] * len(frames)):
         tracker, twin = Tracker(), naive.NaiveTracker()
         for frame, pose in zip(frames, poses, strict=True):

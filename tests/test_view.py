@@ -1,25 +1,41 @@
-"""The server of `view`: its answers, and what it refuses."""
-
-from __future__ import annotations
+"""`view` but its page: the server and its answers, the log that is kept, the command."""
 
 import http.client
 import json
+import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from contextlib import contextmanager
 from importlib.resources import files
+from urllib.request import urlopen
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from view_scans import walls
 
-from lineament import Extractor
+from lineament import Extractor, LaserScan
+from lineament.cli import run
 from lineament.errors import LineamentError
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
 from lineament.view.api import MOST_STAMPS, RequestError, answer
+from lineament.view.store import ScanStore
+
+
+def walls(count, beams=31):
+    """Scans of a wall that comes nearer, every third beam invalid in another way."""
+    bearings = np.linspace(-0.5, 0.5, beams)
+    for k in range(count):
+        ranges = (3.0 - 0.01 * k) / np.cos(bearings)
+        ranges[:3] = np.nan, np.inf, 0.0
+        yield LaserScan(
+            ranges, -0.5, 1.0 / (beams - 1), range_max=30.0, stamp=10 + 0.1 * k, frame_id="laser"
+        )
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +144,9 @@ def test_stamps_come_in_blocks(server):
         ("/api/scan?i=0", 400, "parameter method is missing"),
         ("/api/scan?i=x&method=pdbs", 400, "i is 'x', expected a whole number"),
         ("/api/scan?i=-1&method=pdbs", 400, "i is '-1'"),
-        ("/api/scan?i=1.0&method=pdbs", 400, "i is '1.0'"),
         ("/api/scan?i=%EF%BC%91&method=pdbs", 400, "expected a whole number"),
         (f"/api/scan?i={'9' * 5000}&method=pdbs", 400, "expected a whole number"),
         ("/api/scan?i=9&method=pdbs", 404, "scan 9 is not there: 0 to 8 have been read"),
-        ("/api/scan?i=999999999999&method=pdbs", 404, "is not there"),
         ("/api/scan?i=0&method=lui", 404, "method 'lui' is not there, expected one of: pdbs, "),
         ("/api/scan?i=0&i=1&method=pdbs", 400, "a parameter is given twice"),
         ("/api/scan?i=0&method=pdbs&x=1", 400, "parameter 'x' is unknown, expected i, method"),
@@ -144,9 +158,7 @@ def test_stamps_come_in_blocks(server):
         ("/api/scan?" + "&".join(f"a{k}=1" for k in range(99)), 400, "makes no sense"),
         ("/api/", 404, "/api/ is not there"),
         ("/style.css/../../secret", 404, "is not there"),
-        ("/../store.py", 404, "is not there"),
         ("/%2e%2e/store.py", 404, "is not there"),
-        ("//etc/passwd", 404, "is not there"),
         ("/static/index.html", 404, "is not there"),
     ],
 )
@@ -190,14 +202,6 @@ def test_the_page_and_nothing_else_is_served(server):
     assert int(headers["Content-Length"]) == len(server.page["/"])
 
 
-def test_the_page_needs_nothing_from_elsewhere(server):
-    for name, body in server.page.items():
-        text = body.decode().replace("http://www.w3.org/2000/svg", "")
-        assert "//cdn" not in text
-        assert "http://" not in text, name
-        assert "https://" not in text, name
-
-
 def test_colours_are_those_of_the_figures(server):
     from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR, PALETTE
 
@@ -209,37 +213,30 @@ def test_colours_are_those_of_the_figures(server):
 
 
 @pytest.mark.parametrize(
-    ("host", "status"),
+    ("bound", "host", "status"),
     [
-        ("localhost", 200),
-        ("LOCALHOST:1234", 200),
-        ("127.0.0.1", 200),
-        ("[::1]:80", 200),
-        ("evil.example", 403),
-        ("evil.example:8000", 403),
-        ("localhost.evil.example", 403),
-        ("192.168.0.7", 403),
-        ("localhost@evil.example", 403),
-        ("[", 403),
-        ("", 403),
+        ("127.0.0.1", "localhost", 200),
+        ("127.0.0.1", "LOCALHOST:1234", 200),
+        ("127.0.0.1", "[::1]:80", 200),
+        ("127.0.0.1", "evil.example:8000", 403),
+        ("127.0.0.1", "localhost.evil.example", 403),
+        ("127.0.0.1", "192.168.0.7", 403),
+        ("127.0.0.1", "localhost@evil.example", 403),
+        ("127.0.0.1", "[", 403),
+        ("127.0.0.1", "", 403),
+        ("127.0.0.2", "127.0.0.2", 200),
+        ("127.0.0.2", "127.0.0.3", 403),
+        ("0.0.0.0", "192.168.0.7:80", 200),
+        ("0.0.0.0", "robot.example", 403),
+        ("0.0.0.0", "", 403),
     ],
 )
-def test_requests_by_another_name_are_refused(server, host, status):
-    for target in ("/api/log", "/"):
-        assert ask(server, target, Host=host)[0] == status
-
-
-def test_the_host_that_was_given_is_known(session):
-    with served(session, "127.0.0.2") as server:
-        assert ask(server, "/")[0] == 200
-        assert ask(server, "/", Host="127.0.0.3")[0] == 403
-
-
-def test_listening_everywhere_takes_addresses_but_no_names(session):
-    with served(session, "0.0.0.0") as server:
-        assert server.address == f"http://localhost:{server.server_port}/"
-        assert ask(server, "/", Host="192.168.0.7:80")[0] == 200
-        assert ask(server, "/", Host="robot.example")[0] == 403
+def test_requests_by_another_name_are_refused(session, bound, host, status):
+    with served(session, bound) as server:
+        name = "localhost" if bound == "0.0.0.0" else bound
+        assert server.address == f"http://{name}:{server.server_port}/"
+        for target in ("/api/log", "/"):
+            assert ask(server, target, Host=host)[0] == status
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "BREW"])
@@ -303,3 +300,141 @@ def test_many_at_once_get_what_one_gets(server):
 def test_a_port_that_is_taken_is_one_line(session):
     with ViewServer(session) as server, pytest.raises(LineamentError, match="cannot listen there"):
         ViewServer(session, port=server.server_port)
+
+
+# The log that is kept.
+
+
+def assert_scans_equal(scan, other):
+    for name in ("ranges", "angles"):
+        np.testing.assert_array_equal(getattr(scan, name), getattr(other, name))
+    fields = "is_regular angle_min angle_increment range_min range_max stamp scan_time"
+    for name in (*fields.split(), "time_increment", "frame_id", "pose"):
+        assert getattr(scan, name) == getattr(other, name), name
+
+
+def flaser(count, stamp):
+    return f"FLASER {count} {' '.join(['2.0'] * 181)} 0 0 0 0 0 0 {stamp} robot {stamp}\n"
+
+
+def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path):
+    path = tmp_path / "broken.log"
+    path.write_text(flaser(181, 1) + flaser(181, 2) + flaser(190, 3) + flaser(181, 4))
+    with Session(path, {"pdbs": Extractor("pdbs")}) as session:
+        assert session.wait(30)
+        facts = session.facts()
+        assert facts["scans"] == 2
+        assert "broken.log:3: " in facts["error"]
+        assert session.scan(1, "pdbs")["stamp"] == 2
+    with Session(path, {"pdbs": Extractor("pdbs")}, keep_going=True) as session:
+        assert session.wait(30)
+        facts = session.facts()
+        assert (facts["scans"], facts["error"], facts["skipped"]) == (3, "", 1)
+        assert session.scan(2, "pdbs")["stamp"] == 4
+
+
+def any_scans():
+    yield from walls(3)
+    bearings = np.array([0.0, 0.1, 0.3])
+    yield LaserScan([1.0, np.nan, 1 / 3], angles=bearings, range_min=0.1, pose=(1.0, 2.0, 0.1))
+    yield LaserScan([], 0.0, 0.1, scan_time=0.1, time_increment=1e-5, stamp=1e9 + 1e-6)
+    yield LaserScan([5.0], 0.0, 0.0, frame_id="läser", range_max=np.inf)
+    yield LaserScan([1e300, -np.inf], angles=[0.0, 1e-9])
+
+
+@pytest.mark.parametrize("capacity", [0, 2000, 1 << 20])
+def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
+    scans = list(any_scans())
+    items = [(f"scan{k}", scan) for k, scan in enumerate(scans)]
+    with ScanStore(lambda: items, capacity=capacity) as kept:
+        kept.fill(items)
+        assert len(kept) == len(scans)
+        for index in (0, 5, 2, 2, 3, 1, 0, 6, 4):
+            topic, scan = kept.item(index)
+            assert topic == f"scan{index}"
+            assert_scans_equal(scan, scans[index])
+        assert (len(kept._starts), -1 in kept._starts) == (len(scans), capacity < 1 << 20)
+        assert kept._end <= capacity
+        for index in (-1, len(scans)):
+            with pytest.raises(IndexError):
+                kept.item(index)
+        assert kept.stamps(2, 99) == [scan.stamp for scan in scans[2:]]
+
+
+def test_a_full_disk_is_less_room_and_no_failure(monkeypatch):
+    items = [("scan", scan) for scan in walls(4)]
+    with ScanStore(lambda: items) as kept:
+        kept.fill(items[:2])
+
+        class Full:
+            def __init__(self, file):
+                self.file = file
+
+            def __getattr__(self, name):
+                return getattr(self.file, name)
+
+            def write(self, _):
+                raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(kept, "_file", Full(kept._file))
+        kept.fill(items[2:])
+        for index, (_, scan) in enumerate(items):
+            assert_scans_equal(kept.item(index)[1], scan)
+
+
+def test_a_closed_store_ends_its_reading():
+    kept = ScanStore(lambda: ())
+
+    def endless():
+        while True:
+            yield "scan", next(walls(1))
+
+    reader = threading.Thread(target=kept.fill, args=(endless(),))
+    reader.start()
+    while len(kept) < 3:
+        time.sleep(0.001)
+    kept.close()
+    reader.join(30)
+    assert not reader.is_alive()
+
+
+# The command.
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["{log}x", "--no-browser"], 1, "there is no such"),
+        (["{log}", "-m", "lui"], 2, "method 'lui' is unknown"),
+        (["{log}", "--set", "a=1"], 2, "'a'"),
+        (["{log}", "--port", "70000"], 2, "70000"),
+        (["{log}", "-m", "pdbs", "--no-browser", "--host", "256.1.1.1"], 1, "cannot listen there"),
+        (["{log}", "-m", "pdbs", "--topic", "scan"], 1, "has no topic 'scan'"),
+    ],
+)
+def test_what_is_wrong_is_one_line(log, arguments, status, words, capfd):
+    assert run(["view", *(text.format(log=log) for text in arguments)]) == status
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert words in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child there")
+@pytest.mark.slow
+def test_the_command_writes_its_address_and_ends_quietly(log):
+    command = [sys.executable, "-m", "lineament", "view", str(log), "-m", "pdbs", "--no-browser"]
+    with subprocess.Popen(
+        [*command, "--host", "0.0.0.0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        line = process.stdout.readline()
+        port = int(line.split("http://localhost:")[1].split("/")[0])
+        with urlopen(f"http://127.0.0.1:{port}/api/log", timeout=30) as reply:
+            assert json.load(reply)["name"] == "wall.npz"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert out == ""
+    lines = [line for line in err.splitlines() if line]
+    assert lines[0].startswith("lineament: 0.0.0.0 is not loopback")
+    assert lines[1:] == ["lineament: stopped"]

@@ -1,21 +1,19 @@
 """The page of `view` in headless Chromium: it shows, plays, switches, tells numbers and answers."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
-from view_scans import corners
 
-from lineament import Extractor
+from lineament import Extractor, LaserScan
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
@@ -51,6 +49,17 @@ return import("/main.js").then(({ app }) => {
   app.zoom(4);
 });
 """
+
+
+def corners(count):
+    """Scans of a corner straight ahead that comes nearer; nothing comes back on the left."""
+    bearings = np.radians(np.arange(-60, 61))
+    rng = np.random.default_rng(1)
+    for k in range(count):
+        ranges = (4.0 - 0.05 * k) / (np.cos(bearings) + abs(np.sin(bearings)))
+        ranges += rng.normal(0.0, 0.01, len(ranges))
+        ranges[110:] = np.nan
+        yield LaserScan(ranges, bearings[0], np.radians(1), range_max=30.0, stamp=5 + 0.05 * k)
 
 
 @pytest.fixture(scope="module")

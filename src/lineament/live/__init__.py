@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from .._lazy import lazily
 
 if TYPE_CHECKING:
+    from ..rosmsg.poses import Odometry
     from .config import LiveConfig, read_config
     from .counters import Counts, Report
     from .node import Node
     from .pipeline import Frame, Pipeline
-    from .received import Odometry, Received, Source
+    from .received import Received, Source
     from .replay import ReplaySource
     from .running import run_live
     from .sinks import FoxgloveSink, RosSink, Sink

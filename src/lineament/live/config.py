@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -13,8 +13,6 @@ from typing import Any
 
 from ..errors import LineamentError
 from ..scan import Pose
-
-__all__ = ["LiveConfig", "read_config", "resolved"]
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
@@ -143,7 +141,10 @@ class LiveConfig:
             _check(known.name, str(known.type), getattr(self, known.name))
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
-        if len(self.laser_pose) != 3 or not all(map(_is_finite, self.laser_pose)):
+        if len(self.laser_pose) != 3 or not all(
+            isinstance(value, int | float) and abs(value) <= sys.float_info.max
+            for value in self.laser_pose
+        ):
             raise ValueError(f"laser_pose is {self.laser_pose}, expected three finite numbers")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
@@ -166,13 +167,7 @@ class LiveConfig:
 
 
 def resolved(topic: str, namespace: str) -> str:
-    """Return the full name of a topic; one that begins with ``/`` is full already, as in ROS.
-
-    Examples
-    --------
-    >>> resolved("scan", "robot1"), resolved("/scan", "robot1"), resolved("scan", "")
-    ('/robot1/scan', '/scan', '/scan')
-    """
+    """Return the full name of a topic; one that begins with ``/`` is full already, as in ROS."""
     if topic.startswith("/"):
         return topic
     return "/" + "/".join([*filter(None, namespace.split("/")), topic])
@@ -224,10 +219,3 @@ def _check(name: str, annotation: str, value: Any) -> None:
     text = value.strip("/") or "none" if name == "namespace" else value
     if name in _NAMES and not re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII):
         raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
-
-
-def _is_finite(value: object) -> bool:
-    try:
-        return isinstance(value, int | float) and math.isfinite(value)
-    except OverflowError:  # an integer beyond all floats
-        return False

@@ -9,8 +9,6 @@ import numpy as np
 from ..features import COUNTED, Features
 from ..scan import LaserScan
 
-__all__ = ["Counters", "Counts", "Report"]
-
 #: Latencies that are kept for a report: those of the last scans.
 _MOST = 4096
 
@@ -114,26 +112,7 @@ def _faults(counts: Counts) -> str:
 
 
 class Counters:
-    """Counts scans and faults, and makes reports.
-
-    Parameters
-    ----------
-    now : float
-        The time at which counting begins [s].
-
-    Attributes
-    ----------
-    scans, dropped, malformed : int
-        Since the start; the node adds to the last two.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> counters, scan = Counters(0.0), ln.LaserScan([2.0, 2.0, 2.0], 0.0, 0.01)
-    >>> counters.add(scan, ln.extract(scan), 0.002)
-    >>> print(counters.report(0.5, publishers=1))  # doctest: +ELLIPSIS
-    2.0 scans/s, latency 2.00 ms (p99 2.00), 0 dropped, 0 lost, 0 malformed, 0.0 % of beams ...
-    """
+    """Counts scans and faults, and makes reports; the node adds to `dropped` and `malformed`."""
 
     def __init__(self, now: float) -> None:
         self.scans = self.dropped = self.malformed = 0
@@ -155,17 +134,7 @@ class Counters:
             self._found[name] += count
 
     def report(self, now: float, *, publishers: int, lost: int = 0, unsent: int = 0) -> Report:
-        """Report on what was counted since the last report.
-
-        Parameters
-        ----------
-        now : float
-            The time [s].
-        publishers : int
-            Publishers of scans at the moment.
-        lost, unsent : int
-            Messages that the transport has lost, or could not send, since the start.
-        """
+        """Report on what was counted since the last report; `lost` and `unsent` are in all."""
         total = Counts(self.scans, self.dropped, lost, self.malformed, unsent)
         since = Counts(*(new - old for new, old in zip(total, self._total, strict=True)))
         p50, p99 = np.quantile(self._latencies or [np.nan], (0.5, 0.99)).tolist()

@@ -1,7 +1,5 @@
 """ROS 2 without ROS: its topics over DDS, by Cyclone DDS."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -17,8 +15,6 @@ from .raw_dds import ANY_STATE, RawReader, RawWriter
 from .received import Received, received_odometry, received_scan
 from .sinks import Publisher
 
-__all__ = ["DdsPublisher", "DdsSource", "Participant"]
-
 NANO = 1_000_000_000
 ODOMETRY = "nav_msgs/msg/Odometry"
 #: A writer waits this long for a slow reader [ns], then drops the message.
@@ -32,21 +28,9 @@ _RELIABILITY = 11
 class DdsSource:
     """Scans, and odometry where it is wanted, from topics of ROS 2.
 
-    Parameters
-    ----------
-    participant : Participant
-        Who listens.
-    config : LiveConfig
-        Topics, type, echo and reliability. Best effort matches any publisher; a reliable one
-        sends again what the network has lost.
-    depth : int
-        Messages of a topic that may wait for `receive`. Beyond, best effort counts the newest as
-        lost; reliable forgets the oldest.
-
-    Raises
-    ------
-    LineamentError
-        If a topic does not have a name of ROS 2.
+    Best effort matches any publisher; a reliable one sends again what the network has lost. Up to
+    `depth` messages of a topic wait for `receive`. Beyond, best effort counts the newest as lost,
+    and reliable forgets the oldest.
     """
 
     #: A robot may always publish again.
@@ -145,13 +129,8 @@ class _Subscription:
 class DdsPublisher(Publisher):
     """Publishes messages in CDR to topics of ROS 2, reliably and volatile.
 
-    Parameters
-    ----------
-    participant : Participant
-        Who publishes.
-    depth : int
-        How many of the newest messages of a topic are kept for a slow reader. One that does not
-        read at all delays nobody: it misses messages.
+    The newest `depth` messages of a topic are kept for a slow reader. One that does not read at all
+    delays nobody: it misses messages.
     """
 
     def __init__(self, participant: Participant, depth: int = 1) -> None:

@@ -10,42 +10,14 @@ from ..output.foxglove import FoxgloveMessages
 from ..output.scene import Message
 from .sinks import Publisher
 
-__all__ = ["FoxgloveMessages", "FoxgloveServer"]
-
 #: Messages that wait for a slow viewer; then the oldest are dropped.
 _BACKLOG = 64
 
 
 class FoxgloveServer(Publisher):
-    """Serves Foxglove's own messages to its app: "Open connection", ``ws://localhost:8765``.
+    """Serves Foxglove's own messages to its app, at `address`; port 0 is any that is free.
 
     A viewer that does not keep up loses messages, uncounted, and delays nobody.
-
-    Parameters
-    ----------
-    host : str
-        Address to listen on: this machine alone, or ``0.0.0.0`` for all that can reach it.
-    port : int
-        Port to listen on; 0 for any that is free.
-    name : str
-        Name of the server in the app.
-
-    Raises
-    ------
-    LineamentError
-        If the server cannot listen there.
-
-    Attributes
-    ----------
-    address : str
-        What the app connects to.
-
-    Examples
-    --------
-    >>> server = FoxgloveServer(port=0)
-    >>> server.listeners("/scan")
-    0
-    >>> server.close()
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8765, name: str = "lineament") -> None:

@@ -10,8 +10,6 @@ from .pipeline import Pipeline, check_beams
 from .received import Received, Source
 from .sinks import Sink
 
-__all__ = ["Node"]
-
 #: Longest wait for a scan [s]: how soon a stop is seen.
 _WAIT = 0.1
 #: Time between two reports [s].

@@ -9,8 +9,6 @@ from cyclonedds.domain import Domain, DomainParticipant
 from ..errors import LineamentError, one_line
 from .raw_dds import RawTopic
 
-__all__ = ["Participant", "close_entity", "ros_type", "type_hash", "wire_topic", "wire_type"]
-
 #: The highest domain whose ports are below 65536.
 LAST_DOMAIN = 232
 
@@ -36,21 +34,10 @@ _HASHES = {
 
 
 class Participant:
-    """A participant in a DDS domain, for one source and publishers.
+    """A participant in a DDS domain: 0 to 232, by default that of ROS_DOMAIN_ID.
 
-    Parameters
-    ----------
-    domain : int, optional
-        Number of the domain, 0 to 232; by default that of ROS_DOMAIN_ID, or 0.
-    localhost : bool
-        Whether to stay on this computer, over loopback, with or without multicast. Otherwise
-        Cyclone DDS chooses the interface. CYCLONEDDS_URI holds in both cases.
-
-    Raises
-    ------
-    LineamentError
-        If there is no such domain, or if Cyclone DDS cannot start: without a network, with a
-        faulty configuration, or with `localhost` in a domain that this process already uses.
+    With `localhost` it stays on this computer, over loopback, with or without multicast. Otherwise
+    Cyclone DDS chooses the interface. CYCLONEDDS_URI holds in both cases.
     """
 
     def __init__(self, domain: int | None = None, *, localhost: bool = False) -> None:
@@ -103,24 +90,12 @@ def type_hash(kind: str) -> str:
 
 
 def wire_topic(topic: str) -> str:
-    """Name of a topic in DDS.
-
-    Examples
-    --------
-    >>> wire_topic("/scan"), wire_topic("front/scan")
-    ('rt/scan', 'rt/front/scan')
-    """
+    """Name of a topic in DDS: ``rt/front/scan``."""
     return "rt/" + topic.removeprefix("/")
 
 
 def wire_type(kind: str) -> str:
-    """Name of a type in DDS.
-
-    Examples
-    --------
-    >>> wire_type("sensor_msgs/msg/LaserScan")
-    'sensor_msgs::msg::dds_::LaserScan_'
-    """
+    """Name of a type in DDS: ``sensor_msgs::msg::dds_::LaserScan_``."""
     return kind.replace("/msg/", "::msg::dds_::") + "_"
 
 

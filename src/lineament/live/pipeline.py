@@ -11,12 +11,11 @@ from ..methods import get_method
 from ..motion import Tracker, Tracks
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
+from ..rosmsg.poses import Odometry
 from ..scan import LaserScan, Pose, RangeNoise
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
-from .received import Odometry, Time
-
-__all__ = ["Frame", "Pipeline", "check_beams", "twist_of_laser"]
+from .received import Time
 
 NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
@@ -38,13 +37,7 @@ def check_beams(scan: LaserScan) -> None:
 
 
 def time_of(stamp: float) -> Time:
-    """Seconds and nanoseconds of a stamp, clipped to what a message can hold.
-
-    Examples
-    --------
-    >>> time_of(7.25)
-    (7, 250000000)
-    """
+    """Seconds and nanoseconds of a stamp, clipped to what a message can hold."""
     seconds, nanoseconds = divmod(round(min(max(stamp, 0.0), _LAST) * NANO), NANO)
     return seconds, nanoseconds
 
@@ -101,16 +94,7 @@ class Pipeline:
         self._odometry: Odometry | None = None
 
     def __call__(self, publisher: str, scan: LaserScan, time: Time | None = None) -> Frame:
-        """Find the features of a scan.
-
-        Parameters
-        ----------
-        publisher : str
-            Who sent it.
-        scan : LaserScan
-        time : (int, int), optional
-            Its stamp, exactly; by default that of the scan.
-        """
+        """Find the features of a scan of a publisher; `time` is its stamp, exactly."""
         kept = self._publisher(publisher)
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
@@ -130,13 +114,20 @@ class Pipeline:
 
     def _twist(self, kept: _Publisher, scan: LaserScan) -> Twist | None:
         """Twist of the scanner while it takes a scan, in its own frame; None if unknown."""
+        last, odometry = kept.last, self._odometry
         if self._config.deskew == "off":
             return None
         if self._config.deskew == "scans":
             return kept.tracker.twist if kept.tracker else None
         if self._config.deskew == "poses":
-            return _twist_from_poses(kept.last, scan)
-        return _twist_from_odometry(self._odometry, scan, self._config.laser_pose)
+            if last is None or last.pose is None or scan.pose is None:
+                return None
+            seconds = scan.stamp - last.stamp
+            is_near = 0 < seconds < _LONGEST
+            return twist_between(last.pose, scan.pose, seconds) if is_near else None
+        if odometry is None or abs(scan.stamp - odometry.stamp) > _OLDEST:
+            return None
+        return twist_of_laser(odometry.twist, self._config.laser_pose)
 
     def _publisher(self, name: str) -> _Publisher:
         if name not in self._publishers:
@@ -156,42 +147,10 @@ class _Publisher:
         self.last: LaserScan | None = None
 
 
-def _twist_from_odometry(
-    odometry: Odometry | None, scan: LaserScan, laser_pose: Pose
-) -> Twist | None:
-    """Twist of the scanner by the newest odometry; None if that is not of the time of the scan."""
-    if odometry is None or abs(scan.stamp - odometry.stamp) > _OLDEST:
-        return None
-    return twist_of_laser(odometry.twist, laser_pose)
-
-
-def _twist_from_poses(last: LaserScan | None, scan: LaserScan) -> Twist | None:
-    """Mean twist between two successive scans of a log; None if it cannot be known."""
-    if last is None or last.pose is None or scan.pose is None:
-        return None
-    seconds = scan.stamp - last.stamp
-    return twist_between(last.pose, scan.pose, seconds) if 0 < seconds < _LONGEST else None
-
-
 def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:
-    """Twist of a scanner that is mounted on a moving body, in the scanner's frame.
+    """Twist of a scanner in its own frame [m/s, m/s, rad/s], by that of the body that carries it.
 
-    A point at p of a rigid body moves with v + ω × p.
-
-    Parameters
-    ----------
-    twist : (v_x, v_y, omega)
-        Of the body, in its frame [m/s, m/s, rad/s].
-    laser_pose : (x, y, theta)
-        Pose of the scanner in the frame of the body [m, m, rad].
-
-    Examples
-    --------
-    A scanner half a metre in front of the axle, turned to the left, on a turning robot:
-
-    >>> forward, left, turn_rate = twist_of_laser((1.0, 0.0, 2.0), (0.5, 0.0, math.pi / 2))
-    >>> round(forward, 3), round(left, 3), turn_rate
-    (1.0, -1.0, 2.0)
+    A point at p of a rigid body moves with v + ω × p. `laser_pose` is in the frame of the body.
     """
     forward, left, turn_rate = twist
     x, y, theta = laser_pose

@@ -18,8 +18,6 @@ from cyclonedds.qos import Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-__all__ = ["ANY_STATE", "RawReader", "RawTopic", "RawWriter"]
-
 #: Every message, read or not.
 ANY_STATE = ViewState.Any | SampleState.Any | InstanceState.Any
 #: Kind of a serialised message: data, not a key.
@@ -78,13 +76,7 @@ _write = _function("dds_writecdr", _Int, _Entity, _Pointer)
 
 
 class RawTopic(Topic[Any]):
-    """A topic by its name and that of its type, with messages of any bytes.
-
-    Raises
-    ------
-    DDSException
-        If there can be no such topic.
-    """
+    """A topic by its name and that of its type, with messages of any bytes."""
 
     def __init__(self, participant: DomainParticipant, name: str, type_name: str) -> None:
         description = _Description(

@@ -12,16 +12,6 @@ from ..rosmsg.scans import Decoder, decoders
 from ..rosmsg.wire import Buffer, WireReader
 from ..scan import LaserScan
 
-__all__ = [
-    "Inbox",
-    "Odometry",
-    "Received",
-    "Source",
-    "Time",
-    "received_odometry",
-    "received_scan",
-]
-
 #: Seconds and nanoseconds of a stamp, exactly as a message has them.
 Time = tuple[int, int]
 #: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
@@ -80,25 +70,8 @@ class Source(Protocol):
 class Inbox:
     """The newest messages of each publisher, from a transport's threads until they are taken.
 
-    A publisher that sends faster than is taken displaces its own messages, never another's.
-
-    Parameters
-    ----------
-    depth : int
-        Messages of a publisher that may wait.
-
-    Attributes
-    ----------
-    lost : int
-        Scans that were lost on the way, or displaced here.
-
-    Examples
-    --------
-    >>> inbox = Inbox(depth=1)
-    >>> for arrived in (1.0, 2.0):
-    ...     inbox.put(Received("scanner", lambda: None, arrived))
-    >>> [received.arrived for received in inbox.take(timeout=0)], inbox.lost
-    ([2.0], 1)
+    Up to `depth` of a publisher wait. One that sends faster than is taken displaces its own
+    messages, never another's; `lost` counts the scans that were displaced, or lost on the way.
     """
 
     def __init__(self, depth: int) -> None:
@@ -132,32 +105,18 @@ class Inbox:
 def received_scan(
     publisher: str, data: Buffer, encoding: str, kind: str, echo: str = "first"
 ) -> Received:
-    r"""Return what a source gives of a serialised scan that has just arrived.
+    """Return what a source gives of a serialised scan that has just arrived.
 
     Parameters
     ----------
     publisher : str
         Who sent it.
     data : bytes-like
-        The message; `Received.read` decodes it.
+        The message; `Received.read` decodes it, and raises ValueError if it is malformed.
     encoding : {"ros1", "cdr"}
-        How it is serialised.
     kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
-        Its type.
     echo : {"first", "last", "strongest"}
         Which echo of the latter.
-
-    Raises
-    ------
-    ValueError
-        If the type is another one; from `Received.read`: if the message is malformed.
-
-    Examples
-    --------
-    >>> scan = received_scan("scanner", b"\x01\0\0\0\x02\0", "ros1", "sensor_msgs/LaserScan")
-    >>> scan.read()
-    Traceback (most recent call last):
-    ValueError: ends early: 16 bytes expected from byte 0, 6 are left
     """
     read = partial(_decoder(kind, echo), data, encoding)
     return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))

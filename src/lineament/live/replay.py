@@ -10,8 +10,6 @@ from ..logs import open_log
 from ..scan import LaserScan
 from .received import Received
 
-__all__ = ["ReplaySource"]
-
 #: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
 _LEAP, _STEP = 10.0, 0.1
 #: A scan that is returned so soon after it was due is returned alone [s].

@@ -14,8 +14,6 @@ from .config import LiveConfig
 from .received import Inbox, Received, received_odometry, received_scan
 from .sinks import Publisher
 
-__all__ = ["Ros1Node", "Ros1Publisher", "Ros1Source"]
-
 ODOMETRY = "nav_msgs/Odometry"
 #: How long the master may take to answer [s].
 _PATIENCE = 3.0
@@ -29,18 +27,6 @@ class Ros1Node:
     ``ROS_MASTER_URI`` names the master, ``ROS_IP`` or ``ROS_HOSTNAME`` this machine, as for any
     node; ``__name:=`` and other remappings of the command line hold. Signals are left to the
     program.
-
-    Parameters
-    ----------
-    name : str
-        Name of the node.
-
-    Raises
-    ------
-    LineamentError
-        If rospy is not installed, or the master does not answer.
-    ValueError
-        If the name is not valid in ROS 1.
     """
 
     def __init__(self, name: str = "lineament") -> None:
@@ -90,14 +76,7 @@ class Ros1Node:
 
 
 class Ros1Source:
-    """Scans, and odometry where it is wanted, from topics of ROS 1.
-
-    Parameters
-    ----------
-    node : Ros1Node
-    config : LiveConfig
-        Topics, type and echo; and `depth`, the messages of each publisher that may wait.
-    """
+    """Scans, and odometry where it is wanted, from topics of ROS 1."""
 
     def __init__(self, node: Ros1Node, config: LiveConfig) -> None:
         self._node, self._echo = node, config.echo
@@ -130,10 +109,7 @@ class Ros1Source:
         return self._inbox.take(timeout)
 
     def problems(self) -> list[str]:
-        """Return why topics have no publishers: another type, or the master does not answer.
-
-        Publishers that are connected stay so without a master.
-        """
+        """Return why topics have no publishers: another type, or the master does not answer."""
         silent = {
             topic: kind
             for topic, (kind, subscription) in self._subscribed.items()
@@ -170,14 +146,8 @@ class Ros1Source:
 class Ros1Publisher(Publisher):
     """Publishes serialised messages of ROS 1, each under its genuine type.
 
-    A listener that does not keep up loses the oldest messages and delays nobody. The sequence
-    numbers of headers stay as they are in the bytes: rospy's numbering is not for raw messages.
-
-    Parameters
-    ----------
-    node : Ros1Node
-    depth : int
-        Messages that may wait for each listener.
+    A listener that does not keep up loses all but the newest `depth` messages, and delays nobody.
+    The sequence numbers of headers stay as they are: rospy's numbering is not for raw messages.
     """
 
     def __init__(self, node: Ros1Node, depth: int = 10) -> None:

@@ -19,8 +19,6 @@ from .received import Source
 from .replay import ReplaySource
 from .sinks import FoxgloveSink, RosSink, Sink
 
-__all__ = ["run_live"]
-
 #: What kernels are loaded with, so that the first scan need not wait for them.
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
 _WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
-from ..scan import LaserScan
 from .config import LiveConfig
 from .counters import Report
 from .pipeline import Frame
@@ -17,19 +17,11 @@ from .received import Time
 if TYPE_CHECKING:
     from ..output.foxglove import FoxgloveMessages
 
-__all__ = ["FoxgloveSink", "Publisher", "RosSink", "Sink"]
-
 DIAGNOSTICS = "/diagnostics"
 
 
 class Publisher(ABC):
-    """What carries messages: DDS, ROS 1, a WebSocket.
-
-    Attributes
-    ----------
-    unsent : int
-        Messages that could not be sent, as far as the transport reports it.
-    """
+    """What carries messages: DDS, ROS 1, a WebSocket; `unsent` counts those it could not send."""
 
     unsent = 0
 
@@ -37,13 +29,7 @@ class Publisher(ABC):
         self._topics: dict[str, Any] = {}
 
     def advertise(self, topic: str, kind: str) -> None:
-        """Announce a topic, so that others can subscribe before there is a message.
-
-        Raises
-        ------
-        LineamentError
-            If the transport does not have such a topic, or such a type.
-        """
+        """Announce a topic, so that others can subscribe before there is a message."""
         self._topics[topic] = self._open(topic, kind)
 
     def publish(self, message: Message) -> None:
@@ -118,30 +104,26 @@ class RosSink:
 
     def publish(self, frame: Frame) -> None:
         """Publish what was found in a scan; the cloud first, since programs wait for it."""
-        publisher, make, topic = self._publisher, self._make, self._topic
+        make, topic, scan, features = self._make, self._topic, frame.scan, frame.features
         # A log may name no frame, but /tf needs a name.
-        moment = _moment(
-            frame, frame.scan.frame_id or (LASER_FRAME if self._publishes_scan else "")
-        )
-        features = frame.features
-        if publisher.listeners(f"{topic}/features"):
-            publisher.publish(make.cloud(f"{topic}/features", moment, features, frame.tracks))
-        if publisher.listeners(f"{topic}/corners"):
-            publisher.publish(make.corners(f"{topic}/corners", moment, features))
-        if publisher.listeners(f"{topic}/markers"):
-            layers = layers_of(markers_of(features, frame.straight))
-            publisher.publish(make.features(f"{topic}/markers", moment, layers))
+        moment = _moment(frame, scan.frame_id or (LASER_FRAME if self._publishes_scan else ""))
+        messages: dict[str, Callable[[str], Message]] = {
+            f"{topic}/features": lambda to: make.cloud(to, moment, features, frame.tracks),
+            f"{topic}/corners": lambda to: make.corners(to, moment, features),
+            f"{topic}/markers": lambda to: make.features(
+                to, moment, layers_of(markers_of(features, frame.straight))
+            ),
+        }
         if self._publishes_scan:
-            self._publish_scan(moment, frame.scan)
-
-    def _publish_scan(self, moment: Moment, scan: LaserScan) -> None:
-        publisher, make, topic = self._publisher, self._make, self._topic
-        if scan.pose is not None and publisher.listeners("/tf"):
-            publisher.publish(make.transform("/tf", moment, scan.pose))
-        if scan.is_regular and publisher.listeners(topic):
-            publisher.publish(make.scan(topic, moment, scan))
-        elif not scan.is_regular and publisher.listeners(f"{topic}/points"):
-            publisher.publish(make.points(f"{topic}/points", moment, scan))
+            if (pose := scan.pose) is not None:
+                messages["/tf"] = lambda to: make.transform(to, moment, pose)
+            if scan.is_regular:
+                messages[topic] = lambda to: make.scan(to, moment, scan)
+            else:
+                messages[f"{topic}/points"] = lambda to: make.points(to, moment, scan)
+        for name, message in messages.items():
+            if self._publisher.listeners(name):
+                self._publisher.publish(message(name))
 
     def diagnose(self, report: Report, time: Time) -> None:
         """Publish the report on ``/diagnostics``."""

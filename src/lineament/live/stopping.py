@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["stopping"]
-
 
 class _Stop(BaseException):
     """Ends a start; a KeyboardInterrupt that passes through `exec` would end all of Python."""
@@ -20,17 +18,6 @@ def stopping() -> Iterator[Callable[[], bool]]:
     Once it has been called, the signals interrupt nothing. Before, while a node starts, which may
     compile for a minute, the first of them leaves the block at once. Later ones change nothing: a
     launcher may send one beside that of the terminal.
-
-    Examples
-    --------
-    >>> with stopping() as is_stopped:
-    ...     before = is_stopped()
-    ...     signal.raise_signal(signal.SIGTERM)
-    ...     before, is_stopped()
-    (False, True)
-    >>> with stopping() as is_stopped:
-    ...     signal.raise_signal(signal.SIGTERM)
-    ...     print("never printed")
     """
     is_running = has_come = False
 

@@ -85,14 +85,6 @@ def compare_scan(
 
     They are timed on the scans `timed`, or on the scan itself; ``track(methods, about, total)``
     iterates over the methods and shows the progress.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 9, angle_min=-0.04, angle_increment=0.01)
-    >>> comparison = compare_scan(scan, {"liu": ln.Extractor("liu")})
-    >>> len(comparison.features["liu"].segments)
-    1
     """
     scans = list(timed) or [scan]
     features, seconds = {}, {}
@@ -112,25 +104,9 @@ def compare_log(
     keep_going: bool = False,
     track: Track = untracked,
 ) -> Comparison:
-    """Compare methods on a scan of a log, with times over its first 50 scans.
+    """Compare methods, all by default, on a scan of a log, with times over its first 50 scans.
 
-    Parameters
-    ----------
-    path, topic, keep_going
-        As for `open_log`.
-    index : int
-        Index of the scan, from 0.
-    methods : iterable of str
-        Names of methods; none: all.
-    track : callable
-        As for `compare_scan`.
-
-    Raises
-    ------
-    LogError
-        If the log cannot be read or has no such scan.
-    ValueError
-        If there is no such method.
+    Raises LogError if the log cannot be read or has no such scan, ValueError for an unknown method.
     """
     log = open_log(path, topic=topic, keep_going=keep_going)
     extractors = {name: Extractor(name) for name in methods or METHODS}
@@ -139,13 +115,7 @@ def compare_log(
 
 
 def write_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> None:
-    """Write a comparison as a page or a picture, by the ending of the file: see `ENDINGS`.
-
-    Raises
-    ------
-    LineamentError
-        If the ending is not known or the file cannot be written.
-    """
+    """Write a comparison as a page or a picture, by the ending of the file: see `ENDINGS`."""
     if Path(path).suffix.lower() != ".html":
         canvas.save(comparison.figure(), path)
         return

@@ -14,8 +14,6 @@ from ..scan import LaserScan
 from .findings import Progress, Setting
 from .grid import best_parameters
 
-__all__ = ["Extract", "drawn_methods", "every_method", "feature_methods", "region_lines"]
-
 LITERAL, LITERAL_BEST = "liu:paper, paper’s numbers", "liu:paper, best of Figure 9"
 LIU_PAPER, LIU_BEST = "liu, paper’s numbers", "liu, best of Figure 9"
 PDBS_LINES = "pdbs, fitted"
@@ -74,14 +72,7 @@ def _with_lines(extract: Extractor, scan: LaserScan) -> Features:
 
 
 def region_lines(scan: LaserScan, features: Features) -> Features:
-    """Fit one line to each cluster, by orthogonal least squares.
-
-    Examples
-    --------
-    >>> scan = LaserScan([2.0] * 5 + [4.0] * 5, angle_min=0.0, angle_increment=0.01)
-    >>> len(region_lines(scan, Extractor("pdbs")(scan)).segments)
-    2
-    """
+    """Fit one line to each cluster, by orthogonal least squares."""
     lines = []
     ends = np.flatnonzero(scan.valid)[[0, -1]] if scan.valid.any() else None
     for cluster in range(int(features.clusters.max(initial=-1)) + 1):

@@ -83,14 +83,7 @@ class Table:
         return cls(title, (first, *columns), tuple(rows), note)
 
     def __str__(self) -> str:
-        """Write the table as plain text, in columns.
-
-        Examples
-        --------
-        >>> print(Table("Corners", ("method", "F1"), (("liu", 0.91234),)))
-        method     F1
-        liu     0.912
-        """
+        """Write the table as plain text, in columns."""
         lines = [self.columns, *(tuple(map(cell_text, row)) for row in self.rows)]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(
@@ -174,13 +167,7 @@ def each(items: Mapping[str, T], progress: Progress, what: str) -> Iterator[tupl
 
 
 def cell_text(cell: object) -> str:
-    """Write a cell of a table: fractions with three digits.
-
-    Examples
-    --------
-    >>> cell_text(0.0123456), cell_text(1234.5), cell_text(12), cell_text(None)
-    ('0.0123', '1234', '12', '–')
-    """
+    """Write a cell of a table: fractions with three digits."""
     value = plain(cell)
     if not isinstance(value, float):
         return "–" if value is None else str(value)
@@ -192,19 +179,7 @@ def cell_text(cell: object) -> str:
 def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -> bytes:
     """Draw numbers as dots, as PNG: rows are methods, colours are sensors or logs.
 
-    Parameters
-    ----------
-    numbers : mapping
-        By sensor or log, then by method, then by name; only finite ones are drawn.
-    panels : mapping of str to (str, float)
-        Label of each panel's axis to the name of its number, and a factor.
-    log_axes : iterable of str
-        Labels of the logarithmic axes.
-
-    Examples
-    --------
-    >>> dot_chart({"lms181": {"iepf": {"f1": 0.9}, "pdbs": {}}}, {"F1": ("f1", 1)})[1:4]
-    b'PNG'
+    Only finite ones are drawn; `log_axes` are the labels of the logarithmic axes.
     """
     rows = list(next(iter(numbers.values())))[::-1]
     figure = canvas.new_figure(1.8 + 3.4 * len(panels), 1.1 + 0.32 * len(rows))

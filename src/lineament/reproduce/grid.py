@@ -83,23 +83,12 @@ def repetition_grid(setting: Setting, progress: Progress) -> Grid:
 
 @lru_cache(maxsize=1024)
 def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
-    """Measure AR of the literal pipeline with some parameters, over some scenes.
+    """Measure AR of the literal pipeline with some parameters, over some scenes, by `CRITERIA`.
 
     Each scene is seen once and then again after turns by parts of a beam, with fresh noise. AR is
     that of Awrangjeb and Lu, *Robust image corner detection based on the chord-to-point distance
     accumulation technique*, IEEE Transactions on Multimedia 2008. It is the mean over the views: a
     view without corners counts as 0, so that a single right corner in each view earns little.
-
-    Returns
-    -------
-    dict of str to float
-        AR by the names of `CRITERIA`, corners per view, and precision, recall and F1 after turns.
-
-    Examples
-    --------
-    >>> found = repetition(Parameters("relative", 6, 0.25), range(1))
-    >>> found["of_actual"] <= 1.0 and found["among_found"] <= 1.0
-    True
     """
     views = _views(numbers)
     found = batch_of(parameters.extractor("liu:paper"), [scan for scan, _, _ in views])

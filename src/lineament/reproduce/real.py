@@ -19,7 +19,6 @@ from ..evaluation.repeatability import (
 )
 from ..evaluation.standing import StandingScores, standing_scores
 from ..extractor import Extractor
-from ..features import Features
 from ..logs import find_logs
 from ..scan import LaserScan
 from .arena import ARENAS, arena_figure, arena_scores, load_arena
@@ -248,12 +247,14 @@ def _repeats(
 ) -> tuple[RankedRepeats, dict[str, float]]:
     """Return the ranked corners of all pairs both ways, and their numbers."""
     found = [(a, extract(a), b, extract(b)) for a, b in pairs]
-    every = _both_ways(found)
-    alone = _both_ways([(a, _vertices(fa), b, _vertices(fb)) for a, fa, b, fb in found])
-    again = Repeatability.total(
-        part
-        for a, fa, b, fb in found
-        for part in (repeatability(a, fa, b, fb), repeatability(b, fb, a, fa))
+    views = [view for a, fa, b, fb in found for view in ((a, fa, b, fb), (b, fb, a, fa))]
+    again = Repeatability.total(repeatability(*view) for view in views)
+    every, alone = (
+        RankedRepeats.total(
+            ranked_repeats(a, of(fa), b, of(fb), of(fb).corners["quality"])
+            for a, fa, b, fb in views
+        )
+        for of in (replace, lambda features: replace(features, corners=vertices(features)))
     )
     return every, {
         "expected": len(every.scores),
@@ -272,20 +273,6 @@ def _repeats(
         "segment_rate": again.segments.rate,
         "segment_rmse": again.segments.rmse,
     }
-
-
-def _vertices(features: Features) -> Features:
-    return replace(features, corners=vertices(features))
-
-
-def _both_ways(
-    pairs: Sequence[tuple[LaserScan, Features, LaserScan, Features]],
-) -> RankedRepeats:
-    parts = []
-    for a, found, b, others in pairs:
-        parts.append(ranked_repeats(a, found, b, others, others.corners["quality"]))
-        parts.append(ranked_repeats(b, others, a, found, found.corners["quality"]))
-    return RankedRepeats.total(parts)
 
 
 def _quality_table(ranked: Mapping[str, RankedRepeats]) -> list[Table]:

@@ -55,26 +55,13 @@ class Frame(NamedTuple):
 
 
 def scene_numbers(count: int, seed: int, *, reported: bool = True) -> range:
-    """Return the seeds of the scenes that are reported, or that parameters are chosen on.
-
-    Examples
-    --------
-    >>> scene_numbers(3, 0), scene_numbers(3, 0, reported=False)
-    (range(10000, 10003), range(0, 3))
-    """
+    """Return the seeds of the scenes that are reported, or that parameters are chosen on."""
     first = _SCENES * seed + (_SCENES // 2 if reported else 0)
     return range(first, first + count)
 
 
 def simulated_frames(sensor: Sensor, kinds: Iterable[str], numbers: range) -> Iterator[Frame]:
-    """Simulate a frame for each seed, with the kinds of `lineament.simulation.SCENES` in turn.
-
-    Examples
-    --------
-    >>> from lineament.simulation import SCENES, SENSORS
-    >>> [len(frame.scan) for frame in simulated_frames(SENSORS["ld19"], SCENES, range(2))]
-    [455, 455]
-    """
+    """Simulate a frame for each seed, with these kinds of scenes in turn."""
     in_turn = list(kinds)
     for i, number in enumerate(numbers):
         world, pose = scene(in_turn[i % len(in_turn)], number)
@@ -89,14 +76,7 @@ def batch_of(extractor: Extractor, scans: Iterable[LaserScan]) -> list[Features]
 
 
 def frame_times(extractor: Extractor, scans: Iterable[LaserScan]) -> Array:
-    """Measure the time that each scan takes in the kernels [s], shape (m,).
-
-    Examples
-    --------
-    >>> scan = LaserScan([2.0] * 9, angle_min=0.0, angle_increment=0.01)
-    >>> frame_times(Extractor("pdbs"), [scan, scan]).shape
-    (2,)
-    """
+    """Measure the time that each scan takes in the kernels [s], shape (m,)."""
     medians = []
     for scan in scans:
         copies = np.tile(scan.ranges, (_COPIES, 1))

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -59,13 +59,6 @@ _PANELS = {
 }
 
 
-class Recording(NamedTuple):
-    """Successive scans, and the known pose of each."""
-
-    scans: list[LaserScan]
-    poses: list[Pose]
-
-
 def run(setting: Setting, progress: Progress) -> Findings:
     """Follow the features of all logs."""
     title = "Tracking and motion in real logs"
@@ -75,8 +68,8 @@ def run(setting: Setting, progress: Progress) -> Findings:
     motions, tracks = {}, {}
     for log, path in paths.items():
         progress(f"{log}: reading")
-        recording = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
-        motions[log], tracks[log] = measure(log, recording, setting.seed, progress)
+        scans = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
+        motions[log], tracks[log] = measure(log, scans, setting.seed, progress)
     return Findings(
         title,
         _TEXT,
@@ -129,23 +122,15 @@ def _cells(numbers: Mapping[str, float], columns: Columns) -> dict[str, object]:
     return {label: factor * numbers[key] for label, (key, factor) in columns.items()}
 
 
-def load_recording(path: Path, count: int, skipped: float = 0.0) -> Recording:
+def load_recording(path: Path, count: int, skipped: float = 0.0) -> list[LaserScan]:
     """Load so many successive scans of an archive, after a share that is left out."""
     scans = archived_scans(path)
     first = int(skipped * len(scans))
-    chosen = scans[first : first + count]
-    return Recording(chosen, [scan.pose for scan in chosen if scan.pose is not None])
+    return scans[first : first + count]
 
 
 def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
-    """Make a synthetic odometry: the known poses, with errors that accumulate.
-
-    Examples
-    --------
-    >>> way = stand_in_odometry([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], seed=1)
-    >>> way[0], round(way[1][0])
-    ((0.0, 0.0, 0.0), 1)
-    """
+    """Make a synthetic odometry: the known poses, with errors that accumulate."""
     rng = np.random.default_rng(seed)
     way = [poses[0]]
     for pose, following in pairwise(poses):
@@ -158,14 +143,14 @@ def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
 
 
 def measure(
-    name: str, recording: Recording, seed: int, progress: Progress
+    name: str, scans: Sequence[LaserScan], seed: int, progress: Progress
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, dict[str, float]]]]:
     """Follow the features of a log, with an odometry and without, and run ICP on it.
 
     Returns the numbers of relative pose errors by what the motion is from, and those of tracks by
     tracker and kind of feature.
     """
-    scans, poses = recording
+    poses = [scan.pose for scan in scans if scan.pose is not None]
     extract = Extractor(DEFAULT_METHOD)
     frames = [extract(scan) for scan in scans]
     odometry = stand_in_odometry(poses, seed)

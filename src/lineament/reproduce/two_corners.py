@@ -89,11 +89,6 @@ def distance_bound(pose: Pose) -> float:
     """Return the bound of the deviation of the distance from A to B, from one place [m].
 
     It is uᵀ (Σ_A + Σ_B) u with the bounds Σ of the corners and the direction u between them.
-
-    Examples
-    --------
-    >>> round(distance_bound(POSES[0]), 4)
-    0.0042
     """
     corners = truth(WORLD, pose, SENSORS["paper"]).transform(*pose).corners
     along = (B - A) / DISTANCE

@@ -1,7 +1,5 @@
 """A log in the browser: a local server, its JSON answers, and the page that asks for them."""
 
-from __future__ import annotations
-
 from .server import ViewServer, serve
 from .session import Session
 

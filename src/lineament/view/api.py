@@ -5,8 +5,6 @@ from urllib.parse import parse_qsl
 
 from .session import Session
 
-__all__ = ["RequestError", "answer"]
-
 #: Most stamps in one answer.
 MOST_STAMPS = 4096
 #: No whole number in a request has more digits.
@@ -21,15 +19,7 @@ _ROUTES = {
 
 
 class RequestError(Exception):
-    """A request without an answer.
-
-    Parameters
-    ----------
-    status : int
-        HTTP status: 400 for a request that makes no sense, 404 for what is not there.
-    problem : str
-        One line on what is wrong, and what was expected.
-    """
+    """A request without an answer: 400 or 404, and one line on what was expected."""
 
     def __init__(self, status: int, problem: str) -> None:
         super().__init__(problem)
@@ -37,23 +27,12 @@ class RequestError(Exception):
 
 
 def answer(session: Session, target: str) -> bytes:
-    """Answer a request for ``/api/...``: the log, a scan and its features, stamps, or a trace.
+    """Answer a request for ``/api/...``; RequestError if it makes no sense or nothing is there.
 
     - ``/api/log``: what the log is, and how much of it has been read.
     - ``/api/stamps?first=&count=``: stamps of some scans.
     - ``/api/scan?i=&method=``: a scan and what a method finds in it.
     - ``/api/trace?i=&method=&beam=``: what became of a beam.
-
-    Parameters
-    ----------
-    session : Session
-    target : str
-        Path and query.
-
-    Raises
-    ------
-    RequestError
-        If there is no such thing, or a parameter is missing, unknown or makes no sense.
     """
     path, query = _split(target)
     if path not in _ROUTES:

@@ -18,8 +18,6 @@ from ..errors import LineamentError
 from .api import RequestError, answer
 from .session import Session
 
-__all__ = ["ViewServer", "serve"]
-
 #: The files of the page, by their endings.
 _TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -85,7 +83,7 @@ class ViewServer(ThreadingHTTPServer):
     @property
     def address(self) -> str:
         """The page's address; by loopback where the server listens everywhere."""
-        host = "localhost" if _is_wildcard(self.host) else self.host
+        host = "localhost" if self._is_everywhere else self.host
         return f"http://{f'[{host}]' if ':' in host else host}:{self.server_port}/"
 
     def is_known_host(self, header: str | None) -> bool:
@@ -97,7 +95,12 @@ class ViewServer(ThreadingHTTPServer):
         if name in _LOOPBACK or name == self.host.lower():
             return True
         # Where it listens everywhere it has many addresses; none is a name that could be rebound.
-        return _is_wildcard(self.host) and _is_address(name)
+        return self._is_everywhere and _address(name) is not None
+
+    @property
+    def _is_everywhere(self) -> bool:
+        address = _address(self.host)
+        return self.host == "" or (address is not None and address.is_unspecified)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore it: the other side has gone."""
@@ -177,7 +180,8 @@ def serve(
         If the server cannot listen there.
     """
     with session, ViewServer(session, host, port) as server:
-        if not _is_loopback(host):
+        address = _address(host)
+        if host != "localhost" and not (address and address.is_loopback):
             warning = f"{host} is not loopback: anybody who can reach it can look at this log"
             print(f"lineament: {warning}", file=sys.stderr, flush=True)
         write(f"{session.name}: look at {server.address} (Ctrl-C ends it)")
@@ -188,17 +192,8 @@ def serve(
         server.serve_forever()
 
 
-def _is_address(name: str) -> bool:
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        ipaddress.ip_address(name)
+        return ipaddress.ip_address(name)
     except ValueError:
-        return False
-    return True
-
-
-def _is_loopback(host: str) -> bool:
-    return host == "localhost" or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
-
-
-def _is_wildcard(host: str) -> bool:
-    return host == "" or (_is_address(host) and ipaddress.ip_address(host).is_unspecified)
+        return None

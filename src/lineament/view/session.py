@@ -19,8 +19,6 @@ from ..logs import open_log
 from ..scan import LaserScan
 from .store import ScanStore
 
-__all__ = ["Session"]
-
 
 class Session:
     """A log that is looked at, with one extractor for each method.
@@ -85,13 +83,7 @@ class Session:
         return {"first": first, "stamps": _plain(self._store.stamps(first, count))}
 
     def scan(self, index: int, method: str) -> dict[str, Any]:
-        """Return a scan and the features that a method finds in it, for JSON.
-
-        Raises
-        ------
-        IndexError
-            If the scan was not read yet, or there is none.
-        """
+        """Return a scan and what a method finds in it; IndexError if it was not read."""
         topic, scan = self._store.item(index)
         with self._busy[method]:
             features = self.extractors[method](scan).to_dict()
@@ -99,15 +91,7 @@ class Session:
         return {name: _plain(value) for name, value in (asked | _beams(scan) | features).items()}
 
     def trace(self, index: int, method: str, beam: int) -> dict[str, Any]:
-        """Return what became of a beam, for JSON.
-
-        Raises
-        ------
-        IndexError
-            If there is no such scan.
-        ValueError
-            If there is no such beam.
-        """
+        """Return what became of a beam; ValueError if it is not there, IndexError for the scan."""
         _, scan = self._store.item(index)
         with self._busy[method]:
             trace = self.extractors[method].trace(scan)

@@ -13,8 +13,6 @@ import numpy as np
 
 from ..scan import LaserScan
 
-__all__ = ["ScanStore"]
-
 #: A scan with its topic.
 Item = tuple[str, LaserScan]
 
@@ -29,22 +27,6 @@ class ScanStore:
     `fill` takes the items of a log, once. They go to a temporary file without a name, at most
     `capacity` bytes of it; 16 bytes a scan stay in memory. Scans for which there is no room are
     read from the log again, which is quick forwards, and from the start of the log otherwise.
-
-    Parameters
-    ----------
-    read_again : callable
-        Returns the same items again, from the start.
-    capacity : int
-        Most bytes of scans that are kept.
-
-    Examples
-    --------
-    >>> items = [("scan", LaserScan([1.0 + k], 0.0, 0.1, stamp=k)) for k in range(3)]
-    >>> with ScanStore(lambda: items) as store:
-    ...     store.fill(items)
-    ...     topic, scan = store.item(2)
-    ...     len(store), topic, scan.ranges.tolist(), store.stamps(1, 9)
-    (3, 'scan', [3.0], [1.0, 2.0])
     """
 
     def __init__(
@@ -79,13 +61,7 @@ class ScanStore:
                 self._starts.append(self._write(record))
 
     def item(self, index: int) -> Item:
-        """Return the topic of a scan that was read, and the scan without its intensities.
-
-        Raises
-        ------
-        IndexError
-            If it was not read yet, or there is none.
-        """
+        """Return the topic of a scan and the scan; IndexError if it was not read."""
         with self._lock:
             if self._closed or not 0 <= index < len(self):
                 raise IndexError(f"scan {index} is not there")

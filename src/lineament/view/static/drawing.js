@@ -1,5 +1,7 @@
 // A scan and its features on a canvas.
 
+import { trace } from "./plane.js";
+
 // Colours of clusters, those of the figures: easy to tell apart, also with colour blindness.
 export const PALETTE = [
   "#4477aa", "#ee9933", "#228833", "#cc6699", "#33a9c9",
@@ -77,7 +79,8 @@ export class Drawing {
       const cluster = scan.clusters[i];
       if (cluster < 0) return this.#cross(point, half + 0.8);
       this.ctx.fillStyle = shown.clusters ? PALETTE[cluster % PALETTE.length] : this.theme.soft;
-      this.#disc(point, half);
+      this.#round(point, half);
+      this.ctx.fill();
     });
     this.#sensor();
   }
@@ -175,7 +178,7 @@ export class Drawing {
       lower.unshift([x + half * s, y - half * c]);
     }
     this.ctx.fillStyle = this.theme.accent;
-    this.#trace([...upper, ...lower].map((p) => this.at(p)));
+    trace(this.ctx, [...upper, ...lower].map((p) => this.at(p)));
     this.ctx.fill();
   }
 
@@ -229,27 +232,26 @@ export class Drawing {
     ctx.fillStyle = theme.page;
     ctx.strokeStyle = theme.break;
     ctx.lineWidth = 1.2;
-    this.#disc(position, 3.4);
-    this.#ring(position, 3.4);
+    this.#round(position, 3.4);
+    ctx.fill();
+    ctx.stroke();
   }
 
   // A triangle at the origin that looks along the x axis.
   #sensor() {
     const [u, v] = this.at([0, 0]);
     this.ctx.fillStyle = this.theme.ink;
-    this.#trace([[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]]);
+    trace(this.ctx, [[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]]);
     this.ctx.fill();
   }
 
-  #disc(point, radius) {
+  #round(point, radius) {
     this.ctx.beginPath();
     this.ctx.arc(...this.at(point), radius, 0, 7);
-    this.ctx.fill();
   }
 
   #ring(point, radius) {
-    this.ctx.beginPath();
-    this.ctx.arc(...this.at(point), radius, 0, 7);
+    this.#round(point, radius);
     this.ctx.stroke();
   }
 
@@ -266,12 +268,7 @@ export class Drawing {
   }
 
   #path(pixels) {
-    this.#trace(pixels);
+    trace(this.ctx, pixels);
     this.ctx.stroke();
-  }
-
-  #trace(pixels) {
-    this.ctx.beginPath();
-    pixels.forEach(([u, v], k) => (k ? this.ctx.lineTo(u, v) : this.ctx.moveTo(u, v)));
   }
 }

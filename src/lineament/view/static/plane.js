@@ -53,16 +53,21 @@ export function roundLength(scale, pixels) {
 
 export function drawGrid(ctx, plane, size, theme) {
   const step = roundLength(plane.scale, 56);
+  const line = (isAxis, ...ends) => {
+    ctx.strokeStyle = isAxis ? theme.axis : theme.grid;
+    trace(ctx, ends);
+    ctx.stroke();
+  };
   const [left, top] = plane.toMetres([0, 0], size);
   const [right, bottom] = plane.toMetres([size.width, size.height], size);
   ctx.lineWidth = 1;
   for (let k = Math.ceil(left / step); k * step <= right; k++) {
     const u = Math.round(plane.toPixels([k * step, 0], size)[0]) + 0.5;
-    line(ctx, k ? theme.grid : theme.axis, u, 0, u, size.height);
+    line(k === 0, [u, 0], [u, size.height]);
   }
   for (let k = Math.ceil(bottom / step); k * step <= top; k++) {
     const v = Math.round(plane.toPixels([0, k * step], size)[1]) + 0.5;
-    line(ctx, k ? theme.grid : theme.axis, 0, v, size.width, v);
+    line(k === 0, [0, v], [size.width, v]);
   }
 }
 
@@ -71,11 +76,7 @@ export function drawScaleBar(ctx, plane, size, theme) {
   const u = 14.5, v = size.height - 14.5, w = length * plane.scale;
   ctx.lineWidth = 1.5;
   ctx.strokeStyle = ctx.fillStyle = theme.ink;
-  ctx.beginPath();
-  ctx.moveTo(u, v - 5);
-  ctx.lineTo(u, v);
-  ctx.lineTo(u + w, v);
-  ctx.lineTo(u + w, v - 5);
+  trace(ctx, [[u, v - 5], [u, v], [u + w, v], [u + w, v - 5]]);
   ctx.stroke();
   ctx.font = "12px system-ui, sans-serif";
   ctx.textAlign = "left";
@@ -87,10 +88,8 @@ function metresText(metres) {
   return metres >= 0.01 ? `${Math.round(metres * 100)} cm` : `${+(metres * 1000).toPrecision(1)} mm`;
 }
 
-function line(ctx, color, u1, v1, u2, v2) {
-  ctx.strokeStyle = color;
+/** Begin a path through pixels. */
+export function trace(ctx, pixels) {
   ctx.beginPath();
-  ctx.moveTo(u1, v1);
-  ctx.lineTo(u2, v2);
-  ctx.stroke();
+  pixels.forEach(([u, v], k) => (k ? ctx.lineTo(u, v) : ctx.moveTo(u, v)));
 }
