@@ -1,7 +1,5 @@
 """Small logs for the tests of bulk extraction, and a method that its worker does not survive."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

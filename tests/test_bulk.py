@@ -1,7 +1,5 @@
 """Many logs into one data set: what is in it, what is reported, and what is left as it is."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

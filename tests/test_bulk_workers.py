@@ -1,7 +1,5 @@
 """Threads, processes and Dask: the same table, and what happens when one of them dies."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """What became of a beam: cases made by hand, and no beam of any scan without an answer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from worlds import degenerate_scans, random_scan

@@ -1,7 +1,5 @@
 """One log into one file: topics, options of reading, what is told."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 

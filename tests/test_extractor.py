@@ -1,7 +1,5 @@
 """Extractor: one scan or many, any order, any threads; invariances; hostile scans."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Marks of features: as the plain ways of numpy have them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writers: whole files or none, tables that read back the same, recordings of rerun, pages."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

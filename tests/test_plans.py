@@ -1,7 +1,5 @@
 """Plans: walls that are one, worked by hand; and what SVG and DXF draw of a scan and of a log."""
 
-from __future__ import annotations
-
 import math
 import re
 import xml.etree.ElementTree as ET

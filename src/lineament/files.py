@@ -1,7 +1,5 @@
 """Whole files or none: write beside the target, then rename."""
 
-from __future__ import annotations
-
 import os
 import secrets
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """The commands. Each imports what it calls when it runs: ``--help`` stays quick."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

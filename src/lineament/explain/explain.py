@@ -1,7 +1,5 @@
 """Why a beam is part of a feature, or of no feature: a trace in words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

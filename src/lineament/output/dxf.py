@@ -1,7 +1,5 @@
 """DXF: a plan for CAD, in metres, with the layers WALLS, CORNERS, EDGES, ARCS, ELLIPSES."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,8 +6,6 @@ same weight). Along it a wall counts in how many views each 5 cm were seen: wher
 seldom it is not drawn, so a door that was shut once does not close its doorway.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

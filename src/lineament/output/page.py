@@ -1,7 +1,5 @@
 """One self-contained page of figures and facts, to be opened from a folder or sent by mail."""
 
-from __future__ import annotations
-
 import base64
 import os
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """What plans share: one scan as it was seen, or all scans of a log in one floor plan."""
 
-from __future__ import annotations
-
 import math
 import os
 from abc import abstractmethod

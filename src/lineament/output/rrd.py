@@ -1,7 +1,5 @@
 """Rerun recordings: the scans and what is found in them, where they were taken, over time."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

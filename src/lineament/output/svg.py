@@ -1,7 +1,5 @@
 """SVG: a plan to scale on a sheet of A3, with its layers as groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from html import escape

@@ -1,7 +1,5 @@
 """Tables in files, a row a feature: Parquet and CSV; and JSON lines, a line a scan."""
 
-from __future__ import annotations
-
 import json
 import math
 from contextlib import ExitStack

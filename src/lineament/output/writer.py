@@ -1,7 +1,5 @@
 """What all writers of features share: a whole file or none, and memory that does not grow."""
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A demonstration: a simulated drive, or a log, into a table and a page."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

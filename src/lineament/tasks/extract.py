@@ -1,7 +1,5 @@
 """A whole log to a table of features: what `lineament extract` does."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import dataclass, field

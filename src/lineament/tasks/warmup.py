@@ -1,7 +1,5 @@
 """Compile and cache the kernels before they are needed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The manifest of a data set: the name of each log and what became of it, one line of JSON each."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections import Counter

@@ -1,7 +1,5 @@
 """What a worker does: one log into its part of a data set."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator

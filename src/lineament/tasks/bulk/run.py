@@ -1,7 +1,5 @@
 """Many logs over an executor."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os
