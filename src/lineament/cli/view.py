@@ -7,8 +7,6 @@ import click
 
 from .options import LOG, NOISE, SET, make_extractor, reading
 
-__all__ = ["view"]
-
 
 @click.command()
 @LOG

@@ -8,8 +8,6 @@ import numpy as np
 from ..methods.trace import Trace
 from .measurements import Line, Measurements, along_beam, spans, why_invalid
 
-__all__ = ["Explanation", "explain"]
-
 #: Fewer measurements than this are no line in any of the methods.
 _FEW = 4
 #: The method that finds clusters alone.

@@ -9,8 +9,6 @@ from ezdxf.filemanagement import new
 
 from .plans import Plan, PlanWriter
 
-__all__ = ["DxfWriter"]
-
 #: Layers and their colours, as numbers of AutoCAD: black or white, red, light red, magenta, grey.
 LAYERS = {"WALLS": 7, "CORNERS": 1, "EDGES": 11, "ARCS": 6, "ELLIPSES": 8}
 #: Name under which each wall has the number of views in which it was seen.

@@ -14,8 +14,6 @@ from .markers import markers_of
 from .scene import layers_of
 from .writer import Found, Writer
 
-__all__ = ["RerunWriter"]
-
 # Rerun's log, which the import sets up, would report a full disk in several lines.
 _LOGGED = os.environ.get("RUST_LOG")
 os.environ.setdefault("RUST_LOG", "off")

@@ -11,8 +11,6 @@ from ..scan import Array
 from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
 from .plans import Plan, PlanWriter
 
-__all__ = ["SvgWriter"]
-
 #: The plan and the room below it for scale and caption, and the margin, of a sheet of A3 [mm].
 WIDTH, HEIGHT, FOOT, MARGIN = 400.0, 260.0, 17.0, 10.0
 #: Widths of lines and radius of a corner on paper [mm].

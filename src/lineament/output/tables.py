@@ -14,8 +14,6 @@ import pyarrow.parquet as pq
 from ..features.tables import SCHEMA, features_table
 from .writer import Found, Writer
 
-__all__ = ["TOPIC", "CsvWriter", "JsonLinesWriter", "ParquetWriter"]
-
 #: The column that a table has besides those of `SCHEMA` where its scans come from several topics.
 TOPIC = pa.field(
     "topic",

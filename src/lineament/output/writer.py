@@ -12,8 +12,6 @@ from ..features import Features
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan
 
-__all__ = ["Found", "Writer"]
-
 
 class Found(NamedTuple):
     """What was found in one scan, the scan, and the topic of its log.

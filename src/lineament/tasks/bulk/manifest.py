@@ -22,31 +22,10 @@ MANIFEST = "_manifest.jsonl"
 class Row:
     """What became of one log.
 
-    Attributes
-    ----------
-    log : str
-        Full path, or address.
-    name : str
-        Name in the data set: the value of the column ``log``.
-    outcome : str
-        ``pending`` (not reached, or interrupted), ``done`` or ``failed``.
-    error : str
-        Why it failed.
-    output : str
-        Its file, relative to the folder of the data set, of size `bytes`.
-    topics, scans, features, invalid, skipped, faults, seconds
-        As in `Extraction`.
-    log_bytes : int or None
-        Size of the log; None if unknown.
-    log_state : str
-        Time of the last change of the log, or what its store reports.
-    version, configuration
-        Version of lineament; method, parameters, noise, and how the log is read.
-
-    Examples
-    --------
-    >>> Row(log="/data/a.bag", name="a.bag").outcome
-    'pending'
+    The log is a full path or an address; the name, that in the column ``log``. The outcome is
+    ``pending`` (not reached, or interrupted), ``done`` or ``failed``, with the error. The output is
+    relative to the data set, of size `bytes`. `log_bytes` is None if unknown, `log_state` the time
+    of the last change, or what the store reports. The rest is as in `Extraction`.
     """
 
     log: str
@@ -90,26 +69,8 @@ def _row_of(line: bytes) -> Row | None:
 class Manifest:
     """The rows of a data set, by log.
 
-    Parameters
-    ----------
-    folder : path-like
-        The data set. An existing manifest is read: of several rows of a log the last counts, and
-        torn lines are skipped.
-
-    Raises
-    ------
-    LogError
-        If it cannot be read.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> folder = Path(tempfile.mkdtemp())
-    >>> manifest = Manifest(folder)
-    >>> with manifest.recording() as record:
-    ...     record(Row(log="/data/a.bag", name="a.bag", outcome="done", scans=7))
-    >>> Manifest(folder).rows["/data/a.bag"].scans
-    7
+    An existing manifest is read: of several rows of a log the last counts, and torn lines are
+    skipped. A LogError if it cannot be read.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -125,12 +86,7 @@ class Manifest:
         """Yield a function that appends a row and flushes it to disk.
 
         Before and after, also after an exception, the file is rewritten with one row a log, sorted
-        by name.
-
-        Raises
-        ------
-        LineamentError
-            If it cannot be written.
+        by name. A LineamentError if it cannot be written.
         """
         self._save()
         try:
@@ -155,38 +111,19 @@ class Manifest:
 
 
 def full_path(log: str) -> str:
-    """Return the path or address under which every process finds a log.
-
-    Examples
-    --------
-    >>> full_path("s3://robots/a.bag")
-    's3://robots/a.bag'
-    """
+    """Return the path or address under which every process finds a log."""
     return log if is_address(log) else os.path.abspath(log)  # noqa: PTH100 (keeps links)
 
 
 def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
-    """Name logs: as before, else by the shortest end of the path that is unique.
+    """Name logs (full paths or addresses): as known, else by the shortest end that is unique.
 
-    Parameters
-    ----------
-    logs : iterable of str
-        Full paths or addresses.
-    known : mapping of str to str
-        Names that logs have already; no other log gets them.
-
-    Returns
-    -------
-    dict of str to str
-        The name of each log. No two differ in case alone.
+    No two names differ in case alone, and no log gets the known name of another one.
 
     Examples
     --------
-    >>> names = names_of(["/mon/a.bag", "/tue/a.bag", "/tue/b.bag"], {})
-    >>> list(names.values())
+    >>> list(names_of(["/mon/a.bag", "/tue/a.bag", "/tue/b.bag"], {}).values())
     ['mon/a.bag', 'tue/a.bag', 'b.bag']
-    >>> names_of(["/wed/b.bag"], names | {"/tue/b.bag": "b.bag"})
-    {'/wed/b.bag': 'wed/b.bag'}
     """
     logs = list(dict.fromkeys(logs))
     names = {log: known[log] for log in logs if log in known}
@@ -222,11 +159,5 @@ def _numbered(name: str, taken: set[str]) -> str:
 
 
 def part_path(name: str, ending: str) -> str:
-    """Return where the file of a log is in a data set, partitioned as Hive does.
-
-    Examples
-    --------
-    >>> part_path("mon/a.bag", ".parquet")
-    'log=mon%2Fa.bag/part-0.parquet'
-    """
+    """Return where the file of a log is in a data set, partitioned as Hive does."""
     return f"log={quote(name, safe=' ', errors='surrogateescape')}/part-0{ending}"

@@ -32,14 +32,8 @@ _PERIOD = 0.5
 class Bulk:
     """Result of a run over many logs.
 
-    Attributes
-    ----------
-    folder, manifest : str
-        The data set and its manifest.
-    logs, whole, failed : int
-        Logs asked for; those that were complete before and skipped; those that failed.
-    scans, features, seconds
-        As in `Extraction`, over the logs of this run.
+    The data set and its manifest; logs asked for, those that were complete before and skipped,
+    those that failed; and as in `Extraction`, over the logs of this run.
     """
 
     folder: str
