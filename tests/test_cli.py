@@ -212,16 +212,12 @@ def test_info_prints_what_a_person_wants_to_know(npz, capsys):
         assert words in said
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
-def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, ending):
-    one, two, trace = (tmp_path / f"{name}.{ending}" for name in ("one", "two", "trace"))
+def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
+    one, two, trace = (tmp_path / f"{name}.png" for name in ("one", "two", "trace"))
     base = ["plot", str(npz), "--scan", "3"]
     assert run([*base, "-o", str(one)]) == 0
     assert run([*base, "-o", str(two), "-m", "liu", "-m", "liu:paper"]) == 0
     assert run([*base, "-o", str(trace), "--trace"]) == 0
-    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
-    for path in (one, two, trace):
-        assert path.read_bytes().startswith(starts[ending])
     assert len({path.read_bytes() for path in (one, two, trace)}) == 3
 
 
@@ -359,6 +355,8 @@ def test_several_logs_go_into_a_folder(two_logs, tmp_path, capsys):
     assert "2 done" in capsys.readouterr().out
     assert run([*arguments, "--resume"]) == 0
     assert "0 done, 0 failed, 2 whole before" in capsys.readouterr().out
+    assert run([*arguments, "--format", "jsonl"]) == 0
+    assert len(list(out.rglob("part-0.jsonl"))) == 2
 
 
 def test_logs_that_fail_are_counted_in_one_line(two_logs, tmp_path, capfd):
@@ -369,13 +367,6 @@ def test_logs_that_fail_are_counted_in_one_line(two_logs, tmp_path, capfd):
     assert output == ""
     assert errors == f"lineament: 2 of 3 logs failed, see {out}/_manifest.jsonl\n"
     assert (out / "log=a.npz" / "part-0.parquet").exists()
-
-
-def test_a_folder_of_other_files_than_tables(two_logs, tmp_path):
-    arguments = ["extract", two_logs[0], "-q", "-o", f"{tmp_path}/out/", "--threads", "1"]
-    assert run([*arguments, "--format", "jsonl"]) == 0
-    assert [path.name for path in (tmp_path / "out").rglob("part*")] == ["part-0.jsonl"]
-    assert run([*arguments, "--format", "xls"]) == 1
 
 
 @click.command()

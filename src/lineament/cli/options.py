@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
+F = TypeVar("F", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 
@@ -72,12 +73,15 @@ def wrong_usage() -> Iterator[None]:
 
 
 METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
-METHODS = click.option(
-    "-m",
-    "--method",
-    "methods",
-    multiple=True,
-    help="Name of the method; may be given again, side by side.  [default: optimal]",
+
+
+def methods_option(about: str) -> Callable[[F], F]:
+    """Make the option of methods, which may be given again."""
+    return click.option("-m", "--method", "methods", multiple=True, help=about)
+
+
+METHODS = methods_option(
+    "Name of the method; may be given again, side by side.  [default: optimal]"
 )
 SET = click.option(
     "--set",

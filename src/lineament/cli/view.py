@@ -5,18 +5,12 @@ from typing import Any
 
 import click
 
-from .options import LOG, NOISE, SET, make_extractor, reading
+from .options import LOG, NOISE, SET, make_extractor, methods_option, reading
 
 
 @click.command()
 @LOG
-@click.option(
-    "-m",
-    "--method",
-    "methods",
-    multiple=True,
-    help="A method to choose from; may be given again.  [default: all; with --set, optimal]",
-)
+@methods_option("A method to choose from; may be given again.  [default: all; with --set, optimal]")
 @SET
 @NOISE
 @reading
