@@ -84,14 +84,15 @@ def test_a_dask_cluster_that_does_not_answer_is_named(monkeypatch):
 
 @posix
 @pytest.mark.slow
-def test_a_log_whose_worker_dies_is_tried_twice_and_the_others_go_on(logs, tmp_path):
+def test_a_log_whose_worker_dies_is_tried_twice_and_the_others_go_on(logs, tmp_path, monkeypatch):
     marker = tmp_path / "once"
     marker.touch()
+    monkeypatch.setenv("MARKER", str(marker))
     # Of this one the first worker dies, but not the second.
     once = corner_log(tmp_path / "once.npz", beams=57)
     always = corner_log(tmp_path / "always.npz", beams=43)
     with Processes(2) as processes:
-        for method in (Deadly(fatal_beams=43), Deadly(fatal_beams=57, marker=str(marker))):
+        for method in (Deadly(fatal_beams=43), Deadly(fatal_beams=57, is_once=True)):
             extract_logs(
                 [always, once, *logs],
                 tmp_path / "out",

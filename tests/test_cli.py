@@ -122,6 +122,7 @@ WRONG = [
     ("extract short.log -o f.parquet", 1, "short.log:2: "),
     ("extract cut.log.gz -o f.parquet", 1, "cut.log.gz:"),
     ("extract wall.npz -o no/f.parquet", 1, "/no does not exist"),
+    (f"extract wall.npz -o {300 * 'a'}.csv", 1, "aaa.csv: cannot be written: "),
     ("extract wall.npz -o f.xls", 2, "f.xls: expected a folder or"),
     ("extract wall.npz -o f", 2, "expected a folder or an ending"),
     ("extract wall.npz -o f.parquet -m lui", 2, "'lui'"),

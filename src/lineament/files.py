@@ -35,13 +35,13 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     'all of it'
     """
     target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise LineamentError(f"{path}: is a folder, expected the name of a file")
-    if not target.parent.is_dir():
-        raise LineamentError(f"{path}: the folder {target.parent} does not exist")
-    # mkstemp would make the file private to its owner; this one follows the umask.
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     with naming_errors(path):
+        if target.is_dir():
+            raise LineamentError(f"{path}: is a folder, expected the name of a file")
+        if not target.parent.is_dir():
+            raise LineamentError(f"{path}: the folder {target.parent} does not exist")
+        # mkstemp would make the file private to its owner; this one follows the umask.
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
         temporary.touch(exist_ok=False)
     try:
         yield temporary

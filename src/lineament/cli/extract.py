@@ -67,7 +67,8 @@ def extract(
         raise click.UsageError(
             "--append: a file is written whole or not at all; write another one, or into a FOLDER/"
         )
-    is_folder = output.endswith(("/", os.sep)) or Path(output).is_dir()
+    # Not Path.is_dir, which raises where a name is too long.
+    is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)  # noqa: PTH112
     if not is_folder:
         check_ending(Path(output), ENDINGS, or_folder=True)
         for name, value in bulk.items():
