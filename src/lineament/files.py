@@ -46,18 +46,13 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         with naming_errors(path):
-            _flush_to_disk(temporary)
+            with temporary.open("rb+") as file:  # Windows flushes only what is open for writing
+                os.fsync(file.fileno())
             temporary.replace(target)
     except BaseException:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-
-
-def _flush_to_disk(path: Path) -> None:
-    # Windows flushes only what is open for writing.
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -58,7 +58,7 @@ def reading(command: Callable[..., None]) -> Callable[..., None]:
 
 def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = False) -> None:
     """Refuse a file whose ending is not one of these, before anything is computed for it."""
-    if output.suffix.lower() not in endings and not (or_folder and output.is_dir()):
+    if output.suffix.lower() not in endings:
         wanted = "a folder or an ending" if or_folder else "an ending"
         raise click.UsageError(f"{output}: expected {wanted} of {', '.join(endings)}")
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
+from itertools import count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -128,15 +129,17 @@ def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
     logs = list(dict.fromkeys(logs))
     names = {log: known[log] for log in logs if log in known}
     taken = {name.casefold() for name in known.values()}
-    left = {log: _parts(log) for log in logs if log not in names}
+    paths = {log: log.replace(os.sep, "/").split("/") for log in logs if log not in names}
+    left = {log: list(filter(None, path)) for log, path in paths.items()}
     depth = 1
     while left:
         deepest = depth > max(map(len, left.values()))
         ends = {log: "/".join(parts[-depth:]) for log, parts in left.items()}
         counts = Counter(end.casefold() for end in ends.values())
         for log, end in ends.items():
-            if deepest:
-                end = _numbered(end, taken)
+            if deepest:  # it differs from another in case alone
+                numbered = (f"{end}~{number}" for number in count(1))
+                end = next(name for name in numbered if name.casefold() not in taken)
             elif counts[end.casefold()] > 1 or end.casefold() in taken:
                 continue
             names[log] = end
@@ -144,18 +147,6 @@ def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
             del left[log]
         depth += 1
     return {log: names[log] for log in logs}
-
-
-def _parts(log: str) -> list[str]:
-    return [part for part in log.replace(os.sep, "/").split("/") if part]
-
-
-def _numbered(name: str, taken: set[str]) -> str:
-    """Return a numbered name for one that differs from another in case alone."""
-    number = 1
-    while (numbered := f"{name}~{number}").casefold() in taken:
-        number += 1
-    return numbered
 
 
 def part_path(name: str, ending: str) -> str:
