@@ -60,7 +60,10 @@ def assert_same_features(features, twin, rtol=1e-7, atol=1e-9):
 
     assert features.clusters.tolist() == twin["clusters"].tolist()
     for table, records in (
-        (features.segments, twin["segments"]),
+        (
+            features.segments,
+            [r | {"length": math.dist(r["start"], r["end"])} for r in twin["segments"]],
+        ),
         (features.corners, twin["corners"]),
     ):
         assert len(table) == len(records)

@@ -120,6 +120,20 @@ def test_the_verdict_on_a_corner():
     assert "if it were one line with a neighbour (12 asked)" in text
 
 
+@pytest.mark.parametrize(("beam", "is_cut"), [(3, False), (4, True), (57, True), (58, False)])
+def test_a_cut_is_weighed_where_both_sides_have_four_measurements(beam, is_cut):
+    _, text = explained(wall_with([], []), beam)
+    assert ("cut in two here" in text) == is_cut
+
+
+@pytest.mark.parametrize(("distance", "words"), [(1.05, "1.05 m"), (0.9, "899.7 mm")])
+def test_lengths_below_a_metre_are_in_millimetres(distance, words):
+    ranges, bearings = wall()
+    ranges[30] += distance
+    _, text = explained(LaserScan(ranges, angles=bearings), 30)
+    assert f"by +{words}" in text
+
+
 def test_pdbs_finds_clusters_alone():
     assert explained(wall_with([], []), 5, "pdbs")[0].outcome == "clustered"
 

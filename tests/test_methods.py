@@ -179,3 +179,12 @@ def test_every_method_is_there_and_lists_its_parameters():
             assert f"\n{field.name} : " in method.__doc__
         for preset in method.presets:
             assert get_method(f"{name}:{preset}").name == name
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_docstrings_list_each_parameter_with_default_and_bounds(name):
+    method = get_method(name)
+    for field in dataclasses.fields(method):
+        kind = type(field.default).__name__
+        assert f"{field.name} : {kind}, default {field.default!r}\n" in method.__doc__
+        assert field.metadata["meaning"].split()[-1] in method.__doc__

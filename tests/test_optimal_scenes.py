@@ -102,6 +102,28 @@ def test_faces_beside_a_hole_are_a_slit(extractor, beams):
 
 
 @extractors
+def test_a_wall_seen_through_a_slit_does_not_part_its_corner(extractor):
+    angles = fan(25)
+    ranges, middle = vertex(angles, 2.0, 90, convex=True), len(angles) // 2
+    hole = slice(middle - 3, middle + 4)
+    ranges[hole] = wall(angles[hole], 5.0, 0.0)
+    features = found_in(extractor, ranges, angles, sigma=0.003)
+    assert len(features.segments) == 3
+    (corner,) = of_kind(features, "slit")
+    assert corner["segments"].tolist() == [0, 2]
+    assert within(corner["position"] - (2.0, 0.0), corner["covariance"])
+
+
+def test_the_trace_has_the_spacing_before_each_measurement():
+    angles = fan(25)
+    scan = scan_of(noisy(vertex(angles, 2.0, 90, convex=True)), angles)
+    apart = np.hypot(*np.diff(scan.points, axis=0).T)
+    spacing = AWARE.trace(scan).spacing
+    assert np.isnan(spacing[0])
+    np.testing.assert_allclose(spacing[1:], apart)
+
+
+@extractors
 def test_a_panel_before_a_wall_ends_in_edges(extractor):
     angles = fan(25)
     panel = abs(np.tan(angles)) < 0.2

@@ -20,7 +20,7 @@ __all__ = ["MethodBase"]
 class MethodBase:
     """A method that calls its kernels one by one, for one scan after the other.
 
-    Methods inherit from this, declare their parameters (see `parameters.method`), and say in `find`
+    Methods inherit from this, declare their parameters (`parameters.parameter`), and say in `find`
     what they do.
     """
 
@@ -32,9 +32,10 @@ class MethodBase:
     def __post_init__(self) -> None:
         # Each gets the type of its default, for numba compiles for each type.
         for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
-            value, bounds = getattr(self, field.name), field.metadata["bounds"]
-            bounds.check(field.name, value)
-            object.__setattr__(self, field.name, bounds.kind(value))
+            bounds, value = field.metadata.get("bounds"), getattr(self, field.name)
+            if bounds is not None:  # a plain field of somebody's method is taken as it is
+                bounds.check(field.name, value)
+                object.__setattr__(self, field.name, bounds.kind(value))
 
     def own_arrays(self, beams: int) -> Any:
         """Make what the method needs besides a block, for scans of so many beams."""
