@@ -125,6 +125,25 @@ def test_what_an_executor_loses_is_reported(logs, tmp_path):
     assert error == f"{logs[0]}: its worker failed: RuntimeError: lost it"
 
 
+class Waiting(ProcessPoolExecutor):
+    """An executor that begins nothing."""
+
+    def submit(self, *_arguments):
+        self.futures = [*getattr(self, "futures", []), Future()]
+        return self.futures[-1]
+
+
+def test_an_interrupted_run_cancels_what_has_not_begun(logs, tmp_path):
+    def interrupt(about):
+        raise KeyboardInterrupt(about)
+
+    waiting = Waiting()
+    with pytest.raises(KeyboardInterrupt, match=r"^0/4 logs"):
+        extract_logs(logs, tmp_path / "out", IEPF, executor=waiting, show=interrupt)
+    assert [future.cancelled() for future in waiting.futures] == [True] * 4
+    assert set(outcomes(tmp_path / "out").values()) == {"pending"}
+
+
 def test_what_a_report_raises_ends_the_work_and_leaves_nothing(logs, tmp_path):
     def stop(scans, total):
         assert (scans, total) == (0, 3)

@@ -108,7 +108,7 @@ def test_options_of_method_and_noise_arrive(npz, tmp_path):
 #: Command, exit status, and words of the line that says what is wrong.
 WRONG = [
     ("extract none.log -o f.parquet", 1, "none.log: there is no such"),
-    ("extract . -o f.parquet", 1, "is no folder, expected one for "),
+    ("extract wall.npz bench.npz -o f.parquet", 1, "is no folder, expected one for 2 logs"),
     ("extract *.bag -o f.parquet", 1, "*.bag: holds no log"),
     ("extract wall.npz -o f.csv --resume", 2, "--resume: expected a"),
     ("extract wall.npz -o f.csv --format csv", 2, "--format: expected a"),
