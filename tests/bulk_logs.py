@@ -1,7 +1,5 @@
 """Small logs for the tests of bulk extraction, and a method that its worker does not survive."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -14,6 +12,7 @@ import pyarrow.dataset as ds
 from lineament import LaserScan
 from lineament.logs import save_npz
 from lineament.methods.iepf import IEPF
+from lineament.methods.parameters import parameter
 
 
 def corner_log(path, scans=3, beams=121):
@@ -57,16 +56,17 @@ def halves(folder):
 
 @dataclass(frozen=True)
 class Deadly(IEPF):
-    """Ends its process at scans of so many beams: once, if there is a marker to remove."""
+    """Ends its process at scans of so many beams: always, or while there is the file MARKER."""
 
-    fatal_beams: int = 0
-    marker: str = ""
+    fatal_beams: int = parameter(0, "beams of the scans at which the process ends")
+    is_once: bool = parameter(False, "whether it ends only where it can remove the marker")
 
     def own_arrays(self, beams):
         if beams == self.fatal_beams:
-            if not self.marker:
+            if not self.is_once:
                 os._exit(3)
-            if Path(self.marker).exists():
-                Path(self.marker).unlink()
+            marker = Path(os.environ["MARKER"])
+            if marker.exists():
+                marker.unlink()
                 os.kill(os.getpid(), signal.SIGKILL)
         return super().own_arrays(beams)

@@ -1,10 +1,7 @@
-"""Many logs into one data set: what is in it, what is told, and what is left as it is."""
+"""Many logs into one data set: what is in it, what is reported, and what is left as it is."""
 
-from __future__ import annotations
-
+import json
 import os
-import subprocess
-import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,9 +9,15 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from bulk_logs import corner_log, halves, outcomes, rows_of, table_of
+from hypothesis import given
+from hypothesis import strategies as st
+from test_output import files_up_to, resource
 
 import lineament as ln
-from lineament.tasks.bulk import MANIFEST, Threads, extract_logs
+from lineament.tasks.bulk import MANIFEST, Manifest, Row, Threads, extract_logs
+from lineament.tasks.bulk.manifest import names_of, part_path
+from lineament.tasks.bulk.parts import log_state
+from lineament.tasks.bulk.run import _Progress
 from lineament.tasks.extract import extract_log
 
 IEPF = ln.Extractor("iepf")
@@ -38,7 +41,7 @@ def test_a_data_set_is_one_table_of_all_logs(logs, tmp_path):
         assert part.select(alone.column_names).equals(alone)
 
 
-def test_the_manifest_tells_what_became_of_each_log(logs, tmp_path):
+def test_the_manifest_says_what_became_of_each_log(logs, tmp_path):
     logs[1].write_bytes(logs[1].read_bytes()[:200])
     shown = []
     bulk = extract_logs([*logs, "/none.bag"], tmp_path / "out", IEPF, show=shown.append)
@@ -76,59 +79,33 @@ def test_neither_executor_nor_order_changes_the_table(logs, tmp_path):
         assert list(rows_of(tmp_path / name)) == list(rows_of(tmp_path / "one"))
 
 
-def change_time(log, _out):
-    os.utime(log, ns=(1, 1))
+def with_lines(path, change):
+    path.write_text("".join(change(*path.read_text().splitlines(keepends=True))))
 
 
-def truncate_part(_log, out):
-    part = out / "log=b.npz" / "part-0.parquet"
-    part.write_bytes(part.read_bytes()[:-1])
+def of_older_version(line):
+    return line.replace(f'"version": "{ln.__version__}"', '"version": "0.0.1"')
 
 
-def lose_part(_log, out):
-    (out / "log=b.npz" / "part-0.parquet").unlink()
+LOG, PART, ROWS = "logs/b.npz", "out/log=b.npz/part-0.parquet", f"out/{MANIFEST}"
+HARMS = [
+    (LOG, lambda log: os.utime(log, ns=(1, 1))),
+    (LOG, lambda log: corner_log(log, 9)),
+    (PART, lambda part: part.write_bytes(part.read_bytes()[:-1])),
+    (PART, Path.unlink),
+    (ROWS, lambda rows: with_lines(rows, lambda a, b, c: [a, of_older_version(b), c])),
+    (ROWS, lambda rows: with_lines(rows, lambda a, b, c: [a, c, b[:100]])),
+]
 
 
-def grow(log, _out):
-    corner_log(log, 9)
-
-
-def of_an_older_version(_log, out):
-    manifest = out / MANIFEST
-    lines = manifest.read_text().splitlines(keepends=True)
-    lines[1] = lines[1].replace(f'"version": "{ln.__version__}"', '"version": "0.0.1"')
-    manifest.write_text("".join(lines))
-
-
-def torn(_log, out):
-    manifest = out / MANIFEST
-    lines = manifest.read_text().splitlines(keepends=True)
-    manifest.write_text(lines[0] + lines[2] + lines[1][:100])
-
-
-def nothing(_log, _out):
-    pass
-
-
-@pytest.mark.parametrize(
-    ("harm", "whole"),
-    [
-        (nothing, 3),
-        (change_time, 2),
-        (truncate_part, 2),
-        (lose_part, 2),
-        (grow, 2),
-        (of_an_older_version, 2),
-        (torn, 2),
-    ],
-)
-def test_resume_leaves_what_is_whole_and_does_the_rest_again(harm, whole, logs, tmp_path):
+@pytest.mark.parametrize(("file", "harm"), HARMS)
+def test_resume_leaves_what_is_whole_and_does_the_rest_again(file, harm, logs, tmp_path):
     out = tmp_path / "out"
     extract_logs(logs, out, IEPF)
-    harm(logs[1], out)
+    harm(tmp_path / file)
     kept = out / "log=a.npz" / "part-0.parquet"
     before = kept.stat()
-    assert extract_logs(logs, out, IEPF, resume=True).whole == whole
+    assert extract_logs(logs, out, IEPF, resume=True).whole == 2
     assert kept.stat() == before
     assert set(outcomes(out).values()) == {"done"}
     fresh = tmp_path / "fresh"
@@ -188,7 +165,7 @@ def test_other_formats_than_parquet(logs, tmp_path):
     assert not (tmp_path / "none").exists()
 
 
-def test_an_interrupted_run_leaves_whole_files_and_tells_what_is_missing(logs, tmp_path):
+def test_an_interrupted_run_leaves_whole_files_and_reports_what_is_missing(logs, tmp_path):
     out = tmp_path / "out"
 
     def interrupt(about):
@@ -198,14 +175,14 @@ def test_an_interrupted_run_leaves_whole_files_and_tells_what_is_missing(logs, t
     with Threads(1) as one, pytest.raises(KeyboardInterrupt):
         extract_logs(logs, out, IEPF, executor=one, show=interrupt)
     assert halves(out) == []
-    told = outcomes(out)
-    assert len(told) == 3
-    assert told["a.npz"] == "done"
-    assert {name for name, outcome in told.items() if outcome == "done"} == {
+    found = outcomes(out)
+    assert len(found) == 3
+    assert found["a.npz"] == "done"
+    assert {name for name, outcome in found.items() if outcome == "done"} == {
         path.parent.name.removeprefix("log=") for path in out.rglob("*.parquet")
     }
     bulk = extract_logs(logs, out, IEPF, resume=True)
-    assert bulk.whole == list(told.values()).count("done")
+    assert bulk.whole == list(found.values()).count("done")
     assert set(outcomes(out).values()) == {"done"}
 
 
@@ -217,11 +194,19 @@ def test_half_files_of_a_killed_run_go_when_their_log_is_done(logs, tmp_path):
     assert halves(tmp_path / "out") == []
 
 
-def test_wrong_options_are_named(logs, tmp_path):
-    with pytest.raises(ValueError, match="'ehco' is unknown, expected one of: topic"):
-        extract_logs(logs, tmp_path / "out", IEPF, ehco="last")
-    with pytest.raises(ValueError, match="echo is 'all', expected first"):
-        extract_logs(logs, tmp_path / "out", IEPF, echo="all")
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"ehco": "last"}, "'ehco' is unknown, expected one of: topic"),
+        ({"echo": "second"}, "echo is 'second', expected first or last or strongest"),
+        ({"ring": -1}, "ring is -1, expected a whole number"),
+        ({"ring": True}, "ring is True"),
+        ({"pose_topic": ""}, "pose_topic is ''"),
+    ],
+)
+def test_wrong_options_are_named(options, problem, logs, tmp_path):
+    with pytest.raises(ValueError, match=problem):
+        extract_logs(logs, tmp_path / "out", IEPF, **options)
     (tmp_path / "empty").mkdir()
     with pytest.raises(ln.LineamentError, match="holds no log"):
         extract_logs(tmp_path / "empty", tmp_path / "out", IEPF)
@@ -231,9 +216,6 @@ def test_wrong_options_are_named(logs, tmp_path):
 def test_a_folder_that_cannot_be_written_is_named(logs, tmp_path):
     with pytest.raises(ln.LineamentError, match=r"a\.npz: cannot make this folder"):
         extract_logs(logs, logs[0], IEPF)
-    if Path("/proc/self").is_dir():
-        with pytest.raises(ln.LineamentError, match="/proc/lineament: cannot make this folder"):
-            extract_logs(logs, "/proc/lineament", IEPF)
     (tmp_path / "out" / MANIFEST).mkdir(parents=True)
     with pytest.raises(ln.LineamentError, match="_manifest"):
         extract_logs(logs, tmp_path / "out", IEPF)
@@ -247,44 +229,100 @@ def test_a_part_that_cannot_be_written_stops_no_other(logs, tmp_path):
     assert "log=b.npz: cannot make this folder: File exists" in row["error"]
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A disk of 64 KB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("a small disk can be mounted by root on Linux only")
-    yield folder
-    # Lazily: the file of a writer that failed may be open until its memory is collected.
-    subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
-def test_a_full_disk_is_told_and_leaves_no_half_file(small_disk, tmp_path):
-    few = corner_log(tmp_path / "few.npz", 2)
+@pytest.mark.skipif(resource is None, reason="no limits of files on this system")
+def test_a_full_disk_is_reported_and_leaves_no_half_file(logs, tmp_path):
     many = corner_log(tmp_path / "many.npz", 3000)
-    bulk = extract_logs([few, many], small_disk / "out", IEPF)
+    with files_up_to(60_000):
+        bulk = extract_logs([logs[0], many], tmp_path / "out", IEPF)
     assert bulk.failed == 1
-    rows = rows_of(small_disk / "out")
-    assert rows["few.npz"]["outcome"] == "done"
-    assert rows["many.npz"]["error"].endswith("No space left on device")
-    assert sorted(p.name for p in small_disk.rglob("*") if p.is_file()) == [
-        MANIFEST,
-        "part-0.parquet",
+    rows = rows_of(tmp_path / "out")
+    assert rows["a.npz"]["outcome"] == "done"
+    assert "part-0.parquet: cannot be written: " in rows["many.npz"]["error"]
+    assert rows["many.npz"]["error"].endswith("File too large")
+    assert halves(tmp_path / "out") == []
+    files = [path.relative_to(tmp_path / "out") for path in (tmp_path / "out").rglob("*.*")]
+    assert set(map(str, files)) == {MANIFEST, "log=a.npz", "log=a.npz/part-0.parquet"}
+    with (
+        files_up_to(100),
+        pytest.raises(ln.LineamentError, match=r"_manifest\.jsonl: cannot be written: File too"),
+    ):
+        extract_logs(logs, tmp_path / "other", IEPF)
+    assert list((tmp_path / "other").iterdir()) == []
+
+
+# Manifest and progress.
+
+PATHS = st.lists(st.lists(st.sampled_from("aAbé=%"), min_size=1, max_size=4), max_size=9)
+
+
+@given(PATHS, PATHS)
+def test_names_are_unique_whatever_the_paths_and_stay(first, second):
+    names = names_of(["/" + "/".join(path) for path in first], {})
+    later = names_of(["/" + "/".join(path) for path in second], names)
+    together = names | later
+    assert all(later.get(log, name) == name for log, name in names.items())
+    parts = {part_path(name, ".csv").casefold() for name in together.values()}
+    assert len(parts) == len(together)
+    assert all(part.count("/") == 1 and part.startswith("log=") for part in parts)
+
+
+def test_a_name_is_as_short_as_it_can_be():
+    logs = ["/r1/mon/a.bag", "/r2/mon/a.bag", "/r1/tue/a.bag", "s3://store/b.bag", "/x/B.bag"]
+    assert list(names_of(logs, {}).values()) == [
+        *("r1/mon/a.bag", "r2/mon/a.bag", "tue/a.bag", "store/b.bag", "x/B.bag")
     ]
-    assert pq.read_table(small_disk / "out" / "log=few.npz" / "part-0.parquet").num_rows > 0
+    assert names_of(["/A", "/a"], {}) == {"/A": "A~1", "/a": "a~2"}
 
 
-def test_a_disk_without_room_for_the_manifest_is_one_clear_error(small_disk, logs):
-    (small_disk / "all").write_bytes(b"0" * 65536)
-    with pytest.raises(ln.LineamentError, match=r"_manifest\.jsonl: cannot be written: No space"):
-        extract_logs(logs, small_disk, IEPF)
-    assert [path.name for path in small_disk.iterdir()] == ["all"]
+def test_the_manifest_survives_what_is_no_row(tmp_path):
+    first = Row(log="/a", name="a", outcome="done", scans=3)
+    lines = [
+        "[" * 100_000,
+        "7",
+        '{"log": 5, "name": "x", "outcome": "done", "output": ""}',
+        '{"log": "/x"}',
+        first.to_json().strip(),
+        json.dumps({**json.loads(first.to_json()), "scans": 4, "of a later version": 1}),
+        "\0\xff",
+        Row(log="/b", name="b").to_json()[:40],
+    ]
+    (tmp_path / MANIFEST).write_bytes("\n".join(lines).encode("latin-1"))
+    manifest = Manifest(tmp_path)
+    assert {log: row.scans for log, row in manifest.rows.items()} == {"/a": 4}
+    with manifest.recording() as record:
+        record(Row(log="/b", name="b", outcome="done"))
+        # On the disk at once, after all that was good before.
+        assert outcomes(tmp_path) == {"a": "done", "b": "done"}
+    assert len((tmp_path / MANIFEST).read_text().splitlines()) == 2
 
 
-def test_the_package_imports_bulk_only_when_asked():
-    code = "import sys, lineament; print('lineament.tasks.bulk' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"
+def test_the_state_of_what_is_at_an_address_is_known(tmp_path):
+    fsspec = pytest.importorskip("fsspec")
+    system = fsspec.filesystem("memory")
+    try:
+        log = corner_log(tmp_path / "a.npz")
+        system.pipe("/bulk/a.npz", log.read_bytes())
+        size, state = log_state("memory://bulk/a.npz")
+        assert size == log.stat().st_size
+        assert state
+        assert log_state("memory://bulk/a.npz") == (size, state)
+        assert log_state("memory://bulk/b.npz") == log_state("nonsense://a") == (None, "")
+    finally:
+        system.rm("/bulk", recursive=True)
+
+
+def test_progress_has_a_throughput_and_the_time_left(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("lineament.tasks.bulk.run.time.monotonic", lambda: clock[0])
+    sizes = {"a": (3000, "1"), "b": (1000, "1"), "c": (None, "")}
+    monkeypatch.setattr("lineament.tasks.bulk.run.log_state", sizes.__getitem__)
+    progress = _Progress(["a", "b", "c"])
+    assert str(progress) == "0/3 logs, 0 scans/s"
+    clock[0] += 10.0
+    progress.report("a", 500, 1000)  # half of three of six parts
+    assert str(progress) == "0/3 logs, 50 scans/s, 0:30 left"
+    progress.finish(Row(log="a", name="a", outcome="done", scans=1000))
+    assert str(progress) == "1/3 logs, 100 scans/s, 0:10 left"
+    progress.finish(Row(log="b", name="b", outcome="failed"))
+    progress.finish(Row(log="c", name="c", outcome="done", scans=10))
+    assert str(progress) == "3/3 logs, 1 failed, 101 scans/s, 0:00 left"

@@ -1,7 +1,5 @@
 """What is installed beside the package: little by default, and errors name what else is needed."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,9 +1,6 @@
 """One log into one file: topics, options of reading, what is told."""
 
-from __future__ import annotations
-
 import json
-import zipfile
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -12,7 +9,6 @@ import ros_bags
 from mcap.reader import make_reader
 
 import lineament as ln
-from lineament.cli import run
 from lineament.logs import save_npz
 from lineament.tasks.bulk import extract_logs
 from lineament.tasks.extract import extract_log
@@ -65,26 +61,12 @@ def test_what_draws_the_scans_names_them_after_their_topic(two_topics, tmp_path)
     assert topics == {"/rear", "/rear/features"}
 
 
-def test_a_data_set_of_logs_with_several_topics(two_topics, tmp_path):
-    extract_logs(two_topics, tmp_path / "out", IEPF)
-    table = pq.read_table(tmp_path / "out")
-    assert {(row["log"], row["topic"]) for row in table.to_pylist()} == {
-        ("two.mcap", "/front"),
-        ("two.mcap", "/rear"),
-    }
-
-
-def test_an_archive_of_one_log_is_a_log(tmp_path, capsys):
-    save_npz(tmp_path / "a.npz", [ln.LaserScan(np.full(61, 2.0), -0.5, 1 / 60)] * 3)
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
-        archive.write(tmp_path / "a.npz", "day/a.npz")
-    out = str(tmp_path / "f.csv")
-    assert run(["extract", str(tmp_path / "a.zip"), "-m", "iepf", "-o", out]) == 0
-    assert "  3 scans, 0.0 % of beams invalid, 0 faults skipped" in capsys.readouterr().out
-
-
 def test_a_data_set_has_one_schema_whatever_topics_its_logs_have(two_topics, tmp_path):
     save_npz(tmp_path / "a.npz", [ln.LaserScan(np.full(61, 2.0), -0.5, 1 / 60)] * 3)
     extract_logs([tmp_path / "a.npz", two_topics], tmp_path / "out", IEPF)
-    table = pq.read_table(tmp_path / "out")
-    assert set(table["topic"].to_pylist()) == {"ranges", "/front", "/rear"}
+    rows = pq.read_table(tmp_path / "out").to_pylist()
+    assert {(row["log"], row["topic"]) for row in rows} == {
+        ("a.npz", "ranges"),
+        ("two.mcap", "/front"),
+        ("two.mcap", "/rear"),
+    }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from handmade import arc, corner, features, random_features, segment
 
-from lineament.features import ARC, CORNER, SEGMENT
+from lineament.features import make_records
 from lineament.motion import Tracks
 from lineament.output.feature_points import (
     FEATURE_POINT,
@@ -34,47 +34,44 @@ def test_all_fields_are_words_without_gaps():
         assert FEATURE_POINT[name].str in {"<f4", "<i4", "<u4"}
 
 
+def only(name, **fields):
+    """The point of one feature, of which these fields are known."""
+    (point,) = feature_points(features(**{name: make_records(name, [fields])}))
+    return filled(point)
+
+
 def test_segment():
-    row = np.zeros((), SEGMENT)
-    row["start"], row["end"], row["centroid"], row["angle"] = (1, 2), (4, 6), (2.5, 4.25), 0.75
-    row["covariance"] = [[4, 1], [1, 2]]
-    row["first_beam"], row["last_beam"], row["n_points"], row["rms"] = 90, 3, 14, 0.5
-    row["misfit"], row["length"] = 0.25, 5.0
-    (point,) = feature_points(features(segments=[row]))
-    assert filled(point) == (
+    ends = {"start": (1, 2), "end": (4, 6), "centroid": (2.5, 4.25), "angle": 0.75}
+    beams = {"first_beam": 90, "last_beam": 3, "n_points": 14}
+    sizes = {"rms": 0.5, "misfit": 0.25, "length": 5.0}
+    assert only("segments", **ends, **beams, **sizes, covariance=[[4, 1], [1, 2]]) == (
         named("x y z kind", 2.5, 4.25, 0, 0)
         | named("start_x start_y end_x end_y angle", 1, 2, 4, 6, 0.75)
-        | named("c00 c01 c11 rms misfit length", 4, 1, 2, 0.5, 0.25, 5)
-        | named("first_beam last_beam n_points", 90, 3, 14)
+        | named("c00 c01 c11", 4, 1, 2)
+        | beams
+        | sizes
     )
 
 
 @pytest.mark.parametrize("is_convex", [False, True])
 @pytest.mark.parametrize(("kind", "number"), [("corner", 0), ("slit", 1), ("edge", 2), ("", -1)])
 def test_corner(is_convex, kind, number):
-    row = np.zeros((), CORNER)
-    row["position"], row["covariance"] = (1, 2), [[4, 1], [1, 2]]
-    row["opening"], row["convex"], row["beam"], row["segments"] = 1.5, is_convex, 7, (3, 0)
-    row["quality"], row["kind"] = 0.75, kind
-    (point,) = feature_points(features(corners=[row]))
-    assert filled(point) == (
-        named("x y z kind opening convex", 1, 2, 0, 1, 1.5, float(is_convex))
+    place = {"position": (1, 2), "covariance": [[4, 1], [1, 2]], "beam": 7, "segments": (3, 0)}
+    shape = {"opening": 1.5, "quality": 0.75}
+    assert only("corners", **place, **shape, convex=is_convex, kind=kind) == (
+        named("x y z kind convex", 1, 2, 0, 1, float(is_convex))
         | named("c00 c01 c11", 4, 1, 2)
-        | named("first_beam last_beam segment_a segment_b quality", 7, 7, 3, 0, 0.75)
+        | named("first_beam last_beam segment_a segment_b", 7, 7, 3, 0)
+        | shape
         | ({"corner": number} if kind else {})
     )
 
 
 def test_arc():
-    row = np.zeros((), ARC)
-    row["center"], row["radius"], row["rms"] = (1, 2), 0.25, 0.5
-    row["covariance"] = [[1, 2, 3], [2, 4, 5], [3, 5, 6]]
-    row["first_beam"], row["last_beam"], row["n_points"] = 3, 9, 7
-    (point,) = feature_points(features(arcs=[row]))
-    assert filled(point) == (
-        named("x y z kind radius rms", 1, 2, 0, 2, 0.25, 0.5)
-        | named("c00 c01 c02 c11 c12 c22", 1, 2, 3, 4, 5, 6)
-        | named("first_beam last_beam n_points", 3, 9, 7)
+    covariance = [[1, 2, 3], [2, 4, 5], [3, 5, 6]]
+    same = {"radius": 0.25, "rms": 0.5, "first_beam": 3, "last_beam": 9, "n_points": 7}
+    assert only("arcs", center=(1, 2), covariance=covariance, **same) == (
+        named("x y z kind", 1, 2, 0, 2) | named("c00 c01 c02 c11 c12 c22", 1, 2, 3, 4, 5, 6) | same
     )
 
 

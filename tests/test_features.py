@@ -141,18 +141,11 @@ def test_layout_of_the_records_is_the_one_that_others_read():
 
 
 def test_columns_of_the_kernels_are_where_the_fields_are():
-    for prefix, table, names in (
-        ("S", "segments", "start end centroid angle covariance rms misfit cluster length"),
-        ("C", "corners", "position covariance opening response quality convex beam segments kind"),
-        ("A", "arcs", "center radius covariance rms"),
-        ("B", "breakpoints", "position beam kind occluder"),
-    ):
-        for name in names.split():
-            form, offset = TABLES[table].fields[name][:2]
-            word = 8 if form.base.kind == "f" else 4
-            assert getattr(at, f"{prefix}_{name.upper()}") == offset // word, name
-    assert (at.S_FIRST, at.S_LAST, at.S_POINTS) == (22, 23, 24)
-    assert (at.A_FIRST, at.A_LAST, at.A_POINTS) == (24, 25, 26)
+    short = {"first_beam": "first", "last_beam": "last", "n_points": "points"}
+    for table, dtype in TABLES.items():
+        for name, (form, offset) in dtype.fields.items():
+            column = getattr(at, f"{table[0]}_{short.get(name, name)}".upper())
+            assert column == offset // (8 if form.base.kind == "f" else 4), name
     records = np.zeros(2, at.CORNER)
     records["kind"] = "slit"
     words = at.words(records).view(np.int32)[1, at.C_KIND : at.C_KIND + 6]

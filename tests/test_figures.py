@@ -1,7 +1,5 @@
 """Figures: what is drawn, where, for kind and hostile input."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

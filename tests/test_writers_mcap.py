@@ -1,7 +1,6 @@
 """MCAP: other readers find in it what was written, in both kinds of messages."""
 
 import math
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -207,14 +206,3 @@ def test_many_scans_are_in_chunks_with_an_index(tmp_path):
         summary = make_reader(file).get_summary()
     assert len(summary.chunk_indexes) > 2  # memory does not grow: about 1 MB each
     assert summary.statistics.message_count == 400
-
-
-def test_a_missing_package_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "foxglove", None)
-    monkeypatch.delitem(sys.modules, "lineament.output.foxglove", raising=False)
-    with pytest.raises(
-        LineamentError,
-        match=r"\.mcap: needs foxglove, .*: pip install 'lineament\[foxglove\]'",
-    ):
-        open_writer(tmp_path / "a.mcap")
-    open_writer(tmp_path / "a.ros2.mcap")  # does without

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["EXTRAS", "LineamentError", "LogError", "needed_by", "needs", "one_line"]
-
 #: The packages that only some commands need, each with the extra that installs it.
 EXTRAS = {
     "cyclonedds": "live",
@@ -21,13 +19,7 @@ EXTRAS = {
 
 
 def one_line(text: str) -> str:
-    r"""Write what would break a line or steer a terminal as an escape, whatever a file holds.
-
-    Examples
-    --------
-    >>> print(one_line("a\tb"), one_line("Gebäude 7"))
-    a\tb Gebäude 7
-    """
+    """Write what would break a line or steer a terminal as an escape, whatever a file holds."""
     if text.isprintable():
         return text
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
@@ -39,15 +31,6 @@ class LineamentError(Exception):
 
 class LogError(LineamentError):
     """A log cannot be read: the message names the file, the line or record, and what was expected.
-
-    Parameters
-    ----------
-    path : str
-        The file.
-    problem : str
-        What is wrong and what was expected.
-    line : int, optional
-        Number of the line, from 1.
 
     Examples
     --------
@@ -61,10 +44,9 @@ class LogError(LineamentError):
         self.path, self.problem, self.line = str(path), problem, line
 
     def fresh(self) -> LogError:
-        """Make the same error without a traceback.
+        """Make the same error without a traceback, for one that is kept and raised again.
 
-        One that is kept and raised again makes a cycle with the frame that keeps it: whatever
-        that holds, such as a temporary copy of a log, would stay until the next collection.
+        The cycle with the frame that keeps it would hold a temporary copy of a log, for instance.
         """
         return LogError(self.path, self.problem, self.line)
 
@@ -73,27 +55,13 @@ class LogError(LineamentError):
 
 
 def needs(package: str) -> str:
-    """Return what is wrong when an optional package is missing, with the command that installs it.
-
-    Examples
-    --------
-    >>> needs("ezdxf")
-    "needs ezdxf, which is not installed: pip install 'lineament[cad]'"
-    """
+    """Return that an optional package is missing, with the command that installs it."""
     return f"needs {package}, which is not installed: pip install 'lineament[{EXTRAS[package]}]'"
 
 
 @contextmanager
 def needed_by(who: str) -> Iterator[None]:
-    """Turn the missing import of an optional package into a LineamentError.
-
-    Examples
-    --------
-    >>> with needed_by("DXF"):
-    ...     raise ModuleNotFoundError(name="ezdxf")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    lineament.errors.LineamentError: DXF needs ezdxf, which is not installed: pip install ...
-    """
+    """Turn the missing import of an optional package into a LineamentError."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -1,7 +1,5 @@
 """The command line: arguments only. Every command is one call of the library."""
 
-from __future__ import annotations
-
 import sys
 
 import click

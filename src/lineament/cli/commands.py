@@ -1,7 +1,5 @@
 """The commands. Each imports what it calls when it runs: ``--help`` stays quick."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from .options import (
     SET,
     check_ending,
     make_extractor,
+    methods_option,
     reading,
     wrong_usage,
 )
@@ -44,13 +43,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @click.command()
 @LOG
 @SCAN
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=PATH,
-    help="Picture to write: .png, .svg or .pdf.",
-)
+@click.option("-o", "--output", required=True, type=PATH, help="A picture: .png, .svg or .pdf.")
 @METHODS
 @SET
 @NOISE
@@ -83,13 +76,7 @@ def plot(
 
 
 @click.command()
-@click.option(
-    "-m",
-    "--method",
-    "methods",
-    multiple=True,
-    help="Name of the method; may be given again.  [default: optimal]",
-)
+@methods_option("Name of the method; may be given again.  [default: optimal]")
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
     """Compile and cache the kernels of a method."""
@@ -104,12 +91,7 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 @click.command()
 @click.argument("log", required=False, type=LOG_PATH)
 @click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    default=Path("demo"),
-    show_default=True,
-    help="Folder to write to.",
+    "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
 )
 @QUIET
 def demo(log: Path | str | None, output: Path, quiet: bool) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +67,8 @@ def extract(
         raise click.UsageError(
             "--append: a file is written whole or not at all; write another one, or into a FOLDER/"
         )
-    is_folder = output.endswith(("/", os.sep)) or Path(output).is_dir()
+    # Not Path.is_dir, which raises where a name is too long.
+    is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)  # noqa: PTH112
     if not is_folder:
         check_ending(Path(output), ENDINGS, or_folder=True)
         for name, value in bulk.items():
@@ -78,17 +78,7 @@ def extract(
     extractor = make_extractor(method, settings, noise)
     if is_folder:
         _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)
-    else:
-        _extract_into_file(logs, output, extractor, reading, quiet)
-
-
-def _extract_into_file(
-    logs: tuple[Path | str, ...],
-    output: str,
-    extractor: Extractor,
-    reading: dict[str, Any],
-    quiet: bool,
-) -> None:
+        return
     from ..logs import find_logs
     from ..tasks.extract import extract_log
     from .progress import tracker
@@ -110,14 +100,12 @@ def _extract_into_folder(
     *,
     ending: str | None,
     resume: bool,
-    processes: int | None,
-    threads: int | None,
-    dask: str | None,
+    **workers: Any,
 ) -> None:
     from ..tasks.bulk import extract_logs
     from .progress import status
 
-    with _executor(processes, threads, dask) as executor, status(quiet) as show:
+    with _executor(**workers) as executor, status(quiet) as show:
         bulk = extract_logs(
             logs,
             output,
@@ -134,18 +122,13 @@ def _extract_into_folder(
         raise LineamentError(f"{bulk.failed} of {bulk.logs} logs failed, see {bulk.manifest}")
 
 
-@contextmanager
-def _executor(processes: int | None, threads: int | None, dask: str | None) -> Iterator[Executor]:
+def _executor(
+    processes: int | None, threads: int | None, dask: str | None
+) -> AbstractContextManager[Executor]:
     from ..tasks.bulk import Processes, Threads, dask_executor
 
     if sum(value is not None for value in (processes, threads, dask)) > 1:
         raise click.UsageError("expected one of --processes, --threads and --dask")
     if dask is not None:
-        with dask_executor(dask) as executor:
-            yield executor
-    elif threads is not None:
-        with Threads(threads) as executor:
-            yield executor
-    else:
-        with Processes(processes) as executor:
-            yield executor
+        return dask_executor(dask)
+    return Processes(processes) if threads is None else Threads(threads)

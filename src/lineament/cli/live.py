@@ -15,8 +15,6 @@ from .options import METHOD, NOISE, PATH, QUIET, SET, settings_of, wrong_usage
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report
 
-__all__ = ["live"]
-
 _TYPES = click.Choice(["LaserScan", "MultiEchoLaserScan"])
 _ECHOES = click.Choice(["first", "last", "strongest"])
 _RELIABILITIES = click.Choice(["best-effort", "reliable"])

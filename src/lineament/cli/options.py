@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
+F = TypeVar("F", bound=Callable[..., Any])
 PATH = click.Path(path_type=Path)
 
 
@@ -57,7 +58,7 @@ def reading(command: Callable[..., None]) -> Callable[..., None]:
 
 def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = False) -> None:
     """Refuse a file whose ending is not one of these, before anything is computed for it."""
-    if output.suffix.lower() not in endings and not (or_folder and output.is_dir()):
+    if output.suffix.lower() not in endings:
         wanted = "a folder or an ending" if or_folder else "an ending"
         raise click.UsageError(f"{output}: expected {wanted} of {', '.join(endings)}")
 
@@ -72,12 +73,15 @@ def wrong_usage() -> Iterator[None]:
 
 
 METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
-METHODS = click.option(
-    "-m",
-    "--method",
-    "methods",
-    multiple=True,
-    help="Name of the method; may be given again, side by side.  [default: optimal]",
+
+
+def methods_option(about: str) -> Callable[[F], F]:
+    """Make the option of methods, which may be given again."""
+    return click.option("-m", "--method", "methods", multiple=True, help=about)
+
+
+METHODS = methods_option(
+    "Name of the method; may be given again, side by side.  [default: optimal]"
 )
 SET = click.option(
     "--set",

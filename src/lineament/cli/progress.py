@@ -1,7 +1,5 @@
 """Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator

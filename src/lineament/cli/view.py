@@ -1,26 +1,16 @@
 """The command that opens a log in the browser."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import LOG, NOISE, SET, make_extractor, reading
-
-__all__ = ["view"]
+from .options import LOG, NOISE, SET, make_extractor, methods_option, reading
 
 
 @click.command()
 @LOG
-@click.option(
-    "-m",
-    "--method",
-    "methods",
-    multiple=True,
-    help="A method to choose from; may be given again.  [default: all; with --set, optimal]",
-)
+@methods_option("A method to choose from; may be given again.  [default: all; with --set, optimal]")
 @SET
 @NOISE
 @reading

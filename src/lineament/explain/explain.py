@@ -1,7 +1,5 @@
 """Why a beam is part of a feature, or of no feature: a trace in words."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -9,8 +7,6 @@ import numpy as np
 
 from ..methods.trace import Trace
 from .measurements import Line, Measurements, along_beam, spans, why_invalid
-
-__all__ = ["Explanation", "explain"]
 
 #: Fewer measurements than this are no line in any of the methods.
 _FEW = 4

@@ -1,7 +1,5 @@
 """Features to files: one writer a format, imported when it is used."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from importlib import import_module

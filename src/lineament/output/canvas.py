@@ -158,11 +158,5 @@ def add_legend(figure: Figure) -> None:
 
 
 def count(number: int, one: str) -> str:
-    """Write a number of things.
-
-    Examples
-    --------
-    >>> count(1, "cluster"), count(2, "corner")
-    ('1 cluster', '2 corners')
-    """
+    """Write a number of things: 1 cluster, 2 clusters."""
     return f"{number} {one}" if number == 1 else f"{number} {one}s"

@@ -1,7 +1,5 @@
 """DXF: a plan for CAD, in metres, with the layers WALLS, CORNERS, EDGES, ARCS, ELLIPSES."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +8,6 @@ from ezdxf.document import Drawing
 from ezdxf.filemanagement import new
 
 from .plans import Plan, PlanWriter
-
-__all__ = ["DxfWriter"]
 
 #: Layers and their colours, as numbers of AutoCAD: black or white, red, light red, magenta, grey.
 LAYERS = {"WALLS": 7, "CORNERS": 1, "EDGES": 11, "ARCS": 6, "ELLIPSES": 8}

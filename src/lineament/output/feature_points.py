@@ -13,8 +13,6 @@ from ..features.records import FIELDS, POINTS, kind_codes, numbers
 if TYPE_CHECKING:
     from ..motion import Tracks
 
-__all__ = ["ARC_POINT", "CORNER_POINT", "FEATURE_POINT", "SEGMENT_POINT", "feature_points"]
-
 #: Values of the field `kind`.
 SEGMENT_POINT, CORNER_POINT, ARC_POINT = range(3)
 _TABLES = ("segments", "corners", "arcs")
@@ -61,34 +59,11 @@ _EMPTY_WORDS = _EMPTY.view("<i4").reshape(3, -1)
 
 
 def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[np.void]:
-    """Make one record a feature: the segments, then the corners, then the arcs of a scan.
+    """Make one record a feature, in its frame: segments, then corners, then arcs; shape (n,).
 
-    Segments come first, so that the segments of a corner are also the indices of their records.
-
-    Parameters
-    ----------
-    features : Features
-        Of one scan.
-    tracks : Tracks, optional
-        The numbers that its features have from frame to frame, from `lineament.motion`.
-
-    Returns
-    -------
-    structured array of dtype `FEATURE_POINT`, shape (n,)
-        In the frame of the features. Those that are not finite are there too: indices stay.
-
-    Raises
-    ------
-    ValueError
-        If the tracks are those of other features.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-    >>> point = feature_points(ln.extract(scan))[0]
-    >>> [point[name].item() for name in ("kind", "n_points", "radius", "track")]
-    [0, 5, nan, -1]
+    The segments of a corner are thus also the indices of their records. Those that are not finite
+    are there too. `tracks` are the numbers that the features have from scan to scan; a ValueError
+    if they are those of other features.
     """
     tables = [getattr(features, name) for name in _TABLES]
     counts = [len(table) for table in tables]

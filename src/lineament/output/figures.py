@@ -23,21 +23,13 @@ if TYPE_CHECKING:
 
     from ..methods.trace import Trace
 
-__all__ = ["plot_map", "plot_scan", "plot_trace", "scan_figure"]
-
 _PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch]
 
 
 def plot_scan(
     scan: LaserScan, features_by_method: Mapping[str, Features], path: str | os.PathLike[str]
 ) -> None:
-    """Write the picture that `scan_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file.
-
-    Raises
-    ------
-    LineamentError
-        If the ending is not known or the file cannot be written.
-    """
+    """Write the picture that `scan_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file."""
     canvas.check_ending(path)
     canvas.save(scan_figure(scan, features_by_method), path)
 
@@ -51,25 +43,10 @@ def scan_figure(
 
     Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
     data show where nothing came back. The number beside a corner is its response. Edges are drawn
-    lighter than corners, without a number.
+    lighter than corners, without a number. The similarity errors of the beams (n,) [m], if given,
+    are drawn below the panel of the method.
 
-    Parameters
-    ----------
-    scan : LaserScan
-        The scan.
-    features_by_method : mapping of str to Features
-        Title of each panel, and what to draw in it.
-    errors_by_method : mapping of str to ndarray, shape (n,), optional
-        Similarity error of each beam [m], drawn below the panel of the method.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no method, or features do not have the scan's number of beams.
+    Raises a ValueError if there is no method, or features do not have the scan's number of beams.
     """
     if not features_by_method:
         raise ValueError("features_by_method is empty, expected at least one method")
@@ -106,13 +83,6 @@ def plot_trace(trace: Trace, path: str | os.PathLike[str]) -> None:
     """Draw the stages of one run: filter, spacing against its thresholds, clusters, corners.
 
     Of a method that examines no candidates, the corners and edges that it found are drawn.
-
-    Raises
-    ------
-    LineamentError
-        If the ending of the path is not ``.png``, ``.svg`` or ``.pdf``, or it cannot be written.
-    ValueError
-        If the clusters do not have the scan's number of beams.
     """
     canvas.check_ending(path)
     scan = trace.scan
@@ -224,21 +194,8 @@ def plot_map(
 ) -> None:
     """Draw segments, corners and arcs of many scans in the world, with the way of the sensor.
 
-    Edges are drawn lighter than corners.
-
-    Parameters
-    ----------
-    posed : iterable of ((x, y, theta), Features)
-        Pose of the sensor in the world [m, m, rad], and what was found there, in its own frame.
-    path : path-like
-        A file that ends in ``.png``, ``.svg`` or ``.pdf``.
-    title : str
-        Title of the picture.
-
-    Raises
-    ------
-    LineamentError
-        If the ending is not known or the file cannot be written.
+    Each scan has the pose of the sensor in the world [m, m, rad] and what was found there, in its
+    own frame. Edges are drawn lighter than corners.
     """
     from matplotlib.collections import LineCollection
 

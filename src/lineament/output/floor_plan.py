@@ -6,8 +6,6 @@ same weight). Along it a wall counts in how many views each 5 cm were seen: wher
 seldom it is not drawn, so a door that was shut once does not close its doorway.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -17,8 +15,6 @@ from ..features import Features
 from ..scan import Array
 from .markers import Markers, is_drawn
 from .walls import Wall, offsets_between
-
-__all__ = ["WALL", "Averages", "FloorPlan"]
 
 #: A straight piece of a wall [m], and the mean number of segments that show it.
 WALL = np.dtype([("start", "f8", 2), ("end", "f8", 2), ("views", "f8")])
@@ -35,19 +31,7 @@ CORNER_RADIUS, ARC_RADIUS = 0.15, 0.1
 
 
 class FloorPlan:
-    """Walls, corners and arcs that the scans of a log have in common, in bounded memory.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 41, angle_min=-0.2, angle_increment=0.01)
-    >>> wall = ln.LaserScan(2.0 / np.cos(scan.angles), angle_min=-0.2, angle_increment=0.01)
-    >>> plan = FloorPlan()
-    >>> for y in (0.0, 0.1, 0.2):
-    ...     plan.add(ln.extract(wall).transform(1.0, y, 0.0))
-    >>> plan.walls(min_views=3)["start"].round(1).tolist()
-    [[3.0, -0.2]]
-    """
+    """Walls, corners and arcs that the scans of a log have in common, in bounded memory."""
 
     def __init__(self) -> None:
         self._walls: list[Wall] = []
@@ -117,12 +101,9 @@ class FloorPlan:
         return -1
 
     def walls(self, min_views: int = 1) -> NDArray[np.void]:
-        """Return the parts of the walls that were seen in at least so many views.
+        """Return the parts of the walls that were seen in at least so many views, as `WALL`.
 
-        Returns
-        -------
-        structured array, shape (n,)
-            Of dtype `WALL`, the longest wall first; pieces shorter than 20 cm are left out.
+        The longest wall comes first; pieces shorter than 20 cm are left out.
         """
         self._merge()
         pieces = (piece for wall in self._walls for piece in wall.pieces(min_views))

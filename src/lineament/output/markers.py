@@ -23,20 +23,10 @@ _COSINES, _SINES = (wave(np.linspace(0, 2 * math.pi, TURN + 1)) for wave in (np.
 class Markers:
     """What is drawn of the features of a scan [m, rad], in their frame. All of it is finite.
 
-    Attributes
-    ----------
-    segments : float64 array, shape (L, 2, 2)
-        Start and end of each segment.
-    corners : float64 array, shape (K, 2)
-        Positions of the corners and slits.
-    edges : float64 array, shape (J, 2)
-        Positions of the corners of kind "edge": these are drawn lighter.
-    arcs : float64 array, shape (A, 5)
-        x, y of the centre, radius, and the directions from the centre in which what was seen
-        begins and ends, counter-clockwise; a whole turn apart where that is not known.
-    ellipses : float64 array, shape (E, 5)
-        x, y, half axes (the longer first), direction of the longer: within them lie 95 % of the
-        errors of the corners and edges, then of the centres of the arcs.
+    Edges are corners of kind "edge", which are drawn lighter. An arc is x, y of its centre, radius,
+    and the directions in which what was seen begins and ends, counter-clockwise; a whole turn apart
+    where that is not known. An ellipse is x, y, half axes (the longer first), direction of the
+    longer: within them lie 95 % of the errors of the corners and edges, then of the arcs' centres.
     """
 
     segments: Array
@@ -72,27 +62,9 @@ class Markers:
 
 
 def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
-    """Make the marks of the features of a scan.
+    """Make the marks of the features of a scan; those not finite or too far away are left out.
 
-    Parameters
-    ----------
-    features : Features
-        In the frame of the scan, or moved since.
-    scan : LaserScan, optional
-        What they were found in: only its points show which part of a circle was seen. The
-        features must then be in its frame.
-
-    Returns
-    -------
-    Markers
-        Features that are not finite, or farther away than any scanner sees, are left out.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-    >>> markers_of(ln.extract(scan), scan).segments.round(2).tolist()
-    [[[2.0, -0.04], [2.0, 0.04]]]
+    Without the scan, in whose frame the features must be, arcs are drawn as whole circles.
     """
     segments, corners, arcs = features.segments, features.corners, features.arcs
     lines = np.empty((len(segments), 2, 2))  # faster than stacked, as below
@@ -137,26 +109,10 @@ def arc_span(arc: np.void, scan: LaserScan) -> tuple[float, float]:
 
 
 def ellipses_of(positions: Array, covariances: Array, level: float = LEVEL) -> Array:
-    """Make the ellipses within which a share of the errors of some points lies.
+    """Return the ellipses (m, 5), as in `Markers`, within which a share of the errors lies.
 
-    Parameters
-    ----------
-    positions : float64 array, shape (n, 2)
-        The points [m].
-    covariances : float64 array, shape (n, 2, 2)
-        Their covariances [m²].
-    level : float
-        The share. Of two Gaussian coordinates it lies within √(-2 ln(1 - level)) deviations.
-
-    Returns
-    -------
-    float64 array, shape (m, 5)
-        As in `Markers`; points without a finite covariance have none.
-
-    Examples
-    --------
-    >>> ellipses_of(np.zeros((1, 2)), np.diag([0.01, 0.04])[None]).round(3).tolist()
-    [[0.0, 0.0, 0.49, 0.245, 1.571]]
+    Points (n, 2) [m] without a finite covariance (n, 2, 2) have none. Of two Gaussian coordinates
+    the share lies within √(-2 ln(1 - level)) deviations.
     """
     known = is_drawn(positions) & is_drawn(covariances)
     centers, covariances = positions[known], covariances[known]

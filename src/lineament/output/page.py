@@ -1,23 +1,11 @@
 """One self-contained page of figures and facts, to be opened from a folder or sent by mail."""
 
-from __future__ import annotations
-
 import base64
 import os
 from collections.abc import Iterable
 from html import escape
 
 from ..files import write_text
-
-__all__ = [
-    "contents_part",
-    "heading_part",
-    "image_part",
-    "list_part",
-    "table_part",
-    "text_parts",
-    "write_parts",
-]
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de; --page: #fff; }
@@ -50,24 +38,7 @@ _NUMBER = ' class="number"'
 
 
 def write_parts(path: str | os.PathLike[str], title: str, parts: Iterable[str]) -> None:
-    """Write one HTML file of parts, such as those that the functions below make.
-
-    It needs no network.
-
-    Raises
-    ------
-    LineamentError
-        If the page cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> page = Path(tempfile.mkdtemp()) / "index.html"
-    >>> write_parts(page, "Demo", [list_part([("scans", "331")]), *text_parts(["1 < 2"])])
-    >>> "<dt>scans</dt><dd>331</dd>" in page.read_text(encoding="utf-8")
-    True
-    """
+    """Write one HTML file, which needs no network, of parts as the functions below make them."""
     lines = [
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',

@@ -1,7 +1,5 @@
 """What plans share: one scan as it was seen, or all scans of a log in one floor plan."""
 
-from __future__ import annotations
-
 import math
 import os
 from abc import abstractmethod
@@ -18,8 +16,6 @@ from .canvas import count
 from .floor_plan import FloorPlan
 from .markers import Markers, markers_of
 from .writer import Found, Writer
-
-__all__ = ["Plan", "PlanWriter"]
 
 #: How often a part of a wall must have been seen to be drawn; once, in a log of few scans.
 MIN_VIEWS, FEW = 3, 10
@@ -41,20 +37,9 @@ class Plan(NamedTuple):
 class PlanWriter(Writer):
     """Draws one scan in its own frame, or the floor plan of several in the frame of their poses.
 
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    topics : sequence of str
-        The topics that the scans come from; they are drawn in one plan.
-    min_views : int, optional
-        How often a part of a wall, a corner or an arc must have been seen to be drawn in a floor
-        plan; by default 3 times, or once where the log has fewer than 10 scans.
-
-    Raises
-    ------
-    LineamentError
-        On writing, if one of several scans has no pose.
+    A part of a wall, a corner or an arc is drawn in a floor plan if it was seen `min_views` times;
+    by default 3 times, or once where the log has fewer than 10 scans. On writing, a LineamentError
+    if one of several scans has no pose.
     """
 
     needs_scan = True

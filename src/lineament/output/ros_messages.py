@@ -36,19 +36,6 @@ class RosMessages(SceneMessages):
 
     The encoding is ``cdr``, with the definitions of Humble, which later ones have too, or ``ros1``,
     with those of Noetic. Ranges are those of the scan, invalid ones too.
-
-    Raises
-    ------
-    ValueError
-        If the encoding is another one.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> message = RosMessages("cdr").cloud("/features", Moment.of(scan), ln.extract(scan))
-    >>> message.kind
-    'sensor_msgs/msg/PointCloud2'
     """
 
     def __init__(self, encoding: str = "cdr") -> None:
@@ -137,13 +124,7 @@ class RosMessages(SceneMessages):
     def cloud(
         self, topic: str, moment: Moment, features: Features, tracks: "Tracks | None" = None
     ) -> Message:
-        """``sensor_msgs/PointCloud2`` of `FEATURE_POINT`: one point a feature, all that is known.
-
-        Raises
-        ------
-        ValueError
-            If the tracks are those of other features.
-        """
+        """``sensor_msgs/PointCloud2`` of `FEATURE_POINT`: one point a feature."""
         points = feature_points(features, tracks)
         # They are few: numpy would take longer.
         is_dense = all(map(math.isfinite, points["x"].tolist() + points["y"].tolist()))
@@ -161,13 +142,8 @@ class RosMessages(SceneMessages):
     ) -> Message:
         """``diagnostic_msgs/DiagnosticArray`` with one status: of what, and on which device.
 
-        The level is 0 (OK), 1 (warning), 2 (error) or 3 (stale), the summary one line; the values
-        have names.
-
-        Raises
-        ------
-        ValueError
-            If there is no such level.
+        The level is 0 (OK), 1 (warning), 2 (error) or 3 (stale), else a ValueError; the summary is
+        one line; the values have names.
         """
         if level not in range(4):
             raise ValueError(f"level is {level!r}, expected 0 (OK), 1 (warn), 2 (error), 3 (stale)")

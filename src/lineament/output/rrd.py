@@ -1,7 +1,5 @@
 """Rerun recordings: the scans and what is found in them, where they were taken, over time."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -15,8 +13,6 @@ from numpy.typing import NDArray
 from .markers import markers_of
 from .scene import layers_of
 from .writer import Found, Writer
-
-__all__ = ["RerunWriter"]
 
 # Rerun's log, which the import sets up, would report a full disk in several lines.
 _LOGGED = os.environ.get("RUST_LOG")

@@ -48,17 +48,7 @@ class Layer(NamedTuple):
 
 
 def layers_of(markers: Markers) -> tuple[Layer, ...]:
-    """Make the layers segments, arcs, corners, edges and ellipses; those without marks too.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> from lineament.output.markers import markers_of
-    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-    >>> layers = layers_of(markers_of(ln.extract(scan), scan))
-    >>> [(layer.name, len(layer.strips), len(layer.points)) for layer in layers]
-    [('segments', 1, 0), ('arcs', 0, 0), ('corners', 0, 0), ('edges', 0, 0), ('ellipses', 0, 0)]
-    """
+    """Make the layers segments, arcs, corners, edges and ellipses; those without marks too."""
     return (
         Layer("segments", (0.16, 0.47, 0.84, 1.0), 0.03, markers.segments),
         Layer("arcs", (0.51, 0.31, 0.87, 1.0), 0.03, markers.arc_strips()),
@@ -92,15 +82,7 @@ class Moment(NamedTuple):
     def of(cls, scan: LaserScan) -> Self:
         """Make the moment of a scan; its frame is ``laser`` where it names none.
 
-        Raises
-        ------
-        ValueError
-            If messages do not hold its stamp.
-
-        Examples
-        --------
-        >>> Moment.of(LaserScan([1.0], 0.0, 0.1, stamp=7.5))
-        Moment(seconds=7, nanoseconds=500000000, frame='laser', world='map')
+        Raises a ValueError if messages do not hold its stamp.
         """
         if not 0 <= scan.stamp <= LAST_STAMP:
             raise ValueError(

@@ -1,7 +1,5 @@
 """SVG: a plan to scale on a sheet of A3, with its layers as groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from html import escape
@@ -12,8 +10,6 @@ import numpy as np
 from ..scan import Array
 from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
 from .plans import Plan, PlanWriter
-
-__all__ = ["SvgWriter"]
 
 #: The plan and the room below it for scale and caption, and the margin, of a sheet of A3 [mm].
 WIDTH, HEIGHT, FOOT, MARGIN = 400.0, 260.0, 17.0, 10.0

@@ -1,7 +1,5 @@
 """Tables in files, a row a feature: Parquet and CSV; and JSON lines, a line a scan."""
 
-from __future__ import annotations
-
 import json
 import math
 from contextlib import ExitStack
@@ -15,8 +13,6 @@ import pyarrow.parquet as pq
 
 from ..features.tables import SCHEMA, features_table
 from .writer import Found, Writer
-
-__all__ = ["TOPIC", "CsvWriter", "JsonLinesWriter", "ParquetWriter"]
 
 #: The column that a table has besides those of `SCHEMA` where its scans come from several topics.
 TOPIC = pa.field(

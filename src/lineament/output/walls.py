@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from ..scan import Array
 
-__all__ = ["Wall", "offsets_between"]
-
 #: The most that may lie between two lines that touch [m].
 GAP = 0.2
 #: Length along which views are counted [m].
@@ -23,16 +21,9 @@ CELL = 0.05
 class Wall:
     """One line in the plan.
 
-    Places along it are measured on an axis, in cells, from the first start that was seen.
-
-    Attributes
-    ----------
-    origin, axis : float64 array, shape (2,)
-        Where places are counted from [m], and the direction in which they are.
-    moments : float64 array, shape (3, 3)
-        Integral over all metres seen of v vᵀ, where v = (1, x, y) from the origin.
-    changes : dict of int to int
-        By how much the number of views changes at each cell.
+    Places along it are counted in cells on an axis, from an origin [m]: the first start that was
+    seen. Moments are the integral over all metres seen of v vᵀ, v = (1, x, y) from the origin;
+    changes, by how much the number of views changes at each cell.
     """
 
     origin: Array

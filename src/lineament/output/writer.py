@@ -1,7 +1,5 @@
 """What all writers of features share: a whole file or none, and memory that does not grow."""
 
-from __future__ import annotations
-
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -13,8 +11,6 @@ from typing import ClassVar, NamedTuple, Self
 from ..features import Features
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan
-
-__all__ = ["Found", "Writer"]
 
 
 class Found(NamedTuple):

@@ -1,7 +1,5 @@
 """A demonstration: a simulated drive, or a log, into a table and a page."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -24,20 +22,8 @@ def run_demo(
 ) -> list[tuple[str, str]]:
     """Simulate a drive (or take a log), extract its features, and make a page of pictures.
 
-    Parameters
-    ----------
-    folder : path-like
-        Output folder; created if missing.
-    log : path-like, optional
-        A log in place of the simulated drive.
-    track : callable
-        ``track(items, about, total)`` yields the items and shows the progress.
-
-    Returns
-    -------
-    list of (str, str)
-        Names and values: files and figures. The page is ``index.html``, the table
-        ``features.parquet``.
+    Returns names and values: files and figures. The page is ``index.html``, the table
+    ``features.parquet``. ``track(items, about, total)`` yields the items and shows the progress.
 
     Raises
     ------

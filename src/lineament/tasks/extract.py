@@ -1,7 +1,5 @@
 """A whole log to a table of features: what `lineament extract` does."""
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import dataclass, field
@@ -16,29 +14,14 @@ from ..logs import open_log
 from ..output import open_writer
 from ..progress import Track, untracked
 
-__all__ = ["Extraction", "extract_log"]
-
 
 @dataclass(frozen=True, slots=True)
 class Extraction:
     """Result of the extraction of one log.
 
-    Attributes
-    ----------
-    log, output : str
-        The files.
-    topics : list of str
-        Topics of the scans.
-    scans : int
-        Number of scans.
-    features : dict of str to int
-        Number of features of each kind.
-    invalid : float
-        Share of invalid beams.
-    seconds : float
-        Wall time from opening the log to the finished file.
-    skipped : int
-        Faulty lines or records that were skipped, the first of which are in `faults`.
+    Topics of the scans; number of scans and of features of each kind; share of invalid beams; wall
+    time [s] from opening the log to the finished file; number of faulty lines or records that were
+    skipped, the first of which are in `faults`.
     """
 
     log: str

@@ -1,7 +1,5 @@
 """Compile and cache the kernels before they are needed."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 
@@ -9,15 +7,10 @@ import numpy as np
 
 
 def warm_up(methods: Sequence[str] = ()) -> float:
-    """Compile the kernels of some methods (default: `optimal`) and of the tracker.
+    """Compile the kernels of some methods (default: `optimal`) and of the tracker, for the cache.
 
-    They are cached on disk for the next program. Returns the seconds that it takes, the import of
-    numba included.
-
-    Raises
-    ------
-    ValueError
-        If a method does not exist.
+    Returns the seconds that it takes, the import of numba included; a ValueError if a method does
+    not exist.
     """
     started = time.perf_counter()
     from ..extractor import Extractor

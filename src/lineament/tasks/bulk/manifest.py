@@ -1,13 +1,12 @@
 """The manifest of a data set: the name of each log and what became of it, one line of JSON each."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
+from itertools import count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -24,31 +23,10 @@ MANIFEST = "_manifest.jsonl"
 class Row:
     """What became of one log.
 
-    Attributes
-    ----------
-    log : str
-        Full path, or address.
-    name : str
-        Name in the data set: the value of the column ``log``.
-    outcome : str
-        ``pending`` (not reached, or interrupted), ``done`` or ``failed``.
-    error : str
-        Why it failed.
-    output : str
-        Its file, relative to the folder of the data set, of size `bytes`.
-    topics, scans, features, invalid, skipped, faults, seconds
-        As in `Extraction`.
-    log_bytes : int or None
-        Size of the log; None if unknown.
-    log_state : str
-        Time of the last change of the log, or what its store reports.
-    version, configuration
-        Version of lineament; method, parameters, noise, and how the log is read.
-
-    Examples
-    --------
-    >>> Row(log="/data/a.bag", name="a.bag").outcome
-    'pending'
+    The log is a full path or an address; the name, that in the column ``log``. The outcome is
+    ``pending`` (not reached, or interrupted), ``done`` or ``failed``, with the error. The output is
+    relative to the data set, of size `bytes`. `log_bytes` is None if unknown, `log_state` the time
+    of the last change, or what the store reports. The rest is as in `Extraction`.
     """
 
     log: str
@@ -92,26 +70,8 @@ def _row_of(line: bytes) -> Row | None:
 class Manifest:
     """The rows of a data set, by log.
 
-    Parameters
-    ----------
-    folder : path-like
-        The data set. An existing manifest is read: of several rows of a log the last counts, and
-        torn lines are skipped.
-
-    Raises
-    ------
-    LogError
-        If it cannot be read.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> folder = Path(tempfile.mkdtemp())
-    >>> manifest = Manifest(folder)
-    >>> with manifest.recording() as record:
-    ...     record(Row(log="/data/a.bag", name="a.bag", outcome="done", scans=7))
-    >>> Manifest(folder).rows["/data/a.bag"].scans
-    7
+    An existing manifest is read: of several rows of a log the last counts, and torn lines are
+    skipped. A LogError if it cannot be read.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -127,12 +87,7 @@ class Manifest:
         """Yield a function that appends a row and flushes it to disk.
 
         Before and after, also after an exception, the file is rewritten with one row a log, sorted
-        by name.
-
-        Raises
-        ------
-        LineamentError
-            If it cannot be written.
+        by name. A LineamentError if it cannot be written.
         """
         self._save()
         try:
@@ -157,51 +112,34 @@ class Manifest:
 
 
 def full_path(log: str) -> str:
-    """Return the path or address under which every process finds a log.
-
-    Examples
-    --------
-    >>> full_path("s3://robots/a.bag")
-    's3://robots/a.bag'
-    """
+    """Return the path or address under which every process finds a log."""
     return log if is_address(log) else os.path.abspath(log)  # noqa: PTH100 (keeps links)
 
 
 def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
-    """Name logs: as before, else by the shortest end of the path that is unique.
+    """Name logs (full paths or addresses): as known, else by the shortest end that is unique.
 
-    Parameters
-    ----------
-    logs : iterable of str
-        Full paths or addresses.
-    known : mapping of str to str
-        Names that logs have already; no other log gets them.
-
-    Returns
-    -------
-    dict of str to str
-        The name of each log. No two differ in case alone.
+    No two names differ in case alone, and no log gets the known name of another one.
 
     Examples
     --------
-    >>> names = names_of(["/mon/a.bag", "/tue/a.bag", "/tue/b.bag"], {})
-    >>> list(names.values())
+    >>> list(names_of(["/mon/a.bag", "/tue/a.bag", "/tue/b.bag"], {}).values())
     ['mon/a.bag', 'tue/a.bag', 'b.bag']
-    >>> names_of(["/wed/b.bag"], names | {"/tue/b.bag": "b.bag"})
-    {'/wed/b.bag': 'wed/b.bag'}
     """
     logs = list(dict.fromkeys(logs))
     names = {log: known[log] for log in logs if log in known}
     taken = {name.casefold() for name in known.values()}
-    left = {log: _parts(log) for log in logs if log not in names}
+    paths = {log: log.replace(os.sep, "/").split("/") for log in logs if log not in names}
+    left = {log: list(filter(None, path)) for log, path in paths.items()}
     depth = 1
     while left:
         deepest = depth > max(map(len, left.values()))
         ends = {log: "/".join(parts[-depth:]) for log, parts in left.items()}
         counts = Counter(end.casefold() for end in ends.values())
         for log, end in ends.items():
-            if deepest:
-                end = _numbered(end, taken)
+            if deepest:  # it differs from another in case alone
+                numbered = (f"{end}~{number}" for number in count(1))
+                end = next(name for name in numbered if name.casefold() not in taken)
             elif counts[end.casefold()] > 1 or end.casefold() in taken:
                 continue
             names[log] = end
@@ -211,24 +149,6 @@ def names_of(logs: Iterable[str], known: Mapping[str, str]) -> dict[str, str]:
     return {log: names[log] for log in logs}
 
 
-def _parts(log: str) -> list[str]:
-    return [part for part in log.replace(os.sep, "/").split("/") if part]
-
-
-def _numbered(name: str, taken: set[str]) -> str:
-    """Return a numbered name for one that differs from another in case alone."""
-    number = 1
-    while (numbered := f"{name}~{number}").casefold() in taken:
-        number += 1
-    return numbered
-
-
 def part_path(name: str, ending: str) -> str:
-    """Return where the file of a log is in a data set, partitioned as Hive does.
-
-    Examples
-    --------
-    >>> part_path("mon/a.bag", ".parquet")
-    'log=mon%2Fa.bag/part-0.parquet'
-    """
+    """Return where the file of a log is in a data set, partitioned as Hive does."""
     return f"log={quote(name, safe=' ', errors='surrogateescape')}/part-0{ending}"

@@ -1,7 +1,5 @@
 """What a worker does: one log into its part of a data set."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -49,7 +47,9 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
     size, state = log_state(task.row.log)
     row = replace(task.row, log_bytes=size, log_state=state)
     try:
-        _clear(made_folder(part.parent))
+        for left in made_folder(part.parent).glob(".part-0.*.part"):  # by a killed worker
+            with suppress(OSError):
+                left.unlink()
         found = extract_log(
             row.log,
             part,
@@ -84,13 +84,6 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
 def failed(row: Row, error: str) -> Row:
     """Return the row of a log that failed."""
     return replace(row, outcome="failed", error=" ".join(error.split()))
-
-
-def _clear(folder: Path) -> None:
-    """Remove what a killed worker left of its file."""
-    for left in folder.glob(".part-0.*.part"):
-        with suppress(OSError):
-            left.unlink()
 
 
 def _reporting(report: Report) -> Callable[[Any, str, int], Iterable[Any]]:

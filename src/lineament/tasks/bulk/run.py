@@ -1,13 +1,12 @@
 """Many logs over an executor."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -34,14 +33,8 @@ _PERIOD = 0.5
 class Bulk:
     """Result of a run over many logs.
 
-    Attributes
-    ----------
-    folder, manifest : str
-        The data set and its manifest.
-    logs, whole, failed : int
-        Logs asked for; those that were complete before and skipped; those that failed.
-    scans, features, seconds
-        As in `Extraction`, over the logs of this run.
+    The data set and its manifest; logs asked for, those that were complete before and skipped,
+    those that failed; and as in `Extraction`, over the logs of this run.
     """
 
     folder: str
@@ -147,11 +140,8 @@ def extract_logs(
     home = os.path.abspath(folder)  # noqa: PTH100
     tasks = [Task(row, home, extractor.method, extractor.noise, settings) for row in todo]
     manifest.rows |= {row.log: row for row in todo}
-    if executor is None:
-        with Threads() as threads:
-            _run(tasks, threads, manifest, show)
-    else:
-        _run(tasks, executor, manifest, show)
+    with Threads() if executor is None else nullcontext(executor) as workers:
+        _run(tasks, workers, manifest, show)
     done = [manifest.rows[row.log] for row in todo]
     return Bulk(
         folder=str(folder),
@@ -225,31 +215,28 @@ def _run(
     with manifest.recording() as record:
         try:
             for task in tasks:
-                future = _begin(task, executor, progress)
+                if isinstance(executor, Threads):
+                    future = executor.begin(task, partial(progress.report, task.row.log))
+                else:
+                    future = executor.submit(extract_part, task)
                 rows[future] = task.row
                 future.add_done_callback(ended.put)
             while rows:
-                try:
+                with suppress(Empty):
                     future = ended.get(timeout=_PERIOD)
-                except Empty:
-                    pass
-                else:
                     row = _result(future, rows.pop(future))
                     progress.finish(row)
                     record(row)
                 show(str(progress))
         except BaseException:
-            _stop(executor, rows)
+            for future in rows:
+                future.cancel()
+            if isinstance(executor, Threads):
+                executor.stop()
             for future in rows:
                 if future.done() and not future.cancelled() and future.exception() is None:
                     record(future.result())
             raise
-
-
-def _begin(task: Task, executor: Executor, progress: _Progress) -> Future[Row]:
-    if isinstance(executor, Threads):
-        return executor.begin(task, partial(progress.report, task.row.log))
-    return executor.submit(extract_part, task)
 
 
 def _result(future: Future[Row], row: Row) -> Row:
@@ -258,13 +245,6 @@ def _result(future: Future[Row], row: Row) -> Row:
         return future.result()
     except (Exception, CancelledError) as error:
         return failed(row, f"{row.log}: its worker failed: {type(error).__name__}: {error}")
-
-
-def _stop(executor: Executor, futures: Iterable[Future[Row]]) -> None:
-    for future in futures:
-        future.cancel()
-    if isinstance(executor, Threads):
-        executor.stop()
 
 
 def _settings(reading: dict[str, Any]) -> dict[str, Any]:

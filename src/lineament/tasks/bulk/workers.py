@@ -178,15 +178,8 @@ def _interrupts_held() -> Iterator[None]:
 def dask_executor(address: str) -> Iterator[Executor]:
     """Yield the executor of a Dask cluster whose workers see the same paths.
 
-    Parameters
-    ----------
-    address : str
-        Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
-
-    Raises
-    ------
-    LineamentError
-        If `distributed` is not installed, or no scheduler answers.
+    The address of its scheduler is such as ``tcp://10.0.0.1:8786``. A LineamentError if none
+    answers or `distributed` is not installed.
     """
     with needed_by(f"{address}:"):
         from distributed import Client
