@@ -90,7 +90,7 @@ def draw() -> str:
     for room, below in imports().items():
         x, y, wide = places[room]
         below = {r for r in below if r not in rows[-1] and places[r][1] > y}
-        ends = sorted(below, key=lambda r: places[r][0])
+        ends = sorted(below, key=lambda r: places[r][:2])
         for k, other in enumerate(ends):
             a = x + wide * (k + 1) / (len(ends) + 1)
             left, top, size = places[other]
