@@ -166,7 +166,9 @@ def test_scan_and_its_features(drawn):
     labels = {"no return", "noise", "sensor", "arc", "segment", "breakpoint", "corner", "edge"}
     assert {t.get_text() for t in figure.legends[0].get_texts()} == {*labels, "3 σ of a corner"}
     assert axes.get_aspect() == 1
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
     shown = by_label(axes)
+    assert shown["sensor"].get_marker() == (3, 0, -90)  # a triangle that looks along x
     for label, expected in (
         ("noise", scan.points[60:61]),
         ("sensor", [[0, 0]]),
@@ -231,6 +233,16 @@ def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     panel = axes.get_window_extent()
     assert all(panel.containsx(x) for box in boxes for x in (box.x0, box.x1))
+
+
+def test_numbers_stay_away_from_other_corners():
+    figure = canvas.new_figure(4, 4)
+    axes = figure.add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))  # points
+    positions = np.array([(0, 0), (15, 0)], dtype=float)
+    drawing.label_points(axes, positions, np.array([12.25, 12.25]), np.zeros((0, 2)))
+    for text, position in zip(axes.texts, positions, strict=True):
+        apart = np.abs(position + text.get_position() - positions)
+        assert (apart >= (9.2, 4.5)).any(axis=1).all()
 
 
 @pytest.mark.parametrize(
@@ -301,7 +313,10 @@ def test_stages_of_a_trace(drawn):
     shown = by_label(corners)
     np.testing.assert_allclose(shown["accepted"].get_xydata(), [[1, 1]])  # on filtered ranges
     np.testing.assert_allclose(shown["rejected"].get_xydata(), scan.points[[20, 30]] / 2)
-    assert all(axes.get_legend() for axes in figure.axes)
+    for axes in figure.axes:
+        box = axes.get_legend().get_window_extent()
+        assert box.y1 <= axes.get_window_extent().y0  # below its panel
+        assert box.height < 0.1 * axes.get_window_extent().height  # in one row
     assert clusters.get_xlim() == corners.get_xlim()
 
 

@@ -305,6 +305,7 @@ def test_one_scan_is_drawn_in_its_own_frame(target, part):
     [
         (7.9, 0.5, 20, 1),  # wide: 395 mm of 400
         (0.5, 5.1, 20, 0.1),  # tall: 255 mm of 260
+        (0.5, 13.0, 50, 0.1),  # just as tall as the sheet
         (0.5, 5.3, 50, 0.1),
         (3.0, 90.0, 500, 0.5),
         (399.0, 20.0, 1000, 50),
