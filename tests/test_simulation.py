@@ -348,3 +348,29 @@ def test_sensor_refuses(name, refused, accepted):
     assert getattr(sensor, name) == accepted
     with pytest.raises(ValueError, match=rf"Sensor\.{name} is "):
         replace(sensor, **{name: refused})
+
+
+#: Of the data sheets: beams, field of view [°], range limits [m], sweeps a second; then the noise
+#: (σ and quantum [m]), and the divergence [rad] and shares of lost and false returns assumed.
+SHEETS = {
+    "paper": (481, 160, 0, 30, 10, 0.01, 0, 0, 0, 0),
+    "noisy": (481, 160, 0, 30, 10, 0.03, 0, 0, 0.02, 0),
+    "utm30lx": (1081, 270, 0.1, 30, 40, 0.01, 0.001, 0.004, 0.002, 0.0005),
+    "lms361": (361, 180, 0, 80, 37.5, 0.01, 0.01, 0.0044, 0.001, 0.0002),
+    "lms181": (181, 180, 0, 80, 75, 0.01, 0.01, 0.0044, 0.001, 0.0002),
+    "rplidar": (720, 360, 0.15, 12, 10, 0.002, 0.00025, 0.003, 0.02, 0.002),
+    "ld19": (455, 360, 0.02, 12, 10, 0.01, 0.001, 0.006, 0.01, 0.001),
+}
+
+
+def test_scanners_are_those_of_their_data_sheets():
+    assert list(SENSORS) == list(SHEETS)
+    for name, (beams, field, low, high, rate, sigma, quantum, *shares) in SHEETS.items():
+        s = SENSORS[name]
+        steps = beams if field == 360 else beams - 1
+        assert (s.n_beams, s.range_min, s.range_max, s.rate) == (beams, low, high, rate)
+        assert s.angle_min == pytest.approx(-np.radians(field) / 2)
+        assert s.angle_increment * steps == pytest.approx(np.radians(field))
+        assert (s.noise.sigma, s.noise.quantum) == (sigma, quantum)
+        assert s.noise.proportional == (0.007 if name == "rplidar" else 0)
+        assert [s.mixed_pixel, s.dropout, s.outlier] == shares
