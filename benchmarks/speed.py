@@ -178,6 +178,18 @@ def warmup_seconds(cache: str) -> float:
     return float(said.split()[-2])
 
 
+def compile_seconds(method: str) -> float:
+    """Processor time of the first scan of a method with nothing cached, numba's import included."""
+    code = (
+        "import sys, time, lineament as ln; ln.extract(ln.LaserScan([2.0] * 99, 0.0, 0.01), "
+        "method=sys.argv[1]); print(time.process_time())"
+    )
+    with tempfile.TemporaryDirectory() as cache:
+        run = [sys.executable, "-c", code, method]
+        env = {**os.environ, "NUMBA_CACHE_DIR": cache}
+        return float(subprocess.run(run, env=env, check=True, capture_output=True).stdout)
+
+
 def start_up() -> list[tuple[str, str]]:
     first, cached = [], []
     for _ in range(3):
@@ -185,7 +197,11 @@ def start_up() -> list[tuple[str, str]]:
             first.append(warmup_seconds(cache))
             cached.append(statistics.median(warmup_seconds(cache) for _ in range(5)))
     return [
-        ("first compile", f"{statistics.median(first):.1f} s"),
+        ("first compile of `lineament warmup`", f"{statistics.median(first):.1f} s"),
+        *(
+            (f"first scan of {name}, nothing cached, processor", f"{compile_seconds(name):.1f} s")
+            for name in ("optimal", "liu")
+        ),
         ("cached start, import of numba included", f"{statistics.median(cached):.2f} s"),
         ("float64 filter for reference (2.6 µs elsewhere)", f"{reference_microseconds():.1f} µs"),
         ("`lineament --help`", f"{1e3 * seconds_of('-m', 'lineament', '--help'):.0f} ms"),
