@@ -1,7 +1,5 @@
 """The vertex budget: fewer pieces, by the least squared error, never more vertices than allowed."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -28,10 +26,8 @@ def simplified(ranges, angles, pieces, budget, link=LINK, worst=WORST):
     work.marks[at.BEAM, : len(points)] = points
     work.pieces[[at.FIRST, at.LAST, at.BEFORE], :n] = np.transpose(pieces)
     work.response[:n], work.counts[at.PIECES] = np.arange(n), n
-    bearings, tables = (
-        np.stack((np.cos(angles), np.sin(angles))),
-        budget_scratch(len(ranges), budget),
-    )
+    bearings = np.stack((np.cos(angles), np.sin(angles)))
+    tables = budget_scratch(len(ranges), budget)
     limit_pieces(*memory, bearings, budget, link, worst, *tables)
     left = work.counts[at.PIECES]
     found = work.pieces[[at.FIRST, at.LAST, at.BEFORE], :left].T.tolist()
@@ -126,34 +122,25 @@ def test_no_way_costs_less(seed):
         assert cost(ranges, angles, pieces, found, worst) == pytest.approx(least, abs=1e-9)
 
 
-def l_shape():
-    """Return the walls x = 2 and y = 2, whose corner is beam 40 of 81."""
+@pytest.mark.parametrize(
+    ("pieces", "budget", "left", "responses"),
+    [
+        ([(0, 20, -1), (20, 40, 0), (40, 80, 1)], 4, None, [0, 1, 2]),
+        pytest.param([(0, 20, -1), (20, 40, 0), (40, 80, 1)], 3, [(0, 40, -1), (40, 80, 0)], [0, 2],
+                     id="a corner on a straight wall goes first"),
+        ([(0, 40, -1), (40, 60, 0)], 2, [(0, 40, -1)], [0]),
+        pytest.param([(0, 40, -1), (40, 60, 0)], 1, [], [], id="no room"),
+        pytest.param([(0, 10, -1), (10, 40, 0), (40, 80, 1)], 3, [(10, 40, -1), (40, 80, 0)],
+                     [1, 2], id="an end left out takes its corner along"),
+    ],
+)  # fmt: skip
+def test_by_hand_on_two_walls(pieces, budget, left, responses):
+    # x = 2 and y = 2, whose corner is beam 40; a piece of ten beams is no wall.
     angles = math.pi / 4 + np.radians(np.arange(-40, 41))
-    return 2.0 / np.maximum(np.cos(angles), np.sin(angles)), angles
-
-
-def test_a_corner_on_a_straight_wall_goes_first():
-    ranges, angles = l_shape()
-    pieces = [(0, 20, -1), (20, 40, 0), (40, 80, 1)]
-    assert simplified(ranges, angles, pieces, 4) == (pieces, [0.0, 1.0, 2.0])
-    assert simplified(ranges, angles, pieces, 3) == ([(0, 40, -1), (40, 80, 0)], [0.0, 2.0])
-
-
-def test_what_has_no_room_is_left_out():
-    ranges, angles = l_shape()
-    pieces = [(0, 40, -1), (40, 60, 0)]
-    assert simplified(ranges, angles, pieces, 2)[0] == [(0, 40, -1)]
-    assert simplified(ranges, angles, pieces, 1)[0] == []
-
-
-def test_an_end_left_out_takes_its_corner_along():
-    ranges, angles = l_shape()
-    pieces = [(0, 10, -1), (10, 40, 0), (40, 80, 1)]
-    found, responses = simplified(
-        ranges + np.where(np.arange(81) < 10, 9.0, 0.0), angles, pieces, 3
-    )
-    assert found == [(10, 40, -1), (40, 80, 0)]
-    assert responses == [1.0, 2.0]
+    ranges = 2.0 / np.maximum(np.cos(angles), np.sin(angles))
+    ranges[: 10 if pieces[0][1] == 10 else 0] += 9.0
+    expected = pieces if left is None else left
+    assert simplified(ranges, angles, pieces, budget) == (expected, responses)
 
 
 @pytest.mark.parametrize(
@@ -180,17 +167,15 @@ def square(false_corner):
     return ranges, angles, pieces
 
 
-@pytest.mark.parametrize("false_corner", [10, 30, 70])
-def test_a_ring_stays_closed(false_corner):
-    ranges, angles, pieces = square(false_corner)
-    found, _ = simplified(ranges, angles, pieces, 5)
-    assert found == [(0, 20, 3), (20, 40, 0), (40, 60, 1), (60, 80, 2)]
-
-
-def test_a_ring_that_loses_a_wall_opens():
-    ranges, angles, pieces = square(20)
-    found, _ = simplified(ranges, angles, pieces, 4)
-    assert [before for _, _, before in found] == [-1, 0, 1]
+@pytest.mark.parametrize(
+    ("false_corner", "budget", "before"),
+    [*((cut, 5, [3, 0, 1, 2]) for cut in (10, 30, 70)), (20, 4, [-1, 0, 1])],
+)
+def test_a_ring_stays_closed_unless_it_loses_a_wall(false_corner, budget, before):
+    found, _ = simplified(*square(false_corner), budget)
+    assert [piece[2] for piece in found] == before
+    walls = [(0, 20), (20, 40), (40, 60), (60, 80)]
+    assert [piece[:2] for piece in found] == walls[: len(found)]
 
 
 @pytest.mark.slow

@@ -4,10 +4,8 @@ import ast
 import gzip
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import click
 import numpy as np
@@ -392,24 +390,6 @@ def test_imports_are_light(code, heavy):
     code = f"import sys; {code}; print(sorted({{*{heavy.split()}}} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
-
-
-@pytest.mark.slow
-def test_an_interrupted_run_leaves_no_half_file(tmp_path):
-    log, out = tmp_path / "long.log", tmp_path / "f.jsonl"
-    log.write_text(flaser(np.linspace(2.0, 3.0, 181)) * 60_000)
-    out.write_text("of the run before")
-    process = start("extract", log, "-o", out)
-    # Stopped when it is under way: something stands beside the output.
-    deadline = time.monotonic() + 60
-    while len(list(tmp_path.iterdir())) < 3 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert errors.splitlines()[-1] == "lineament: stopped"
-    assert out.read_text() == "of the run before"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["f.jsonl", "long.log"]
 
 
 def test_compare_writes_a_page_and_a_table(npz, tmp_path, capsys):

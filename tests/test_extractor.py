@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from equality import assert_sound
+from handmade import assert_alike
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import BOX, NOISE, STEP, degenerate_scans, full_circle, random_scan, room
@@ -143,23 +144,7 @@ def test_turned_bearings_turn_the_features(turn, seed):
     extractor = Extractor("liu:scale_free", noise=NOISE, sigma_d=1.0)
     found, expected = extractor(turned), extractor(scan).transform(0.0, 0.0, turn)
     assert len(found.segments) > 0
-    assert_same_features(found, expected)
-
-
-def assert_same_features(found, expected, atol=1e-9):
-    for name, dtype in TABLES.items():
-        a, b = getattr(found, name), getattr(expected, name)
-        assert len(a) == len(b)
-        for field in dtype.names:
-            if field == "angle":
-                np.testing.assert_allclose(np.exp(1j * a[field]), np.exp(1j * b[field]), atol=atol)
-            elif a[field].dtype.kind == "f":
-                # A corner of nearly parallel lines is as far off as they are alike.
-                rtol = 1e-6 if name == "corners" else 1e-9
-                np.testing.assert_allclose(a[field], b[field], rtol, atol * 10)
-            else:
-                np.testing.assert_array_equal(a[field], b[field])
-    np.testing.assert_array_equal(found.clusters, expected.clusters)
+    assert_alike(found, expected, 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
