@@ -307,5 +307,7 @@ def test_progress_has_a_throughput_and_the_time_left(monkeypatch):
     progress.finish(Row(log="a", name="a", outcome="done", scans=1000))
     assert str(progress) == "1/3 logs, 100 scans/s, 0:10 left"
     progress.finish(Row(log="b", name="b", outcome="failed"))
+    progress.report("c", 1, 0)  # of a length that is not known
+    assert str(progress) == "2/3 logs, 1 failed, 100 scans/s, 0:00 left"
     progress.finish(Row(log="c", name="c", outcome="done", scans=10))
     assert str(progress) == "3/3 logs, 1 failed, 101 scans/s, 0:00 left"

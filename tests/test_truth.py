@@ -111,12 +111,16 @@ CASES = {
         lines(box(2, -0.5, 3, 0.5)), ORIGIN, fan(40),
         [(2, -0.5, 2, 0.5, 26, 53)], [], scan_ends(26, 53),
     ),
-    # Straight through (2, 0), where the front and the hidden side of the block are met.
+    # Straight through (2, 0), where the front and the hidden side of the block are met; of a front
+    # of two beams, they are the only neighbours.
     **{
-        f"a beam through the end of a hidden wall, {order}": (
-            lines([(2, 0), (2, 1), (3, 1), (3, 0.2), (2, 0)][::order]), ORIGIN,
+        f"a beam through the end of a hidden wall, {width}, {order}": (
+            lines([(2, 0), (2, width), (3, width), (3, 0.4 * width), (2, 0)][::order]), ORIGIN,
             Sensor("through", 81, -40 * STEP, STEP, noise=NOISE),
-            [(2, 0, 2, 1, 40, 66)], [], scan_ends(40, 66),
+            [(2, min(width, 0), 2, max(width, 0), *beams)], [], ends,
+        )
+        for width, *beams, ends in (
+            (1, 40, 66, scan_ends(40, 66)), (0.05, 40, 41, []), (-0.05, 39, 40, [])
         )
         for order in (1, -1)
     },
