@@ -34,7 +34,8 @@ class IEPF(PieceMethod):
        line, and put corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + proportion ρ + noise_factor σ_r``. The
-    preset `paper` is the plain method: a fixed tolerance, no merging, corners on measurements.
+    preset `paper` is the method as published: step 2 alone, of the whole scan, with a fixed
+    tolerance; corners on measurements.
 
     Examples
     --------
@@ -47,7 +48,13 @@ class IEPF(PieceMethod):
     """
 
     name: ClassVar[str] = "iepf"
-    presets: ClassVar[tuple[str, ...]] = ("paper",)
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "threshold": 0.1,
+        "proportion": 0.0,
+        "noise_factor": 0.0,
+        "corner": "beam",
+    }
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
     proportion: float = parameter(
@@ -57,7 +64,6 @@ class IEPF(PieceMethod):
         4.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
-    merge: bool = parameter(True, "whether step 3 is done")
     corner: str = parameter(
         "intersection",
         "whether a corner lies where its lines meet, or on its measurement",
@@ -69,12 +75,6 @@ class IEPF(PieceMethod):
         if self.threshold == self.proportion == self.noise_factor == 0:
             raise ValueError("threshold, proportion and noise_factor are all 0, expected one > 0")
 
-    @classmethod
-    def paper(cls, **changes: Any) -> IEPF:
-        """Make the plain method: fixed tolerance, no merging, corners on their measurements."""
-        plain = {"threshold": 0.1, "proportion": 0.0, "noise_factor": 0.0}
-        return cls(**{**plain, "merge": False, "corner": "beam", **changes})
-
     def find(self, block: Block, row: int) -> None:
         """Cluster, split, merge and fit."""
         self._part(block, row, self.min_points)
@@ -82,12 +82,14 @@ class IEPF(PieceMethod):
             block.floats, block.ints, block.noises[row], False, self.threshold, self.proportion,
             self.noise_factor, self.min_piece,
         )  # fmt: skip
-        if self.merge:
-            self._settle(block, row, self.unevenness)
+        self._settle(block, row, self.unevenness)
         if self.corner == "intersection":
             self._measure(block, row, fit=WEIGHTED, trim=self.corner_trim)
         else:
             self._measure(block, row, fit=TOTAL, sharp=False)
+
+    def _leave(self, block: Block, row: int) -> None:
+        """Leave the corners where the pieces meet."""
 
     @property
     def least_response(self) -> float:

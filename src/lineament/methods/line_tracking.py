@@ -11,7 +11,7 @@ primitives produced by a 2D range finder*, ICRA 1996.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..kernels.rivals.line_tracking import track_lines
 from .lines import PieceMethod
@@ -46,6 +46,7 @@ class LineTracking(PieceMethod):
     """
 
     name: ClassVar[str] = "line_tracking"
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "max_misses": 0}
 
     threshold: float = parameter(
         0.0, "distance from its line that a point without noise may have [m]", low=0

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
+from ..kernels import layout as at
 from ..kernels.budget import LINK, WORST, limit_pieces
 from ..kernels.line_fit import FITS, WEIGHTED
+from ..kernels.rivals.pdbs import BORGES_ALDON, FIXED
 from ..kernels.rivals.settling import settle
 from .base import MethodBase
 from .parameters import documented, parameter
@@ -19,8 +22,28 @@ __all__ = ["LineMethod", "NearMethod", "PieceMethod"]
 @documented
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineMethod(MethodBase):
-    """A method that parts a scan at its breakpoints, finds lines, and settles their borders."""
+    """A method that parts a scan at its breakpoints, finds lines, and settles their borders.
 
+    Its preset `paper` is the method as published: its own clusters or none, and no settling but
+    what its paper has.
+    """
+
+    presets: ClassVar[tuple[str, ...]] = ("paper",)
+    #: Parameters of the preset `paper`, where they differ from the defaults.
+    published: ClassVar[dict[str, Any]] = {}
+
+    clusters: str = parameter(
+        "borges_aldon",
+        "how the scan is parted first: by the detector of Borges and Aldon, at a fixed distance, "
+        "or not at all",
+        choices=("borges_aldon", "fixed", "none"),
+    )
+    distance: float = parameter(0.3, "distance at which `fixed` parts two neighbours [m]", above=0)
+    settling: bool = parameter(
+        True,
+        "whether neighbours are merged, points about their border go to the nearer line, and "
+        "lines meet in corners, for all methods alike; else as published",
+    )
     reach: float = parameter(
         6.0, "spacings from the ends of two pieces within which their lines meet in a corner", low=0
     )
@@ -35,20 +58,39 @@ class LineMethod(MethodBase):
         0, "pieces are joined until their polylines have no more vertices; 0: any number", low=0
     )
 
+    @classmethod
+    def paper(cls, **changes: Any) -> Self:
+        """Make the method as published; ``docs/methods.md`` names what the papers leave open."""
+        return cls(**{"settling": False, **cls.published, **changes})
+
     def _part(self, block: Block, row: int, min_points: int, noise_factor: float = 3.0) -> None:
         """Part the scan into clusters."""
+        if self.clusters == "borges_aldon":
+            rule, constant, missing = BORGES_ALDON, noise_factor, self.max_missing
+        else:
+            rule, missing = FIXED, block.beams
+            constant = self.distance if self.clusters == "fixed" else math.inf
         part(
             block,
             row,
-            constant=noise_factor,
+            rule=rule,
+            constant=constant,
             angle=self.grazing_angle,
-            max_missing=self.max_missing,
+            max_missing=missing,
             min_points=min_points,
         )
 
     def _settle(self, block: Block, row: int, misfit: float) -> None:
-        """Merge the pieces that one line fits, settle their borders, and join them at corners."""
-        settle(block.floats, block.ints, block.noises[row], misfit, self.reach)
+        """Settle the borders of the pieces, or leave them as the method's paper does."""
+        if self.settling:
+            settle(block.floats, block.ints, block.noises[row], misfit, self.reach)
+        else:
+            self._leave(block, row)
+
+    def _leave(self, block: Block, row: int) -> None:  # noqa: ARG002
+        """Leave the lines as they are, without corners."""
+        block.work.pieces[at.BEFORE] = -1
+        block.work.response[:] = math.nan
 
     def _measure(
         self, block: Block, row: int, *, fit: int, sharp: bool = True, trim: int = 0
@@ -87,6 +129,8 @@ class PieceMethod(LineMethod):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NearMethod(LineMethod):
     """A method that looks for points near a line, one line after the other."""
+
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "sigmas": 0.0, "fit": "total"}
 
     epsilon: float = parameter(
         0.01, "misfit: how far a point may lie from the line without noise [m]", low=0

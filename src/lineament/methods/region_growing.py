@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..kernels.rivals.region_growing import Parameters, grow_regions
+from ..kernels.rivals.settling import divide_overlaps
 from .lines import NearMethod
 from .parameters import documented, parameter
 from .workspace import Block
@@ -44,6 +45,14 @@ class RegionGrowing(NearMethod):
     """
 
     name: ClassVar[str] = "region_growing"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "epsilon": 0.03,
+        "delta": 0.1,
+        "sigmas": 0.0,
+        "p_min": 10,
+        "fit": "total",
+    }
 
     s_num: int = parameter(6, "points of a seed", low=3)
     p_min: int = parameter(6, "least points of a region", low=3)
@@ -54,6 +63,11 @@ class RegionGrowing(NearMethod):
     sigmas: float = parameter(
         3.0, "standard deviations of its range noise that a point may lie off besides", low=0
     )
+
+    def _leave(self, block: Block, row: int) -> None:
+        """Divide what two regions share."""
+        divide_overlaps(block.floats, block.ints)
+        NearMethod._leave(self, block, row)
 
     def find(self, block: Block, row: int) -> None:
         """Part, seed and grow, settle the overlaps and fit."""

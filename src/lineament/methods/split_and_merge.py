@@ -10,8 +10,9 @@ ICRA 2003.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from ..kernels.rivals.settling import merge_alike
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import PieceMethod
@@ -47,6 +48,12 @@ class SplitAndMerge(PieceMethod):
     """
 
     name: ClassVar[str] = "split_and_merge"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "fixed",
+        "threshold": 0.03,
+        "noise_factor": 0.0,
+        "corner_trim": 0,
+    }
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
     noise_factor: float = parameter(
@@ -67,6 +74,10 @@ class SplitAndMerge(PieceMethod):
             self.noise_factor, self.min_piece,
         )  # fmt: skip
         self._finish(block, row)
+
+    def _leave(self, block: Block, row: int) -> None:
+        """Merge neighbours that one line fits; lines that touch meet in a corner."""
+        merge_alike(block.floats, block.ints, block.noises[row], self.unevenness)
 
     @property
     def least_response(self) -> float:
