@@ -19,6 +19,7 @@ from lineament.cli import run
 from lineament.cli.options import reading
 from lineament.logs import save_npz
 from lineament.logs.base import ECHOES, ReadOptions
+from lineament.reproduce import EXPERIMENTS, Setting
 
 
 @pytest.fixture
@@ -132,6 +133,9 @@ WRONG = [
     ("warmup -m lui", 2, "method 'lui' is unknown"),
     ("demo none.log -o demo", 1, "none.log"),
     ("demo -o wall.npz", 1, "cannot make this folder"),
+    ("live --from wall.npz --ros 0 --domain 233", 2, "--domain"),
+    ("live --from wall.npz --ros 0 --depth 1001", 2, "--depth"),
+    ("live --from wall.npz --ros 0 --foxglove 65536", 2, "--foxglove"),
     ("compare wall.npz -o a.txt", 2, "expected an ending of .html, .png"),
     ("compare wall.npz -o a.png -m lui", 2, "method 'lui' is unknown"),
     ("compare wall.npz -o a.png --scan 99 -m pdbs", 1, "expected 0 to 6"),
@@ -278,13 +282,19 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys
     from lineament.cli import progress
 
     assert list(progress.tracker(quiet=True)(range(3), "x", 3)) == [0, 1, 2]
-    clock = iter(np.arange(0.0, 100.0, 1.5))
+    clock = iter(np.arange(100.0))
     monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     assert list(progress.tracker(quiet=False)(range(4), "reading", 4)) == [0, 1, 2, 3]
+    with progress.status(quiet=False) as show:
+        for about in "abcd":
+            show(about)
     assert capsys.readouterr().err.splitlines() == [
-        "reading: 2/4, 0.7/s, 3 s left",
-        "reading: 4/4, 0.7/s, 0 s left",
+        "reading: 2/4, 1.0/s, 2 s left",
+        "reading: 4/4, 1.0/s, 0 s left",
+        "b",
+        "d",
     ]
+    assert [progress._rate_text(rate) for rate in (9.94, 10.0)] == ["9.9/s", "10/s"]
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="pseudo-terminals are not everywhere")
@@ -340,11 +350,11 @@ def show(reading):
 
 def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
-    given = ["--topic", "/scan", "--echo", "last", "--ring", "3", "--poses", "/odom"]
+    given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
     show.main([*given, "--keep-going"], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
     assert plain == {"topic": None, "keep_going": False, **vars(ReadOptions())}
-    assert list(all_given.values()) == ["/scan", True, "last", 3, "/odom"]
+    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom"]
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES
@@ -402,21 +412,28 @@ def test_compare_writes_a_page_and_a_table(npz, tmp_path, capsys):
     assert all((tmp_path / name).stat().st_size > 1000 for name in ("a.html", "a.png"))
 
 
-@pytest.mark.slow
-def test_reproduce_writes_page_and_figures(tmp_path, monkeypatch, capsys):
-    monkeypatch.delenv("LINEAMENT_DATA", raising=False)
-    out = tmp_path / "report"
-    assert run(["reproduce", "-o", str(out), "--only", "fig5", "--frames", "1"]) == 0
-    assert capsys.readouterr().out.strip() == str(out / "index.html")
-    figures = json.loads((out / "figures.json").read_text(encoding="utf-8"))
-    assert list(figures["experiments"]) == ["layers"]
-    assert figures["recordings"] is False
+def test_reproduce_runs_what_is_asked_for_on_the_recordings_of_the_environment(
+    tmp_path, monkeypatch, capsys
+):
+    calls = []
 
+    def report(output, *asked):
+        calls.append(asked[:2])
+        return output / "index.html"
 
-def test_reproduce_takes_the_recordings_of_the_environment(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("lineament.reproduce.report.reproduce", report)
+    monkeypatch.setenv("LINEAMENT_DATA", str(tmp_path))
+    given = ["reproduce", "-o", str(tmp_path), "--only", "fig5", "--frames", "3", "--seed", "2"]
+    assert run(given) == 0
+    assert capsys.readouterr().out == f"{tmp_path}/index.html\n"
     monkeypatch.setenv("LINEAMENT_DATA", str(tmp_path / "nowhere"))
-    assert run(["reproduce", "-o", str(tmp_path / "report")]) == 2
+    assert run(given) == 2
     assert "nowhere" in capsys.readouterr().err
+    monkeypatch.delenv("LINEAMENT_DATA")
+    assert run(["reproduce", "-o", str(tmp_path), "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+    names = list(EXPERIMENTS)
+    assert calls == [(["layers"], Setting(3, 2, tmp_path)), (names, Setting(10, 0, None))]
 
 
 def test_bench_ple_prints_means_beside_the_authors(benchmark, tmp_path, capsys):
