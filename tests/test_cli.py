@@ -214,6 +214,9 @@ def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
         "scan.png",
         "trace.png",
     }
+    assert run(["extract", str(npz), "-q", "-o", str(tmp_path / "f.parquet")]) == 0
+    tables = [pq.read_table(path) for path in (folder / "features.parquet", tmp_path / "f.parquet")]
+    assert tables[0].equals(tables[1])
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 3
     assert str(folder / "index.html") in capsys.readouterr().out
