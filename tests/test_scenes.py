@@ -107,7 +107,7 @@ def test_clearance_and_freedom_by_hand():
     assert is_free(room(), points).tolist() == [True, False, True, True, False]
     column = World(room().segments, [[-1, 0, 0.5]])
     assert clearance(column, [(-1.2, 0)])[0] == pytest.approx(0.3)
-    assert is_free(column, [(-1.2, 0), (-1.6, 0)]).tolist() == [False, True]
+    assert is_free(column, [(-1.2, 0), (-1.5, 0), (-1.6, 0)]).tolist() == [False, True, True]
     assert clearance(World([]), [(0, 0)]).tolist() == [math.inf]
 
 

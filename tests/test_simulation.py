@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from worlds import drum, ring_sensor
 
+from lineament.logs import open_log
 from lineament.scan import RangeNoise
 from lineament.simulation import (
     SENSORS,
@@ -14,9 +15,11 @@ from lineament.simulation import (
     World,
     building,
     cast_rays,
+    drive,
     drive_poses,
     room,
     scene,
+    simulate_log,
 )
 
 #: Statistics are held to this many standard deviations of their own: a chance of 7e-6 each.
@@ -352,7 +355,7 @@ MOMENTS = (
 )
 
 
-def test_the_building_and_the_drive_through_it_are_what_they_were():
+def test_the_building_and_the_drive_through_it_are_what_they_were(tmp_path):
     """Every coordinate and angle has a part in these sums."""
     world, way = building()
     moments = [table.T @ table for table in (world.segments[:, :2], world.circles, way)]
@@ -360,3 +363,7 @@ def test_the_building_and_the_drive_through_it_are_what_they_were():
         np.testing.assert_allclose(found, expected, rtol=1e-9)
     stamps, _ = drive_poses(way)
     assert (len(stamps), stamps[-1]) == (896, 89.5)
+    alone = Sensor("alone", 1, 0.0, 0.1)
+    assert sum(1 for _ in drive(world, way, alone)) == 896
+    simulate_log(tmp_path / "a.npz", "building", alone)
+    assert len(open_log(tmp_path / "a.npz")) == 896
