@@ -17,11 +17,11 @@ from mcap.reader import make_reader
 from test_output import files_up_to, resource
 
 import lineament as ln
-from lineament.tasks.bulk import MANIFEST, Manifest, Row, Threads, extract_logs
+from lineament.tasks.bulk import MANIFEST, Bulk, Manifest, Row, Threads, extract_logs
 from lineament.tasks.bulk.manifest import names_of, part_path
 from lineament.tasks.bulk.parts import log_state
 from lineament.tasks.bulk.run import _Progress
-from lineament.tasks.extract import extract_log
+from lineament.tasks.extract import Extraction, extract_log
 
 IEPF = ln.Extractor("iepf")
 
@@ -237,6 +237,11 @@ def test_a_full_disk_is_reported_and_leaves_no_half_file(logs, tmp_path):
 
 
 # Topics.
+
+
+def test_a_run_that_takes_no_time_has_no_rate():
+    for found in (Extraction(log="a"), Bulk("out", "rows", 0, 0, 0, 0, {}, 0.0)):
+        assert str(found).endswith("  0.00 s, 0 scans/s")
 
 
 @pytest.fixture

@@ -144,6 +144,16 @@ def test_how_a_process_ended(status, text):
     assert workers._ending_of(status) == text
 
 
+@posix
+def test_interrupts_are_held_while_a_process_starts_and_no_longer():
+    def is_held():
+        return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+    with workers._interrupts_held():
+        assert is_held()
+    assert not is_held()
+
+
 class Lost(ProcessPoolExecutor):
     """An executor whose workers are lost."""
 

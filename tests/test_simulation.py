@@ -363,7 +363,9 @@ def test_the_building_and_the_drive_through_it_are_what_they_were(tmp_path):
         np.testing.assert_allclose(found, expected, rtol=1e-9)
     stamps, _ = drive_poses(way)
     assert (len(stamps), stamps[-1]) == (896, 89.5)
-    alone = Sensor("alone", 1, 0.0, 0.1)
-    assert sum(1 for _ in drive(world, way, alone)) == 896
-    simulate_log(tmp_path / "a.npz", "building", alone)
-    assert len(open_log(tmp_path / "a.npz")) == 896
+    sensor = Sensor("one beam", 1, 0.0, 0.1, noise=RangeNoise(0.01))
+    simulate_log(tmp_path / "a.npz", "building", sensor)
+    for scans in (list(drive(world, way, sensor)), list(open_log(tmp_path / "a.npz"))):
+        assert len(scans) == 896
+        first = sensor.scan(world, (*way[0], 0.0), np.random.default_rng([0, 0]))
+        np.testing.assert_array_equal(scans[0].ranges, first.ranges)
