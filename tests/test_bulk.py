@@ -20,7 +20,7 @@ import lineament as ln
 from lineament.tasks.bulk import MANIFEST, Bulk, Manifest, Row, Threads, extract_logs
 from lineament.tasks.bulk.manifest import names_of, part_path
 from lineament.tasks.bulk.parts import log_state
-from lineament.tasks.bulk.run import _Progress
+from lineament.tasks.bulk.run import _duration, _Progress
 from lineament.tasks.extract import Extraction, extract_log
 
 IEPF = ln.Extractor("iepf")
@@ -377,3 +377,4 @@ def test_progress_has_a_throughput_and_the_time_left(monkeypatch):
     assert str(progress) == "2/3 logs, 1 failed, 100 scans/s, 0:00 left"
     progress.finish(Row(log="c", name="c", outcome="done", scans=10))
     assert str(progress) == "3/3 logs, 1 failed, 101 scans/s, 0:00 left"
+    assert [_duration(seconds) for seconds in (75.4, 3660)] == ["1:15", "1:01:00"]
