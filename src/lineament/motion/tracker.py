@@ -126,11 +126,7 @@ class Tracker:
             Those of the next scan, in the frame of its sensor.
         odometry : (x, y, theta), optional
             Pose of the sensor by odometry, in any frame that stays [m, m, rad]. Its change since
-            the last frame is what is made use of, where both have one.
-
-        Returns
-        -------
-        Tracks
+            the last frame is made use of, where both have one.
 
         Raises
         ------

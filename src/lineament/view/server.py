@@ -162,22 +162,9 @@ def serve(
     browser: bool = True,
     write: Callable[[str], None] = print,
 ) -> None:
-    """Serve the page of a session until interrupted, and open it in the browser.
+    """Serve the page of a session until interrupted, and open it in the browser unless told not to.
 
-    Parameters
-    ----------
-    session : Session
-    host, port
-        As in `ViewServer`.
-    browser : bool
-        Whether to open the page.
-    write : callable
-        Called with a line that has the address.
-
-    Raises
-    ------
-    LineamentError
-        If the server cannot listen there.
+    `write` is called with a line that has the address. Raises as `ViewServer` does.
     """
     with session, ViewServer(session, host, port) as server:
         address = _address(host)
