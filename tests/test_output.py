@@ -251,7 +251,6 @@ def test_parquet_has_a_column_of_topics_where_there_are_several(tmp_path):
     write(tmp_path / "two.parquet", scans, TOPICS)
     table = pq.read_table(tmp_path / "two.parquet")
     assert table.schema.names == [*SCHEMA.names, "topic"]
-    # The other columns are what they are without it.
     assert table.schema.metadata == SCHEMA.metadata
     assert table.drop_columns("topic").combine_chunks().equals(features_table(scans))
     assert table["topic"].to_pylist() == [TOPICS[k % 2] for k in table["scan"].to_pylist()]

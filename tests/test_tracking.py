@@ -13,8 +13,8 @@ import lineament as ln
 from lineament.motion import Tracker, associate, estimate_motion
 from lineament.motion.association import KINDS, chi_square
 from lineament.reproduce.tracking import LOGS, load_recording, stand_in_odometry
-from lineament.scan.poses import compose, inverse, relative
-from lineament.simulation import SENSORS, building, drive, drive_poses, room, truth
+from lineament.scan.poses import compose, inverse
+from lineament.simulation import SENSORS, drive, room
 
 WALLS = (segment((2, -1), (2, 1), 10, 30), segment((2, 1), (-1, 1), 31, 60))
 FRAME = features(
@@ -123,7 +123,10 @@ def varied(seed):
 def test_pairs_and_motion_of_random_features(seed):
     before, rng = varied(seed), np.random.default_rng([seed, 1])
     motion = tuple((rng.normal(size=3) * (0.1, 0.1, 0.3 if seed % 3 else 3.0)).tolist())
-    now = shaken(before, seed).transform(*motion)
+    now = shaken(before, seed)
+    sides = now.corners["segments"]
+    sides[:] = rng.integers(-1, len(now.segments), sides.shape)
+    now = now.transform(*motion)
     back = inverse(motion)
     for spread, roughness in ((None, 0.0), (SPREAD, 0.0), (SPREAD, 0.02)):
         given = {"gate": 0.9, "roughness": roughness}
@@ -289,17 +292,6 @@ def test_a_stamp_that_is_wrong_does_not_throw_the_tracks_off(gap):
     assert all(now & before for before, now in pairwise(numbers))
     assert len(numbers[8] & numbers[16]) >= 4
     assert tracker.twist == pytest.approx((1.0, 0.0, 0.0), abs=0.05)
-
-
-def test_a_drive_through_rooms_without_noise_is_followed_exactly():
-    world, waypoints = building()
-    stamps, poses = drive_poses(waypoints[:3], speed=0.6, rate=5)
-    tracker, way = Tracker(roughness=0.0), (0.0, 0.0, 0.0)
-    for stamp, pose in zip(stamps.tolist(), map(tuple, poses.tolist()), strict=True):
-        tracks = tracker(at(truth(world, pose, SENSORS["utm30lx"]), stamp))
-        if tracks.motion is not None:
-            way = compose(way, tracks.motion.pose)
-    np.testing.assert_allclose(way, relative(tuple(poses[0]), tuple(poses[-1])), atol=0.02)
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """The motion from matched features: exact without noise, consistent with it, blind in corridors."""
 
 import math
-from dataclasses import replace
 
 import naive_tracking as naive
 import numpy as np
@@ -90,27 +89,6 @@ def test_covariance_by_hand(sigma, lost):
     assert len(motion.unobserved) == lost
     if not lost:
         np.testing.assert_allclose(motion.covariance, sigma**2 * np.eye(3), rtol=2e-3, atol=1e-8)
-
-
-def test_a_corner_of_matched_walls_says_nothing_new():
-    whole = moved_by((0.1, 0.0, 0.0), segments=APART, corners=[corner(2, 3, segments=(0, 1))])
-    walls = replace(whole, corners=NONE)
-    np.testing.assert_allclose(estimate_motion(whole).covariance, estimate_motion(walls).covariance)
-    # Where one wall is matched, the corner gives the place along it alone: here, y.
-    one = estimate_motion(replace(whole, segments=whole.segments[:1]), covariance=WIDE)
-    assert one.covariance[1, 1] < 0.03**2
-    none = estimate_motion(
-        replace(whole, segments=whole.segments[:1], corners=NONE), covariance=WIDE
-    )
-    assert none.covariance[1, 1] > 0.09**2
-
-
-def test_a_wrong_pair_counts_little():
-    rows = [corner(x, y, segments=(-1, -1)) for x in (-1, 1, 2) for y in (-1, 1, 2)]
-    matches = moved_by((0.1, 0.0, 0.02), corners=rows)
-    matches.now.corners.flags.writeable = True
-    matches.now.corners["position"][0] += (0.5, 0.3)
-    np.testing.assert_allclose(estimate_motion(matches).pose, (0.1, 0.0, 0.02), atol=2e-3)
 
 
 def test_derivatives_of_the_twin_are_those_of_its_errors():
