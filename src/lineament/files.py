@@ -1,4 +1,4 @@
-"""Whole files or none: written beside the target, then renamed; and what they are written by."""
+"""Whole files or none: write beside the target, then rename."""
 
 import json
 import os

@@ -41,8 +41,7 @@ class Features:
     Examples
     --------
     >>> import lineament as ln
-    >>> features = ln.extract(ln.LaserScan([], angle_min=0.0, angle_increment=0.1))
-    >>> features
+    >>> ln.extract(ln.LaserScan([], angle_min=0.0, angle_increment=0.1))
     Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
 
@@ -90,8 +89,8 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-        >>> moved = ln.extract(scan).transform(1.0, 0.0, math.pi / 2)
+        >>> features = ln.extract(ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01))
+        >>> moved = features.transform(1.0, 0.0, math.pi / 2)
         >>> moved.segments["centroid"].round(2).tolist()
         [[1.0, 2.0]]
         """

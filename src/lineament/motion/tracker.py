@@ -66,10 +66,8 @@ class Tracker:
     ----------
     max_missed : int
         Frames through which a track lasts without being seen.
-    gate : float
-        Share of the right pairs that are within the gates.
-    roughness : float
-        How far surfaces are from straight and round [m]: 0 in a simulation, 1 cm in offices.
+    gate, roughness : float
+        As in `associate`; surfaces are rough by 0 in a simulation, by 1 cm in offices.
 
     Raises
     ------

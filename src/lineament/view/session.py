@@ -22,19 +22,8 @@ from .store import ScanStore
 class Session:
     """A log that is looked at, with one extractor for each method.
 
-    Parameters
-    ----------
-    path : path-like
-        The log, of any format that `lineament.open_log` reads.
-    extractors : mapping of str to Extractor
-        By the name under which the page shows them; the first is shown first.
-    **reading
-        How to read the log, as in `lineament.open_log`.
-
-    Raises
-    ------
-    LogError
-        If the log cannot be read, up to its first scan.
+    The page shows the extractors by their names, the first of them first. The log is read as by
+    `lineament.open_log`; a LogError if it cannot be read up to its first scan.
     """
 
     def __init__(
