@@ -420,8 +420,9 @@ def test_edges_are_marks_of_their_own():
     layers = {layer.name: layer for layer in layers_of(markers)}
     corners, edges = layers["corners"], layers["edges"]
     assert (corners.points.tolist(), edges.points.tolist()) == ([[0, 1], [2, 1]], [[1, 1]])
-    assert edges.size < corners.size
     assert min(edges.color) > min(corners.color)  # lighter
+    assert [layer.size for layer in layers.values()] == [0.03, 0.03, 0.08, 0.05, 0.01]
+    assert layers["segments"].color == (0.16, 0.47, 0.84, 1.0)
 
 
 def test_pieces_of_strips_are_the_same_in_one_array():
