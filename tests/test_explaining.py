@@ -134,6 +134,19 @@ def test_lengths_below_a_metre_are_in_millimetres(distance, words):
     assert f"by +{words}" in text
 
 
+@pytest.mark.parametrize(
+    ("seed", "beam", "method", "words"),
+    [
+        (6, 70, "optimal", "yet it was not cut, and the two lines turn by"),
+        (6, 90, "optimal", "°: one wall that bends"),
+        (2, 70, "iepf", "asked; cut there first, then merged again"),
+        (2, 65, "iepf", "asked; a border, but the lines on its sides do not meet there"),
+    ],
+)
+def test_what_was_not_cut(seed, beam, method, words):
+    assert words in explained(random_scan(seed), beam, method)[1]
+
+
 def test_pdbs_finds_clusters_alone():
     assert explained(wall_with([], []), 5, "pdbs")[0].outcome == "clustered"
 

@@ -101,9 +101,9 @@ def test_walls(scans, least, walls):
     ],
 )
 def test_what_is_one_wall(other, count):
-    plan = plan_of([WALL], [other])
+    plan = plan_of([WALL], [other, ((-20, -20), (-20, 24))])
     plan.walls()
-    assert len(plan._walls) == count
+    assert len(plan._walls) == count + 1
 
 
 def test_line_is_the_main_axis_of_points_spread_over_what_was_seen():

@@ -197,6 +197,9 @@ def test_odd_scans_are_written(tmp_path, name, read):
 def test_many_scans_are_in_chunks_with_an_index(tmp_path):
     long = LaserScan(np.full(2000, 2.0), angle_min=0.0, angle_increment=0.003)
     with write(tmp_path / "a.mcap", *[(EMPTY, long)] * 200).open("rb") as file:
-        summary = make_reader(file).get_summary()
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        sequences = [message.sequence for _, _, message in reader.iter_messages()]
+    assert sorted(sequences) == [k // 2 for k in range(400)]
     assert len(summary.chunk_indexes) > 2  # memory does not grow: about 1 MB each
     assert summary.statistics.message_count == 400
