@@ -28,6 +28,7 @@ DEGENERATE = degenerate_scans()
 EXTRACTORS = {
     "default": Extractor("liu"),
     "paper": Extractor("liu:paper", threshold=0.3),
+    "chord": Extractor("liu:paper", response="chord_scaled"),
     "scale free": Extractor("liu:scale_free", noise=RangeNoise(0.0, 0.01, 0.002, 0.01)),
     "weighted": Extractor(
         "liu:scale_free", fit="weighted", noise=RangeNoise(0.01, 0.001, 0.001), min_points=5
@@ -35,7 +36,9 @@ EXTRACTORS = {
     "product": Extractor(
         "liu", response="product", threshold=0.05, support_radius=3, half_width=3, min_points=4
     ),
-    "at beams": Extractor("liu", threshold=0.3, corner="beam", min_points=2, noise=NOISE),
+    "at beams": Extractor(
+        "liu", response="tangent", threshold=0.3, corner="beam", min_points=2, noise=NOISE
+    ),
 }
 
 
