@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import click
 import numpy as np
@@ -380,9 +381,12 @@ def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys):
     assert f"holds several logs, expected a log file: {tmp_path}/a.zip/x.log" in error
 
 
-def test_warmup_takes_methods_and_says_how_long(capsys):
-    assert run(["warmup"]) == 0
-    assert capsys.readouterr().out.startswith("kernels ready after ")
+def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
+    with monkeypatch.context() as patched:
+        clock = SimpleNamespace(perf_counter=iter((1.0, 3.5)).__next__)
+        patched.setattr("lineament.tasks.warmup.time", clock)
+        assert run(["warmup"]) == 0
+    assert capsys.readouterr().out == "kernels ready after 2.50 s\n"
     assert run(["warmup", "-q", "-m", "pdbs", "-m", "liu"]) == 0
     assert capsys.readouterr() == ("", "")
 
