@@ -1,7 +1,5 @@
 """Slow twins of method optimal: the model of ``docs/optimal.md``, with numbers of their own."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What every method of lines must do, whatever its way: scenes whose features are known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

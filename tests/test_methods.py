@@ -1,7 +1,5 @@
 """Methods by name, and what their parameters may be."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Maps of method `optimal`: polylines of a budget of vertices, against every choice of vertices."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations, pairwise, product
 
