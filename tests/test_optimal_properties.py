@@ -163,21 +163,14 @@ def all_hostile():
 
 
 @every_extractor
-def test_features_of_hostile_scans_are_sound(extractor):
-    for scan in [*all_hostile(), *degenerate_scans().values()]:
+@pytest.mark.parametrize("source", ["hostile", "random", *SENSORS])
+def test_features_are_sound(extractor, source):
+    if source == "hostile":
+        scans = [*all_hostile(), *degenerate_scans().values()]
+    else:
+        scans = map(random_scan, range(40)) if source == "random" else simulated(source)
+    for scan in scans:
         assert_sound(scan, extractor(scan), extractor)
-
-
-@every_extractor
-def test_features_of_random_scans_are_sound(extractor):
-    for scan in map(random_scan, range(40)):
-        assert_sound(scan, extractor(scan), extractor)
-
-
-@pytest.mark.parametrize("sensor", SENSORS)
-def test_features_of_simulated_scans_are_sound(sensor):
-    for scan in simulated(sensor):
-        assert_sound(scan, EXTRACTORS["default"](scan), EXTRACTORS["default"])
 
 
 @pytest.mark.slow
