@@ -36,7 +36,7 @@ def test_tolerance_by_hand():
     for parts in ({"threshold": 1.0}, {"proportion": 1 / 3.0}, {"noise_factor": 100.0}):
         for scale, corners in ((height * 0.999, 1), (height * 1.001, 0)):
             own = plain | {name: value * scale for name, value in parts.items()}
-            extractor = Extractor("iepf", merge=False, noise=NOISE, **own)
+            extractor = Extractor("iepf", settling=False, noise=NOISE, **own)
             assert len(extractor(scan).corners) == corners
             candidate = extractor.trace(scan).candidates[0]
             assert candidate["chord_distance"] == pytest.approx(height)
@@ -56,7 +56,7 @@ def test_merging_joins_what_was_split_by_noise():
     angles = fan(40)
     ranges = 2.0 / np.cos(angles) + 0.01 * np.random.default_rng(3).normal(size=len(angles))
     scan, parameters = scan_of(ranges, angles), {"noise_factor": 1.0, "proportion": 0.0}
-    assert len(Extractor("iepf", merge=False, noise=NOISE, **parameters)(scan).segments) > 10
+    assert len(Extractor("iepf", settling=False, noise=NOISE, **parameters)(scan).segments) > 10
     assert len(Extractor("iepf", noise_factor=3.0, noise=NOISE)(scan).segments) == 1
 
 

@@ -41,9 +41,9 @@ PARTITIONS = {
     "santos, wide": Extractor("pdbs", rule="santos", beta=1.2, c0=0.0, max_missing=200),
 }
 SPLITTERS = {
-    "iepf": Extractor("iepf", merge=False),
+    "iepf": Extractor("iepf", settling=False),
     "iepf:paper": Extractor("iepf:paper"),
-    "iepf, changed": Extractor("iepf", merge=False, **CHANGED),
+    "iepf, changed": Extractor("iepf", settling=False, **CHANGED),
     "split_and_merge": Extractor("split_and_merge"),
     "split_and_merge, changed": Extractor("split_and_merge", **CHANGED),
 }

@@ -7,7 +7,7 @@ verifies, are those of M. Przybyła, *Detection and tracking of 2D geometric obs
 data*, RoMoCo 2017.
 """
 
-from typing import Any, Self
+from typing import Any, ClassVar
 
 from ..kernels.line_fit import TOTAL, WEIGHTED
 from ..kernels.rivals.splitting import split
@@ -28,11 +28,18 @@ class IEPF(PieceMethod):
        line, and put corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + proportion ρ + noise_factor σ_r``. The
-    preset `paper` is the plain method: a fixed tolerance, no merging, corners on measurements.
+    preset `paper` is the method as published: step 2 alone, of the whole scan, with a fixed
+    tolerance; corners on measurements.
     """
 
     name = "iepf"
-    presets = ("paper",)
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "threshold": 0.1,
+        "proportion": 0.0,
+        "noise_factor": 0.0,
+        "corner": "beam",
+    }
     least_response = 1.0
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
@@ -43,7 +50,6 @@ class IEPF(PieceMethod):
         4.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
-    merge: bool = parameter(True, "whether step 3 is done")
     corner: str = parameter(
         "intersection",
         "whether a corner lies where its lines meet, or on its measurement",
@@ -55,20 +61,16 @@ class IEPF(PieceMethod):
         if self.threshold == self.proportion == self.noise_factor == 0:
             raise ValueError("threshold, proportion and noise_factor are all 0, expected one > 0")
 
-    @classmethod
-    def paper(cls, **changes: Any) -> Self:
-        """Make the plain method: fixed tolerance, no merging, corners on their measurements."""
-        plain = {"threshold": 0.1, "proportion": 0.0, "noise_factor": 0.0}
-        return cls(**{**plain, "merge": False, "corner": "beam", **changes})
-
     def find(self, block: Block) -> None:
         """Cluster, split, merge and fit."""
         self.part(block, self.min_points)
         tolerance = self.threshold, self.proportion, self.noise_factor
         split(*block.workspace, False, *tolerance, self.min_piece)
-        if self.merge:
-            self.settle(block, self.unevenness)
+        self.settle(block, self.unevenness)
         if self.corner == "intersection":
             self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
         else:
             self.measure(block, fit=TOTAL, sharp=False)
+
+    def leave(self, block: Block) -> None:
+        """Leave the corners where the pieces meet."""

@@ -8,6 +8,8 @@ P. Vandorpe, H. Van Brussel, H. Xu, *Exact dynamic map building for a mobile rob
 primitives produced by a 2D range finder*, ICRA 1996.
 """
 
+from typing import Any, ClassVar
+
 from ..kernels.rivals.line_tracking import track_lines
 from .lines import PieceMethod
 from .parameters import method, parameter
@@ -29,6 +31,7 @@ class LineTracking(PieceMethod):
     """
 
     name = "line_tracking"
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "max_misses": 0}
 
     threshold: float = parameter(
         0.0, "distance from its line that a point without noise may have [m]", low=0

@@ -1,9 +1,12 @@
 """What the methods share that find lines in clusters: the clusters before, the settling after."""
 
 import math
+from typing import Any, ClassVar, Self
 
+from ..kernels import layout as at
 from ..kernels.budget import LINK, WORST, limit_pieces
 from ..kernels.line_fit import FITS, WEIGHTED
+from ..kernels.rivals.pdbs import BORGES_ALDON, FIXED
 from ..kernels.rivals.settling import settle
 from .base import MethodBase
 from .parameters import method, parameter
@@ -12,8 +15,28 @@ from .workspace import Block, budget_scratch
 
 @method
 class LineMethod(MethodBase):
-    """A method that parts a scan at its breakpoints, finds lines, and settles their borders."""
+    """A method that parts a scan at its breakpoints, finds lines, and settles their borders.
 
+    Its preset `paper` is the method as published: its own clusters or none, and no settling but
+    what its paper has.
+    """
+
+    presets = ("paper",)
+    #: Parameters of the preset `paper`, where they differ from the defaults.
+    published: ClassVar[dict[str, Any]] = {}
+
+    clusters: str = parameter(
+        "borges_aldon",
+        "how the scan is parted first: by the detector of Borges and Aldon, at a fixed distance, "
+        "or not at all",
+        choices=("borges_aldon", "fixed", "none"),
+    )
+    distance: float = parameter(0.3, "distance at which `fixed` parts two neighbours [m]", above=0)
+    settling: bool = parameter(
+        True,
+        "whether neighbours are merged, points about their border go to the nearer line, and "
+        "lines meet in corners, for all methods alike; else as published",
+    )
     reach: float = parameter(
         6.0, "spacings from the ends of two pieces within which their lines meet in a corner", low=0
     )
@@ -28,18 +51,37 @@ class LineMethod(MethodBase):
         0, "pieces are joined until their polylines have no more vertices; 0: any number", low=0
     )
 
+    @classmethod
+    def paper(cls, **changes: Any) -> Self:
+        """Make the method as published; ``docs/methods.md`` names what the papers leave open."""
+        return cls(**{"settling": False, **cls.published, **changes})
+
     def part(self, block: Block, min_points: int, noise_factor: float = 3.0) -> None:
         """Part the scan into clusters."""
+        if self.clusters == "borges_aldon":
+            rule, constant, missing = BORGES_ALDON, noise_factor, self.max_missing
+        else:
+            rule, missing = FIXED, block.beams
+            constant = self.distance if self.clusters == "fixed" else math.inf
         block.part(
-            constant=noise_factor,
+            rule=rule,
+            constant=constant,
             angle=self.grazing_angle,
-            max_missing=self.max_missing,
+            max_missing=missing,
             min_points=min_points,
         )
 
     def settle(self, block: Block, misfit: float) -> None:
-        """Merge the pieces that one line fits, settle their borders, and join them at corners."""
-        settle(*block.workspace, misfit, self.reach)
+        """Settle the borders of the pieces, or leave them as the method's paper does."""
+        if self.settling:
+            settle(*block.workspace, misfit, self.reach)
+        else:
+            self.leave(block)
+
+    def leave(self, block: Block) -> None:
+        """Leave the lines as they are, without corners."""
+        block.work.pieces[at.BEFORE] = -1
+        block.work.response[:] = math.nan
 
     def measure(self, block: Block, *, fit: int, sharp: bool = True, trim: int = 0) -> None:
         """Keep within the budget of vertices, and measure."""
@@ -72,6 +114,8 @@ class PieceMethod(LineMethod):
 @method
 class NearMethod(LineMethod):
     """A method that looks for points near a line, one line after the other."""
+
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "sigmas": 0.0, "fit": "total"}
 
     epsilon: float = parameter(
         0.01, "misfit: how far a point may lie from the line without noise [m]", low=0

@@ -68,13 +68,27 @@ class Liu(MethodBase):
     )
     response: str = parameter(
         "tangent",
-        "interpretation of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], or "
-        "that over Σ|s| [-]",
+        "interpretation of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], Σd "
+        "over Σ|s| or the length of the chord [-], or Σ of the products of both distances of each "
+        "point over the square of that length [-]",
         choices=RESPONSES,
+    )
+    recursion: str = parameter(
+        "both",
+        "whether both sides of a corner are searched in turn, or that after it alone, which is "
+        "step 7 to the letter",
+        choices=("both", "after"),
+    )
+    ends: str = parameter(
+        "truncated",
+        "whether the support of points near an end of their cluster is cut short, or such points "
+        "are no corners; not stated",
+        choices=("truncated", "excluded"),
     )
     fit: str = parameter(
         "total",
-        "orthogonal least squares, the paper's y = kx + b, or maximum likelihood",
+        "orthogonal least squares; the paper's y = kx + b, with x = ky + b where a wall is steeper "
+        "than 45° (`y_of_x`) or to the letter (`slope_intercept`); or maximum likelihood",
         choices=FITS,
     )
     measure: str = parameter(
@@ -119,6 +133,8 @@ class Liu(MethodBase):
         codes = {
             "response": RESPONSES[self.response],
             "measure": RANGE if self.measure == "raw" else FILTERED,
+            "recursion": self.recursion == "both",
+            "ends": self.ends == "excluded",
             "fit": FITS[self.fit],
             "corner": sharp,
             "corner_trim": self.corner_trim if sharp else 0,

@@ -5,8 +5,10 @@ seeded region growing*, International Journal of Advanced Robotic Systems 15(1),
 """
 
 from operator import attrgetter
+from typing import Any, ClassVar
 
 from ..kernels.rivals.region_growing import Parameters, grow_regions
+from ..kernels.rivals.settling import divide_overlaps
 from .lines import NearMethod
 from .parameters import method, parameter
 from .workspace import Block
@@ -27,6 +29,14 @@ class RegionGrowing(NearMethod):
     """
 
     name = "region_growing"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "epsilon": 0.03,
+        "delta": 0.1,
+        "sigmas": 0.0,
+        "p_min": 10,
+        "fit": "total",
+    }
 
     s_num: int = parameter(6, "points of a seed", low=3)
     p_min: int = parameter(6, "least points of a region", low=3)
@@ -43,3 +53,8 @@ class RegionGrowing(NearMethod):
         self.part(block, self.s_num, self.noise_factor)
         grow_regions(*block.workspace, _numbers(self))
         self.finish(block)
+
+    def leave(self, block: Block) -> None:
+        """Divide what two regions share."""
+        divide_overlaps(block.floats, block.ints)
+        NearMethod.leave(self, block)

@@ -7,6 +7,9 @@ of the points and the χ² test of the merging follow S. T. Pfister, S. I. Roume
 ICRA 2003.
 """
 
+from typing import Any, ClassVar
+
+from ..kernels.rivals.settling import merge_alike
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import PieceMethod
@@ -30,6 +33,12 @@ class SplitAndMerge(PieceMethod):
     """
 
     name = "split_and_merge"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "fixed",
+        "threshold": 0.03,
+        "noise_factor": 0.0,
+        "corner_trim": 0,
+    }
     least_response = 1.0
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
@@ -49,3 +58,7 @@ class SplitAndMerge(PieceMethod):
         tolerance = self.threshold, 0.0, self.noise_factor
         split(*block.workspace, True, *tolerance, self.min_piece)
         self.finish(block)
+
+    def leave(self, block: Block) -> None:
+        """Merge neighbours that one line fits; lines that touch meet in a corner."""
+        merge_alike(*block.workspace, self.unevenness)

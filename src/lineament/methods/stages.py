@@ -144,7 +144,7 @@ def adaptive_clusters(
 
 
 def corner_response(
-    points: ArrayLike, *, support_radius: int = 6, response: str = "relative"
+    points: ArrayLike, *, support_radius: int = 6, response: str = "tangent"
 ) -> Array:
     """Response of the corner detection operator along one cluster (equations 15-22).
 
@@ -163,7 +163,7 @@ def corner_response(
     --------
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
-    >>> corner_response(right_angle).round(2).tolist()[4:9]
+    >>> corner_response(right_angle, response="relative").round(2).tolist()[4:9]
     [0.35, 0.51, 0.71, 0.51, 0.35]
     """
     xy = _points(points)
@@ -178,7 +178,9 @@ def primary_corners(
     *,
     support_radius: int = 6,
     threshold: float = 0.66,
-    response: str = "relative",
+    response: str = "tangent",
+    recursion: str = "both",
+    ends: str = "truncated",
     min_points: int = 3,
 ) -> NDArray[np.void]:
     """Find the corners of one cluster: the farthest point from the chord, again and again.
@@ -190,7 +192,7 @@ def primary_corners(
     ----------
     points : array_like, shape (m, 2)
         Points of the cluster in beam order [m].
-    support_radius, threshold, response, min_points
+    support_radius, threshold, response, recursion, ends, min_points
         As in `Liu`.
 
     Returns
@@ -202,7 +204,7 @@ def primary_corners(
     --------
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
-    >>> found = primary_corners(right_angle)
+    >>> found = primary_corners(right_angle, threshold=0.5)
     >>> found["beam"][found["accepted"]].tolist()
     [6]
     """
@@ -211,11 +213,16 @@ def primary_corners(
         support_radius=support_radius,
         threshold=threshold,
         response=response,
+        recursion=recursion,
+        ends=ends,
         min_points=min_points,
     )
     block = _one_cluster(xy, noise_row(None))
     kind, least = RESPONSES[response], int(min_points)
-    cut(block.floats, block.ints, int(support_radius), float(threshold), kind, least)
+    cut(
+        block.floats, block.ints, int(support_radius), float(threshold), kind, least,
+        recursion == "both", ends == "excluded",
+    )  # fmt: skip
     return candidate_records(block, float(threshold))
 
 
