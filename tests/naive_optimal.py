@@ -38,7 +38,7 @@ def third_of(errors, squares):
 
 def estimated_noise(scan: LaserScan) -> tuple[float, float]:
     """Constant and growth, of measurements off the line through their neighbours."""
-    usable = np.flatnonzero(scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e6))
+    usable = np.flatnonzero(scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e3))
     rho, bearing = scan.ranges, scan.angles
     middle = [b for a, b, c in zip(usable, usable[1:], usable[2:], strict=False) if c - a == 2]
     if len(middle) < 24:
@@ -80,7 +80,7 @@ def neighbours(scan, beams):
 
 def spikes(scan: LaserScan, noise, max_missing) -> tuple[list[int], set[int]]:
     """Usable beams, and those that are broken from both neighbours while these hold together."""
-    usable = scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e6)
+    usable = scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e3)
     beams, found = np.flatnonzero(usable).tolist(), set()
     pairs = neighbours(scan, beams)
     broken = {b: parts(scan, a, b, noise, max_missing) for a, b in pairs}

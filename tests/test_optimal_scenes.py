@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
-from lineament import Extractor, RangeNoise
+from lineament import Extractor
 from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
@@ -59,16 +59,6 @@ def test_vertex_has_its_two_walls(extractor, opening, convex):
         assert (first["first_beam"], second["last_beam"]) == (0, len(angles) - 1)
         assert 1 <= second["first_beam"] - first["last_beam"] <= 4
         assert (features.clusters == 0).all()
-
-
-@pytest.mark.parametrize(("opening", "corners"), [(165, 0), (150, 1)])
-def test_a_shallow_turn_is_a_wall_that_bends(opening, corners):
-    """By 15° with arms of half a metre; by 30° it is a corner."""
-    angles = fan(10)
-    scan = scan_of(noisy(vertex(angles, 3.0, opening, convex=False)), angles)
-    features = AWARE(scan)
-    assert (len(features.corners), len(features.segments)) == (corners, corners + 1)
-    assert (features.segments["misfit"] > 0.01).any() == (corners == 0)
 
 
 @extractors
@@ -320,16 +310,6 @@ def test_drop_outs_do_not_cut_a_wall(extractor):
     assert line["rms"] == pytest.approx(NOISE.sigma, rel=0.2)
 
 
-def test_evidence_is_what_a_corner_must_have():
-    """A faint corner is two walls for who asks for little, one wall for who asks for much."""
-    angles = fan(6)
-    scan = scan_of(noisy(vertex(angles, 3.0, 150, convex=False), 2), angles)
-    (corner,) = Extractor("optimal", evidence=10.0, noise=NOISE)(scan).corners
-    for evidence, corners in ((0.9 * corner["response"], 1), (1.1 * corner["response"], 0)):
-        found = Extractor("optimal", evidence=evidence, noise=NOISE)(scan)
-        assert len(found.corners) == corners
-
-
 # Noise
 
 
@@ -366,18 +346,3 @@ def test_a_room_in_noise_that_grows_with_range_is_closed_too():
         ranges = room(angles, LONG)
         features = UNAWARE(scan_of(ranges * noisy(1.0 + 0.0 * ranges, seed), angles))
         assert len(features.segments) == len(features.corners) == 4, seed
-
-
-def test_noise_is_no_more_than_a_sensor_has():
-    ranges = np.random.default_rng(1).uniform(1.0, 9.0, 500)
-    noise = UNAWARE(scan_of(ranges, full_circle(500))).noise
-    assert math.hypot(noise.sigma, noise.proportional * ranges.max()) <= 0.1 + 1e-9
-
-
-def test_a_given_noise_is_that_of_the_covariances():
-    angles = fan(20)
-    scan = scan_of(noisy(wall(angles, 2.0, 0.0), sigma=0.001), angles)
-    one, two = (
-        Extractor("optimal", noise=RangeNoise(sigma=s))(scan).segments for s in (0.01, 0.02)
-    )
-    np.testing.assert_allclose(two["covariance"], 4 * one["covariance"], rtol=1e-6)

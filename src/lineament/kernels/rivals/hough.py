@@ -22,14 +22,9 @@ Parameters = namedtuple("Parameters", "resolution min_points min_length max_miss
 def find_by_votes(floats, ints, noise, parameters, votes, normals):
     """Find the lines of a scan: from points and clusters, the ends of pieces.
 
-    Parameters
-    ----------
-    parameters : tuple
-        See `Parameters`, and `methods.hough.Hough`.
-    votes : int32 array, shape (A, D)
-        The accumulator; scratch.
-    normals : float64 array, shape (A, 2)
-        Unit normals of the lines that are voted for, over half a turn.
+    `parameters` are a tuple, see `Parameters`, and `methods.hough.Hough`; `votes` is the
+    accumulator, an int32 array of shape (A, D); `normals`, shape (A, 2), are the unit normals of
+    the lines that are voted for, over half a turn.
     """
     work, p = at.extended(floats, ints), Parameters(*parameters)
     prepare(work, noise, p.epsilon, p.sigmas)

@@ -72,12 +72,7 @@ def _sums(work, first, last):
 def line_of_sums(x0, y0, n, sx, sy, sxx, sxy, syy):
     """Line n · p = d of least squares of orthogonal distances, from sums about (x0, y0).
 
-    Returns
-    -------
-    nx, ny, d : float
-        Unit normal, and distance of the sensor from the line along it [m].
-    squares : float
-        Sum of the squared distances [m²].
+    Returns nx, ny, d [m] and the sum of the squared distances [m²].
     """
     mx, my = sx / n, sy / n
     sxx -= sx * mx
@@ -122,12 +117,8 @@ def longest_run(points, free, first, last, line, margin, max_misses):
     """Find the run of free points near a line n · p = d that has the most of them.
 
     A run ends at a point that is not free, or where more than `max_misses` points in a row are
-    farther from the line than their tolerance and `margin` allow.
-
-    Returns
-    -------
-    near, begin, end : int
-        Number of near points, and the first and last of them (0, -1, -1 where there are none).
+    farther from the line than their tolerance and `margin` allow. Returns the number of near
+    points, and the first and last of them (0, -1, -1 where there are none).
     """
     x, y, slack, slope = points[at.X], points[at.Y], points[at.SLACK], points[at.SLOPE]
     nx, ny, d = line
