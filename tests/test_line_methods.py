@@ -130,6 +130,18 @@ def test_a_segment_goes_over_as_many_missing_beams_as_it_may(name, max_missing):
         assert segments["n_points"].sum() == len(angles) - missing
 
 
+@pytest.mark.parametrize("name", [*NAMES, "liu", "pdbs", "optimal"])
+def test_gap_over_many_missing_beams_has_no_occluder(name):
+    extractor = Extractor(name, noise=NOISE)
+    most = getattr(extractor.method, "max_missing", 5)
+    for missing, kind in ((most, "jump"), (most + 1, "gap"), (20, "gap")):
+        ranges = np.array([2.0] * 20 + [np.nan] * missing + [9.0] * 20)
+        (point, *_) = extractor(LaserScan(ranges, 0.0, 0.01)).breakpoints
+        assert point["kind"] == kind
+        assert point["beam"].tolist() == [19, 20 + missing]
+        assert point["occluder"] == (19 if kind == "jump" else -1)
+
+
 @and_others
 @pytest.mark.parametrize(("behind", "lines"), [(np.nan, 2), (np.inf, 2), (5.0, 3)])
 def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor, behind, lines):

@@ -78,15 +78,6 @@ def test_breakpoints_name_the_side_that_occludes():
     np.testing.assert_allclose(end["position"], scan.points[59], rtol=1e-12)
 
 
-def test_gap_over_many_missing_beams_has_no_occluder():
-    for missing, kind in ((5, "jump"), (6, "gap"), (20, "gap")):
-        ranges = np.array([2.0] * 20 + [np.nan] * missing + [4.0] * 20)
-        (point, *_) = Extractor("liu", noise=NOISE)(LaserScan(ranges, 0.0, 0.01)).breakpoints
-        assert point["kind"] == kind
-        assert point["beam"].tolist() == [19, 20 + missing]
-        assert point["occluder"] == (19 if kind == "jump" else -1)
-
-
 def test_closed_room_has_a_ring_of_corners():
     angles = full_circle(1440)
     features = Extractor("liu:scale_free", noise=NOISE)(scan_of(room(angles, BOX), angles))

@@ -161,6 +161,22 @@ def test_partition_is_the_least(scan, noise, evidence, least):
     assert len(assert_least(scan, noise, evidence)) >= least
 
 
+def test_a_trace_has_where_surfaces_break():
+    cuts = 0
+    for seed in range(30):
+        scan = random_scan(seed)
+        trace = Extractor("optimal", noise=NOISE).trace(scan)
+        used = np.flatnonzero(~np.isnan(trace.filtered)).tolist()
+        for a, b in naive.neighbours(scan, used):
+            is_apart = not trace.spacing[b] <= trace.distance_threshold[b]
+            assert is_apart == naive.parts(scan, a, b, (NOISE.sigma**2, 0.0), MISSING)
+        corners = trace.features.corners
+        meet = np.isin(corners["kind"], ("corner", "slit"))
+        assert trace.cuts.tolist() == sorted(corners["beam"][meet])
+        cuts += len(trace.cuts)
+    assert cuts > 20
+
+
 # Noise
 
 
