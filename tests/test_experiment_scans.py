@@ -14,10 +14,12 @@ from lineament.reproduce.arena import ARENAS, arena_scores, load_arena
 from lineament.reproduce.scans import (
     batch_of,
     frame_times,
+    interleaved_times,
     scan_pairs,
     scene_numbers,
     simulated_frames,
     still_pairs,
+    time_ratio,
 )
 from lineament.simulation import SENSORS, Sensor, World, truth
 
@@ -42,9 +44,26 @@ def test_scans_at_once_give_what_each_alone_gives():
         assert np.array_equal(found.clusters, extractor(scan).clusters)
 
 
+def test_methods_are_timed_in_turns(monkeypatch):
+    """A clock by which each call takes twice as long as the one before it.
+
+    Two methods on two scans are four calls a round, of which the first round does not count: a scan
+    of a batch takes an eighth of 16, 32, 64, 128 s, then of 16 times that.
+    """
+    clock = iter([t for k in range(12) for t in (0.0, 2.0**k)])
+    monkeypatch.setattr(scans.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(scans, "_BATCHES", 2)
+    scan = LaserScan([2.0] * 9, angle_min=0.0, angle_increment=0.01)
+    taken = interleaved_times({"a": Extractor("pdbs"), "b": Extractor("pdbs")}, [scan, scan])
+    assert taken["a"].tolist() == [[2.0, 8.0], [32.0, 128.0]]
+    assert taken["b"].tolist() == [[4.0, 16.0], [64.0, 256.0]]
+    taken["b"][1] += 4 * taken["a"][1]
+    assert time_ratio(taken["b"], taken["a"]) == (4.0, 2.0, 6.0)
+
+
 def test_time_of_a_scan_is_the_median_of_batches_of_copies(monkeypatch):
-    """A clock by which the batches take 8, 16, 800 ... s: one scan takes an eighth."""
-    clock = iter([0, 8, 0, 16, 0, 800, 0, 24, 0, 4])
+    """A clock by which the first call takes 1000 s, and then 8, 16, 800 ... s."""
+    clock = iter([0, 1000, 0, 8, 0, 16, 0, 800, 0, 24, 0, 4])
     monkeypatch.setattr(scans.time, "perf_counter", lambda: float(next(clock)))
     scan = LaserScan([2.0] * 9, angle_min=0.0, angle_increment=0.01)
     assert frame_times(Extractor("pdbs"), [scan]).tolist() == [2.0]

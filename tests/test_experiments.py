@@ -60,7 +60,7 @@ def small(monkeypatch):
         (success, {"MORE": 2}),
         (two_corners, {"SCANS_A_FRAME": 2}),
         (scenes, {"INDOORS": ("room",)}),
-        (similarity, {"INDOORS": ("room",)}),
+        (similarity, {"INDOORS": ("room",), "SHOWN": ("iepf", "pdbs, fitted")}),
         (layers, {"RULES": ("fixed", "dietmayer")}),
         (real, {"SHOWN": "iepf"}),
     ):
@@ -411,15 +411,18 @@ class TestTexts:
     def test_claim_of_figure_12(self, largest, verdict):
         true, liu = (SimilarityScores(np.array([0.0, error]), 2) for error in (0.03, largest))
         text = similarity._text(true, liu)
-        assert f"{largest:.2f} m: the claim {verdict} here" in text[-1]
+        assert (
+            f"100 % are explained, and the largest error is {largest:.2f} m: the claim {verdict} here"
+            in text[-1]
+        )
         assert "50 % of the points are more than 0.01 m" in text[1]
 
     def test_table_of_similarity(self):
         scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
         (row,) = similarity._table("x", {"iepf": scores}).rows
-        assert row[:3] == ("iepf", "up to 0.25 m", 0.03)
-        assert row[3:] == ("lost", pytest.approx(15), "lost", *row[6:])
-        assert row[6:] == pytest.approx((1e6 * scores.variance, 50, 80))
+        rms = math.sqrt((100 + 900 + 25 + 225) / 4)
+        assert row[:6] == ("iepf", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
+        assert row[6:] == ("up to 250 mm", 50)
 
     def test_claims_of_table_3(self):
         frames = list(scans.simulated_frames(PAPER, ["room"], range(2)))
