@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +29,30 @@ class MotionErrors(Summable):
     #: Error of the turn, without its sign [rad], shape (m,).
     turns: Array = field(default_factory=lambda: np.empty(0))
 
+    @classmethod
+    def of(cls, off: Sequence[Pose]) -> "MotionErrors":
+        """Return those of estimated motions in the frames of the true ones."""
+        x, y, turn = np.array(off).reshape(-1, 3).T
+        return cls(np.hypot(x, y), abs(turn))
+
     def summary(self) -> dict[str, float]:
-        """List the figures by name."""
-        figures = {}
+        """List the figures by name; `std` is the scatter about the mean."""
+        figures: dict[str, float] = {"motions": len(self.ways)}
         for name, errors in (("way", self.ways), ("turn", self.turns)):
-            figures[f"{name}_rmse"] = rms(errors)
-            figures[f"{name}_median"] = quantile(errors, 0.5)
-            figures[f"{name}_p95"] = quantile(errors, 0.95)
+            mean = ratio(float(errors.sum()), len(errors))
+            figures |= {
+                f"{name}_rmse": rms(errors),
+                f"{name}_mean": mean,
+                f"{name}_std": rms(errors - mean),
+                f"{name}_median": quantile(errors, 0.5),
+                f"{name}_p95": quantile(errors, 0.95),
+            }
         return figures
+
+
+def chained(motions: Sequence[Pose]) -> list[Pose]:
+    """Put motions between successive frames together: the pose of each, from (0, 0, 0) on."""
+    return list(accumulate(motions, compose, initial=(0.0, 0.0, 0.0)))
 
 
 def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1) -> MotionErrors:
@@ -46,16 +63,13 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
     """
     if len(poses) != len(motions) + 1:
         raise ValueError(f"there are {len(poses)} poses, expected one more than motions")
-    way: list[Pose] = [(0.0, 0.0, 0.0)]
-    for motion in motions:
-        way.append(compose(way[-1], motion))
-    errors = np.array(
+    way = chained(motions)
+    return MotionErrors.of(
         [
             relative(relative(poses[i], poses[i + step]), relative(way[i], way[i + step]))
             for i in range(len(poses) - step)
         ]
-    ).reshape(-1, 3)
-    return MotionErrors(np.hypot(errors[:, 0], errors[:, 1]), abs(errors[:, 2]))
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
