@@ -554,11 +554,15 @@ class TestReal:
         assert found["segments_expected"] == 28
         assert found["corner_rmse"] < 0.02
         assert findings.numbers["arena"] == {}
-        assert len(findings.tables) == len(real.FREE_SPACE) + 5
-        covered = findings.tables[3]
-        assert covered.columns == ("recording", "optimal", "iepf", "scans")
-        assert [row[0] for row in covered.rows] == ["wedge.npz", "all"]
-        assert covered.rows[1][1::2] == (100.0, 2)
+        measures = len(real.FREE_SPACE), 2 * len(real.STANDING_STILL), len(real.REPEATS), 1
+        assert len(findings.tables) == sum(measures)
+        assert {table.columns for table in findings.tables[:-1]} == {
+            ("recording", "optimal", "iepf")
+        }
+        assert findings.tables[3].rows[1][:2] == ("all", 100.0)
+        again = findings.tables[6]
+        assert again.title == "Standing still, segments: found again [%]"
+        assert [row[:2] for row in again.rows[:1]] == [("wedge.npz", 100.0)]
         json.dumps(findings.to_dict(), allow_nan=False)
 
     @pytest.mark.slow
@@ -571,6 +575,6 @@ class TestReal:
         unread = set(findings.text[-1].rstrip(".").split(": ")[1].split(", "))
         assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
         assert set(scans.STANDING) < set(findings.numbers["standing"])
-        assert list(findings.numbers["repeats"]) == list(logs)
+        assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
         assert list(findings.numbers["arena"]) == list(real.ARENAS)
         json.dumps(findings.to_dict(), allow_nan=False)

@@ -44,21 +44,24 @@ class ScatterScores(Summable):
     seen: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
     again: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
 
+    def figures(self, low: float = 0, high: float = math.inf) -> dict[str, float]:
+        """List the figures of features whose shorter arm has `low` to below `high` measurements."""
+        of_bin = (self.arms >= low) & (self.arms < high)
+        looked_for = (self.seen >= low) & (self.seen < high)
+        differences = NormalisedErrors(self.differences.whitened[of_bin])
+        return {
+            "pairs": int(of_bin.sum()),
+            "nees_median": differences.median_ratio,
+            "in_95_ellipse": differences.share_within(0.95),
+            "found_again": ratio(int(self.again[looked_for].sum()), int(looked_for.sum())),
+        }
+
     def bins(self) -> dict[str, dict[str, float]]:
         """List the figures of each bin of arm lengths by the name of the bin, as "5-9"."""
-        figures = {}
-        for low, high in pairwise((*ARM_BINS, math.inf)):
-            name = f"{low}-{high - 1}" if math.isfinite(high) else f"{low}-"
-            of_bin = (self.arms >= low) & (self.arms < high)
-            looked_for = (self.seen >= low) & (self.seen < high)
-            differences = NormalisedErrors(self.differences.whitened[of_bin])
-            figures[name] = {
-                "pairs": int(of_bin.sum()),
-                "nees_median": differences.median_ratio,
-                "in_95_ellipse": differences.share_within(0.95),
-                "found_again": ratio(int(self.again[looked_for].sum()), int(looked_for.sum())),
-            }
-        return figures
+        return {
+            f"{low}-{high - 1}" if math.isfinite(high) else f"{low}-": self.figures(low, high)
+            for low, high in pairwise((*ARM_BINS, math.inf))
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
