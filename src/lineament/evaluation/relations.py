@@ -27,20 +27,13 @@ FAR_APART = 60.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Relations:
-    """Relative poses of pairs of scans.
+    """Relative poses of pairs of scans."""
 
-    Attributes
-    ----------
-    scans : int array, shape (m, 2)
-        Indices of the scans.
-    motions : ndarray, shape (m, 3)
-        Pose of the second scan in the frame of the first [m, m, rad].
-    seconds : ndarray, shape (m,)
-        Time between them.
-    """
-
+    #: Indices of the scans, shape (m, 2).
     scans: NDArray[np.intp]
+    #: Pose of the second scan in the frame of the first [m, m, rad], shape (m, 3).
     motions: Array
+    #: Time between them [s], shape (m,).
     seconds: Array
 
     def far_apart(self) -> "Relations":

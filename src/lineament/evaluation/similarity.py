@@ -3,7 +3,6 @@
 One number misleads: many short pieces have small errors, and what has no line has none.
 """
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,23 +15,12 @@ from .counts import Summable, finite_figures, quantile, ratio, rms
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimilarityScores(Summable):
-    """Similarity errors of some scans: how many measurements are explained, and how well.
+    """Similarity errors of some scans: how many measurements are explained, and how well."""
 
-    Attributes
-    ----------
-    errors : ndarray, shape (m,)
-        Distance of each explained measurement from its segment or arc [m].
-    valid : int
-        All valid measurements.
-    """
-
+    #: Distance of each explained measurement from its segment or arc [m].
     errors: Array = field(default_factory=lambda: np.empty(0))
+    #: All valid measurements.
     valid: int = 0
-
-    @property
-    def mean(self) -> float:
-        """Mean error [m]."""
-        return float(self.errors.mean()) if len(self.errors) else math.nan
 
     @property
     def maximum(self) -> float:
@@ -48,7 +36,7 @@ class SimilarityScores(Summable):
         """List all figures by name; those that nothing defines are left out."""
         figures = {
             "explained": self.explained,
-            "mean": self.mean,
+            "mean": ratio(float(self.errors.sum()), len(self.errors)),
             "rms": rms(self.errors),
             "p95": quantile(self.errors, 0.95),
             "maximum": self.maximum,

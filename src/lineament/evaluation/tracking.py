@@ -24,9 +24,8 @@ _GATE, _OVERLAP = 0.10, 0.5
 class MotionErrors(Summable):
     """Relative pose errors: how far estimated motions are from the true ones."""
 
-    #: Length of the error of the way [m], shape (m,).
+    #: Errors of the way [m] and of the turn [rad], without their signs, (m,).
     ways: Array = field(default_factory=lambda: np.empty(0))
-    #: Error of the turn, without its sign [rad], shape (m,).
     turns: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
@@ -76,11 +75,10 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
 class TrackScores(Summable):
     """How the tracks of one kind last."""
 
-    #: Features that are the same in two successive frames by the known poses.
+    #: Features that are the same in two successive frames by the known poses; of these, those whose
+    #: number changes to one that was given before, an *id switch*, or to a new one.
     pairs: int = 0
-    #: Of these, those whose number changes to one that was given before: an *id switch*.
     switched: int = 0
-    #: Of these, those that get a new number.
     lost: int = 0
     #: Frames in which each track is seen, shape (m,).
     lengths: Array = field(default_factory=lambda: np.empty(0))
