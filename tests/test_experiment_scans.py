@@ -21,7 +21,7 @@ from lineament.reproduce.scans import (
     still_pairs,
     time_ratio,
 )
-from lineament.simulation import SENSORS, Sensor, World, truth
+from lineament.simulation import SENSORS, Sensor, World, building, drive, truth
 
 
 def test_frames_are_of_the_kinds_in_turn_and_can_be_repeated():
@@ -110,6 +110,20 @@ def test_pairs_of_a_sensor_that_stands(tmp_path):
     assert stamps(10, standing=True) == [(k, k + 1) for k in range(8)]
     assert stamps(3) == [still[0], still[2], still[5]]
     assert stamps(0) == []
+
+
+def test_the_simulated_building_and_the_speed_of_a_drive_are_those_of_the_results():
+    world, way = building()
+    for part, total in (
+        (world.segments, 1488.1661717670454),
+        (world.circles, 54.63541666666666),
+        (way, 128.0544117647059),
+    ):
+        values = np.ravel(part)
+        weights = np.arange(1, len(values) + 1) / len(values)
+        assert values @ weights == pytest.approx(total, rel=1e-12)
+    (scan, *_, last) = drive(world, [(0, 0), (3, 0), (3, 0.6)], SENSORS["lms181"], rate=10)
+    assert (scan.stamp, last.stamp) == (0.0, pytest.approx(5.0 + math.pi / 2 + 1.0, abs=0.1))
 
 
 #: A room of 4 m x 3 m whose fitted walls leave gaps at two corners; a board ends on a wall.

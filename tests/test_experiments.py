@@ -414,7 +414,9 @@ class TestTexts:
 
     @pytest.mark.parametrize(("largest", "verdict"), [(0.009, "holds"), (0.5, "does not hold")])
     def test_claim_of_figure_12(self, largest, verdict):
-        true, liu = (SimilarityScores(np.array([0.0, error]), 2) for error in (0.03, largest))
+        true, liu = (
+            SimilarityScores(np.array([0.0, 0.01, error, error]), 4) for error in (0.03, largest)
+        )
         text = similarity._text(true, liu)
         assert "100 % are explained" in text[-1]
         assert f"{largest:.2f} m: the claim {verdict} here" in text[-1]

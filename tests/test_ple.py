@@ -16,6 +16,7 @@ from lineament.evaluation.ple import (
     cast_map,
     iepf_map,
     load_benchmark,
+    maps,
     method_map,
     polylines_of,
     run_benchmark,
@@ -265,6 +266,30 @@ def test_a_method_of_the_registry():
     assert [len(line) for line in method_map("iepf")(wall_benchmark().scans[0], 10)] == [2]
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_the_sparing_map_is_that_of_the_least_penalty(seed, monkeypatch):
+    """Walls across the view, behind the true one and ending early, or at its very place.
+
+    An error counts as 0.3 m at most, as does a return without a wall; none counts for nothing.
+    """
+    rng = np.random.default_rng(seed)
+    bearings = np.linspace(-0.5, 0.5, 40)
+    scan = LaserScan(
+        np.where(rng.random(40) < 0.2, np.nan, 2.0 / np.cos(bearings)), angles=bearings
+    )
+    n, walls, penalties = int(scan.valid.sum()), {}, {}
+    for v in range(2, 9):
+        behind = rng.choice([0.0, 0.0005, 0.005, 0.02, 0.1, 0.5])
+        end = rng.choice([-0.6, -0.6, 0.013, 0.4])
+        x = 2.0 + behind
+        walls[v] = [np.array([[x, x * math.tan(end)], [x, x * math.tan(0.6)]])]
+        errors = np.where(bearings > end, np.minimum(behind / np.cos(bearings), 0.3), 0.3)
+        squares = max(np.square(errors[scan.valid]).sum(), n * 1e-24)
+        penalties[v] = n * math.log(squares / n) + v * (2 * math.log(n / v) + 5)
+    monkeypatch.setattr(maps, "method_map", lambda _: lambda _, v: walls[v])
+    assert sparing_map("any")(scan, 8) is walls[min(penalties, key=penalties.get)]
+
+
 @pytest.mark.parametrize("sigma", [1e-3, 0.02])
 def test_a_sparing_map_spends_no_vertices_on_noise(sigma):
     bearings = np.radians(np.arange(-60, 61))
@@ -306,6 +331,8 @@ def test_what_a_file_holds(tmp_path):
     assert sorted(benchmark.scores) == ["area_error", "f", "fnr", "rmse"]
     np.testing.assert_allclose(benchmark.outlines[0], [[0, 0], [0, -1], [1, 0]], atol=1e-12)
     assert benchmark.outlines[1].tolist() == [[1, 1], [2, 1]]
+    np.savez(tmp_path / "a.npz", **archive(beams=np.array([3, 0])))
+    assert [len(scan) for scan in load_benchmark(tmp_path / "a.npz").scans] == [3, 0]
 
 
 @pytest.mark.parametrize(
