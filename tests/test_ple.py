@@ -331,8 +331,10 @@ def test_what_a_file_holds(tmp_path):
     assert sorted(benchmark.scores) == ["area_error", "f", "fnr", "rmse"]
     np.testing.assert_allclose(benchmark.outlines[0], [[0, 0], [0, -1], [1, 0]], atol=1e-12)
     assert benchmark.outlines[1].tolist() == [[1, 1], [2, 1]]
-    np.savez(tmp_path / "a.npz", **archive(beams=np.array([3, 0])))
-    assert [len(scan) for scan in load_benchmark(tmp_path / "a.npz").scans] == [3, 0]
+    real = {"polygon": None, "pose": None, "area_error": None, "beams": np.array([3, 0])}
+    np.savez(tmp_path / "a.npz", **archive(**real))
+    benchmark = load_benchmark(tmp_path / "a.npz")
+    assert ([len(scan) for scan in benchmark.scans], benchmark.outlines) == ([3, 0], None)
 
 
 @pytest.mark.parametrize(
