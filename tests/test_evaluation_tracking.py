@@ -144,13 +144,34 @@ def test_segments_are_the_same_if_they_lie_side_by_side(start, end, pairs):
         assert track_scores(both, [tracks_of([0])] * 2, STILL)["segments"].pairs == pairs
 
 
-def test_icp_finds_the_motion():
+@pytest.mark.parametrize("motion", [(0.12, -0.05, 0.08), (-0.1, 0.2, -0.2)])
+def test_icp_finds_the_motion_of_the_least_squares(motion):
     sensor = replace(SENSORS["utm30lx"], noise=RangeNoise(0.005), outlier=0.0)
-    rng, motion = np.random.default_rng(0), (0.12, -0.05, 0.08)
-    pose = (-1.0, 0.5, 0.3)
+    rng, pose = np.random.default_rng(0), (-1.0, 0.5, 0.3)
     before, now = (sensor.scan(room(), at, rng) for at in (pose, compose(pose, motion)))
-    np.testing.assert_allclose(icp(before, now), motion, atol=2e-3)
+    found = icp(before, now)
+    np.testing.assert_allclose(found, motion, atol=2e-3)
     np.testing.assert_allclose(icp(now, before), relative(motion, (0, 0, 0)), atol=2e-3)
+    # Of the pairs that it ends with, within 10 cm: any other motion has a greater sum.
+    points = before.points[before.valid]
+    arms = np.diff(points, axis=0)
+    near = np.hypot(*arms.T) < 0.3
+    anchors, normals = (points[1:] + points[:-1])[near] / 2, arms[near] @ [[0, 1], [-1, 0]]
+    normals /= np.hypot(*normals.T)[:, np.newaxis]
+
+    def moved(x, y, theta):
+        c, s = math.cos(theta), math.sin(theta)
+        return now.points[now.valid] @ [[c, s], [-s, c]] + (x, y)
+
+    apart = np.linalg.norm(moved(*found)[:, np.newaxis] - anchors, axis=2)
+    nearest, kept = apart.argmin(axis=1), apart.min(axis=1) <= 0.1
+
+    def squares(at):
+        off = (moved(*at) - anchors[nearest]) * normals[nearest]
+        return np.square(off.sum(axis=1)[kept]).sum()
+
+    for step in 1e-5 * np.vstack((np.eye(3), -np.eye(3))):
+        assert squares(found + step) > squares(found)
 
 
 def test_icp_without_points_stays_where_it_began():
