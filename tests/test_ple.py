@@ -99,16 +99,24 @@ def test_a_map_of_few_vertices_is_nearer_to_the_truth_than_the_authors_best(simu
     assert area_error[0] < 0.8 * min(scans.means()["area_error"]["ple+"])
 
 
-def test_iepf_by_hand():
-    points = np.array([[0, 0], [1, 3], [2, 0], [3, 1], [4, 0]], float)
-    assert benchmark_iepf(points, 2).tolist() == [[0, 0], [4, 0]]
-    assert benchmark_iepf(points, 3).tolist() == [[0, 0], [1, 3], [4, 0]]
-    # (2, 0) is 2/√2 off the chord from (1, 3) to (4, 0), (3, 1) on it.
-    assert benchmark_iepf(points, 4).tolist() == [[0, 0], [1, 3], [2, 0], [4, 0]]
-    assert benchmark_iepf(points, 99).tolist() == points.tolist()
-    # Of hardly any points, and of one many times.
+def test_iepf_of_hardly_any_points_and_of_one_many_times():
     assert [len(benchmark_iepf(np.ones((n, 2)), 5)) for n in (0, 1, 2)] == [0, 1, 2]
     assert benchmark_iepf(np.ones((6, 2)), 4).tolist() == [[1.0, 1.0]] * 4
+    points = np.array([[0, 0], [2, 0], [4, 0]], float)
+    assert benchmark_iepf(points, 99).tolist() == points.tolist()
+
+
+def test_iepf_adds_the_farthest_of_all_points_again_and_again():
+    points = np.random.default_rng(0).normal(size=(12, 2))
+    taken = [0, 11]
+    for budget in range(2, 13):
+        assert np.array_equal(benchmark_iepf(points, budget), points[sorted(taken)])
+        off = {}
+        for i in set(range(12)) - set(taken):
+            a = points[max(k for k in taken if k < i)]
+            arm, chord = points[i] - a, points[min(k for k in taken if k > i)] - a
+            off[i] = np.linalg.norm(arm - arm @ chord / (chord @ chord) * chord)
+        taken += [max(off, key=off.get)] if off else []
 
 
 def test_scores_by_hand():
