@@ -23,6 +23,11 @@ class SimilarityScores(Summable):
     valid: int = 0
 
     @property
+    def mean(self) -> float:
+        """Mean error [m]."""
+        return ratio(float(self.errors.sum()), len(self.errors))
+
+    @property
     def maximum(self) -> float:
         """Largest error [m]."""
         return quantile(self.errors, 1.0)
@@ -36,7 +41,7 @@ class SimilarityScores(Summable):
         """List all figures by name; those that nothing defines are left out."""
         figures = {
             "explained": self.explained,
-            "mean": ratio(float(self.errors.sum()), len(self.errors)),
+            "mean": self.mean,
             "rms": rms(self.errors),
             "p95": quantile(self.errors, 0.95),
             "maximum": self.maximum,
