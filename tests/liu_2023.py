@@ -207,6 +207,8 @@ def corner_response(points, index, closed, paper):
             return to_tangent.sum() * to_chord.sum()
         case "relative":
             return to_tangent.sum() / np.abs(arc).sum()
+        case _ if not chord.any():
+            return 0.0
         case "product_scaled":
             return to_tangent @ to_chord / (chord @ chord)
         case "chord_scaled":

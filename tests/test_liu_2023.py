@@ -7,7 +7,7 @@ import pytest
 from liu_2023 import Paper, bilateral_filter, distances, liu_2023, polar
 from worlds import degenerate_scans, random_scan
 
-from lineament import Extractor, open_log
+from lineament import Extractor, LaserScan, open_log
 from lineament.simulation import SCENES, SENSORS, scene
 
 #: The filter of the kernels sums in float32 [m].
@@ -116,6 +116,13 @@ def test_recorded_scans_are_reproduced(data_dir, log, changes):
 
 @pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
 def test_degenerate_scans_are_reproduced(scan):
+    for changes in VARIANTS.values():
+        assert_reproduced(scan, **changes)
+
+
+@pytest.mark.parametrize("n", range(3, 20))
+def test_rings_of_few_beams_are_reproduced(n):
+    scan = LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
     for changes in VARIANTS.values():
         assert_reproduced(scan, **changes)
 
