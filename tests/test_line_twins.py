@@ -28,7 +28,6 @@ from lineament import Extractor, LaserScan, RangeNoise
 from lineament.features import noise_row
 from lineament.kernels import layout as at
 from lineament.kernels.rivals.line_tracking import track_lines
-from lineament.methods import steps
 from lineament.methods.hough import Hough
 from lineament.methods.ransac import Ransac
 from lineament.methods.region_growing import RegionGrowing
@@ -109,11 +108,10 @@ def tracked(scan, extractor):
     method, block = extractor.method, Block(scan, noise_row(extractor.noise), 1)
     block.load(scan.ranges)
     block.take(0)
-    steps.estimate_noise(block, 0)
-    method._part(block, 0, method.min_points)
+    method.part(block, method.min_points)
     track_lines(
-        block.floats, block.ints, block.noises[0], method.threshold, method.noise_factor,
-        method.max_misses, method.min_piece,
+        *block.workspace, method.threshold, method.noise_factor, method.max_misses,
+        method.min_piece,
     )  # fmt: skip
     ends = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
     return list(map(tuple, block.work.marks[at.BEAM][ends].T.tolist()))

@@ -3,8 +3,6 @@
 Each checks what it is given and calls one kernel. The methods call the same kernels directly.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -18,7 +16,6 @@ from ..kernels.corner_operator import RESPONSES, response_along
 from ..kernels.cutting import cut
 from ..kernels.line_fit import FITS
 from ..scan import LaserScan, RangeNoise
-from . import steps
 from .liu import Liu
 from .parameters import Bounds, bounds_of
 from .trace import candidate_records
@@ -84,9 +81,7 @@ def estimate_noise(scan: LaserScan) -> RangeNoise | None:
     >>> round(estimate_noise(LaserScan(ranges, 0.0, 0.001)).sigma, 2)
     0.02
     """
-    block = _block(scan)
-    steps.estimate_noise(block, 0)
-    return noise_of(block.noises[0])
+    return noise_of(_block(scan).noises[0])
 
 
 def adaptive_clusters(
@@ -263,7 +258,7 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
     block = _one_cluster(xy, noise_row(noise or RangeNoise(sigma=1.0)))
     block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
     block.counts[at.PIECES] = 1
-    steps.measure(block, 0, fit=FITS[fit], sharp=False)
+    block.measure(fit=FITS[fit], sharp=False)
     line: np.void = block.written()[0][0]
     return line
 
