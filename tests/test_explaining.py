@@ -112,7 +112,7 @@ def test_the_verdict_on_a_corner():
     assert "was examined as a corner" in text
     assert "asked; a corner" in text
     # Metres against metres: near walls have no corner by the paper's numbers.
-    _, text = explained(LaserScan(0.5 * ranges, angles=bearings), 40, "liu")
+    _, text = explained(LaserScan(0.5 * ranges, angles=bearings), 40, "liu", response="tangent")
     assert "0.66 asked; rejected" in text
     # All partitions are compared: no corner was examined for itself.
     _, text = explained(LaserScan(ranges, angles=bearings), 41)

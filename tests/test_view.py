@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib.resources import files
+from queue import SimpleQueue
 from types import SimpleNamespace
 from unittest.mock import Mock
 from urllib.request import urlopen
@@ -27,7 +28,7 @@ from lineament.cli import run
 from lineament.errors import LineamentError
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
-from lineament.view import Session, ViewServer
+from lineament.view import Session, ViewServer, serve
 from lineament.view.api import MOST_STAMPS, RequestError, answer
 from lineament.view.store import ScanStore
 
@@ -387,6 +388,24 @@ def test_what_is_wrong_is_one_line(log, arguments, status, words, capfd):
     assert out == ""
     assert words in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("host", "name"),
+    [("127.0.0.1", "127.0.0.1"), ("localhost", "localhost"), ("0.0.0.0", "localhost")],
+)
+def test_serving_names_the_address_warns_and_opens_the_page(host, name, log, monkeypatch, capsys):
+    opened, lines = SimpleQueue(), []
+    monkeypatch.setattr("webbrowser.open", opened.put)
+    monkeypatch.setattr(ViewServer, "serve_forever", lambda _: None)
+    serve(Session(log, {"pdbs": Extractor("pdbs")}), host, write=lines.append)
+    address = opened.get(timeout=30)
+    port = int(address.removeprefix(f"http://{name}:").removesuffix("/"))
+    assert port > 1023  # any that is free
+    assert lines == [f"{log}: look at {address} (Ctrl-C ends it)"]
+    serve(Session(log, {"pdbs": Extractor("pdbs")}), host, browser=False, write=lines.append)
+    assert opened.empty()
+    assert ("is not loopback" in capsys.readouterr().err) == (host == "0.0.0.0")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child there")
