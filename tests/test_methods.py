@@ -169,7 +169,7 @@ def test_presets():
     free = get_method("liu:scale_free", support_radius=4)
     assert (free.response, free.threshold, free.support_radius) == ("relative", 0.25, 4)
     plain = get_method("iepf:paper")
-    assert (plain.threshold, plain.proportion, plain.noise_factor) == (0.1, 0.0, 0.0)
+    assert (plain.threshold, plain.proportion, plain.noise_factor) == (0.15, 0.0, 0.0)
     assert (plain.clusters, plain.settling, plain.corner) == ("none", False, "beam")
     assert get_method("pdbs:paper").grazing_angle == math.radians(10)
 

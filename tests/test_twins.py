@@ -22,6 +22,7 @@ CHANGED = {"threshold": 0.02, "min_piece": 2, "noise": SENSOR}
 LIU = {
     "default": Extractor("liu"),
     "paper": Extractor("liu:paper", threshold=0.3),
+    "chord": Extractor("liu:paper", response="chord_scaled"),
     "scale free": Extractor("liu:scale_free", noise=RangeNoise(0.0, 0.01, 0.002, 0.01)),
     "weighted": Extractor(
         "liu:scale_free", fit="weighted", noise=RangeNoise(0.01, 0.001, 0.001), min_points=5
@@ -29,7 +30,9 @@ LIU = {
     "product": Extractor(
         "liu", response="product", threshold=0.05, support_radius=3, half_width=3, min_points=4
     ),
-    "at beams": Extractor("liu", threshold=0.3, corner="beam", min_points=2, noise=NOISE),
+    "at beams": Extractor(
+        "liu", response="tangent", threshold=0.3, corner="beam", min_points=2, noise=NOISE
+    ),
 }
 PARTITIONS = {
     # Not 0.05, that measurements in whole centimetres have exactly.
