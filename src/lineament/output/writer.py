@@ -85,14 +85,8 @@ class Writer(ABC):
     def write(self, features: Features, scan: LaserScan | None = None, topic: str = "") -> None:
         """Take the features of the next scan.
 
-        Parameters
-        ----------
-        features : Features
-            They must not change until the block ends.
-        scan : LaserScan, optional
-            What they were found in. Formats that draw it need it; tables do without.
-        topic : str
-            The topic of the scan, where its log has several.
+        They must not change until the block ends. The scan is what they were found in: formats that
+        draw it need it. The topic is that of the scan, where its log has several.
 
         Raises
         ------
