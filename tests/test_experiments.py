@@ -170,6 +170,7 @@ PINNED: dict[str, dict[str, float]] = {
         "Office/far_apart/the log’s corrected poses/motions": 1,
         "Office/far_apart/features/way_mean": 0.002978,
         "Office/motion/features/way_median": 0.0016062,
+        "Office/motion/features/unobserved": 0.0,
         "Office/motion/ICP/way_rmse": 0.0016927,
         "Office/tracks/features/segments/kept": 1.0,
     },
