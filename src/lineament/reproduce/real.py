@@ -34,7 +34,6 @@ from .findings import (
     Table,
     cells,
     each,
-    legend_below,
 )
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
@@ -300,7 +299,7 @@ def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
         axes.set_ylim(0, 100)
     for axes in panels[len(ranked) :]:
         axes.remove()
-    legend_below(figure, panels[0])
+    canvas.add_legend(figure)
     caption = (
         "Corners found again from another place, less chance, ranked by their quality: how many "
         f"of the best, and which share of them, from the {FIRST + 1}th on. Further to the upper "
