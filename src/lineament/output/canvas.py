@@ -38,6 +38,8 @@ _METADATA: dict[str, dict[str, Any]] = {
 #: The endings of pictures.
 PICTURE_ENDINGS = tuple(_METADATA)
 DPI = 150
+#: Of the pictures of pages; those of this width [inch] are legible in print, on 7 inches.
+PAGE_DPI, PAGE_WIDTH = 200, 9.0
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
@@ -68,7 +70,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         _write(figure, temporary, ending, DPI)
 
 
-def figure_bytes(figure: Figure, dpi: int = DPI) -> bytes:
+def figure_bytes(figure: Figure, dpi: int = PAGE_DPI) -> bytes:
     """Return a figure as the bytes of a PNG file, and free its memory."""
     buffer = io.BytesIO()
     _write(figure, buffer, ".png", dpi)
