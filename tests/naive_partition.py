@@ -34,11 +34,14 @@ def noise_of(scan, extractor) -> tuple[float, ...]:
 
 def clusters_of(method) -> PDBS:
     """Make the method pdbs that parts scans as another method does."""
-    return PDBS(
-        grazing_angle=method.grazing_angle,
-        max_missing=method.max_missing,
-        min_points=method.min_points,
-    )
+    if method.clusters == "borges_aldon":
+        return PDBS(
+            grazing_angle=method.grazing_angle,
+            max_missing=method.max_missing,
+            min_points=method.min_points,
+        )
+    distance = method.distance if method.clusters == "fixed" else 1e300
+    return PDBS(rule="fixed", distance=distance, max_missing=10**6, min_points=method.min_points)
 
 
 def threshold(rule, before, rho, step, noise, method):

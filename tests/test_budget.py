@@ -13,7 +13,7 @@ import lineament as ln
 from lineament.evaluation.ple import polylines_of
 from lineament.kernels import layout as at
 from lineament.kernels.budget import limit_pieces
-from lineament.methods.steps import budget_scratch
+from lineament.methods.workspace import budget_scratch
 
 LINK, WORST = 1.0, 0.25
 

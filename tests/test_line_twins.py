@@ -28,7 +28,6 @@ from lineament import Extractor, LaserScan, RangeNoise
 from lineament.features import noise_row
 from lineament.kernels import layout as at
 from lineament.kernels.rivals.line_tracking import track_lines
-from lineament.methods import steps
 from lineament.methods.hough import Hough
 from lineament.methods.ransac import Ransac
 from lineament.methods.region_growing import RegionGrowing
@@ -38,9 +37,9 @@ DEGENERATE = degenerate_scans()
 SENSOR = RangeNoise(0.01, 0.01, 0.002, 0.01)
 CHANGED = {"threshold": 0.02, "min_piece": 2, "noise": SENSOR}
 SPLITTERS = {
-    "iepf": Extractor("iepf", merge=False),
+    "iepf": Extractor("iepf", settling=False),
     "iepf:paper": Extractor("iepf:paper"),
-    "iepf, changed": Extractor("iepf", merge=False, **CHANGED),
+    "iepf, changed": Extractor("iepf", settling=False, **CHANGED),
     "split_and_merge": Extractor("split_and_merge"),
     "split_and_merge, changed": Extractor("split_and_merge", **CHANGED),
 }
@@ -109,11 +108,10 @@ def tracked(scan, extractor):
     method, block = extractor.method, Block(scan, noise_row(extractor.noise), 1)
     block.load(scan.ranges)
     block.take(0)
-    steps.estimate_noise(block, 0)
-    method._part(block, 0, method.min_points)
+    method.part(block, method.min_points)
     track_lines(
-        block.floats, block.ints, block.noises[0], method.threshold, method.noise_factor,
-        method.max_misses, method.min_piece,
+        *block.workspace, method.threshold, method.noise_factor, method.max_misses,
+        method.min_piece,
     )  # fmt: skip
     ends = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
     return list(map(tuple, block.work.marks[at.BEAM][ends].T.tolist()))
@@ -177,7 +175,7 @@ def test_tolerance_by_hand():
     for parts in ({"threshold": 1.0}, {"proportion": 1 / 3.0}, {"noise_factor": 100.0}):
         for scale, corners in ((height * 0.999, 1), (height * 1.001, 0)):
             own = plain | {name: value * scale for name, value in parts.items()}
-            extractor = Extractor("iepf", merge=False, noise=NOISE, **own)
+            extractor = Extractor("iepf", settling=False, noise=NOISE, **own)
             assert len(extractor(scan).corners) == corners
             candidate = extractor.trace(scan).candidates[0]
             assert candidate["chord_distance"] == pytest.approx(height)
@@ -197,7 +195,7 @@ def test_merging_joins_what_was_split_by_noise():
     angles = fan(40)
     ranges = 2.0 / np.cos(angles) + 0.01 * np.random.default_rng(3).normal(size=len(angles))
     scan, parameters = scan_of(ranges, angles), {"noise_factor": 1.0, "proportion": 0.0}
-    assert len(Extractor("iepf", merge=False, noise=NOISE, **parameters)(scan).segments) > 10
+    assert len(Extractor("iepf", settling=False, noise=NOISE, **parameters)(scan).segments) > 10
     assert len(Extractor("iepf", noise_factor=3.0, noise=NOISE)(scan).segments) == 1
 
 

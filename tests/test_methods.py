@@ -15,11 +15,19 @@ from lineament.methods.liu import Liu
 
 NAN, INF = math.nan, math.inf
 NOT_NUMBERS = ["1", None, True, 1j, [1.0]]
-FITS = ("total", "y_of_x", "weighted")
+FITS = ("total", "y_of_x", "weighted", "slope_intercept")
 ENDS = ("intersection", "beam")
 
 #: By method and parameter: the least whole number; "> 0"; "≥ 0"; "acute" angles; or the choices.
-SHARED = {"reach": "≥ 0", "grazing_angle": "acute", "max_missing": 0, "max_vertices": 0}
+SHARED = {
+    "clusters": ("borges_aldon", "fixed", "none"),
+    "distance": "> 0",
+    "settling": bool,
+    "reach": "≥ 0",
+    "grazing_angle": "acute",
+    "max_missing": 0,
+    "max_vertices": 0,
+}
 MERGED = SHARED | {"threshold": "≥ 0", "unevenness": "≥ 0", "corner_trim": 0, "min_points": 2}
 NEAR = SHARED | {"epsilon": "≥ 0", "sigmas": "≥ 0", "fit": FITS, "noise_factor": "≥ 0"}
 RUNS = NEAR | {"min_points": 3, "min_length": "≥ 0", "max_misses": 0}
@@ -35,7 +43,9 @@ BOUNDS = {
         "min_points": 2,
         "support_radius": 1,
         "threshold": "≥ 0",
-        "response": ("tangent", "product", "relative"),
+        "response": ("tangent", "product", "relative", "chord_scaled", "product_scaled"),
+        "recursion": ("both", "after"),
+        "ends": ("truncated", "excluded"),
         "fit": FITS,
         "measure": ("raw", "filtered"),
         "corner": ENDS,
@@ -53,8 +63,7 @@ BOUNDS = {
         "max_missing": 0,
         "min_points": 1,
     },
-    "iepf": MERGED
-    | {"proportion": "≥ 0", "noise_factor": "≥ 0", "min_piece": 2, "merge": bool, "corner": ENDS},
+    "iepf": MERGED | {"proportion": "≥ 0", "noise_factor": "≥ 0", "min_piece": 2, "corner": ENDS},
     "split_and_merge": MERGED | {"noise_factor": "≥ 0", "min_piece": 2},
     "line_tracking": MERGED | {"noise_factor": "> 0", "max_misses": 0, "min_piece": 3},
     "hough": RUNS | {"angles": 4, "distances": 4, "resolution": "> 0"},
@@ -113,7 +122,7 @@ def test_refusals_name_what_is_expected():
         ("liu", {"min_points": 1}, "min_points is 1, expected a whole number ≥ 2"),
         ("liu", {"sigma_d": 0}, "sigma_d is 0, expected a number > 0"),
         ("pdbs", {"beta": 2}, r"beta is 2, expected a number > 0 and < 1\.57079632679"),
-        ("iepf", {"merge": 1}, "merge is 1, expected True or False"),
+        ("iepf", {"settling": 1}, "settling is 1, expected True or False"),
         ("ransac", {"seed": 2**31 - 1}, "seed is 2147483647, .* ≥ 1 and < 2147483647"),
         (
             "iepf",
@@ -163,7 +172,7 @@ def test_presets():
     assert (free.response, free.threshold, free.support_radius) == ("relative", 0.25, 4)
     plain = get_method("iepf:paper")
     assert (plain.threshold, plain.proportion, plain.noise_factor) == (0.1, 0.0, 0.0)
-    assert (plain.merge, plain.corner) == (False, "beam")
+    assert (plain.clusters, plain.settling, plain.corner) == ("none", False, "beam")
     assert get_method("pdbs:paper").grazing_angle == math.radians(10)
 
 

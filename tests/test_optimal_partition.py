@@ -37,7 +37,7 @@ def ran(scan, noise=None, **parameters):
     block = Block(scan, noise_row(noise), 1, method.own_arrays(len(scan)))
     block.load(scan.ranges)
     method.run(block)
-    return layout.Work(*block.own.arrays), int(block.counts[0])
+    return layout.Work(*block.own[0]), int(block.counts[0])
 
 
 def lines_of(own, count):

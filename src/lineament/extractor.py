@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
-from .methods.batching import block_capacity, run_batch
 from .methods.trace import Trace
-from .methods.workspace import Block
+from .methods.workspace import Block, block_capacity, run_batch
 from .scan import LaserScan, RangeNoise
 
 __all__ = ["Extractor", "extract", "trace"]

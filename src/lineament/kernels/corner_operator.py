@@ -7,8 +7,14 @@ import numpy as np
 from . import helper, kernel
 
 #: What the response is: the interpretations of equation 22 and the text of Figure 9.
-TANGENT, PRODUCT, RELATIVE = 0, 1, 2
-RESPONSES = {"relative": RELATIVE, "tangent": TANGENT, "product": PRODUCT}
+TANGENT, PRODUCT, RELATIVE, CHORD_SCALED, PRODUCT_SCALED = range(5)
+RESPONSES = {
+    "relative": RELATIVE,
+    "tangent": TANGENT,
+    "product": PRODUCT,
+    "chord_scaled": CHORD_SCALED,
+    "product_scaled": PRODUCT_SCALED,
+}
 
 
 @kernel
@@ -30,8 +36,10 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
     -------
     float
         TANGENT: Σd to the tangent [m] (equations 20-22); PRODUCT: that times Σd to the chord of
-        the support [m²]; RELATIVE: that over Σ|s|, in 0..1, free of range and scale. 0 where the
-        support has no point on one side, or no length.
+        the support [m²]; RELATIVE: Σd to the tangent over Σ|s|, in 0..1, free of range and scale;
+        CHORD_SCALED: the same over the length of the chord; PRODUCT_SCALED: the sum of the products
+        of both distances of each point, over the square of that length. 0 where the support has no
+        point on one side, or no length.
     """
     before, after = _support(i, first, last, radius, closed)
     if before == 0 or after == 0:
@@ -61,9 +69,15 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
     if determinant <= 1e-12 * s2 * s4:
         # All support points at one distance determine no parabola, but a line.
         bx, by = sx, sy
-    norm = math.sqrt(bx * bx + by * by)
-    if norm == 0.0:
+    if bx == 0.0 and by == 0.0:
         return 0.0
+    return _accumulate(x, y, i, before, after, first, period, closed, (bx, by), arcs, kind)
+
+
+@helper
+def _accumulate(x, y, i, before, after, first, period, closed, tangent, arcs, kind):
+    """Add up the distances of a support to its tangent and its chord, by the form of response."""
+    bx, by = tangent
     to_tangent = _distance_sum(x, y, i, before, after, first, period, closed, i, bx, by)
     if kind == TANGENT:
         return to_tangent
@@ -72,7 +86,17 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
     a = _neighbour(i, -before, first, period, closed)
     b = _neighbour(i, after, first, period, closed)
     cx, cy = x[b] - x[a], y[b] - y[a]
-    return to_tangent * _distance_sum(x, y, i, before, after, first, period, closed, a, cx, cy)
+    if kind == PRODUCT:
+        return to_tangent * _distance_sum(x, y, i, before, after, first, period, closed, a, cx, cy)
+    chord = math.sqrt(cx * cx + cy * cy)
+    if kind == CHORD_SCALED or chord == 0.0:
+        return to_tangent / chord if chord > 0.0 else 0.0
+    total, norm = 0.0, math.sqrt(bx * bx + by * by)
+    for k in range(-before, after + 1):
+        j = _neighbour(i, k, first, period, closed)
+        to_chord = (cy * (x[j] - x[a]) - cx * (y[j] - y[a])) / chord
+        total += abs((by * (x[j] - x[i]) - bx * (y[j] - y[i])) * to_chord)
+    return total / (norm * chord * chord)
 
 
 @helper

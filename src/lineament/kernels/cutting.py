@@ -14,7 +14,7 @@ from .corner_operator import corner_response
 
 
 @kernel
-def cut(floats, ints, radius, threshold, kind, min_points):
+def cut(floats, ints, radius, threshold, kind, min_points, both_sides, whole_support):
     """Cut the clusters of a scan where the corner operator responds (Liu et al. 2023, steps 5-7).
 
     From points and clusters, candidates and pieces.
@@ -27,6 +27,10 @@ def cut(floats, ints, radius, threshold, kind, min_points):
         A candidate whose response exceeds this is a corner.
     min_points : int
         No piece gets shorter.
+    both_sides : bool
+        Both sides of a corner are searched in turn, else only that after it (step 7 to the letter).
+    whole_support : bool
+        Points whose support an end of their cluster cuts short have no response.
     """
     work = at.named(floats, ints)
     points, counts = work.points, work.counts
@@ -44,11 +48,14 @@ def cut(floats, ints, radius, threshold, kind, min_points):
             depth, a, b, i, distance = next_candidate(points, work.waiting, depth, min_points)
             if i < 0:
                 continue
-            response = corner_response(x, y, i, first, last, radius, kind, closed)
+            response = 0.0
+            if closed or not whole_support or (first + radius <= i <= last - radius):
+                response = corner_response(x, y, i, first, last, radius, kind, closed)
             found = add_candidate(work.candidates, found, i, distance, response)
             if response > threshold:
                 depth = add_side(work.waiting, depth, i, b)
-                depth = add_side(work.waiting, depth, a, i)
+                if both_sides:
+                    depth = add_side(work.waiting, depth, a, i)
     list_pieces(work, found, threshold)
 
 

@@ -11,8 +11,13 @@ from . import helper, sums
 from .noise import LEAST_SIGMA
 
 #: How a line is fitted (equations 23, 24, and what is better).
-TOTAL, Y_OF_X, WEIGHTED = 0, 1, 2
-FITS = {"total": TOTAL, "y_of_x": Y_OF_X, "weighted": WEIGHTED}
+TOTAL, Y_OF_X, WEIGHTED, SLOPE_INTERCEPT = range(4)
+FITS = {
+    "total": TOTAL,
+    "y_of_x": Y_OF_X,
+    "weighted": WEIGHTED,
+    "slope_intercept": SLOPE_INTERCEPT,
+}
 
 
 @sums
@@ -30,7 +35,8 @@ def fit_line(x, y, rho, first, last, noise, kind):
         (sigma, proportional, bearing, quantum), see `lineament.RangeNoise`.
     kind : int
         TOTAL: least orthogonal distances. Y_OF_X: y = kx + b, or x = ky + b where the points are
-        steeper than 45° (equations 23, 24). WEIGHTED: maximum likelihood by Pfister's weights.
+        steeper than 45° (equations 23, 24). SLOPE_INTERCEPT: y = kx + b of every line, also of
+        the steepest; k = 0 of a line x = const. WEIGHTED: maximum likelihood by Pfister's weights.
 
     Returns
     -------
@@ -104,8 +110,9 @@ def _line(x, y, rho, noise, c, s, weighted, kind):
 @helper
 def direction(sxx, sxy, syy, kind):
     """Return the unit vector along a line, from the second moments of its points."""
-    if kind == Y_OF_X:
-        u, v = (sxx, sxy) if sxx >= syy else (sxy, syy)
+    if kind in (Y_OF_X, SLOPE_INTERCEPT):
+        swaps = kind == Y_OF_X and sxx < syy
+        u, v = (sxy, syy) if swaps else (sxx, sxy)
     else:
         # That of the larger eigenvalue: at half the angle of (sxx - syy, 2 sxy).
         difference = sxx - syy

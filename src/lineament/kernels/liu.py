@@ -16,7 +16,7 @@ from .noise import estimate_noise
 Parameters = namedtuple(
     "Parameters",
     "sigma_d sigma_r half_width spacing_scale noise_floor density_k min_points support_radius "
-    "threshold response fit measure corner corner_trim max_vertices",
+    "threshold response recursion ends fit measure corner corner_trim max_vertices",
 )
 
 
@@ -60,7 +60,10 @@ def extract_rows(
             floats, ints, bearings, step, circular, noise, p.spacing_scale, p.noise_floor,
             p.density_k, p.min_points,
         )  # fmt: skip
-        cut(floats, ints, p.support_radius, p.threshold, p.response, p.min_points)
+        cut(
+            floats, ints, p.support_radius, p.threshold, p.response, p.min_points, p.recursion,
+            p.ends,
+        )  # fmt: skip
         if p.max_vertices > 0:
             limit_pieces(floats, ints, bearings, p.max_vertices, LINK, WORST, costs, follow)
         measure(floats, ints, row, bearings, circular, noise, options, tables)

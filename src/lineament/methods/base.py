@@ -1,7 +1,5 @@
 """What the methods share: the check of their parameters, the run over scans, the trace."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any, ClassVar
 
@@ -10,11 +8,8 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import LaserScan
-from .steps import estimate_noise
-from .trace import Trace, trace_of
+from .trace import Trace, intermediates
 from .workspace import Block
-
-__all__ = ["MethodBase"]
 
 
 class MethodBase:
@@ -28,6 +23,8 @@ class MethodBase:
 
     name: ClassVar[str]
     presets: ClassVar[tuple[str, ...]] = ()
+    #: What the response of a candidate exceeds where the first search accepts it.
+    least_response: ClassVar[float] = 0.0
 
     def __post_init__(self) -> None:
         # Each gets the type of its default, for numba compiles for each type.
@@ -40,24 +37,15 @@ class MethodBase:
     def own_arrays(self, beams: int) -> Any:
         """Make what the method needs besides a block, for scans of so many beams."""
 
-    def find(self, block: Block, row: int) -> None:
-        """Find and measure the features of scan `row` of a block.
-
-        It is in the block's workspace, and its noise is there.
-        """
+    def find(self, block: Block) -> None:
+        """Find and measure the features of the scan that a block has taken, in its workspace."""
         raise NotImplementedError
 
     def run(self, block: Block) -> None:
         """Find and measure the features of the scans of a block."""
         for row in range(block.rows):
             block.take(row)
-            estimate_noise(block, row)
-            self.find(block, row)
-
-    @property
-    def least_response(self) -> float:
-        """What the response of a candidate exceeds where the first search accepts it."""
-        return 0.0
+            self.find(block)
 
     def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
         """Run again on a scan from which these features came, and keep every intermediate.
@@ -69,10 +57,9 @@ class MethodBase:
         block = Block(scan, noise, 1, self.own_arrays(len(scan)))
         block.load(scan.ranges)
         self.run(block)
-        return trace_of(
-            block, self.name, scan, features, self.least_response, self.report_evidence(block)
-        )
+        given: dict[str, Any] = {"scan": scan, "method": self.name, "features": features}
+        return Trace(**given, clusters=features.clusters, **self.intermediates(block))
 
-    def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:  # noqa: ARG002
-        """Report how much evidence there is for each feature of the last scan, by table."""
-        return {}
+    def intermediates(self, block: Block) -> dict[str, Any]:
+        """Return what a trace has besides the features of the scan that was run, by name."""
+        return intermediates(block, self.least_response)

@@ -6,28 +6,21 @@ A. Martinelli, N. Tomatis, R. Siegwart, *A comparison of line extraction algorit
 data for indoor mobile robotics*, Autonomous Robots 23, 2007.
 """
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
 from operator import attrgetter
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.rivals.hough import Parameters, find_by_votes
 from .lines import NearMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
-
-__all__ = ["Hough"]
 
 _numbers = attrgetter(*Parameters._fields)
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class Hough(NearMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
 
@@ -40,18 +33,9 @@ class Hough(NearMethod):
     4. Withdraw the run's votes, and look for the next peak, until none has `min_points`.
     5. *Settle* neighbouring pieces: about their border each point goes to the nearer line; those
        that one line fits are merged, those whose lines meet at their ends have a corner there.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> bearings = np.radians(np.arange(-40, 41))
-    >>> ranges = 2.0 / (np.cos(bearings) + abs(np.sin(bearings)))  # a corner, straight ahead
-    >>> corners = ln.extract(ln.LaserScan(ranges, angles=bearings), method="hough").corners
-    >>> abs(corners["position"]).round(3).tolist(), corners["opening"].round(3).tolist()
-    ([[2.0, 0.0]], [1.571])
     """
 
-    name: ClassVar[str] = "hough"
+    name = "hough"
 
     angles: int = parameter(180, "directions that are voted for: 180 are 1° apart", low=4)
     distances: int = parameter(
@@ -72,8 +56,8 @@ class Hough(NearMethod):
         votes = np.empty((self.angles, self.distances), np.int32)
         return votes, np.column_stack((np.cos(alpha), np.sin(alpha)))
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Part, find by votes, settle the borders and fit."""
-        self._part(block, row, self.min_points, self.noise_factor)
-        find_by_votes(block.floats, block.ints, block.noises[row], _numbers(self), *block.own)
-        self._finish(block, row)
+        self.part(block, self.min_points, self.noise_factor)
+        find_by_votes(*block.workspace, _numbers(self), *block.own)
+        self.finish(block)

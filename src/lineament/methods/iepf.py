@@ -7,23 +7,17 @@ verifies, are those of M. Przybyła, *Detection and tracking of 2D geometric obs
 data*, RoMoCo 2017.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..kernels.line_fit import TOTAL, WEIGHTED
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import PieceMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
 
-__all__ = ["IEPF"]
 
-
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class IEPF(PieceMethod):
     """Iterative end point fit.
 
@@ -34,20 +28,19 @@ class IEPF(PieceMethod):
        line, and put corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + proportion ρ + noise_factor σ_r``. The
-    preset `paper` is the plain method: a fixed tolerance, no merging, corners on measurements.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> import numpy as np
-    >>> from lineament.simulation import SENSORS, room
-    >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
-    >>> ln.extract(scan, method="iepf").corners["position"].round(1).tolist()
-    [[1.4, -0.5], [3.0, 2.0]]
+    preset `paper` is the method as published: step 2 alone, of the whole scan, with a fixed
+    tolerance; corners on measurements.
     """
 
-    name: ClassVar[str] = "iepf"
-    presets: ClassVar[tuple[str, ...]] = ("paper",)
+    name = "iepf"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "threshold": 0.1,
+        "proportion": 0.0,
+        "noise_factor": 0.0,
+        "corner": "beam",
+    }
+    least_response = 1.0
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
     proportion: float = parameter(
@@ -57,7 +50,6 @@ class IEPF(PieceMethod):
         4.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
-    merge: bool = parameter(True, "whether step 3 is done")
     corner: str = parameter(
         "intersection",
         "whether a corner lies where its lines meet, or on its measurement",
@@ -69,27 +61,16 @@ class IEPF(PieceMethod):
         if self.threshold == self.proportion == self.noise_factor == 0:
             raise ValueError("threshold, proportion and noise_factor are all 0, expected one > 0")
 
-    @classmethod
-    def paper(cls, **changes: Any) -> IEPF:
-        """Make the plain method: fixed tolerance, no merging, corners on their measurements."""
-        plain = {"threshold": 0.1, "proportion": 0.0, "noise_factor": 0.0}
-        return cls(**{**plain, "merge": False, "corner": "beam", **changes})
-
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Cluster, split, merge and fit."""
-        self._part(block, row, self.min_points)
-        split(
-            block.floats, block.ints, block.noises[row], False, self.threshold, self.proportion,
-            self.noise_factor, self.min_piece,
-        )  # fmt: skip
-        if self.merge:
-            self._settle(block, row, self.unevenness)
+        self.part(block, self.min_points)
+        tolerance = self.threshold, self.proportion, self.noise_factor
+        split(*block.workspace, False, *tolerance, self.min_piece)
+        self.settle(block, self.unevenness)
         if self.corner == "intersection":
-            self._measure(block, row, fit=WEIGHTED, trim=self.corner_trim)
+            self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
         else:
-            self._measure(block, row, fit=TOTAL, sharp=False)
+            self.measure(block, fit=TOTAL, sharp=False)
 
-    @property
-    def least_response(self) -> float:
-        """What the response of a candidate exceeds where the first search accepts it."""
-        return 1.0
+    def leave(self, block: Block) -> None:
+        """Leave the corners where the pieces meet."""

@@ -8,21 +8,15 @@ P. Vandorpe, H. Van Brussel, H. Xu, *Exact dynamic map building for a mobile rob
 primitives produced by a 2D range finder*, ICRA 1996.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..kernels.rivals.line_tracking import track_lines
 from .lines import PieceMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
 
-__all__ = ["LineTracking"]
 
-
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class LineTracking(PieceMethod):
     """Line tracking.
 
@@ -34,18 +28,10 @@ class LineTracking(PieceMethod):
        one more; there the next line begins.
     3. *Merge* neighbours that one line fits as well, let each point at a border go to the nearer
        line (a tracker runs past corners, where both are near), and put corners where lines meet.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> import numpy as np
-    >>> from lineament.simulation import SENSORS, room
-    >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
-    >>> ln.extract(scan, method="line_tracking").corners["position"].round(1).tolist()
-    [[1.4, -0.5], [3.0, 2.0]]
     """
 
-    name: ClassVar[str] = "line_tracking"
+    name = "line_tracking"
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "max_misses": 0}
 
     threshold: float = parameter(
         0.0, "distance from its line that a point without noise may have [m]", low=0
@@ -56,11 +42,10 @@ class LineTracking(PieceMethod):
     max_misses: int = parameter(2, "points in a row that a line passes over as outliers", low=0)
     min_piece: int = parameter(3, "least points of a line", low=3)
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Cluster, track, merge and fit."""
-        self._part(block, row, self.min_points)
+        self.part(block, self.min_points)
         track_lines(
-            block.floats, block.ints, block.noises[row], self.threshold, self.noise_factor,
-            self.max_misses, self.min_piece,
-        )  # fmt: skip
-        self._finish(block, row)
+            *block.workspace, self.threshold, self.noise_factor, self.max_misses, self.min_piece
+        )
+        self.finish(block)

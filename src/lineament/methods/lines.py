@@ -1,26 +1,42 @@
 """What the methods share that find lines in clusters: the clusters before, the settling after."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
+from ..kernels import layout as at
 from ..kernels.budget import LINK, WORST, limit_pieces
 from ..kernels.line_fit import FITS, WEIGHTED
+from ..kernels.rivals.pdbs import BORGES_ALDON, FIXED
 from ..kernels.rivals.settling import settle
 from .base import MethodBase
-from .parameters import documented, parameter
-from .steps import budget_scratch, measure, part
-from .workspace import Block
-
-__all__ = ["LineMethod", "NearMethod", "PieceMethod"]
+from .parameters import method, parameter
+from .workspace import Block, budget_scratch
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class LineMethod(MethodBase):
-    """A method that parts a scan at its breakpoints, finds lines, and settles their borders."""
+    """A method that parts a scan at its breakpoints, finds lines, and settles their borders.
 
+    Its preset `paper` is the method as published: its own clusters or none, and no settling but
+    what its paper has.
+    """
+
+    presets = ("paper",)
+    #: Parameters of the preset `paper`, where they differ from the defaults.
+    published: ClassVar[dict[str, Any]] = {}
+
+    clusters: str = parameter(
+        "borges_aldon",
+        "how the scan is parted first: by the detector of Borges and Aldon, at a fixed distance, "
+        "or not at all",
+        choices=("borges_aldon", "fixed", "none"),
+    )
+    distance: float = parameter(0.3, "distance at which `fixed` parts two neighbours [m]", above=0)
+    settling: bool = parameter(
+        True,
+        "whether neighbours are merged, points about their border go to the nearer line, and "
+        "lines meet in corners, for all methods alike; else as published",
+    )
     reach: float = parameter(
         6.0, "spacings from the ends of two pieces within which their lines meet in a corner", low=0
     )
@@ -35,37 +51,49 @@ class LineMethod(MethodBase):
         0, "pieces are joined until their polylines have no more vertices; 0: any number", low=0
     )
 
-    def _part(self, block: Block, row: int, min_points: int, noise_factor: float = 3.0) -> None:
+    @classmethod
+    def paper(cls, **changes: Any) -> Self:
+        """Make the method as published; ``docs/methods.md`` names what the papers leave open."""
+        return cls(**{"settling": False, **cls.published, **changes})
+
+    def part(self, block: Block, min_points: int, noise_factor: float = 3.0) -> None:
         """Part the scan into clusters."""
-        part(
-            block,
-            row,
-            constant=noise_factor,
+        if self.clusters == "borges_aldon":
+            rule, constant, missing = BORGES_ALDON, noise_factor, self.max_missing
+        else:
+            rule, missing = FIXED, block.beams
+            constant = self.distance if self.clusters == "fixed" else math.inf
+        block.part(
+            rule=rule,
+            constant=constant,
             angle=self.grazing_angle,
-            max_missing=self.max_missing,
+            max_missing=missing,
             min_points=min_points,
         )
 
-    def _settle(self, block: Block, row: int, misfit: float) -> None:
-        """Merge the pieces that one line fits, settle their borders, and join them at corners."""
-        settle(block.floats, block.ints, block.noises[row], misfit, self.reach)
+    def settle(self, block: Block, misfit: float) -> None:
+        """Settle the borders of the pieces, or leave them as the method's paper does."""
+        if self.settling:
+            settle(*block.workspace, misfit, self.reach)
+        else:
+            self.leave(block)
 
-    def _measure(
-        self, block: Block, row: int, *, fit: int, sharp: bool = True, trim: int = 0
-    ) -> None:
+    def leave(self, block: Block) -> None:
+        """Leave the lines as they are, without corners."""
+        block.work.pieces[at.BEFORE] = -1
+        block.work.response[:] = math.nan
+
+    def measure(self, block: Block, *, fit: int, sharp: bool = True, trim: int = 0) -> None:
         """Keep within the budget of vertices, and measure."""
         if self.max_vertices:
             costs, follow = budget_scratch(block.beams, self.max_vertices)
-            budget = follow.shape[1] - 1
-            limit_pieces(
-                block.floats, block.ints, block.bearings, budget, LINK, WORST, costs, follow
-            )
+            limits = follow.shape[1] - 1, LINK, WORST
+            limit_pieces(block.floats, block.ints, block.bearings, *limits, costs, follow)
         gap = self.max_missing + 1.0
-        measure(block, row, fit=fit, sharp=sharp, trim=trim, reach=self.reach, gap=gap)
+        block.measure(fit=fit, sharp=sharp, trim=trim, reach=self.reach, gap=gap)
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class PieceMethod(LineMethod):
     """A method that cuts or grows along clusters, and merges what one line fits."""
 
@@ -77,16 +105,17 @@ class PieceMethod(LineMethod):
     )
     min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
-    def _finish(self, block: Block, row: int) -> None:
+    def finish(self, block: Block) -> None:
         """Settle the borders and fit."""
-        self._settle(block, row, self.unevenness)
-        self._measure(block, row, fit=WEIGHTED, trim=self.corner_trim)
+        self.settle(block, self.unevenness)
+        self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class NearMethod(LineMethod):
     """A method that looks for points near a line, one line after the other."""
+
+    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "sigmas": 0.0, "fit": "total"}
 
     epsilon: float = parameter(
         0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
@@ -99,7 +128,7 @@ class NearMethod(LineMethod):
         3.0, "standard deviations of the breakpoint detector, see `PDBS`", low=0
     )
 
-    def _finish(self, block: Block, row: int) -> None:
+    def finish(self, block: Block) -> None:
         """Settle the borders and fit."""
-        self._settle(block, row, self.epsilon)
-        self._measure(block, row, fit=FITS[self.fit])
+        self.settle(block, self.epsilon)
+        self.measure(block, fit=FITS[self.fit])

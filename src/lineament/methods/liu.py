@@ -5,13 +5,10 @@ Y. Liu, L. Sui, P. Li, L. Zhang, Q. Wu, J. Du, Y. Liu, H. Yu, *Journal of Sensor
 where the paper is open.
 """
 
-from __future__ import annotations
-
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import asdict
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kernels.bilateral import scratch_shape
 from ..kernels.corner_operator import RESPONSES
@@ -19,20 +16,12 @@ from ..kernels.layout import FILTERED, RANGE
 from ..kernels.line_fit import FITS
 from ..kernels.liu import Parameters, extract_rows
 from .base import MethodBase
-from .parameters import documented, parameter
-from .steps import budget_scratch
-from .workspace import Block
-
-__all__ = ["Liu"]
+from .parameters import method, parameter
+from .trace import intermediates
+from .workspace import Block, budget_scratch
 
 
-class _Own(NamedTuple):
-    parameters: tuple[Any, ...]
-    scratch: tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64]]
-
-
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class Liu(MethodBase):
     """The method of Liu et al. 2023, and its parameters; defaults are the paper's numbers.
 
@@ -50,8 +39,8 @@ class Liu(MethodBase):
     'y_of_x'
     """
 
-    name: ClassVar[str] = "liu"
-    presets: ClassVar[tuple[str, ...]] = ("paper", "scale_free")
+    name = "liu"
+    presets = ("paper", "scale_free")
 
     sigma_d: float = parameter(4.0, "width of the filter along the scan [beams]", above=0)
     sigma_r: float = parameter(0.3, "width of the filter in range [m]", above=0)
@@ -79,13 +68,27 @@ class Liu(MethodBase):
     )
     response: str = parameter(
         "tangent",
-        "interpretation of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], or "
-        "that over Σ|s| [-]",
+        "interpretation of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], Σd "
+        "over Σ|s| or the length of the chord [-], or Σ of the products of both distances of each "
+        "point over the square of that length [-]",
         choices=RESPONSES,
+    )
+    recursion: str = parameter(
+        "both",
+        "whether both sides of a corner are searched in turn, or that after it alone, which is "
+        "step 7 to the letter",
+        choices=("both", "after"),
+    )
+    ends: str = parameter(
+        "truncated",
+        "whether the support of points near an end of their cluster is cut short, or such points "
+        "are no corners; not stated",
+        choices=("truncated", "excluded"),
     )
     fit: str = parameter(
         "total",
-        "orthogonal least squares, the paper's y = kx + b, or maximum likelihood",
+        "orthogonal least squares; the paper's y = kx + b, with x = ky + b where a wall is steeper "
+        "than 45° (`y_of_x`) or to the letter (`slope_intercept`); or maximum likelihood",
         choices=FITS,
     )
     measure: str = parameter(
@@ -109,13 +112,13 @@ class Liu(MethodBase):
     )
 
     @classmethod
-    def paper(cls, **changes: Any) -> Liu:
+    def paper(cls, **changes: Any) -> Self:
         """Make the paper's literal pipeline: its fits, filtered ranges, corners on measurements."""
         plain = {"noise_floor": 0.0, "fit": "y_of_x", "measure": "filtered", "corner": "beam"}
         return cls(**{**plain, **changes})
 
     @classmethod
-    def scale_free(cls, **changes: Any) -> Liu:
+    def scale_free(cls, **changes: Any) -> Self:
         """Make the response that does not depend on range, with its own threshold.
 
         In metres, 0.66 finds right angles only farther than some 3 m, less what the filter takes
@@ -123,31 +126,31 @@ class Liu(MethodBase):
         """
         return cls(**{"response": "relative", "threshold": 0.25, **changes})
 
-    def own_arrays(self, beams: int) -> _Own:
+    def own_arrays(self, beams: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """Make the parameters as the kernel takes them, and scratch for filter and budget."""
         costs, follow = budget_scratch(beams, self.max_vertices)
         sharp = self.corner == "intersection"
         codes = {
             "response": RESPONSES[self.response],
             "measure": RANGE if self.measure == "raw" else FILTERED,
+            "recursion": self.recursion == "both",
+            "ends": self.ends == "excluded",
             "fit": FITS[self.fit],
             "corner": sharp,
             "corner_trim": self.corner_trim if sharp else 0,
             "max_vertices": follow.shape[1] - 1,
         }
         filtering = np.empty(scratch_shape(beams, self.half_width), np.float32)
-        parameters = Parameters(**{**asdict(self), **codes})
-        return _Own(tuple(parameters), (filtering, costs, follow))
+        return tuple(Parameters(**{**asdict(self), **codes})), (filtering, costs, follow)
 
     def run(self, block: Block) -> None:
         """Filter, cluster, cut and fit the scans of a block."""
-        own: _Own = block.own
+        parameters, scratch = block.own
         extract_rows(
-            block.ranges, block.rows, block.bearings, block.sensor, block.noise, own.parameters,
-            block.floats, block.ints, own.scratch, block.noises, block.tables,
+            block.ranges, block.rows, block.bearings, block.sensor, block.noise, parameters,
+            block.floats, block.ints, scratch, block.noises, block.tables,
         )  # fmt: skip
 
-    @property
-    def least_response(self) -> float:
-        """What the response of a candidate exceeds where the first search accepts it."""
-        return self.threshold
+    def intermediates(self, block: Block) -> dict[str, Any]:
+        """Return what a trace has besides the features of the scan that was run, by name."""
+        return intermediates(block, self.threshold)

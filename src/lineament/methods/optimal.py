@@ -4,30 +4,24 @@ Where Liu et al. 2023 cluster, cut and fit by thresholds, one energy decides her
 ``docs/optimal.md`` leads from the model of a scan to the recurrence that finds its minimum.
 """
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import Features
 from ..kernels.line_fit import WEIGHTED
-from ..kernels.optimal import layout
+from ..kernels.optimal import layout as at
+from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
 from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
 from ..kernels.vertices import hold_together
-from ..scan import LaserScan
 from .base import MethodBase
-from .optimal_trace import evidence_of, trace_of
-from .parameters import documented, parameter
-from .steps import measure, part
-from .trace import Trace
+from .parameters import method, parameter
+from .trace import CANDIDATE, intermediates
 from .workspace import Block
 
-__all__ = ["Optimal"]
+Array = NDArray[np.float64]
 
 #: Error of a range beyond which a measurement is better left out of a map [m]; distance of
 #: neighbours beyond which no line of a map joins them [m]; spacings from a vertex of a map within
@@ -37,16 +31,7 @@ _WORST, _LINK, _NEAR = 0.31, 1.0, 2.0
 _GRAZING = math.radians(4.0)
 
 
-class Workspace(NamedTuple):
-    """Arrays of one scan: as in `kernels.optimal.layout.Work`, and those of maps."""
-
-    arrays: tuple[NDArray[Any], ...]
-    costs: NDArray[np.float64]
-    follow: NDArray[np.int64]
-
-
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class Optimal(MethodBase):
     """Lines, corners and arcs: the partition of a scan that has the least energy.
 
@@ -77,7 +62,7 @@ class Optimal(MethodBase):
     [[1.4, -0.5], [3.0, 2.0]]
     """
 
-    name: ClassVar[str] = "optimal"
+    name = "optimal"
 
     evidence: float = parameter(
         12.0,
@@ -93,81 +78,103 @@ class Optimal(MethodBase):
         low=0,
     )
 
-    def own_arrays(self, beams: int) -> Workspace:
-        """Make the workspace of a scan."""
+    def own_arrays(self, beams: int) -> tuple[tuple[NDArray[Any], ...], Array, NDArray[np.int64]]:
+        """Make the workspace of a scan, see `kernels.optimal.layout.Work`, and the two of maps."""
         n, vertices = beams + 2, min(self.max_vertices, beams + 1) + 1
-        return Workspace(
-            (
-                np.zeros((layout.POINTS, n)),
-                np.zeros((layout.BEAMS, n), np.int64),
-                np.zeros((layout.SPANS, n), np.int64),
-                np.zeros((n, layout.PIECES)),
-                np.zeros((n, layout.SUMS)),
-                np.zeros(3),
-            ),
-            np.empty((PLANES, n, vertices)),
-            np.empty((n, vertices), np.int64),
+        arrays = (
+            np.zeros((at.POINTS, n)),
+            np.zeros((at.BEAMS, n), np.int64),
+            np.zeros((at.SPANS, n), np.int64),
+            np.zeros((n, at.PIECES)),
+            np.zeros((n, at.SUMS)),
+            np.zeros(3),
         )
+        return arrays, np.empty((PLANES, n, vertices)), np.empty((n, vertices), np.int64)
 
     def run(self, block: Block) -> None:
         """Find and measure the features of the scans of a block."""
         if self.max_vertices:
             MethodBase.run(self, block)
             return
-        own: Workspace = block.own
         # Plain tuples: named ones take numba a microsecond to recognise.
+        limits = block.range_min, block.range_max, block.circular, self.evidence, self.max_missing
+        segments, corners, *others = block.tables
         extract_rows(
-            block.ranges,
-            block.rows,
-            block.bearings,
-            block.noise,
-            (block.range_min, block.range_max, block.circular, self.evidence, self.max_missing),
-            own.arrays,
-            (
-                block.segments,
-                block.corners,
-                block.arcs,
-                block.breakpoints,
-                block.clusters,
-                block.offsets,
-            ),
-            block.noises,
-            block.counts,
-        )
-
-    def find(self, block: Block, row: int) -> None:
-        """Lay the polylines of a map through the scan in a block's workspace."""
-        own: Workspace = block.own
-        floats, ints = block.floats, block.ints
-        part(block, row, angle=_GRAZING, max_missing=self.max_missing, min_points=3)
-        fit_polylines(
-            floats, ints, block.bearings, own.follow.shape[1] - 1, self.max_missing, _LINK,
-            _WORST, own.costs, own.follow,
+            block.ranges, block.rows, block.bearings, block.noise, limits, block.own[0],
+            (segments, corners, block.arcs, *others), block.noises, block.counts,
         )  # fmt: skip
-        measure(block, row, fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))
-        hold_together(floats, ints, row, block.segments, block.corners, block.offsets)
 
-    @property
-    def least_response(self) -> float:
-        """Least response of a corner: the price of a line."""
-        return self.evidence
+    def find(self, block: Block) -> None:
+        """Lay the polylines of a map through the scan that a block has taken."""
+        _, costs, follow = block.own
+        block.part(angle=_GRAZING, max_missing=self.max_missing, min_points=3)
+        limits = follow.shape[1] - 1, self.max_missing, _LINK, _WORST
+        fit_polylines(block.floats, block.ints, block.bearings, *limits, costs, follow)
+        block.measure(fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))
+        tables = block.segments, block.corners, block.offsets
+        hold_together(block.floats, block.ints, block.row, *tables)
 
-    def trace(self, scan: LaserScan, features: Features, noise: NDArray[np.float64]) -> Trace:
-        """Run again on a scan of which these features came, and keep every intermediate.
+    def intermediates(self, block: Block) -> dict[str, Any]:
+        """Return what a trace has besides the features of the scan that was run, by name.
 
-        It has no candidates: all partitions are compared.
+        It has no candidates: all partitions are compared. The evidence is by how much χ² would
+        rise: of a corner, if its two segments were one; of a segment, if it were one with the
+        neighbour that it is most like (inf without neighbours); of an arc, if lines were in its
+        place.
         """
         if self.max_vertices:
-            return MethodBase.trace(self, scan, features, noise)
-        block = Block(scan, noise, 1, self.own_arrays(len(scan)))
-        block.load(scan.ranges)
-        self.run(block)
-        return trace_of(block, self, scan, features)
+            return intermediates(block, self.evidence)
+        work, count, n = at.Work(*block.own[0]), int(block.counts[0]), block.beams
+        order = np.argsort(work.beams[at.BEAM, :count])
+        beam, rho = work.beams[at.BEAM, order], work.points[at.RHO, order]
+        filtered, spacing, limit = (np.full(n, np.nan) for _ in range(3))
+        filtered[beam] = rho
+        before = np.roll(np.arange(count), 1)
+        xy = work.points[at.X : at.Y + 1, order]
+        spacing[beam] = np.hypot(*(xy - xy[:, before]))
+        missing = (beam - beam[before]) % n - 1 > self.max_missing
+        limit[beam] = np.where(missing, np.nan, _largest_spacing(xy, rho, before, work.noise))
+        if not block.circular and count:
+            spacing[beam[0]] = limit[beam[0]] = np.nan
+        corners = block.written()[1]
+        return {
+            "filtered": filtered,
+            "spacing": spacing,
+            "distance_threshold": limit,
+            "density_threshold": np.full(n, np.nan),
+            "candidates": np.zeros(0, CANDIDATE),
+            "threshold": self.evidence,
+            "cuts": np.sort(corners["beam"][corners["kind"] != "edge"]),
+            "evidence": _evidence(work, int(block.counts[2])) | {"corners": corners["response"]},
+            "scale": TAU,
+        }
 
-    def report_evidence(self, block: Block) -> dict[str, NDArray[np.float64]]:
-        """Rise of χ² without each feature of the last scan.
 
-        Of a corner, if its two segments were one; of a segment, if it were one with the neighbour
-        that it is most like (inf without neighbours); of an arc, if lines were in its place.
-        """
-        return {} if self.max_vertices else evidence_of(block)
+def _largest_spacing(xy: Array, rho: Array, before: NDArray[np.intp], noise: Array) -> Array:
+    """Largest distance of each point from the one before at which a surface goes on [m]."""
+    near, far = np.minimum(rho, rho[before]), np.maximum(rho, rho[before])
+    cross = np.abs(xy[0, before] * xy[1] - xy[1, before] * xy[0])
+    dot = xy[0, before] * xy[0] + xy[1, before] * xy[1]
+    step = STEEPEST * cross / far + 2 * SIGMAS * np.sqrt(noise[0] + noise[1] * far**2)
+    return np.asarray(np.sqrt(step**2 + 2 * np.maximum(near * far - dot, 0)))
+
+
+def _evidence(work: at.Work, surfaces: int) -> dict[str, Array]:
+    """Rise of χ² without each segment and each arc of the last scan."""
+    kind, first, end = work.spans[at.KIND, :surfaces], work.spans[at.FIRST], work.spans[at.LAST] + 1
+    rise = np.full(surfaces + 1, np.inf)
+    for k in range(1, surfaces):
+        if kind[k - 1] == kind[k] == at.LINE:
+            sums = [work.sums[end[m]] - work.sums[first[m]] for m in (k - 1, k)]
+            rise[k] = _chi_square(sums[0] + sums[1]) - sum(map(_chi_square, sums))
+    return {
+        "segments": np.minimum(rise[:-1], rise[1:])[kind == at.LINE],
+        "arcs": work.pieces[:surfaces, at.GAIN][kind == at.ARC].copy(),
+    }
+
+
+def _chi_square(sums: Array) -> float:
+    """Least χ² of a line, by sums of w (xx, xy, yy, x, y, 1)."""
+    xx, xy, yy, x, y, s = sums
+    line = np.linalg.lstsq([[xx, xy], [xy, yy]], [x, y], rcond=None)[0]
+    return float(max(s - line @ [x, y], 0.0))

@@ -1,16 +1,12 @@
 """Parameters of methods, each declared once: its default, bounds, unit and meaning."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Collection
 from dataclasses import dataclass, field, fields
 from inspect import cleandoc
 from numbers import Integral, Real
 from textwrap import wrap
-from typing import Any, TypeVar
-
-__all__ = ["Bounds", "bounds_of", "documented", "parameter"]
+from typing import Any, TypeVar, dataclass_transform
 
 T = TypeVar("T")
 
@@ -69,8 +65,24 @@ def bounds_of(cls: Any, name: str) -> Bounds:
     return found  # type: ignore[no-any-return]
 
 
-def documented(cls: type[T]) -> type[T]:
-    """List the parameters of a method, which is a dataclass, in its docstring."""
+_EXAMPLE = """Examples
+--------
+>>> import lineament as ln
+>>> import numpy as np
+>>> from lineament.simulation import SENSORS, room
+>>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
+>>> ln.extract(scan, method="{}").corners["position"].round(1).tolist()
+[[1.4, -0.5], [3.0, 2.0]]
+"""
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
+def method(cls: type[T]) -> type[T]:
+    """Make a class of parameters a frozen dataclass, and list them in its docstring.
+
+    One with a name, and without an example, gets the example that finds the corners of a room.
+    """
+    cls = dataclass(frozen=True, slots=True, kw_only=True)(cls)
     lines = ["Parameters", "----------"]
     for one in fields(cls):  # type: ignore[arg-type]
         bounds, meaning = one.metadata["bounds"], one.metadata["meaning"]
@@ -79,7 +91,10 @@ def documented(cls: type[T]) -> type[T]:
         lines += wrap(f"{text}; {bounds}.", 96, initial_indent="    ", subsequent_indent="    ")
     lines += ["", "Raises", "------", "ValueError", "    If a parameter is out of bounds."]
     text = cleandoc(cls.__doc__ or "")
-    ends = [text.find(f"{name}\n---") for name in ("References", "Examples")]
+    name = getattr(cls, "name", "")
+    if name and "Examples\n---" not in text:
+        text += "\n\n" + _EXAMPLE.format(name)
+    ends = [text.find(f"{head}\n---") for head in ("References", "Examples")]
     end = min((at for at in ends if at >= 0), default=len(text))
     cls.__doc__ = "\n".join([text[:end].rstrip(), "", *lines, "", text[end:]])
     return cls

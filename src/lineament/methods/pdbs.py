@@ -6,32 +6,22 @@ G. A. Borges and M.-J. Aldon, *Line extraction in 2D range images for mobile rob
 Intelligent and Robotic Systems 40, 2004.
 """
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, Self
 
-from ..kernels.rivals.pdbs import BORGES_ALDON, DIETMAYER, FIXED, LEE, SANTOS
+from ..kernels.rivals import pdbs
 from .base import MethodBase
-from .parameters import documented, parameter
-from .steps import measure, part
+from .parameters import method, parameter
 from .workspace import Block
-
-__all__ = ["PDBS", "RULES"]
 
 #: Names of the rules.
 RULES = {
-    "fixed": FIXED,
-    "dietmayer": DIETMAYER,
-    "santos": SANTOS,
-    "lee": LEE,
-    "borges_aldon": BORGES_ALDON,
+    name: getattr(pdbs, name.upper())
+    for name in ("fixed", "dietmayer", "santos", "lee", "borges_aldon")
 }
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class PDBS(MethodBase):
     """Clusters of neighbouring points, and the breakpoints between them.
 
@@ -58,8 +48,8 @@ class PDBS(MethodBase):
     [0, 0, 0, 0, 0, 1, 1, 1, 1, 1]
     """
 
-    name: ClassVar[str] = "pdbs"
-    presets: ClassVar[tuple[str, ...]] = ("paper",)
+    name = "pdbs"
+    presets = ("paper",)
 
     rule: str = parameter("borges_aldon", "the rule", choices=RULES)
     distance: float = parameter(0.3, "D_0 [m]", above=0)
@@ -87,11 +77,11 @@ class PDBS(MethodBase):
     min_points: int = parameter(3, "clusters of fewer points are noise", low=1)
 
     @classmethod
-    def paper(cls, **changes: Any) -> PDBS:
+    def paper(cls, **changes: Any) -> Self:
         """Make the detector of Borges and Aldon with their λ of 10°."""
         return cls(**{"grazing_angle": math.radians(10.0), **changes})
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Part the scan in a block's workspace."""
         constants = {
             "fixed": (self.distance, 0.0),
@@ -101,13 +91,11 @@ class PDBS(MethodBase):
             "borges_aldon": (self.noise_factor, self.grazing_angle),
         }
         constant, angle = constants[self.rule]
-        part(
-            block,
-            row,
+        block.part(
             rule=RULES[self.rule],
             constant=constant,
             angle=angle,
             max_missing=self.max_missing,
             min_points=self.min_points,
         )
-        measure(block, row, gap=self.max_missing + 1.0)
+        block.measure(gap=self.max_missing + 1.0)

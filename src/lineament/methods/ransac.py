@@ -6,24 +6,17 @@ the clusters of a scan: V. Nguyen, S. Gächter, A. Martinelli, N. Tomatis, R. Si
 Autonomous Robots 23, 2007.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from operator import attrgetter
-from typing import ClassVar
 
 from ..kernels.rivals.ransac import PERIOD, Parameters, find_by_consensus
 from .lines import NearMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
-
-__all__ = ["Ransac"]
 
 _numbers = attrgetter(*Parameters._fields)
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class Ransac(NearMethod):
     """Random sample consensus within the clusters of a scan.
 
@@ -36,19 +29,9 @@ class Ransac(NearMethod):
 
     The generator of the numbers that are drawn starts again with each scan: the same scan has the
     same features, whatever comes before it.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> import numpy as np
-    >>> bearings = np.radians(np.arange(-40, 41))
-    >>> ranges = 2.0 / (np.cos(bearings) + abs(np.sin(bearings)))  # a corner, straight ahead
-    >>> corners = ln.extract(ln.LaserScan(ranges, angles=bearings), method="ransac").corners
-    >>> abs(corners["position"]).round(3).tolist(), corners["opening"].round(3).tolist()
-    ([[2.0, 0.0]], [1.571])
     """
 
-    name: ClassVar[str] = "ransac"
+    name = "ransac"
 
     trials: int = parameter(30, "pairs that are drawn for a piece", low=1)
     window: int = parameter(
@@ -61,8 +44,8 @@ class Ransac(NearMethod):
     )
     seed: int = parameter(1, "where the generator starts", low=1, below=PERIOD)
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Part, find by consensus, settle the borders and fit."""
-        self._part(block, row, self.min_points, self.noise_factor)
-        find_by_consensus(block.floats, block.ints, block.noises[row], _numbers(self))
-        self._finish(block, row)
+        self.part(block, self.min_points, self.noise_factor)
+        find_by_consensus(*block.workspace, _numbers(self))
+        self.finish(block)

@@ -4,24 +4,19 @@ H. Gao, X. Zhang, Y. Fang, J. Yuan, *A line segment extraction algorithm using l
 seeded region growing*, International Journal of Advanced Robotic Systems 15(1), 2018.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from operator import attrgetter
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..kernels.rivals.region_growing import Parameters, grow_regions
+from ..kernels.rivals.settling import divide_overlaps
 from .lines import NearMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
-
-__all__ = ["RegionGrowing"]
 
 _numbers = attrgetter(*Parameters._fields)
 
 
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class RegionGrowing(NearMethod):
     """The method of Gao et al. 2018, its thresholds scaled by the noise.
 
@@ -31,19 +26,17 @@ class RegionGrowing(NearMethod):
     3. *Grow* the seed both ways, point by point by the same two tests, fitting again each time.
     4. *Overlaps* of neighbouring regions: each point goes to the nearer line. Neighbours that one
        line fits are merged, those whose lines meet at their ends have a corner there.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> import numpy as np
-    >>> bearings = np.radians(np.arange(-40, 41))
-    >>> ranges = 2.0 / (np.cos(bearings) + abs(np.sin(bearings)))  # a corner, straight ahead
-    >>> corners = ln.extract(ln.LaserScan(ranges, angles=bearings), method="region_growing").corners
-    >>> abs(corners["position"]).round(3).tolist(), corners["opening"].round(3).tolist()
-    ([[2.0, 0.0]], [1.571])
     """
 
-    name: ClassVar[str] = "region_growing"
+    name = "region_growing"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "none",
+        "epsilon": 0.03,
+        "delta": 0.1,
+        "sigmas": 0.0,
+        "p_min": 10,
+        "fit": "total",
+    }
 
     s_num: int = parameter(6, "points of a seed", low=3)
     p_min: int = parameter(6, "least points of a region", low=3)
@@ -55,8 +48,13 @@ class RegionGrowing(NearMethod):
         3.0, "standard deviations of its range noise that a point may lie off besides", low=0
     )
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Part, seed and grow, settle the overlaps and fit."""
-        self._part(block, row, self.s_num, self.noise_factor)
-        grow_regions(block.floats, block.ints, block.noises[row], _numbers(self))
-        self._finish(block, row)
+        self.part(block, self.s_num, self.noise_factor)
+        grow_regions(*block.workspace, _numbers(self))
+        self.finish(block)
+
+    def leave(self, block: Block) -> None:
+        """Divide what two regions share."""
+        divide_overlaps(block.floats, block.ints)
+        NearMethod.leave(self, block)

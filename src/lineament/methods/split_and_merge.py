@@ -7,22 +7,17 @@ of the points and the χ² test of the merging follow S. T. Pfister, S. I. Roume
 ICRA 2003.
 """
 
-from __future__ import annotations
+from typing import Any, ClassVar
 
-from dataclasses import dataclass
-from typing import ClassVar
-
+from ..kernels.rivals.settling import merge_alike
 from ..kernels.rivals.splitting import split
 from .base import MethodBase
 from .lines import PieceMethod
-from .parameters import documented, parameter
+from .parameters import method, parameter
 from .workspace import Block
 
-__all__ = ["SplitAndMerge"]
 
-
-@documented
-@dataclass(frozen=True, slots=True, kw_only=True)
+@method
 class SplitAndMerge(PieceMethod):
     """Split-and-merge.
 
@@ -35,18 +30,16 @@ class SplitAndMerge(PieceMethod):
        a border go to the nearer line, and put corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + noise_factor σ_r``.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> import numpy as np
-    >>> from lineament.simulation import SENSORS, room
-    >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
-    >>> ln.extract(scan, method="split_and_merge").corners["position"].round(1).tolist()
-    [[1.4, -0.5], [3.0, 2.0]]
     """
 
-    name: ClassVar[str] = "split_and_merge"
+    name = "split_and_merge"
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "fixed",
+        "threshold": 0.03,
+        "noise_factor": 0.0,
+        "corner_trim": 0,
+    }
+    least_response = 1.0
 
     threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
     noise_factor: float = parameter(
@@ -59,16 +52,13 @@ class SplitAndMerge(PieceMethod):
         if self.threshold == self.noise_factor == 0:
             raise ValueError("threshold and noise_factor are both 0, expected one > 0")
 
-    def find(self, block: Block, row: int) -> None:
+    def find(self, block: Block) -> None:
         """Cluster, split, merge and fit."""
-        self._part(block, row, self.min_points)
-        split(
-            block.floats, block.ints, block.noises[row], True, self.threshold, 0.0,
-            self.noise_factor, self.min_piece,
-        )  # fmt: skip
-        self._finish(block, row)
+        self.part(block, self.min_points)
+        tolerance = self.threshold, 0.0, self.noise_factor
+        split(*block.workspace, True, *tolerance, self.min_piece)
+        self.finish(block)
 
-    @property
-    def least_response(self) -> float:
-        """What the response of a candidate exceeds where the first search accepts it."""
-        return 1.0
+    def leave(self, block: Block) -> None:
+        """Merge neighbours that one line fits; lines that touch meet in a corner."""
+        merge_alike(*block.workspace, self.unevenness)

@@ -3,8 +3,6 @@
 Each checks what it is given and calls one kernel. The methods call the same kernels directly.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -18,7 +16,6 @@ from ..kernels.corner_operator import RESPONSES, response_along
 from ..kernels.cutting import cut
 from ..kernels.line_fit import FITS
 from ..scan import LaserScan, RangeNoise
-from . import steps
 from .liu import Liu
 from .parameters import Bounds, bounds_of
 from .trace import candidate_records
@@ -84,9 +81,7 @@ def estimate_noise(scan: LaserScan) -> RangeNoise | None:
     >>> round(estimate_noise(LaserScan(ranges, 0.0, 0.001)).sigma, 2)
     0.02
     """
-    block = _block(scan)
-    steps.estimate_noise(block, 0)
-    return noise_of(block.noises[0])
+    return noise_of(_block(scan).noises[0])
 
 
 def adaptive_clusters(
@@ -149,7 +144,7 @@ def adaptive_clusters(
 
 
 def corner_response(
-    points: ArrayLike, *, support_radius: int = 6, response: str = "relative"
+    points: ArrayLike, *, support_radius: int = 6, response: str = "tangent"
 ) -> Array:
     """Response of the corner detection operator along one cluster (equations 15-22).
 
@@ -168,7 +163,7 @@ def corner_response(
     --------
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
-    >>> corner_response(right_angle).round(2).tolist()[4:9]
+    >>> corner_response(right_angle, response="relative").round(2).tolist()[4:9]
     [0.35, 0.51, 0.71, 0.51, 0.35]
     """
     xy = _points(points)
@@ -183,7 +178,9 @@ def primary_corners(
     *,
     support_radius: int = 6,
     threshold: float = 0.66,
-    response: str = "relative",
+    response: str = "tangent",
+    recursion: str = "both",
+    ends: str = "truncated",
     min_points: int = 3,
 ) -> NDArray[np.void]:
     """Find the corners of one cluster: the farthest point from the chord, again and again.
@@ -195,7 +192,7 @@ def primary_corners(
     ----------
     points : array_like, shape (m, 2)
         Points of the cluster in beam order [m].
-    support_radius, threshold, response, min_points
+    support_radius, threshold, response, recursion, ends, min_points
         As in `Liu`.
 
     Returns
@@ -207,7 +204,7 @@ def primary_corners(
     --------
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
-    >>> found = primary_corners(right_angle)
+    >>> found = primary_corners(right_angle, threshold=0.5)
     >>> found["beam"][found["accepted"]].tolist()
     [6]
     """
@@ -216,11 +213,16 @@ def primary_corners(
         support_radius=support_radius,
         threshold=threshold,
         response=response,
+        recursion=recursion,
+        ends=ends,
         min_points=min_points,
     )
     block = _one_cluster(xy, noise_row(None))
     kind, least = RESPONSES[response], int(min_points)
-    cut(block.floats, block.ints, int(support_radius), float(threshold), kind, least)
+    cut(
+        block.floats, block.ints, int(support_radius), float(threshold), kind, least,
+        recursion == "both", ends == "excluded",
+    )  # fmt: skip
     return candidate_records(block, float(threshold))
 
 
@@ -256,7 +258,7 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
     block = _one_cluster(xy, noise_row(noise or RangeNoise(sigma=1.0)))
     block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
     block.counts[at.PIECES] = 1
-    steps.measure(block, 0, fit=FITS[fit], sharp=False)
+    block.measure(fit=FITS[fit], sharp=False)
     line: np.void = block.written()[0][0]
     return line
 

@@ -1,8 +1,7 @@
 """Every intermediate of one run of a method: for pictures, tests, and the question why."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from ..kernels import layout as at
 from ..scan import LaserScan
 from .workspace import Block
 
-__all__ = ["CANDIDATE", "Trace", "candidate_records", "trace_of"]
+Array = NDArray[np.float64]
 
 #: A beam that was examined as a corner: how far it lies from the chord of its piece (equation 14,
 #: [m]), the response of the corner operator there (equation 22), and whether it was taken.
@@ -66,46 +65,41 @@ class Trace:
     scan: LaserScan
     method: str
     features: Features
-    filtered: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    distance_threshold: NDArray[np.float64]
-    density_threshold: NDArray[np.float64]
+    filtered: Array
+    spacing: Array
+    distance_threshold: Array
+    density_threshold: Array
     clusters: NDArray[np.int32]
     candidates: NDArray[np.void]
     threshold: float
     cuts: NDArray[np.int32]
-    evidence: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    evidence: dict[str, Array] = field(default_factory=dict)
     scale: float = 0.0
 
 
-def trace_of(
-    block: Block,
-    method: str,
-    scan: LaserScan,
-    features: Features,
-    threshold: float,
-    evidence: dict[str, NDArray[np.float64]],
-) -> Trace:
-    """Make the trace of the scan that a method has just run on, alone in its block."""
+def intermediates(block: Block, threshold: float) -> dict[str, Any]:
+    """Return the intermediates of the scan that a method has just run on, alone in its block."""
+    filtered = block.work.beams[at.FILTERED, : block.beams]
+    usable = ~np.isnan(filtered)
+    by_beam = np.full((3, block.beams), np.nan)
+    rows = [at.SPACING, at.DISTANCE_THRESHOLD, at.DENSITY_THRESHOLD]
+    by_beam[:, usable] = block.work.points[rows, : int(usable.sum())]
+    if not block.circular and usable.any():
+        by_beam[:, np.argmax(usable)] = np.nan  # Nothing lies before the first.
     candidates = candidate_records(block, threshold)
-    return Trace(
-        scan=scan,
-        method=method,
-        features=features,
-        filtered=block.work.beams[at.FILTERED, : len(scan)],
-        spacing=block.by_beam(at.SPACING),
-        distance_threshold=block.by_beam(at.DISTANCE_THRESHOLD),
-        density_threshold=block.by_beam(at.DENSITY_THRESHOLD),
-        clusters=features.clusters,
-        candidates=candidates,
-        threshold=threshold,
-        cuts=np.sort(candidates["beam"][candidates["accepted"]]),
-        evidence=evidence,
-    )
+    return {
+        "filtered": filtered,
+        "spacing": by_beam[0],
+        "distance_threshold": by_beam[1],
+        "density_threshold": by_beam[2],
+        "candidates": candidates,
+        "threshold": threshold,
+        "cuts": np.sort(candidates["beam"][candidates["accepted"]]),
+    }
 
 
 def candidate_records(block: Block, threshold: float) -> NDArray[np.void]:
-    """Candidates of the last scan of a block as records."""
+    """Return the candidates of the last scan of a block as records."""
     candidates = block.work.candidates[:, : block.counts[at.CANDIDATES]]
     points = candidates[at.POINT].astype(int)
     records = np.zeros(len(points), CANDIDATE)

@@ -1,23 +1,29 @@
 """`Block`: some scans with the same bearings on their way through a method's kernels."""
 
-from __future__ import annotations
-
-from typing import Any
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..features import TABLES
 from ..features.records import words
-from ..kernels import layout
+from ..kernels import layout as at
+from ..kernels.line_fit import TOTAL
+from ..kernels.measuring import measure
+from ..kernels.noise import estimate_noise
+from ..kernels.rivals.pdbs import BORGES_ALDON, part_by_distance
 from ..scan import LaserScan
-
-__all__ = ["Block"]
 
 Array = NDArray[np.float64]
 
 #: The type of each table, and an empty one.
 _TABLES = [(dtype, np.frombuffer(b"", dtype)) for dtype in TABLES.values()]
+#: Values in a block of a batch: its arrays stay in the cache, and a kernel has so much to do that
+#: threads hardly ever wait for each other.
+_BLOCK_VALUES = 32768
 
 
 class Block:
@@ -41,9 +47,8 @@ class Block:
 
     def __init__(self, frame: LaserScan, noise: Array, capacity: int, own: Any = None) -> None:
         n = len(frame)
-        self.frame, self.capacity = frame, capacity
-        self.rows = 0
-        self.beams = n
+        self.frame, self.capacity, self.beams = frame, capacity, n
+        self.rows = self.row = 0
         self.bearings = np.stack((np.cos(frame.angles), np.sin(frame.angles)))
         self.step, self.circular = frame.angle_increment, frame.is_full_circle
         self.range_min, self.range_max = frame.range_min, frame.range_max
@@ -51,8 +56,8 @@ class Block:
         self.noise, self.own = noise, own
         self.noises = np.empty((capacity, 4))
         self.ranges = np.empty((capacity, n))
-        self.floats, self.ints = layout.workspace(n)
-        self.work = layout.named(self.floats, self.ints)
+        self.floats, self.ints = at.workspace(n)
+        self.work = at.named(self.floats, self.ints)
         self.counts = self.work.counts
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
         self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
@@ -79,8 +84,53 @@ class Block:
         self.ranges[: self.rows] = ranges
 
     def take(self, row: int) -> None:
-        """Put a scan into the workspace, for kernels that are called one by one."""
-        self.work.beams[layout.RANGE, : self.beams] = self.ranges[row]
+        """Put a scan, and its noise, into the workspace, for kernels that are called one by one."""
+        self.row = row
+        self.work.beams[at.RANGE, : self.beams] = self.ranges[row]
+        estimate_noise(self.floats, self.range_min, self.range_max, self.noise, self.noises[row])
+
+    @property
+    def workspace(self) -> tuple[Array, NDArray[np.int64], Array]:
+        """Workspace and noise of the scan that was taken, as kernels are given them."""
+        return self.floats, self.ints, self.noises[self.row]
+
+    def part(
+        self,
+        *,
+        rule: int = BORGES_ALDON,
+        constant: float = 3.0,
+        angle: float,
+        max_missing: int,
+        min_points: int,
+    ) -> None:
+        """Part the scan that was taken into clusters.
+
+        Parameters are those of `kernels.rivals.pdbs.part_by_distance`; by default the breakpoint
+        detector of Borges and Aldon, with the angle λ and three standard deviations.
+        """
+        floats, ints, noise = self.workspace
+        rules = rule, constant, angle
+        part_by_distance(
+            floats, ints, self.bearings, self.sensor, noise, rules, max_missing, min_points
+        )
+
+    def measure(
+        self,
+        *,
+        source: int = at.RANGE,
+        fit: int = TOTAL,
+        sharp: bool = True,
+        trim: int = 0,
+        reach: float = 3.0,
+        gap: float = 6.0,
+    ) -> None:
+        """Fit the pieces of the scan that was taken, and write its features.
+
+        Scans are measured in order. Parameters are those of `kernels.measuring.Options`.
+        """
+        floats, ints, noise = self.workspace
+        options = source, fit, sharp, trim, reach, gap
+        measure(floats, ints, self.row, self.bearings, self.circular, noise, options, self.tables)
 
     @property
     def tables(self) -> tuple[NDArray[Any], ...]:
@@ -103,11 +153,53 @@ class Block:
             for raw, (dtype, none) in zip(self.raw(), _TABLES, strict=True)
         ]
 
-    def by_beam(self, row: int) -> Array:
-        """Spread a row of the points, by usable beam, over all beams; NaN on the others."""
-        spread = np.full(self.beams, np.nan)
-        usable = ~np.isnan(self.work.beams[layout.FILTERED, : self.beams])
-        spread[usable] = self.work.points[row, : int(usable.sum())]
-        if not self.circular and usable.any():
-            spread[np.argmax(usable)] = np.nan  # Nothing lies before the first.
-        return spread
+
+def budget_scratch(beams: int, max_vertices: int) -> tuple[Array, NDArray[np.int64]]:
+    """Make the tables of `kernels.budget.limit_pieces`; no scan needs 2 (n + 1) vertices."""
+    shape = (beams + 2, min(max_vertices, 2 * beams + 2) + 1)
+    return np.empty((2, *shape)), np.empty(shape, np.int64)
+
+
+class Batch(NamedTuple):
+    """What came of some rows: counts and arrays by row, records by table."""
+
+    counts: NDArray[np.int64]
+    clusters: NDArray[np.int32]
+    noises: Array
+    records: dict[str, NDArray[np.void]]
+
+
+def block_capacity(beams: int) -> int:
+    """Return how many scans of so many beams go into a block of a batch."""
+    return max(1, _BLOCK_VALUES // max(beams, 1))
+
+
+def run_batch(rows: Array, blocks: Sequence[Block], run: Callable[[Block], None]) -> Batch:
+    """Run a method over rows of ranges, shape (m, n), with a thread for each block."""
+    m, n = rows.shape
+    counts, clusters = np.empty((m, len(TABLES)), np.int64), np.empty((m, n), np.int32)
+    batch = Batch(counts, clusters, np.empty((m, 4)), {})
+
+    def run_share(k: int) -> list[list[bytes]]:
+        """Run over some of the rows; arrays go to the batch at once, records are returned."""
+        block, written = blocks[k], []
+        share = range(m * k // len(blocks), m * (k + 1) // len(blocks))
+        own = block.clusters, block.noises
+        for start in share[:: block.capacity]:
+            part = slice(start, min(start + block.capacity, share.stop))
+            block.load(rows[part])
+            block.clusters, block.noises = batch.clusters[part], batch.noises[part]
+            run(block)
+            batch.counts[part] = np.diff(block.offsets[: block.rows + 1], axis=0)
+            written.append(block.raw())
+        block.clusters, block.noises = own
+        return written
+
+    if len(blocks) == 1:
+        written = run_share(0)
+    else:
+        with ThreadPoolExecutor(len(blocks)) as pool:
+            written = list(chain(*pool.map(run_share, range(len(blocks)))))
+    for k, (name, dtype) in enumerate(TABLES.items()):
+        batch.records[name] = np.frombuffer(b"".join(raw[k] for raw in written), dtype)
+    return batch

@@ -66,6 +66,32 @@ def settle(floats, ints, noise, epsilon, reach):
         _join(work, moments, n - 1, np.int64(0), reach)
 
 
+@kernel
+def merge_alike(floats, ints, noise, epsilon):
+    """Merge neighbours that one line fits; those that still touch meet in a corner.
+
+    The second half of split-and-merge, and no more than that.
+    """
+    work, moments = at.named(floats, ints), at.moments_of(floats)
+    fill_moments(work, moments)
+    _merge(work, moments, noise, epsilon)
+    for k in range(work.counts[at.PIECES]):
+        work.pieces[at.BEFORE, k], work.response[k] = -1, math.nan
+    for k in range(1, work.counts[at.PIECES]):
+        if work.pieces[at.FIRST, k] == work.pieces[at.LAST, k - 1] and _are_neighbours(work, k):
+            _join(work, moments, k - 1, k, math.inf)
+
+
+@kernel
+def divide_overlaps(floats, ints):
+    """Give each point of two overlapping neighbours to the nearer line (Gao et al. 2018)."""
+    work, moments = at.named(floats, ints), at.moments_of(floats)
+    fill_moments(work, moments)
+    for k in range(1, work.counts[at.PIECES]):
+        if work.pieces[at.FIRST, k] <= work.pieces[at.LAST, k - 1]:
+            _cut(work.points, moments, work.pieces, k)
+
+
 @helper
 def _are_neighbours(work, k):
     """Whether a piece goes on, but for a few points, where the one before it ends."""
