@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -149,11 +150,12 @@ def add_legend(figure: Figure) -> None:
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
+    width = sum(0.6 + 0.08 * len(label) for label in handles)  # of one line [inch], about
     figure.legend(
         list(handles.values()),
         list(handles),
         loc="outside lower center",
-        ncols=8,
+        ncols=max(1, math.ceil(len(handles) / math.ceil(width / figure.get_figwidth()))),
         fontsize=9,
         frameon=False,
     )

@@ -47,6 +47,7 @@ th.number, td.number { text-align: right; }
 td.number, td.number small, td.verdict, td a { white-space: nowrap; }
 td.number small { display: block; line-height: 1.2; }
 td:first-child, th:first-child { position: sticky; left: 0; background: var(--page); }
+td:first-child { min-width: min(11rem, 30vw); }
 td.verdict { font-weight: 600; color: var(--soft); }
 td.holds { color: var(--good); } td.in { color: var(--fair); } td.does { color: var(--bad); }
 th button { all: unset; cursor: pointer; }

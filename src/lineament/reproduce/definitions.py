@@ -29,7 +29,7 @@ _NOISE = 263, 3.7
 _STEPS = [(3.0, -1.6), (3.0, 0.3), (1.9, 0.5), (1.7, 1.6)]
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def run(_: Setting, progress: Progress) -> Findings:
     """Draw the figures that illustrate definitions."""
     progress("drawing")
     drawn = (_scan(), _spacing(), _chords(), _parabolas(), _tangent())
@@ -66,8 +66,10 @@ def _note(axes: Axes, text: str, at: Any, by: tuple[float, float], color: str = 
     )
 
 
-def _line(axes: Axes, start: Any, end: Any, style: str = "-", **given: Any) -> None:
-    axes.plot(*np.transpose([start, end]), style, **{"color": canvas.INK, "lw": 0.9} | given)
+def _line(
+    axes: Axes, start: Any, end: Any, style: str = "-", lw: float = 0.9, color: str = canvas.INK
+) -> None:
+    axes.plot(*np.transpose([start, end]), style, lw=lw, color=color)
 
 
 def _without_noise(world: World, step: float) -> LaserScan:
@@ -101,10 +103,11 @@ def _scan() -> Drawn:
     axes.axvline(0, color=canvas.FAINT, lw=0.7, zorder=0)
     turn = np.linspace(0, scan.angles[beam], 20)
     axes.plot(1.1 * np.cos(turn), 1.1 * np.sin(turn), color=_BLUE, lw=0.9)
-    for text, at in ((r"$\theta_i$", (1.17, 0.14)), (r"$\rho_i$", point * 0.7 + (-0.14, 0.1))):
-        axes.text(*at, text, color=_BLUE, fontsize=11)
+    axes.text(1.17, 0.14, r"$\theta_i$", color=_BLUE, fontsize=11)
+    axes.text(0.64 * x, 0.79 * y, r"$\rho_i$", color=_BLUE, fontsize=11)
     _note(axes, r"$(x_i, y_i)$", point, (34, 10), _BLUE)
-    axes.scatter(*scan.points.T, s=8, c=canvas.PALETTE[found.clusters], linewidths=0, zorder=3)
+    xs, ys = scan.points.T
+    axes.scatter(xs, ys, s=8, c=canvas.PALETTE[found.clusters], linewidths=0, zorder=3)
     noise = scan.points[_NOISE[0]]
     axes.plot(*noise, "x", ms=6, color="#57606a", zorder=4)
     drawing.draw_sensor(axes)
@@ -132,7 +135,10 @@ def _away(points: Array, place: tuple[float, float]) -> float:
 def _spacing() -> Drawn:
     """Figure 4: the spacing of points grows with range and incidence, and so does the threshold."""
     wall = World.of_polygons([[(0.4, -0.75), (5.4, 1.6)]])
-    scan, fine = _without_noise(wall, 5.0), SENSORS["paper"].scan(wall, _ORIGIN, np.random.default_rng(0))
+    scan, fine = (
+        _without_noise(wall, 5.0),
+        SENSORS["paper"].scan(wall, _ORIGIN, np.random.default_rng(0)),
+    )
     trace = Extractor("liu", half_width=0).trace(fine)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
     plan, axes = figure.subplots(1, 2)
@@ -151,7 +157,9 @@ def _spacing() -> Drawn:
     order = np.argsort(fine.ranges[valid])
     far = fine.ranges[valid][order]
     axes.plot(far, trace.spacing[valid][order], ".", color=_BLUE, ms=4, label="spacing on the wall")
-    axes.plot(far, far * fine.angle_increment, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$")
+    axes.plot(
+        far, far * fine.angle_increment, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$"
+    )
     limit = trace.distance_threshold[valid][order]
     axes.plot(far, limit, color=_RED, lw=1.2, label=r"threshold $T_d$ (equation 10)")
     axes.legend(fontsize=8, frameon=False)
@@ -181,7 +189,10 @@ def _chords() -> Drawn:
         along = (end - start) / np.hypot(*(end - start))
         about = "accepted" if candidate["accepted"] else "rejected: the branch ends"
         canvas.style_plane(
-            axes, "Figure 6" if k == 0 else "", f"step {k + 1}: {about}", np.array([(1.3, -1.6), *_STEPS, (3.5, 1.6)])
+            axes,
+            "Figure 6" if k == 0 else "",
+            f"step {k + 1}: {about}",
+            np.array([(1.3, -1.6), *_STEPS, (3.5, 1.6)]),
         )
         axes.plot(*points.T, ".", ms=3.5, color=canvas.FAINT)
         axes.plot(*points[first : last + 1].T, ".", ms=4.5, color=_BLUE)
@@ -216,7 +227,9 @@ def _parabolas() -> Drawn:
     bends, x = (1.6, 0.6), np.linspace(-0.75, 0.75, 2 * RADIUS + 1)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
     plan, axes = figure.subplots(1, 2)
-    canvas.style(plan, "Figure 7", f"support radius {RADIUS}", "along the tangent", "distance to it")
+    canvas.style(
+        plan, "Figure 7", f"support radius {RADIUS}", "along the tangent", "distance to it"
+    )
     fine = np.linspace(-0.8, 0.8, 200)
     sums = []
     for bend, color in zip(bends, (_RED, _BLUE), strict=True):
@@ -226,7 +239,9 @@ def _parabolas() -> Drawn:
         sums.append(float((bend * x**2).sum()))
     for k, name in ((RADIUS + 4, "A"), (RADIUS + 5, "B")):
         plan.plot(x[k], 0, "o", ms=4, color=canvas.INK)
-        plan.annotate(name, (x[k], 0), (0, -11), textcoords="offset points", ha="center", fontsize=9)
+        plan.annotate(
+            name, (x[k], 0), (0, -11), textcoords="offset points", ha="center", fontsize=9
+        )
     plan.axhline(0, color=canvas.INK, lw=0.9)
     plan.legend(fontsize=9, frameon=False, loc="upper center")
     about = "corner_response, form “tangent”"
@@ -239,7 +254,9 @@ def _parabolas() -> Drawn:
         for k in curvatures
     ]
     axes.plot(curvatures, responses, color=canvas.INK, lw=1.2, label="of sampled parabolas")
-    axes.plot(curvatures, curvatures / 2 * (x**2).sum(), ":", color=canvas.INK, label="proportional")
+    axes.plot(
+        curvatures, curvatures / 2 * (x**2).sum(), ":", color=canvas.INK, label="proportional"
+    )
     for bend, total, color in zip(bends, sums, (_RED, _BLUE), strict=True):
         axes.plot(2 * bend, total, "o", color=color)
     axes.legend(fontsize=8, frameon=False)
@@ -249,9 +266,12 @@ def _parabolas() -> Drawn:
         "tangent is fitted; for a symmetric support it is the true one."
     )
     off = float(np.abs(responses - curvatures / 2 * (x**2).sum()).max())
-    return "fig7", caption, figure, {"sums": sums[0] / sums[1], "bends": bends[0] / bends[1]} | {
-        "off": off
-    }
+    return (
+        "fig7",
+        caption,
+        figure,
+        {"sums": sums[0] / sums[1], "bends": bends[0] / bends[1]} | {"off": off},
+    )
 
 
 def fitted(points: Array, at: int, radius: int) -> tuple[Array, Array, Array]:
@@ -286,7 +306,9 @@ def _tangent() -> Drawn:
         (panels[0], "Figure 8  (a)", f"support of a target, radius {RADIUS}"),
         (panels[5], "(f)", "tangent, and distances to it"),
     ):
-        canvas.style_plane(axes, letter, about, np.vstack((support, target + np.outer((-0.38, 0.38), tangent))))
+        canvas.style_plane(
+            axes, letter, about, np.vstack((support, target + np.outer((-0.38, 0.38), tangent)))
+        )
         axes.plot(*points.T, ".", ms=3, color=canvas.FAINT)
         axes.plot(*support.T, "o", ms=4, color=_BLUE)
         axes.plot(*target, "o", ms=6, color=_RED, zorder=5)

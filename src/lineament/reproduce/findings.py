@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple, Self, TypeVar
 
 from ..evaluation.counts import plain
@@ -245,13 +246,10 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
     Only finite ones are drawn; `log_axes` are the labels of the logarithmic axes.
     """
     rows = list(next(iter(numbers.values())))[::-1]
-    lines = -(-len(panels) // 2) if len(panels) > 3 else 1
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, (0.8 + 0.24 * len(rows)) * lines + 0.4)
-    grid = figure.subplots(lines, -(-len(panels) // lines), sharey=True, squeeze=False).ravel()
-    for axes in grid[len(panels) :]:
-        axes.remove()
-    for axes, (label, (key, factor)) in zip(grid, panels.items(), strict=False):
-        canvas.style(axes, "", xlabel=label)
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 1.2 + 0.24 * len(rows))
+    all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axes, (label, (key, factor)) in zip(all_axes, panels.items(), strict=True):
+        canvas.style(axes, "", xlabel=fill(label, 22))
         for color, (name, methods) in zip(canvas.PALETTE, numbers.items(), strict=False):
             values = [factor * methods.get(row, {}).get(key, math.nan) for row in rows]
             dots = {"color": color, "markersize": 5, "alpha": 0.85, "label": name}
@@ -259,7 +257,7 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
         if label in log_axes:
             log_axis(axes.xaxis)
         axes.set_yticks(range(len(rows)), rows, fontsize=8)
-    legend_below(figure, grid[0])
+    canvas.add_legend(figure)
     return canvas.figure_bytes(figure)
 
 
@@ -273,14 +271,3 @@ def log_axis(axis: Any) -> None:
     axis.set_major_locator(LogLocator(10, digits))
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_locator(NullLocator())
-
-
-def legend_below(figure: Any, *panels: Any) -> None:
-    """Write one legend of all panels below a figure."""
-    handles: dict[str, Any] = {}
-    for axes in panels:
-        of_axes, labels = axes.get_legend_handles_labels()
-        handles |= dict(zip(labels, of_axes, strict=True))
-    columns = min(len(handles), 4 if max(map(len, handles)) > 18 else 7)
-    given = {"loc": "outside lower center", "ncols": columns, "fontsize": 8, "frameon": False}
-    figure.legend(list(handles.values()), list(handles), **given)

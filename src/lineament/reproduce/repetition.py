@@ -1,7 +1,7 @@
 """Figure 9: average repetition against support radius and threshold, for every form."""
 
 from ..output import canvas
-from .findings import Figure, Findings, Progress, Setting, Table, legend_below
+from .findings import Figure, Findings, Progress, Setting, Table
 from .grid import (
     CRITERIA,
     FORMS,
@@ -134,7 +134,7 @@ def _verdict(grid: Grid) -> str:
 
 def _figure(grid: Grid, field: str, name: str, label: str, caption: str) -> Figure:
     """Draw AR along one of the two parameters, with N_o either way."""
-    figure = canvas.new_figure(11, 4.2)
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.8)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, (criterion, about) in zip(panels, CRITERIA.items(), strict=True):
         canvas.style(axes, f"N_o: {about}")
@@ -158,5 +158,5 @@ def _figure(grid: Grid, field: str, name: str, label: str, caption: str) -> Figu
             ticks = (0.05, 0.1, 0.2, 0.5, 1.0)
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     panels[0].set_ylabel("AR", fontsize=9)
-    legend_below(figure, panels[0])
+    canvas.add_legend(figure)
     return Figure(name, caption, canvas.figure_bytes(figure))

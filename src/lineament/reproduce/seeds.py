@@ -46,6 +46,7 @@ class Spread(float):
         return self
 
     __sub__ = _by_seed(operator.sub)
+    __rsub__ = _by_seed(lambda b, a: a - b)
     __mul__ = __rmul__ = _by_seed(operator.mul)
     __truediv__ = _by_seed(lambda part, whole: part / whole if whole else math.nan)
 
@@ -54,10 +55,8 @@ class Spread(float):
         known = [value for value in self.values if not math.isnan(value)]
         if not known:
             return write(math.nan)
-        return _with_range(
-            *(write(value) for value in (float(self), min(known), max(known))),
-            f"{len(known)} of {len(self.values)} seeds" if len(known) < len(self.values) else "",
-        )
+        some = f"{len(known)} of {len(self.values)} seeds" if len(known) < len(self.values) else ""
+        return _with_range(write(float(self)), write(min(known)), write(max(known)), some)
 
     def __format__(self, form: str) -> str:
         """Write each number in a format."""
