@@ -30,7 +30,7 @@ figure { margin: 0 0 2.25rem; }
 .card { overflow-x: auto; max-width: max-content; padding: .5rem; border-radius: 8px;
   background: #fff; border: 1px solid var(--line); }
 .card img { display: block; width: var(--width); max-width: 100%; height: auto;
-  min-width: min(var(--width), 40rem); }
+  min-width: min(.6 * var(--width), 40rem); }
 figcaption { margin-top: .6rem; max-width: 46rem; }
 h2 { margin: 3rem 0 .75rem; font-size: 1.4rem; line-height: 1.25; }
 nav { columns: 20rem; margin: 0 0 2rem; }
@@ -44,7 +44,8 @@ th, td { padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line); tex
 td { min-width: 3.5rem; }
 th { font-weight: 500; vertical-align: bottom; }
 th.number, td.number { text-align: right; }
-td.number, td.number small, td.verdict, td a { white-space: nowrap; }
+td.number, td.number small, td.verdict { white-space: nowrap; }
+td.long { min-width: 14rem; }
 td.number small { display: block; line-height: 1.2; }
 td:first-child, th:first-child { position: sticky; left: 0; background: var(--page); }
 td:first-child { min-width: min(11rem, 30vw); }
@@ -64,9 +65,11 @@ th[aria-sort=descending] button::after { content: " \\2193"; }
   h2, caption { break-after: avoid; }
   .card, .table > div { overflow: visible; border: 0; padding: 0; }
   .card img { min-width: 0; max-height: 235mm; width: auto; max-width: 100%; }
-  table { font-size: 7.5pt; }
-  th, td { padding: .15rem .5rem .15rem 0; overflow-wrap: anywhere; }
-  td { min-width: 0; }
+  table { font-size: 7pt; }
+  th, td { padding: .15rem .35rem .15rem 0; }
+  th { hyphens: auto; }
+  td.number small { white-space: normal; overflow-wrap: anywhere; }
+  td, td.long, td:first-child { min-width: 0; }
 }
 """
 #: A click on the name of a column sorts by it: up, then down, then as the table was.
@@ -116,6 +119,8 @@ class Cell(NamedTuple):
             text = f'<a href="{escape(self.href)}">{text}</a>'
         if kind == "verdict":
             kind += f" {self.text.split()[0]}"
+        elif not kind and len(self.text) > 40:
+            kind = "long"
         return f"<td{_class(kind)}>{text}</td>"
 
 

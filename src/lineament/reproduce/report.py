@@ -77,8 +77,7 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
         "lineament": version("lineament"),
         "machine": machine(),
         "frames": setting.frames,
-        "seed": setting.seed,
-        "seeds": setting.seeds,
+        "seeds": [one.seed for one in setting.by_seed()],
         "recordings": setting.data is not None,
         "museum": setting.museum is not None,
     }
@@ -90,7 +89,8 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     }
     text = json.dumps(written, indent=1, ensure_ascii=False)
     write_text(folder / "figures.json", text + "\n")
-    facts = [(k, ("no", "yes")[v] if isinstance(v, bool) else str(v)) for k, v in about.items()]
+    shown = {**about, "seeds": ", ".join(str(one.seed) for one in setting.by_seed())}
+    facts = [(k, ("no", "yes")[v] if isinstance(v, bool) else str(v)) for k, v in shown.items()]
     entries = {"verdicts": "The paper’s figures and tables"}
     entries |= {name: found.title for name, found in findings.items()}
     parts = [
@@ -114,10 +114,11 @@ def _verdicts_part(
         figures = {figure.name for figure in found.figures} if found else {}
         at = claim.figure if claim.figure in figures else claim.experiment
         place = Cell(claim.place, href=f"#{at}" if found else "")
-        rows.append([place, Cell(claim.paper), Cell(here or "–"), Cell(verdict or "–", "verdict")])
+        word = Cell(verdict or "–", "verdict")
+        rows.append([place, word, Cell(claim.paper), Cell(here or "–")])
     words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
     note = f"{words[0].upper()}{words[1:]}. A dash: the experiment was not run."
-    return table_part("Verdicts", ("", "paper", "here", "verdict"), rows, note)
+    return table_part("Verdicts", ("", "verdict", "paper", "here"), rows, note)
 
 
 def findings_parts(findings: Findings) -> list[str]:
