@@ -152,10 +152,12 @@ WRONG = [
     ("compare wall.npz -o a.png --scan 99 -m pdbs", 1, "expected 0 to 6"),
     ("compare wall.npz -o no/where/a.png -m pdbs", 1, "does not exist"),
     ("compare wall.npz", 2, "--output"),
-    ("reproduce -o out --only fig1", 2, "experiment 'fig1' is unknown"),
+    ("reproduce -o out --only fig0", 2, "experiment 'fig0' is unknown"),
     ("reproduce -o out --frames 0", 2, "--frames"),
     ("reproduce -o out --seed -1", 2, "--seed"),
     ("reproduce -o out --data no/where", 2, "no/where"),
+    ("reproduce -o out --museum no.bag", 2, "no.bag"),
+    ("reproduce -o out --seeds 0", 2, "--seeds"),
     ("bench ple --data bench.npz -m pdbs", 2, "max_vertices"),
     ("bench ple --data bench.npz -m iepf -m hough --json a.json", 2, "one -m"),
     ("bench ple --data no.npz -m iepf", 1, "no.npz"),
@@ -470,7 +472,8 @@ def test_compare_writes_a_page_and_a_table(npz, tmp_path, capsys):
 def test_reproduce_writes_page_and_figures(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv("LINEAMENT_DATA", raising=False)
     out = tmp_path / "report"
-    assert run(["reproduce", "-o", str(out), "--only", "fig5", "--frames", "1"]) == 0
+    few = ["--frames", "1", "--seeds", "1"]
+    assert run(["reproduce", "-o", str(out), "--only", "fig5", *few]) == 0
     assert capsys.readouterr().out.strip() == str(out / "index.html")
     figures = json.loads((out / "figures.json").read_text(encoding="utf-8"))
     assert list(figures["experiments"]) == ["layers"]

@@ -52,7 +52,11 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     help="Folder of the recordings.  [default: LINEAMENT_DATA if set]",
 )
-@click.option("--museum", type=PATH, help="A bag of the Deutsches Museum, by Cartographer.")
+@click.option(
+    "--museum",
+    type=click.Path(path_type=Path, exists=True),
+    help="A bag of the Deutsches Museum, by Cartographer.",
+)
 @QUIET
 def reproduce(output: Path, names: tuple[str, ...], quiet: bool, **setting: Any) -> None:
     """Run the paper's experiments: a page, and all numbers as JSON."""

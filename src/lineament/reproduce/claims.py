@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from .contenders import LITERAL, LITERAL_BEST, LIU_PAPER, PDBS_LINES
 from .findings import Findings
+from .seeds import by_seed
 from .two_corners import DISTANCE
 
 #: The words of verdicts, and what they mean.
@@ -13,7 +14,7 @@ WORDS = {
     "holds": "in all seeds and all that is compared",
     "in part": "in some",
     "does not": "in none",
-    "cannot be told": "nothing of it can be compared, or nothing is found",
+    "undecided": "nothing of it can be compared, or nothing is found",
 }
 
 
@@ -21,7 +22,7 @@ class Claim(NamedTuple):
     """A claim of the paper: its place there and here, what it is, and how to judge it.
 
     `judge` gets the numbers of the experiment, and returns what is found here, and margins: each
-    is a number or `Spread`, not negative where the claim holds, NaN where it cannot be told.
+    is a number or `Spread`, not negative where the claim holds, NaN where it is undecided.
     """
 
     place: str
@@ -37,12 +38,12 @@ def word(margins: Iterable[float]) -> str:
     Examples
     --------
     >>> word([0.1, 0.0]), word([0.1, -0.1]), word([-0.1]), word([])
-    ('holds', 'in part', 'does not', 'cannot be told')
+    ('holds', 'in part', 'does not', 'undecided')
     """
     values = [value for margin in margins for value in getattr(margin, "values", (margin,))]
     good = [value >= 0 for value in values if not math.isnan(value)]
     if not good:
-        return "cannot be told"
+        return "undecided"
     return "holds" if all(good) else "in part" if any(good) else "does not"
 
 
@@ -99,7 +100,7 @@ def _counts(n: Any) -> tuple[str, Sequence[float]]:
 
 
 def _repetition(n: Any) -> tuple[str, Sequence[float]]:
-    """AR at the paper's parameters, less the largest elsewhere on the two lines of Figure 9."""
+    """AR at the paper's parameters, less the largest on the two lines of Figure 9; best form."""
     margins = []
     for form in dict.fromkeys(p["response"] for p in n["grid"]):
         along = [
@@ -108,12 +109,12 @@ def _repetition(n: Any) -> tuple[str, Sequence[float]]:
             if p["response"] == form and (p["support_radius"] == 6 or p["threshold"] == 0.66)
         ]
         here = [ar for radius, threshold, ar in along if (radius, threshold) == (6, 0.66)]
-        margins += [ar - max(other for *_, other in along) for ar in here]
+        margins += [by_seed(min, *(ar - other for *_, other in along), 0.0) for ar in here]
     best = n["best"]
     return (
         f"Largest at radius {best['support_radius']:.0f}, threshold {best['threshold']:.2f}, form "
         f"{best['response']}",
-        margins,
+        [by_seed(max, *margins, -1.0)],
     )
 
 
@@ -186,7 +187,7 @@ CLAIMS = (
     ),
     Claim(
         *("Figure 4", "definitions", "fig4", "Points are farther apart at a distance"),
-        _definition("fig4", "So is the threshold", lambda n: n["spacings"] - n["ranges"]),
+        _definition("fig4", "So is the threshold", lambda n: min(n["ratio"] - 1, -n["beyond"])),
     ),
     Claim(
         *("Figure 5", "layers", "fig5", "Adaptive clusters part the levels of obstacles"),
@@ -198,7 +199,7 @@ CLAIMS = (
     ),
     Claim(
         *("Figure 7", "definitions", "fig7", "Distance to the tangent grows with the curvature"),
-        _definition("fig7", "Proportional", lambda n: 1e-9 - abs(n["sums"] - n["bends"])),
+        _definition("fig7", "Proportional", lambda n: 1e-9 - n["off"]),
     ),
     Claim(
         *("Figure 8", "definitions", "fig8", "Support, arc length, parabolas, tangent"),

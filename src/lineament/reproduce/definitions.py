@@ -135,11 +135,10 @@ def _away(points: Array, place: tuple[float, float]) -> float:
 def _spacing() -> Drawn:
     """Figure 4: the spacing of points grows with range and incidence, and so does the threshold."""
     wall = World.of_polygons([[(0.4, -0.75), (5.4, 1.6)]])
-    scan, fine = (
-        _without_noise(wall, 5.0),
-        SENSORS["paper"].scan(wall, _ORIGIN, np.random.default_rng(0)),
+    scan = _without_noise(wall, 5.0)
+    trace = Extractor("liu", half_width=0).trace(
+        SENSORS["paper"].scan(wall, _ORIGIN, np.random.default_rng(0))
     )
-    trace = Extractor("liu", half_width=0).trace(fine)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
     plan, axes = figure.subplots(1, 2)
     points = scan.points[scan.valid]
@@ -153,30 +152,27 @@ def _spacing() -> Drawn:
         _line(plan, points[k], points[k + 1], lw=2, color=_RED)
         _note(plan, f"{steps[k]:.2f} m", middles[k], by, _RED)
     canvas.style(axes, "", "beams ⅓° apart", "range [m]", "spacing of neighbours [m]")
-    valid = fine.valid & np.isfinite(trace.spacing)
-    order = np.argsort(fine.ranges[valid])
-    far = fine.ranges[valid][order]
-    axes.plot(far, trace.spacing[valid][order], ".", color=_BLUE, ms=4, label="spacing on the wall")
-    axes.plot(
-        far, far * fine.angle_increment, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$"
+    order = np.argsort(trace.scan.ranges)
+    order = order[np.isfinite(trace.spacing[order])]
+    far, spacing, limit = (
+        of[order] for of in (trace.scan.ranges, trace.spacing, trace.distance_threshold)
     )
-    limit = trace.distance_threshold[valid][order]
+    least = far * trace.scan.angle_increment
+    axes.plot(far, spacing, ".", color=_BLUE, ms=4, label="spacing on the wall")
+    axes.plot(far, least, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$")
     axes.plot(far, limit, color=_RED, lw=1.2, label=r"threshold $T_d$ (equation 10)")
     axes.legend(fontsize=8, frameon=False)
     caption = (
         "The spacing of neighbouring points grows with their range, and with the incidence on the "
         "wall: so does the threshold of the clusters."
     )
-    ranges = np.hypot(*middles.T)
-    numbers = {"spacings": steps[-1] / steps[0], "ranges": ranges[-1] / ranges[0]}
-    numbers["beyond"] = float((trace.spacing[valid][order] > limit).mean())
-    return "fig4", caption, figure, numbers
+    beyond = float((spacing > limit).mean())
+    return "fig4", caption, figure, {"ratio": float(steps[-1] / steps[0]), "beyond": beyond}
 
 
 def _chords() -> Drawn:
     """Figure 6: the point farthest from the chord is a primary corner; then on both its sides."""
-    world = World.of_polygons([_STEPS])
-    scan = _without_noise(world, 1 / 3)
+    scan = _without_noise(World.of_polygons([_STEPS]), 1 / 3)
     points = scan.points[scan.valid]
     found = primary_corners(points, response="relative", threshold=0.5, support_radius=RADIUS)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 4.6)
@@ -188,12 +184,8 @@ def _chords() -> Drawn:
         start, end, corner = points[first], points[last], points[beam]
         along = (end - start) / np.hypot(*(end - start))
         about = "accepted" if candidate["accepted"] else "rejected: the branch ends"
-        canvas.style_plane(
-            axes,
-            "Figure 6" if k == 0 else "",
-            f"step {k + 1}: {about}",
-            np.array([(1.3, -1.6), *_STEPS, (3.5, 1.6)]),
-        )
+        shown = np.array([(1.3, -1.6), *_STEPS, (3.5, 1.6)])
+        canvas.style_plane(axes, "" if k else "Figure 6", f"step {k + 1}: {about}", shown)
         axes.plot(*points.T, ".", ms=3.5, color=canvas.FAINT)
         axes.plot(*points[first : last + 1].T, ".", ms=4.5, color=_BLUE)
         _line(axes, start, end, "--")
@@ -227,38 +219,26 @@ def _parabolas() -> Drawn:
     bends, x = (1.6, 0.6), np.linspace(-0.75, 0.75, 2 * RADIUS + 1)
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
     plan, axes = figure.subplots(1, 2)
-    canvas.style(
-        plan, "Figure 7", f"support radius {RADIUS}", "along the tangent", "distance to it"
-    )
+    about = f"support radius {RADIUS}"
+    canvas.style(plan, "Figure 7", about, "along the tangent", "distance to it")
     fine = np.linspace(-0.8, 0.8, 200)
-    sums = []
     for bend, color in zip(bends, (_RED, _BLUE), strict=True):
         plan.plot(fine, bend * fine**2, color=color, label=f"$y = {bend} x^2$")
         plan.vlines(x, 0, bend * x**2, color=color, lw=1.0, alpha=0.6)
         plan.plot(x, bend * x**2, "o", ms=4, color=color)
-        sums.append(float((bend * x**2).sum()))
+        axes.plot(2 * bend, bend * (x**2).sum(), "o", color=color)
     for k, name in ((RADIUS + 4, "A"), (RADIUS + 5, "B")):
         plan.plot(x[k], 0, "o", ms=4, color=canvas.INK)
-        plan.annotate(
-            name, (x[k], 0), (0, -11), textcoords="offset points", ha="center", fontsize=9
-        )
+        plan.text(x[k], -0.045, name, ha="center", fontsize=9)
     plan.axhline(0, color=canvas.INK, lw=0.9)
     plan.legend(fontsize=9, frameon=False, loc="upper center")
     about = "corner_response, form “tangent”"
     canvas.style(axes, "", about, "curvature at the vertex", "cumulative distance to the tangent")
     curvatures = np.linspace(0.0, 4.0, 17)
-    responses = [
-        corner_response(
-            np.column_stack((x + 2, k / 2 * x**2)), support_radius=RADIUS, response="tangent"
-        )[RADIUS]
-        for k in curvatures
-    ]
+    sampled = (np.column_stack((x, k / 2 * x**2)) for k in curvatures)
+    given: dict[str, Any] = {"support_radius": RADIUS, "response": "tangent"}
+    responses = [corner_response(points, **given)[RADIUS] for points in sampled]
     axes.plot(curvatures, responses, color=canvas.INK, lw=1.2, label="of sampled parabolas")
-    axes.plot(
-        curvatures, curvatures / 2 * (x**2).sum(), ":", color=canvas.INK, label="proportional"
-    )
-    for bend, total, color in zip(bends, sums, (_RED, _BLUE), strict=True):
-        axes.plot(2 * bend, total, "o", color=color)
     axes.legend(fontsize=8, frameon=False)
     caption = (
         "Of two parabolas with the same tangent, the more curved one is farther from it at the "
@@ -266,12 +246,7 @@ def _parabolas() -> Drawn:
         "tangent is fitted; for a symmetric support it is the true one."
     )
     off = float(np.abs(responses - curvatures / 2 * (x**2).sum()).max())
-    return (
-        "fig7",
-        caption,
-        figure,
-        {"sums": sums[0] / sums[1], "bends": bends[0] / bends[1]} | {"off": off},
-    )
+    return "fig7", caption, figure, {"off": off}
 
 
 def fitted(points: Array, at: int, radius: int) -> tuple[Array, Array, Array]:

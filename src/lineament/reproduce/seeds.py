@@ -11,15 +11,21 @@ from typing import Any, Self
 import numpy as np
 
 
-def _by_seed(operation: Callable[..., float]) -> Callable[..., "Spread"]:
-    """Make an operator of spreads, and of spreads and numbers, of one of numbers."""
+def by_seed(operation: Callable[..., float], *numbers: float) -> "Spread":
+    """Apply an operation seed by seed to spreads, and to numbers that are the same in all seeds.
 
-    def applied(self: "Spread", *others: float) -> "Spread":
-        n = len(self.values)
-        each = (getattr(other, "values", (other,) * n) for other in (self, *others))
-        return Spread(map(operation, *each))
+    Examples
+    --------
+    >>> by_seed(min, Spread([1.0, 3.0]), 2.0)
+    Spread([1.0, 2.0])
+    """
+    n = max(len(getattr(number, "values", ())) for number in numbers) or 1
+    each = (getattr(number, "values", (number,) * n) for number in numbers)
+    return Spread(map(operation, *each))
 
-    return applied
+
+def _operator(operation: Callable[..., float]) -> Callable[..., "Spread"]:
+    return lambda *numbers: by_seed(operation, *numbers)
 
 
 class Spread(float):
@@ -45,10 +51,14 @@ class Spread(float):
         self.values = given
         return self
 
-    __sub__ = _by_seed(operator.sub)
-    __rsub__ = _by_seed(lambda b, a: a - b)
-    __mul__ = __rmul__ = _by_seed(operator.mul)
-    __truediv__ = _by_seed(lambda part, whole: part / whole if whole else math.nan)
+    __sub__ = _operator(operator.sub)
+    __rsub__ = _operator(lambda b, a: a - b)
+    __mul__ = __rmul__ = _operator(operator.mul)
+    __truediv__ = _operator(lambda part, whole: part / whole if whole else math.nan)
+
+    def __getnewargs__(self) -> Any:
+        """Return what copies are made of."""
+        return (self.values,)
 
     def written(self, write: Callable[[float], str]) -> str:
         """Write the median, and the range if that is another, each as a function does."""
