@@ -50,7 +50,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         totals = {name: Scores.total(of) for name, of in scores.items()}
         everything = {name: everything[name] + total for name, total in totals.items()}
         rows = numbers[kind] = {name: _numbers(total) for name, total in totals.items()}
-        some = totals["optimal"]
+        some = next(iter(totals.values()))
         note = (
             f"{len(frames)} scans. True segments: {some.segments.counts.true}, true corners: "
             f"{some.corners.counts.true}, both sides of 6 beams or more."
