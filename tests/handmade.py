@@ -1,4 +1,4 @@
-"""Features written by hand, to be compared with each other."""
+"""Features written by hand, and how features are compared with each other."""
 
 import math
 from dataclasses import replace
@@ -107,3 +107,19 @@ def shuffled(truth, seed):
     tables["corners"]["segments"] = new_index[tables["corners"]["segments"]]
     numbers = np.append(rng.permutation(truth.clusters.max() + 1), -1)
     return replace(truth, **tables, clusters=numbers[truth.clusters].astype(np.int32))
+
+
+def assert_alike(found, expected, rtol=1e-6):
+    """Hold features equal but for rounding, in every field of every table."""
+    np.testing.assert_array_equal(found.clusters, expected.clusters)
+    for name, dtype in TABLES.items():
+        for field in dtype.names:
+            a, b = getattr(found, name)[field], getattr(expected, name)[field]
+            if field == "angle":
+                a, b = np.exp(1j * a), np.exp(1j * b)
+            if a.dtype.kind not in "fc":
+                assert a.tolist() == b.tolist(), field
+                continue
+            # A corner of nearly parallel lines is as far off as they are alike.
+            loose = 1e-6 if name == "corners" else rtol
+            np.testing.assert_allclose(a, b, rtol=loose, atol=1e-9, err_msg=field)

@@ -3,8 +3,6 @@
 They take scans and the parameters of a method, by its attributes, and know no kernel.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -31,7 +29,7 @@ def valid(scan) -> list[bool]:
     return [one(r) for r in scan.ranges.tolist()]
 
 
-def bilateral(scan, sigma_d=4.0, sigma_r=0.3, half_width=8):
+def bilateral(scan, sigma_d=4.0, sigma_r=0.3, half_width=2):
     """Equations 4-9. A full circle wraps, if it is longer than half the window."""
     n, ok, r = len(scan), valid(scan), scan.ranges.tolist()
     wraps = scan.is_full_circle and n > half_width
@@ -171,7 +169,12 @@ def response(points, i, radius, reading, closed=False):
         return to_tangent / abs(s).sum()
     support = np.array([*before[::-1], points[i], *after])
     to_chord = distances_to_line(support, support[0], support[-1] - support[0]).sum()
-    return to_tangent * to_chord
+    chord = np.linalg.norm(support[-1] - support[0])
+    if reading == "product":
+        return to_tangent * to_chord
+    if chord == 0:
+        return 0.0
+    return to_tangent / chord if reading == "chord_scaled" else to_tangent * to_chord / chord**2
 
 
 def distances_to_line(points, through, direction):

@@ -1,7 +1,5 @@
 """The vertex budget: fewer pieces, by the least squared error, never more vertices than allowed."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -28,10 +26,8 @@ def simplified(ranges, angles, pieces, budget, link=LINK, worst=WORST):
     work.marks[at.BEAM, : len(points)] = points
     work.pieces[[at.FIRST, at.LAST, at.BEFORE], :n] = np.transpose(pieces)
     work.response[:n], work.counts[at.PIECES] = np.arange(n), n
-    bearings, tables = (
-        np.stack((np.cos(angles), np.sin(angles))),
-        budget_scratch(len(ranges), budget),
-    )
+    bearings = np.stack((np.cos(angles), np.sin(angles)))
+    tables = budget_scratch(len(ranges), budget)
     limit_pieces(*memory, bearings, budget, link, worst, *tables)
     left = work.counts[at.PIECES]
     found = work.pieces[[at.FIRST, at.LAST, at.BEFORE], :left].T.tolist()
@@ -115,59 +111,17 @@ def test_no_way_costs_less(seed):
     rng = np.random.default_rng(seed)
     ranges, angles, pieces = random_pieces(rng)
     worst, link = float(rng.choice([0.1, 0.5, 3.0])), float(rng.choice([0.3, 1.0]))
-    ways = list(all_ways(ranges, angles, pieces, link))
+    ways, firsts = list(all_ways(ranges, angles, pieces, link)), [first for first, _, _ in pieces]
     for budget in range(1, vertices(pieces)):
-        found, _ = simplified(ranges, angles, pieces, budget, link, worst)
-        assert vertices(found) <= budget
+        found, responses = simplified(ranges, angles, pieces, budget, link, worst)
         allowed = [way for way in ways if vertices(way) <= budget]
-        spans = [[piece[:2] for piece in way] for way in allowed]
-        assert [piece[:2] for piece in found] in spans
+        assert [(first, last, min(before, 0)) for first, last, before in found] in allowed
+        # What is left is numbered anew, and has the response of its first piece.
+        assert all(before in (-1, k - 1) for k, (_, _, before) in enumerate(found))
+        assert responses == [firsts.index(first) for first, _, _ in found]
         least = min(cost(ranges, angles, pieces, way, worst) for way in allowed)
         assert cost(ranges, angles, pieces, found, worst) == pytest.approx(least, abs=1e-9)
-
-
-def l_shape():
-    """Return the walls x = 2 and y = 2, whose corner is beam 40 of 81."""
-    angles = math.pi / 4 + np.radians(np.arange(-40, 41))
-    return 2.0 / np.maximum(np.cos(angles), np.sin(angles)), angles
-
-
-def test_a_corner_on_a_straight_wall_goes_first():
-    ranges, angles = l_shape()
-    pieces = [(0, 20, -1), (20, 40, 0), (40, 80, 1)]
-    assert simplified(ranges, angles, pieces, 4) == (pieces, [0.0, 1.0, 2.0])
-    assert simplified(ranges, angles, pieces, 3) == ([(0, 40, -1), (40, 80, 0)], [0.0, 2.0])
-
-
-def test_what_has_no_room_is_left_out():
-    ranges, angles = l_shape()
-    pieces = [(0, 40, -1), (40, 60, 0)]
-    assert simplified(ranges, angles, pieces, 2)[0] == [(0, 40, -1)]
-    assert simplified(ranges, angles, pieces, 1)[0] == []
-
-
-def test_an_end_left_out_takes_its_corner_along():
-    ranges, angles = l_shape()
-    pieces = [(0, 10, -1), (10, 40, 0), (40, 80, 1)]
-    found, responses = simplified(
-        ranges + np.where(np.arange(81) < 10, 9.0, 0.0), angles, pieces, 3
-    )
-    assert found == [(10, 40, -1), (40, 80, 0)]
-    assert responses == [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("gap", "silent", "joined"), [(0.4, False, True), (1.2, False, False), (0.4, True, False)]
-)
-def test_clusters_become_one_across_a_small_gap_that_all_beams_see(gap, silent, joined):
-    y = np.concatenate((np.linspace(-1.0, 0.0, 12), np.linspace(gap, gap + 1.0, 11)))
-    if silent:
-        y = np.insert(y, 12, gap / 2)
-    ranges, angles = np.hypot(y, 3.0), np.arctan2(y, 3.0)
-    if silent:
-        ranges[12] = np.nan
-    found, _ = simplified(ranges, angles, [(0, 11, -1), (12, 22, -1)], 3)
-    assert found == ([(0, 22, -1)] if joined else [(0, 11, -1)])
+    assert simplified(ranges, angles, pieces, vertices(pieces), link, worst)[0] == pieces
 
 
 def square(false_corner):
@@ -180,17 +134,15 @@ def square(false_corner):
     return ranges, angles, pieces
 
 
-@pytest.mark.parametrize("false_corner", [10, 30, 70])
-def test_a_ring_stays_closed(false_corner):
-    ranges, angles, pieces = square(false_corner)
-    found, _ = simplified(ranges, angles, pieces, 5)
-    assert found == [(0, 20, 3), (20, 40, 0), (40, 60, 1), (60, 80, 2)]
-
-
-def test_a_ring_that_loses_a_wall_opens():
-    ranges, angles, pieces = square(20)
-    found, _ = simplified(ranges, angles, pieces, 4)
-    assert [before for _, _, before in found] == [-1, 0, 1]
+@pytest.mark.parametrize(
+    ("false_corner", "budget", "before"),
+    [*((cut, 5, [3, 0, 1, 2]) for cut in (10, 30, 70)), (20, 4, [-1, 0, 1])],
+)
+def test_a_ring_stays_closed_unless_it_loses_a_wall(false_corner, budget, before):
+    found, _ = simplified(*square(false_corner), budget)
+    assert [piece[2] for piece in found] == before
+    walls = [(0, 20), (20, 40), (40, 60), (60, 80)]
+    assert [piece[:2] for piece in found] == walls[: len(found)]
 
 
 @pytest.mark.slow

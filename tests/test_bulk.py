@@ -6,19 +6,22 @@ import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import ros_bags
 from bulk_logs import corner_log, halves, outcomes, rows_of, table_of
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 from test_output import files_up_to, resource
 
 import lineament as ln
-from lineament.tasks.bulk import MANIFEST, Manifest, Row, Threads, extract_logs
+from lineament.tasks.bulk import MANIFEST, Bulk, Manifest, Row, Threads, extract_logs
 from lineament.tasks.bulk.manifest import names_of, part_path
 from lineament.tasks.bulk.parts import log_state
 from lineament.tasks.bulk.run import _Progress
-from lineament.tasks.extract import extract_log
+from lineament.tasks.extract import Extraction, extract_log
 
 IEPF = ln.Extractor("iepf")
 
@@ -29,34 +32,45 @@ def logs(tmp_path):
     return [corner_log(home / f"{name}.npz", 3 + k) for k, name in enumerate("abc")]
 
 
-def test_a_data_set_is_one_table_of_all_logs(logs, tmp_path):
-    bulk = extract_logs(logs, tmp_path / "out", IEPF)
+def test_a_data_set_is_one_table_of_all_logs_without_the_halves_of_a_killed_run(logs, tmp_path):
+    out = tmp_path / "out"
+    left = out / "log=a.npz" / ".part-0.parquet.0badf00d.part"
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"PAR1")
+    bulk = extract_logs(logs, out, IEPF)
     assert (bulk.logs, bulk.whole, bulk.failed, bulk.scans) == (3, 0, 0, 12)
-    table = table_of(tmp_path / "out")
-    assert sorted(set(table["log"].to_pylist())) == ["a.npz", "b.npz", "c.npz"]
+    assert halves(out) == []
+    assert set(table_of(out)["log"].to_pylist()) == {"a.npz", "b.npz", "c.npz"}
     for log in logs:
         extract_log(log, tmp_path / "alone.parquet", IEPF)
         alone = pq.read_table(tmp_path / "alone.parquet")
-        part = pq.ParquetFile(tmp_path / "out" / f"log={log.name}" / "part-0.parquet").read()
+        part = pq.ParquetFile(out / f"log={log.name}" / "part-0.parquet").read()
         assert part.select(alone.column_names).equals(alone)
 
 
-def test_the_manifest_says_what_became_of_each_log(logs, tmp_path):
-    logs[1].write_bytes(logs[1].read_bytes()[:200])
-    shown = []
-    bulk = extract_logs([*logs, "/none.bag"], tmp_path / "out", IEPF, show=shown.append)
+def test_the_manifest_says_what_became_of_each_log_and_what_failed_is_tried_again(logs, tmp_path):
+    out, shown, whole = tmp_path / "out", [], logs[1].read_bytes()
+    logs[1].write_bytes(whole[:200])
+    bulk = extract_logs([*logs, "/none.bag"], out, IEPF, show=shown.append)
     assert (bulk.failed, bulk.scans) == (2, 8)
     assert "2 done, 2 failed, 0 whole before" in str(bulk)
-    rows = rows_of(tmp_path / "out")
+    assert shown[-1].startswith("4/4 logs, 2 failed, ")
+    rows = rows_of(out)
     assert list(rows) == ["a.npz", "b.npz", "c.npz", "none.bag"]
-    row = rows["c.npz"]
-    assert row["log"] == str(logs[2])
-    assert (row["outcome"], row["error"], row["scans"]) == ("done", "", 5)
-    assert row["topics"] == ["ranges"]
-    assert row["bytes"] == (tmp_path / "out" / row["output"]).stat().st_size
-    assert row["log_bytes"] == logs[2].stat().st_size
+    row, output = rows["c.npz"], "log=c.npz/part-0.parquet"
+    expected = {
+        "log": str(logs[2]),
+        "outcome": "done",
+        "error": "",
+        "output": output,
+        "bytes": (out / output).stat().st_size,
+        "topics": ["ranges"],
+        "scans": 5,
+        "log_bytes": logs[2].stat().st_size,
+        "version": ln.__version__,
+    }
+    assert expected.items() <= row.items()
     assert row["seconds"] > 0
-    assert row["version"] == ln.__version__
     assert row["features"]["segments"] >= 5
     configuration = row["configuration"]
     assert (configuration["method"], configuration["noise"]) == ("iepf", None)
@@ -64,8 +78,10 @@ def test_the_manifest_says_what_became_of_each_log(logs, tmp_path):
     assert rows["b.npz"]["outcome"] == "failed"
     assert rows["b.npz"]["error"].startswith(f"{logs[1]}: ")
     assert rows["none.bag"]["error"] == "/none.bag: there is no such file, expected a log"
-    assert not (tmp_path / "out" / "log=b.npz").exists()
-    assert shown[-1].startswith("4/4 logs, 2 failed, ")
+    assert not (out / "log=b.npz").exists()
+    logs[1].write_bytes(whole)
+    bulk = extract_logs(logs, out, IEPF, resume=True)
+    assert (bulk.whole, bulk.failed, bulk.scans) == (2, 0, 4)
 
 
 def test_neither_executor_nor_order_changes_the_table(logs, tmp_path):
@@ -124,15 +140,6 @@ def test_resume_does_all_again_with_another_configuration(logs, tmp_path):
     assert extract_logs(logs, out, IEPF, keep_going=True).whole == 0
 
 
-def test_what_failed_is_tried_again(logs, tmp_path):
-    whole = logs[1].read_bytes()
-    logs[1].write_bytes(whole[:200])
-    assert extract_logs(logs, tmp_path / "out", IEPF).failed == 1
-    logs[1].write_bytes(whole)
-    bulk = extract_logs(logs, tmp_path / "out", IEPF, resume=True)
-    assert (bulk.whole, bulk.failed, bulk.scans) == (2, 0, 4)
-
-
 def test_logs_of_one_name_stay_apart_and_keep_their_names(tmp_path):
     days = [corner_log(tmp_path / day / "scan.npz", 3 + k) for k, day in enumerate(("mon", "tue"))]
     out = tmp_path / "out"
@@ -156,15 +163,6 @@ def test_logs_in_folders_patterns_and_archives(tmp_path):
     assert extract_logs(tmp_path / "logs" / "more.zip", out, IEPF, resume=True).whole == 2
 
 
-def test_other_formats_than_parquet(logs, tmp_path):
-    extract_logs(logs[:1], tmp_path / "out", IEPF, ending=".jsonl")
-    part = tmp_path / "out" / "log=a.npz" / "part-0.jsonl"
-    assert len(part.read_text().splitlines()) == 3
-    with pytest.raises(ln.LineamentError, match=r"'\.xls' is not known"):
-        extract_logs(logs, tmp_path / "none", IEPF, ending=".xls")
-    assert not (tmp_path / "none").exists()
-
-
 def test_an_interrupted_run_leaves_whole_files_and_reports_what_is_missing(logs, tmp_path):
     out = tmp_path / "out"
 
@@ -184,14 +182,6 @@ def test_an_interrupted_run_leaves_whole_files_and_reports_what_is_missing(logs,
     bulk = extract_logs(logs, out, IEPF, resume=True)
     assert bulk.whole == list(found.values()).count("done")
     assert set(outcomes(out).values()) == {"done"}
-
-
-def test_half_files_of_a_killed_run_go_when_their_log_is_done(logs, tmp_path):
-    left = tmp_path / "out" / "log=a.npz" / ".part-0.parquet.0badf00d.part"
-    left.parent.mkdir(parents=True)
-    left.write_bytes(b"PAR1")
-    extract_logs(logs, tmp_path / "out", IEPF)
-    assert halves(tmp_path / "out") == []
 
 
 @pytest.mark.parametrize(
@@ -231,23 +221,82 @@ def test_a_part_that_cannot_be_written_stops_no_other(logs, tmp_path):
 
 @pytest.mark.skipif(resource is None, reason="no limits of files on this system")
 def test_a_full_disk_is_reported_and_leaves_no_half_file(logs, tmp_path):
+    out = tmp_path / "out"
     many = corner_log(tmp_path / "many.npz", 3000)
     with files_up_to(60_000):
-        bulk = extract_logs([logs[0], many], tmp_path / "out", IEPF)
-    assert bulk.failed == 1
-    rows = rows_of(tmp_path / "out")
-    assert rows["a.npz"]["outcome"] == "done"
-    assert "part-0.parquet: cannot be written: " in rows["many.npz"]["error"]
-    assert rows["many.npz"]["error"].endswith("File too large")
-    assert halves(tmp_path / "out") == []
-    files = [path.relative_to(tmp_path / "out") for path in (tmp_path / "out").rglob("*.*")]
-    assert set(map(str, files)) == {MANIFEST, "log=a.npz", "log=a.npz/part-0.parquet"}
-    with (
-        files_up_to(100),
-        pytest.raises(ln.LineamentError, match=r"_manifest\.jsonl: cannot be written: File too"),
-    ):
-        extract_logs(logs, tmp_path / "other", IEPF)
-    assert list((tmp_path / "other").iterdir()) == []
+        extract_logs([logs[0], many], out, IEPF)
+    assert outcomes(out) == {"a.npz": "done", "many.npz": "failed"}
+    error = rows_of(out)["many.npz"]["error"]
+    assert "part-0.parquet: cannot be written: " in error
+    assert error.endswith("File too large")
+    assert {path.name for path in out.rglob("*.*")} == {MANIFEST, "log=a.npz", "part-0.parquet"}
+    other, problem = tmp_path / "other", r"_manifest\.jsonl: cannot be written: File too"
+    with files_up_to(100), pytest.raises(ln.LineamentError, match=problem):
+        extract_logs(logs, other, IEPF)
+    assert list(other.iterdir()) == []
+
+
+# Topics.
+
+
+def test_a_run_that_takes_no_time_has_no_rate():
+    for found in (Extraction(log="a"), Bulk("out", "rows", 0, 0, 0, 0, {}, 0.0)):
+        assert str(found).endswith("  0.00 s, 0 scans/s")
+
+
+@pytest.fixture
+def two_topics(tmp_path):
+    messages = ros_bags.Messages(2)
+    walls = np.full(101, 2.0), np.full(81, 3.0)
+
+    def items():
+        for k in range(6):
+            topic = ("/front", "/rear")[k % 2]
+            yield topic, k * 10**8, messages.scan(0.1 * k, walls[k % 2])
+
+    return ros_bags.write(tmp_path, "mcap", items(), "two")
+
+
+def test_all_topics_go_into_one_table_with_a_column(two_topics, tmp_path):
+    found = extract_log(two_topics, tmp_path / "all.parquet", IEPF)
+    assert (found.scans, found.topics) == (6, ["/front", "/rear"])
+    table = pq.read_table(tmp_path / "all.parquet").to_pylist()
+    assert {(row["scan"], row["topic"]) for row in table} == {
+        (k, ("/front", "/rear")[k % 2]) for k in range(6)
+    }
+    extract_log(two_topics, tmp_path / "all.jsonl", IEPF)
+    lines = [json.loads(line) for line in (tmp_path / "all.jsonl").read_text().splitlines()]
+    assert [line["topic"] for line in lines] == ["/front", "/rear"] * 3
+
+
+def test_one_topic_is_chosen_and_tables_need_not_tell_it(two_topics, tmp_path):
+    found = extract_log(two_topics, tmp_path / "rear.parquet", IEPF, topic="/rear")
+    assert (found.scans, found.topics) == (3, ["/rear"])
+    table = pq.read_table(tmp_path / "rear.parquet")
+    assert "topic" not in table.column_names
+    assert max(table["scan"].to_pylist()) == 2
+    extract_log(two_topics, tmp_path / "rear.jsonl", IEPF, topic="/rear")
+    assert "topic" not in json.loads((tmp_path / "rear.jsonl").read_text().splitlines()[0])
+    with pytest.raises(ln.LogError, match="on '/up'; topics there are"):
+        extract_log(two_topics, tmp_path / "up.parquet", IEPF, topic="/up")
+    assert not (tmp_path / "up.parquet").exists()
+
+
+def test_what_draws_the_scans_names_them_after_their_topic(two_topics, tmp_path):
+    extract_log(two_topics, tmp_path / "out.mcap", IEPF, topic="/rear")
+    with (tmp_path / "out.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert topics == {"/rear", "/rear/features"}
+
+
+def test_a_data_set_has_one_schema_whatever_topics_its_logs_have(two_topics, tmp_path):
+    extract_logs([corner_log(tmp_path / "a.npz"), two_topics], tmp_path / "out", IEPF)
+    rows = pq.read_table(tmp_path / "out").to_pylist()
+    assert {(row["log"], row["topic"]) for row in rows} == {
+        ("a.npz", "ranges"),
+        ("two.mcap", "/front"),
+        ("two.mcap", "/rear"),
+    }
 
 
 # Manifest and progress.
@@ -324,5 +373,7 @@ def test_progress_has_a_throughput_and_the_time_left(monkeypatch):
     progress.finish(Row(log="a", name="a", outcome="done", scans=1000))
     assert str(progress) == "1/3 logs, 100 scans/s, 0:10 left"
     progress.finish(Row(log="b", name="b", outcome="failed"))
+    progress.report("c", 1, 0)  # of a length that is not known
+    assert str(progress) == "2/3 logs, 1 failed, 100 scans/s, 0:00 left"
     progress.finish(Row(log="c", name="c", outcome="done", scans=10))
     assert str(progress) == "3/3 logs, 1 failed, 101 scans/s, 0:00 left"

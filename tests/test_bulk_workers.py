@@ -14,7 +14,7 @@ from bulk_logs import Deadly, corner_log, flaser_log, halves, outcomes, rows_of,
 
 import lineament as ln
 from lineament.cli import run
-from lineament.tasks.bulk import Processes, Row, dask_executor, extract_logs
+from lineament.tasks.bulk import Processes, Row, dask_executor, extract_logs, workers
 from lineament.tasks.bulk.parts import Task, extract_part
 
 IEPF = ln.Extractor("iepf")
@@ -108,6 +108,50 @@ def test_a_log_whose_worker_dies_is_tried_twice_and_the_others_go_on(logs, tmp_p
     assert not marker.exists()
     assert halves(tmp_path / "out") == []
     assert processes_of_ours() == []
+
+
+class Dying:
+    """A worker that dies in its task the first times."""
+
+    deaths = 0
+
+    def run(self, task, _report):
+        if Dying.deaths:
+            raise EOFError
+        return task.row
+
+    def end(self):
+        Dying.deaths -= 1
+        return "SIGKILL"
+
+
+@pytest.mark.parametrize(
+    ("deaths", "error"), [(1, ""), (2, "/a: its process died twice (SIGKILL, SIGKILL)")]
+)
+def test_a_task_whose_process_dies_is_tried_once_more(deaths, error, monkeypatch):
+    monkeypatch.setattr(Dying, "deaths", deaths)
+    monkeypatch.setattr(workers, "_Worker", Dying)
+    with Processes(1) as processes:
+        task = Task(Row(log="/a", name="a"), "/out", IEPF.method, None, {})
+        assert processes.begin(task, lambda *_: None).result().error == error
+
+
+@pytest.mark.parametrize(
+    ("status", "text"),
+    [(None, "exit status None"), (0, "exit status 0"), (-9, "SIGKILL"), (-250, "signal 250")],
+)
+def test_how_a_process_ended(status, text):
+    assert workers._ending_of(status) == text
+
+
+@posix
+def test_interrupts_are_held_while_a_process_starts_and_no_longer():
+    def is_held():
+        return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+    with workers._interrupts_held():
+        assert is_held()
+    assert not is_held()
 
 
 class Lost(ProcessPoolExecutor):

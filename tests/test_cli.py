@@ -4,51 +4,41 @@ import ast
 import gzip
 import json
 import os
-import signal
 import subprocess
 import sys
-import time
 
 import click
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from bulk_logs import corner_log
-from text_logs import FLASER, zipped
+from text_logs import FLASER, flaser, zipped
 
 import lineament as ln
 from lineament.cli import run
-from lineament.cli.options import LOG_PATH, reading
+from lineament.cli.options import reading
 from lineament.logs import save_npz
 from lineament.logs.base import ECHOES, ReadOptions
-
-
-def wall_scans(count, beams=61):
-    """Scans of a wall that comes nearer, each with its own stamp and pose."""
-    bearings = np.linspace(-0.5, 0.5, beams)
-    return [
-        ln.LaserScan(
-            (3.0 - 0.01 * k) / np.cos(bearings),
-            angle_min=-0.5,
-            angle_increment=1.0 / (beams - 1),
-            range_max=30.0,
-            stamp=10.0 + 0.1 * k,
-            pose=(0.01 * k, 0.0, 0.0),
-        )
-        for k in range(count)
-    ]
-
-
-def flaser(ranges, stamp=1.0):
-    values = " ".join(f"{r:.2f}" for r in ranges)
-    return f"FLASER {len(ranges)} {values} 0 0 0 0 0 0 {stamp} robot {stamp}\n"
+from lineament.reproduce import EXPERIMENTS, Setting
 
 
 @pytest.fixture
 def npz(tmp_path):
-    path = tmp_path / "wall.npz"
-    save_npz(path, wall_scans(7))
-    return path
+    """A log of a wall that comes nearer, each scan with its own stamp and pose."""
+    bearings = np.linspace(-0.5, 0.5, 61)
+    shape = np.where(bearings < -0.49, np.nan, 1 / np.cos(bearings))
+    scans = [
+        ln.LaserScan(
+            (3.0 - 0.01 * k) * shape,
+            angles=bearings,
+            range_max=30.0,
+            stamp=10.0 + 0.1 * k,
+            pose=(0.01 * k, 0.0, 0.0),
+        )
+        for k in range(7)
+    ]
+    save_npz(tmp_path / "wall.npz", scans)
+    return tmp_path / "wall.npz"
 
 
 @pytest.fixture
@@ -70,39 +60,36 @@ def benchmark(tmp_path):
     return path
 
 
-def test_extract_writes_the_features_of_each_scan(npz, tmp_path, capsys):
+def test_extract_writes_a_table_and_says_what_it_found(npz, tmp_path, capsys):
     out = tmp_path / "features.parquet"
     assert run(["extract", str(npz), "-o", str(out)]) == 0
     table = pq.read_table(out)
-    expected = [ln.extract(scan) for scan in ln.open_log(npz)]
     segments = table.filter(np.array(table["kind"].to_pylist()) == "segment")
     assert segments["scan"].to_pylist() == list(range(7))
-    assert segments["stamp"].to_pylist() == [f.stamp for f in expected]
-    assert segments["x"].to_pylist() == [f.segments["centroid"][0, 0] for f in expected]
     said = capsys.readouterr().out
-    assert "7 scans" in said
-    assert "0.0 % of beams invalid" in said
-    assert "7 segments, 0 corners, 0 edges, 0 arcs, 14 breakpoints" in said
+    assert "  7 scans, 1.6 % of beams invalid, 0 faults skipped\n" in said
+    assert "  7 segments, 0 corners, 0 edges, 0 arcs, 14 breakpoints\n" in said
     assert "scans/s" in said
 
 
-def test_extract_jsonl_holds_what_to_dict_gives(npz, tmp_path, capfd):
+@pytest.mark.parametrize(
+    ("options", "extractor"),
+    [
+        ("", ln.Extractor()),
+        ("--set max_missing=4", ln.Extractor(max_missing=4)),
+        (
+            "-m liu:paper --noise 0.02 --set response=relative",
+            ln.Extractor("liu:paper", noise=ln.RangeNoise(0.02), response="relative"),
+        ),
+    ],
+)
+def test_options_of_method_and_noise_arrive(options, extractor, npz, tmp_path, capfd):
     out = tmp_path / "features.jsonl"
-    assert run(["extract", str(npz), "-o", str(out), "-q", "--set", "max_missing=4"]) == 0
+    assert run(["extract", str(npz), "-o", str(out), "-q", *options.split()]) == 0
     assert capfd.readouterr() == ("", "")
     lines = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
-    extractor = ln.Extractor(max_missing=4)
-    assert lines == [
-        {"scan": k, **extractor(scan).to_dict()} for k, scan in enumerate(ln.open_log(npz))
-    ]
-
-
-def test_options_of_method_and_noise_arrive(npz, tmp_path):
-    out = tmp_path / "f.jsonl"
-    arguments = ["-m", "liu:paper", "--noise", "0.02", "--set", "response=relative"]
-    assert run(["extract", str(npz), "-o", str(out), "-q", *arguments]) == 0
-    first = json.loads(out.read_text(encoding="utf-8").splitlines()[0])
-    assert first["noise"]["sigma"] == 0.02
+    found = [extractor(scan).to_dict() for scan in ln.open_log(npz)]
+    assert lines == [{"scan": k, **features} for k, features in enumerate(found)]
 
 
 #: Command, exit status, and words of the line that says what is wrong.
@@ -147,6 +134,9 @@ WRONG = [
     ("warmup -m lui", 2, "method 'lui' is unknown"),
     ("demo none.log -o demo", 1, "none.log"),
     ("demo -o wall.npz", 1, "cannot make this folder"),
+    ("live --from wall.npz --ros 0 --domain 233", 2, "--domain"),
+    ("live --from wall.npz --ros 0 --depth 1001", 2, "--depth"),
+    ("live --from wall.npz --ros 0 --foxglove 65536", 2, "--foxglove"),
     ("compare wall.npz -o a.txt", 2, "expected an ending of .html, .png"),
     ("compare wall.npz -o a.png -m lui", 2, "method 'lui' is unknown"),
     ("compare wall.npz -o a.png --scan 99 -m pdbs", 1, "expected 0 to 6"),
@@ -176,7 +166,7 @@ WRONG = [
 @pytest.mark.parametrize(("command", "status", "words"), WRONG)
 @pytest.mark.usefixtures("npz", "benchmark")
 def test_bad_input_gets_one_clear_line(command, status, words, tmp_path, monkeypatch, capsys):
-    whole = gzip.compress("".join(flaser(np.full(181, 2.0), k) for k in range(99)).encode())
+    whole = gzip.compress("".join(flaser([2.0] * 181) for _ in range(99)).encode())
     (tmp_path / "cut.log.gz").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "empty.log").touch()
     (tmp_path / "text.log").write_text("It was a dark and stormy night.\n" * 9)
@@ -195,7 +185,7 @@ def test_bad_input_gets_one_clear_line(command, status, words, tmp_path, monkeyp
 
 def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsys):
     log, out = tmp_path / "broken.log", tmp_path / "f.jsonl"
-    good = [flaser([2.0] * 181, k) for k in range(3)]
+    good = [flaser([2.0] * 181, stamp=float(k)) for k in range(3)]
     log.write_text(good[0] + "FLASER 181 1 2 3\n" + good[1] + "FLASER x\n" + good[2])
     assert run(["extract", str(log), "-o", str(out)]) == 1
     assert not out.exists()
@@ -206,13 +196,6 @@ def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsy
     said = capsys.readouterr().out
     assert "2 faults skipped" in said
     assert "broken.log:2" in said
-
-
-def test_info_prints_what_a_person_wants_to_know(npz, capsys):
-    assert run(["info", str(npz)]) == 0
-    said = capsys.readouterr().out
-    for words in ("7", "61", "10 Hz", "100.0 % valid", "poses"):
-        assert words in said
 
 
 def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
@@ -234,12 +217,14 @@ def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
         "scan.png",
         "trace.png",
     }
+    assert run(["extract", str(npz), "-q", "-o", str(tmp_path / "f.parquet")]) == 0
+    tables = [pq.read_table(path) for path in (folder / "features.parquet", tmp_path / "f.parquet")]
+    assert tables[0].equals(tables[1])
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 3
     assert str(folder / "index.html") in capsys.readouterr().out
     # Without poses there is no map.
-    log = tmp_path / "still.npz"
-    save_npz(log, [ln.LaserScan(np.full(61, 2.0), -0.5, 1 / 60)] * 2)
+    log = corner_log(tmp_path / "still.npz", 2)
     assert run(["demo", str(log), "-q", "-o", str(tmp_path / "demo")]) == 0
     assert not (tmp_path / "demo" / "map.png").exists()
 
@@ -258,19 +243,21 @@ def start(*arguments, **options):
     return subprocess.Popen(
         [sys.executable, "-m", "lineament", *map(str, arguments)],
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=options.pop("stderr", subprocess.PIPE),
         text=True,
         **options,
     )
 
 
-def test_help_version_and_status_of_the_real_program():
-    for arguments, status in ((["--help"], 0), (["--version"], 0), ([], 2), (["x"], 2)):
-        process = start(*arguments)
-        out, errors = process.communicate(timeout=60)
-        assert process.returncode == status
-        assert "Traceback" not in errors
-        assert ("Commands:" in out + errors) == (arguments in (["--help"], []))
+@pytest.mark.parametrize(
+    ("argument", "status"), [("--help", 0), ("--version", 0), ("", 2), ("x", 2)]
+)
+def test_help_version_and_status_of_the_real_program(argument, status):
+    process = start(*argument.split())
+    out, errors = process.communicate(timeout=60)
+    assert process.returncode == status
+    assert "Traceback" not in errors
+    assert ("Commands:" in out + errors) == (argument in ("--help", ""))
 
 
 @pytest.mark.slow
@@ -297,41 +284,30 @@ def test_memory_does_not_grow_with_the_log(output, tmp_path):
     assert peaks[1] < 1.15 * peaks[0]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["intel", "csail", "aces", "acapulco"])
-def test_real_logs_from_file_to_table(name, data_dir, tmp_path):
-    log, out = data_dir / "carmen" / f"{name}-corrected.log.gz", tmp_path / "f.parquet"
-    assert run(["extract", str(log), "-q", "-o", str(out)]) == 0
-    table = pq.read_table(out)
-    scans = {"intel": 910, "csail": 406, "aces": 440, "acapulco": 861}[name]
-    assert set(table["scan"].to_pylist()) == set(range(scans))
-    rms = np.array([value for value in table["rms"].to_pylist() if value is not None])
-    assert len(rms) > 5 * scans
-    assert np.isfinite(rms).all()
-
-
 def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys):
     from lineament.cli import progress
 
     assert list(progress.tracker(quiet=True)(range(3), "x", 3)) == [0, 1, 2]
-    clock = iter(np.arange(0.0, 100.0, 1.5))
+    clock = iter(np.arange(100.0))
     monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
     assert list(progress.tracker(quiet=False)(range(4), "reading", 4)) == [0, 1, 2, 3]
+    with progress.status(quiet=False) as show:
+        for about in "abcd":
+            show(about)
     assert capsys.readouterr().err.splitlines() == [
-        "reading: 2/4, 0.7/s, 3 s left",
-        "reading: 4/4, 0.7/s, 0 s left",
+        "reading: 2/4, 1.0/s, 2 s left",
+        "reading: 4/4, 1.0/s, 0 s left",
+        "b",
+        "d",
     ]
+    assert [progress._rate_text(rate) for rate in (9.94, 10.0)] == ["9.9/s", "10/s"]
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="pseudo-terminals are not everywhere")
 def test_progress_bar_on_a_real_terminal(npz):
     main, terminal = os.openpty()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "lineament", "info", str(npz)],
-        stdout=subprocess.PIPE,
-        stderr=terminal,
-        env={**os.environ, "TERM": "xterm", "COLUMNS": "100"},
-    )
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
+    process = start("info", npz, stderr=terminal, env=environment)
     process.communicate(timeout=60)
     os.close(terminal)
     shown = os.read(main, 65536).decode()
@@ -380,19 +356,14 @@ def show(reading):
 
 def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
-    given = ["--topic", "/scan", "--echo", "last", "--ring", "3", "--poses", "/odom"]
+    given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
     show.main([*given, "--keep-going"], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
     assert plain == {"topic": None, "keep_going": False, **vars(ReadOptions())}
-    assert list(all_given.values()) == ["/scan", True, "last", 3, "/odom"]
+    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom"]
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES
-
-
-def test_paths_and_addresses():
-    assert LOG_PATH.convert("s3://bucket/a.log", None, None) == "s3://bucket/a.log"
-    assert LOG_PATH.convert("a.log", None, None).name == "a.log"
 
 
 def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys):
@@ -437,53 +408,38 @@ def test_imports_are_light(code, heavy):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.slow
-def test_an_interrupted_run_leaves_no_half_file(tmp_path):
-    log, out = tmp_path / "long.log", tmp_path / "f.jsonl"
-    log.write_text(flaser(np.linspace(2.0, 3.0, 181)) * 60_000)
-    out.write_text("of the run before")
-    process = start("extract", log, "-o", out)
-    # Stopped when it is under way: something stands beside the output.
-    deadline = time.monotonic() + 60
-    while len(list(tmp_path.iterdir())) < 3 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert errors.splitlines()[-1] == "lineament: stopped"
-    assert out.read_text() == "of the run before"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["f.jsonl", "long.log"]
-
-
 def test_compare_writes_a_page_and_a_table(npz, tmp_path, capsys):
-    out = tmp_path / "a.html"
-    given = ["compare", str(npz), "--scan", "1", "-m", "pdbs", "-m", "liu", "-o", str(out)]
-    assert run(given) == 0
-    assert out.stat().st_size > 1000
+    given = ["compare", str(npz), "--scan", "1", "-m", "pdbs", "-m", "liu", "-o"]
+    assert run([*given, str(tmp_path / "a.html")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("method")
-    assert [line.split()[0] for line in lines[1:]] == ["pdbs", "liu"]
-    assert run(["compare", str(npz), "-m", "pdbs", "-o", str(tmp_path / "a.png"), "-q"]) == 0
-    assert (tmp_path / "a.png").stat().st_size > 1000
+    assert [line.split()[0] for line in lines] == ["method", "pdbs", "liu"]
+    assert run([*given, str(tmp_path / "a.png"), "-q"]) == 0
     assert capsys.readouterr() == ("", "")
+    assert all((tmp_path / name).stat().st_size > 1000 for name in ("a.html", "a.png"))
 
 
-@pytest.mark.slow
-def test_reproduce_writes_page_and_figures(tmp_path, monkeypatch, capsys):
-    monkeypatch.delenv("LINEAMENT_DATA", raising=False)
-    out = tmp_path / "report"
-    few = ["--frames", "1", "--seeds", "1"]
-    assert run(["reproduce", "-o", str(out), "--only", "fig5", *few]) == 0
-    assert capsys.readouterr().out.strip() == str(out / "index.html")
-    figures = json.loads((out / "figures.json").read_text(encoding="utf-8"))
-    assert list(figures["experiments"]) == ["layers"]
-    assert figures["recordings"] is False
+def test_reproduce_runs_what_is_asked_for_on_the_recordings_of_the_environment(
+    tmp_path, monkeypatch, capsys
+):
+    calls = []
 
+    def report(output, *asked):
+        calls.append(asked[:2])
+        return output / "index.html"
 
-def test_reproduce_takes_the_recordings_of_the_environment(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("lineament.reproduce.report.reproduce", report)
+    monkeypatch.setenv("LINEAMENT_DATA", str(tmp_path))
+    given = ["reproduce", "-o", str(tmp_path), "--only", "fig5", "--frames", "3", "--seed", "2"]
+    assert run(given) == 0
+    assert capsys.readouterr().out == f"{tmp_path}/index.html\n"
     monkeypatch.setenv("LINEAMENT_DATA", str(tmp_path / "nowhere"))
-    assert run(["reproduce", "-o", str(tmp_path / "report")]) == 2
+    assert run(given) == 2
     assert "nowhere" in capsys.readouterr().err
+    monkeypatch.delenv("LINEAMENT_DATA")
+    assert run(["reproduce", "-o", str(tmp_path), "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+    names = list(EXPERIMENTS)
+    assert calls == [(["layers"], Setting(3, 2, tmp_path)), (names, Setting(10, 0, None))]
 
 
 def test_bench_ple_prints_means_beside_the_authors(benchmark, tmp_path, capsys):
@@ -503,15 +459,17 @@ def test_bench_ple_prints_means_beside_the_authors(benchmark, tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize("name", ["a.npz", "a.log.gz"])
-def test_simulate_records_a_drive(tmp_path, name):
+@pytest.mark.parametrize(
+    ("name", "options", "count"), [("a.npz", [], 45), ("a.log.gz", ["--scans", "4"], 4)]
+)
+def test_simulate_records_a_drive(name, options, count, tmp_path):
     out = tmp_path / name
     given = ["simulate", "building", "--sensor", "lms181", "--rate", "0.5", "--moving", "-q"]
-    assert run([*given, "-o", str(out), "--scans", "4"]) == 0
+    assert run([*given, "-o", str(out), *options]) == 0
     scans = list(ln.open_log(out))
-    assert len(scans) == 4
-    assert len({scan.pose for scan in scans}) == 4
+    assert len(scans) == count
     assert len(scans[0]) == 181
+    assert len({scan.pose for scan in scans}) == count
 
 
 def test_simulated_scene_is_seen_from_one_place_with_the_noise_asked_for(tmp_path):

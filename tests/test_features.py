@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from handmade import features as made
 from test_tables import random_features
 from worlds import NOISE
 
@@ -42,20 +41,11 @@ def test_each_field_moves_as_it_must(pose):
     assert moved.clusters is features.clusters
 
 
-def test_a_quarter_turn_by_hand():
-    corner = {"position": (1, 2), "covariance": [[1, 2], [2, 5]]}
-    arc = {"center": (1, 2), "covariance": [[1, 2, 3], [2, 5, 6], [3, 6, 9]]}
-    moved = made(corners=make_records("corners", [corner]), arcs=make_records("arcs", [arc]))
-    moved = moved.transform(10.0, -5.0, math.pi / 2)
-    np.testing.assert_allclose(moved.corners["position"], [(8, -4)])
-    np.testing.assert_allclose(moved.corners["covariance"], [[[5, -2], [-2, 1]]], atol=1e-12)
-    expected = [[[5, -2, -6], [-2, 1, 3], [-6, 3, 9]]]
-    np.testing.assert_allclose(moved.arcs["covariance"], expected, atol=1e-12)
-
-
 def test_dict_is_json():
     scan = ln.LaserScan([2.0] * 9 + [1.0] * 9, 0.0, 0.01, stamp=2.5, frame_id="laser")
     features = ln.extract(scan, noise=NOISE)
+    for name in (*TABLES, "clusters"):
+        assert not getattr(features, name).flags.writeable, name
     again = json.loads(json.dumps(features.to_dict(), allow_nan=False))
     for name, dtype in TABLES.items():
         for record, row in zip(getattr(features, name), again[name], strict=True):
@@ -67,21 +57,17 @@ def test_dict_is_json():
     assert (empty["noise"], empty["clusters"]) == (None, [-1, -1, -1])
 
 
-def test_reprs():
-    features = random_features(1)
-    n = features.clusters.max() + 1
-    assert repr(features) == (
-        f"Features(3 segments, 2 corners, 1 arcs, 2 breakpoints, {n} clusters, stamp=0.100)"
-    )
-    batch = ln.Extractor("liu").batch(np.full((2, 9), 2.0), angle_min=0.0, angle_increment=0.01)
-    assert repr(batch) == ("FeatureBatch(2 scans: 2 segments, 0 corners, 0 arcs, 4 breakpoints)")
-
-
-def test_edges_are_counted_apart():
+def test_reprs_and_counts():
     features = random_features(1, counts=(3, 4, 2, 1))
     features.corners["kind"] = ["edge", "corner", "slit", "edge"]
+    n = features.clusters.max() + 1
+    assert repr(features) == (
+        f"Features(3 segments, 4 corners, 2 arcs, 1 breakpoints, {n} clusters, stamp=0.100)"
+    )
     counted = {"segments": 3, "corners": 2, "edges": 2, "arcs": 2, "breakpoints": 1}
-    assert features.counts() == counted
+    assert features.counts() == counted  # edges apart
+    batch = ln.Extractor("liu").batch(np.full((2, 9), 2.0), angle_min=0.0, angle_increment=0.01)
+    assert repr(batch) == "FeatureBatch(2 scans: 2 segments, 0 corners, 0 arcs, 4 breakpoints)"
 
 
 def test_batch_views():
@@ -108,13 +94,6 @@ def test_empty_batch(shape):
     batch = ln.Extractor("liu").batch(np.empty(shape), angle_min=0.0, angle_increment=0.1)
     assert (len(batch), batch.clusters.shape) == (shape[0], shape)
     assert [len(f.clusters) for f in batch] == [0] * shape[0]
-
-
-def test_arrays_are_read_only():
-    found = ln.extract(ln.LaserScan([2.0] * 9, 0.0, 0.01), method="liu")
-    for name in (*TABLES, "clusters"):
-        assert len(found.segments) == 1
-        assert not getattr(found, name).flags.writeable, name
 
 
 def test_noise_rows():

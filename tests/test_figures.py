@@ -1,10 +1,8 @@
 """Figures: what is drawn, where, for kind and hostile input."""
 
 import math
-import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -54,28 +52,10 @@ def room() -> tuple[ln.LaserScan, Features]:
     return scan, Features(segments, corners, arcs, clusters, breakpoints)
 
 
-def trace_of(scan: ln.LaserScan, features: Features) -> Trace:
-    n = len(scan)
-    used = np.flatnonzero(scan.valid)
-    spacing = np.full(n, np.nan)
-    spacing[used[1:]] = np.hypot(*np.diff(scan.points[used], axis=0).T)
-    candidates = np.zeros(min(n, 3), CANDIDATE)
-    candidates["beam"] = np.array([40, 20, 30])[: len(candidates)] % max(n, 1)
-    candidates["response"] = np.array([12.5, 3.25, 1.125])[: len(candidates)]
-    candidates["accepted"] = [True, False, False][: len(candidates)]
-    return Trace(
-        scan=scan,
-        method="liu",
-        features=features,
-        filtered=np.where(scan.valid, 0.5 * scan.ranges, np.nan),
-        spacing=spacing,
-        distance_threshold=np.full(n, 0.2),
-        density_threshold=np.full(n, np.nan),
-        clusters=features.clusters,
-        candidates=candidates,
-        threshold=10.0,
-        cuts=np.zeros(0, np.int32),
-    )
+def trace_of(scan: ln.LaserScan, features: Features, **stages) -> Trace:
+    """Stages of a run of liu, which is said to have found these features."""
+    trace = ln.Extractor("liu").trace(scan)
+    return replace(trace, features=features, clusters=features.clusters, **stages)
 
 
 def hostile() -> dict[str, tuple[ln.LaserScan, Features]]:
@@ -112,27 +92,13 @@ def texts_of(axes) -> set[str]:
     ("ending", "start"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF")]
 )
 def test_endings(tmp_path, ending, start):
-    path = tmp_path / f"a{ending}"
-    files = []
+    path, files = tmp_path / f"a{ending}", []
     for _ in range(2):
         figures.plot_map([((0.0, 0.0, 0.0), room()[1])], path)
         files.append(path.read_bytes())
     assert files[0].startswith(start)
     assert files[0] == files[1]
     assert list(tmp_path.iterdir()) == [path]
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("a.gif", r"the ending '\.gif' is not known, expected one of \.png, \.svg, \.pdf"),
-        ("a", "the name has no ending"),
-        ("no/a.png", "does not exist"),
-    ],
-)
-def test_files_that_cannot_be(tmp_path, name, problem):
-    with pytest.raises(LineamentError, match=problem):
-        figures.plot_map([], tmp_path / name)
 
 
 @pytest.mark.parametrize(("n", "columns"), [(1, 1), (4, 3), (10, 4)])
@@ -252,12 +218,17 @@ def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
     assert all(panel.containsx(x) for box in boxes for x in (box.x0, box.x1))
 
 
+def labels(positions, obstacles):
+    """Texts beside the positions in a panel whose unit is a point of the paper."""
+    axes = canvas.new_figure(4, 4).add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))
+    values = np.full(len(positions), 12.25)
+    drawing.label_points(axes, np.array(positions, float), values, np.reshape(obstacles, (-1, 2)))
+    return axes.texts
+
+
 def test_numbers_stay_away_from_other_corners():
-    figure = canvas.new_figure(4, 4)
-    axes = figure.add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))  # points
-    positions = np.array([(0, 0), (15, 0)], dtype=float)
-    drawing.label_points(axes, positions, np.array([12.25, 12.25]), np.zeros((0, 2)))
-    for text, position in zip(axes.texts, positions, strict=True):
+    positions = np.array([(0, 0), (15, 0)])
+    for text, position in zip(labels(positions, []), positions, strict=True):
         apart = np.abs(position + text.get_position() - positions)
         assert (apart >= (9.2, 4.5)).any(axis=1).all()
 
@@ -275,12 +246,7 @@ def test_numbers_stay_away_from_other_corners():
     ],
 )
 def test_number_stands_where_it_hides_least(place, hidden, offset):
-    figure = canvas.new_figure(4, 4)
-    axes = figure.add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))  # points
-    obstacles = np.reshape([*hidden, (np.nan, 0)], (-1, 2))
-    positions, values = np.array([place, (np.nan, 0)], dtype=float), np.array([12.25, 1.0])
-    drawing.label_points(axes, positions, values, obstacles)
-    (text,) = axes.texts
+    (text,) = labels([place, (np.nan, 0)], [*hidden, (np.nan, 0)])
     assert text.get_text() == "12.2"
     if isinstance(offset, str):
         is_near = (np.abs(text.get_position()) < (15.3, 10.6)).all()
@@ -308,7 +274,12 @@ def test_many_corners_have_no_numbers(more):
 
 def test_stages_of_a_trace(drawn):
     scan, features = room()
-    trace = trace_of(scan, features)
+    candidates = np.zeros(3, CANDIDATE)
+    candidates["beam"], candidates["accepted"] = [40, 20, 30], [True, False, False]
+    candidates["response"] = [12.5, 3.25, 1.125]
+    filtered = np.where(scan.valid, 0.5 * scan.ranges, np.nan)
+    trace = trace_of(scan, features, filtered=filtered, candidates=candidates, threshold=10.0)
+    trace.spacing[5] = 0.0  # a log axis has no place for it
     figure = drawn(figures.plot_trace, trace)
     filter_, spacing, clusters, corners = figure.axes
     assert texts_of(filter_) == {f"{scan.valid.sum()} valid beams of 81"}
@@ -323,7 +294,8 @@ def test_stages_of_a_trace(drawn):
     assert breaks == [41, 60, 61]
     assert texts_of(spacing) == {"3 breaks"}
     assert spacing.get_yscale() == "log"
-    np.testing.assert_array_equal(by_label(spacing)["spacing"].get_ydata(), trace.spacing)
+    expected = np.where(trace.spacing > 0, trace.spacing, np.nan)
+    np.testing.assert_array_equal(by_label(spacing)["spacing"].get_ydata(), expected)
     assert texts_of(clusters) == {"2 clusters · 1 noise point"}
     about = "3 candidates · 1 accepted · threshold 10 · 2 segments"
     assert texts_of(corners) == {about, "12.5", "3.25", "1.12"}
@@ -338,18 +310,10 @@ def test_stages_of_a_trace(drawn):
 
 
 def test_trace_without_candidates_shows_corners_and_edges(drawn):
-    trace = replace(trace_of(*room()), candidates=np.zeros(0, CANDIDATE))
+    trace = trace_of(*room(), candidates=np.zeros(0, CANDIDATE))
     panel = drawn(figures.plot_trace, trace).axes[3]
     assert {"corner", "edge"} <= set(by_label(panel))
     assert any("1 corner · 1 edge" in text for text in texts_of(panel))
-
-
-def test_trace_whose_beams_share_a_point_is_drawn_on_a_log_axis(drawn):
-    trace = trace_of(*room())
-    trace.spacing[5] = 0.0
-    spacing = by_label(drawn(figures.plot_trace, trace).axes[1])["spacing"].get_ydata()
-    assert np.isnan(spacing[5])
-    assert spacing[6] == trace.spacing[6]
 
 
 def test_map_moves_features_by_their_poses(drawn):
@@ -395,27 +359,23 @@ def test_hostile_scans_are_drawn(tmp_path, case, monkeypatch):
         plot()
         assert matplotlib.image.imread(path)[..., :3].std() > 0.01, "blank"
         path.unlink()
+    assert "matplotlib.pyplot" not in sys.modules  # which has a global state
 
 
 def test_wrong_arguments(tmp_path):
     scan, features = room()
-    with pytest.raises(ValueError, match="at least one method"):
-        figures.plot_scan(scan, {}, tmp_path / "a.png")
-    features.clusters = features.clusters[1:]
-    with pytest.raises(ValueError, match="clusters of 80 beams, the scan has 81"):
-        figures.plot_scan(scan, {"liu": features}, tmp_path / "a.png")
-    with pytest.raises(ValueError, match="clusters of 80 beams, the scan has 81"):
-        figures.plot_trace(trace_of(scan, features), tmp_path / "a.png")
+    few = replace(features, clusters=features.clusters[1:])
+    path, beams = tmp_path / "a.png", "clusters of 80 beams, the scan has 81"
+    for plot, arguments, message in (
+        (figures.plot_scan, (scan, {}, path), "at least one method"),
+        (figures.plot_scan, (scan, {"liu": few}, path), beams),
+        (figures.plot_trace, (trace_of(scan, few), path), beams),
+    ):
+        with pytest.raises(ValueError, match=message):
+            plot(*arguments)
+    # The ending is known in any case.
+    ending = r"the ending '\.gif' is not known, expected one of \.png, \.svg, \.pdf"
+    for name, problem in (("a.gif", ending), ("a", "has no ending"), ("no/a.png", "not exist")):
+        with pytest.raises(LineamentError, match=problem):
+            figures.plot_map([], tmp_path / name)
     assert not list(tmp_path.iterdir())
-
-
-def test_no_global_state_of_matplotlib(tmp_path):
-    code = f"""
-import sys
-from test_figures import room
-from lineament.output.figures import plot_scan
-scan, features = room()
-plot_scan(scan, {{"liu": features}}, {str(tmp_path / "a.png")!r})
-sys.exit("matplotlib.pyplot" in sys.modules)
-"""
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parent)

@@ -260,6 +260,13 @@ def test_a_domain_that_does_not_exist(monkeypatch, text):
             Participant(int(text), localhost=True)
 
 
+@pytest.mark.parametrize("number", [0, 232])
+def test_the_first_and_the_last_domain(monkeypatch, number):
+    monkeypatch.setattr("lineament.live.participant.DomainParticipant", lambda domain: domain)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    assert [Participant(number).entity, Participant().entity] == [number, number]
+
+
 def test_the_environment_gives_domain_and_configuration(monkeypatch, domain, capfd):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     with closing(Participant(localhost=True)) as made:

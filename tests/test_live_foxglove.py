@@ -88,13 +88,15 @@ def test_an_impossible_stamp_is_the_first_or_the_last(server, client, stamp, sho
 
 def test_listeners_come_and_go(server, client, connect):
     server.advertise("/scan", "LaserScan")
+    server.advertise("/points", "PointCloud")
     client.subscribe("/scan")
     eventually(lambda: server.listeners("/scan") == 1)
     other = connect()
     other.subscribe("/scan")
-    eventually(lambda: server.listeners("/scan") == 2)
     client.unsubscribe("/scan")
-    eventually(lambda: server.listeners("/scan") == 1)
+    other.subscribe("/points")
+    eventually(lambda: server.listeners("/points") == 1)  # after what came before it
+    assert server.listeners("/scan") == 1
     other.close()
     eventually(lambda: server.listeners("/scan") == 0)
 

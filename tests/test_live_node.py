@@ -140,14 +140,11 @@ def test_a_malformed_message_is_counted_written_once_and_survived(name):
     assert "\n" not in line
 
 
-@pytest.mark.parametrize(("n", "is_refused"), [(1, False), (MOST_BEAMS, False), (65_537, True)])
-def test_most_beams(n, is_refused):
-    scan = ln.LaserScan(np.ones(n), 0.0, 1e-6)
-    if is_refused:
-        with pytest.raises(ValueError, match="has 65537 beams, expected 1 to 65536"):
-            check_beams(scan)
-    else:
-        check_beams(scan)
+def test_most_beams():
+    for n in (1, MOST_BEAMS):
+        check_beams(ln.LaserScan(np.ones(n), 0.0, 1e-6))
+    with pytest.raises(ValueError, match="has 65537 beams, expected 1 to 65536"):
+        check_beams(ln.LaserScan(np.ones(65_537), 0.0, 1e-6))
 
 
 def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
@@ -238,6 +235,7 @@ class Taken(Publisher):
     def __init__(self) -> None:
         super().__init__()
         self.sent: list[str] = []
+        self.heard: list[str] | None = None  # the topics that have listeners; all, if None
 
     def _open(self, topic: str, kind: str) -> str:
         assert topic.startswith("/")
@@ -250,7 +248,7 @@ class Taken(Publisher):
         self.sent.append(topic)
 
     def _count(self, topic: str) -> int:
-        return int(bool(topic))
+        return int(self.heard is None or topic in self.heard)
 
 
 #: What a message may hold that no scanner means.
@@ -311,43 +309,26 @@ def test_no_message_ends_a_node(options):
     assert not any("\n" in line for line in lines)
 
 
-class Choosy(Taken):
-    """Only some topics have listeners."""
-
-    heard: tuple[str, ...] = ()
-
-    def _count(self, topic: str) -> int:
-        return int(topic in self.heard)
-
-
-def test_messages_that_have_no_listeners_are_not_made():
-    publisher = Choosy()
-    sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log="a.npz"))
-    frame = Pipeline(LiveConfig())("a", sweep(pose=(1.0, 2.0, 0.5)))
-    for topic in ("/scan/features", "/scan/corners", "/scan/markers", "/tf", "/scan"):
-        publisher.heard = ()
-        sink.publish(frame)
-        publisher.heard = (topic,)
-        sink.publish(frame)
-        assert publisher.sent.pop() == topic
-        assert publisher.sent == []
-
-
 @pytest.mark.parametrize("log", ["a.npz", None])
-def test_a_scan_of_a_log_is_published_with_its_pose_or_by_its_points(log):
+@pytest.mark.parametrize(
+    ("scan", "topics"),
+    [
+        (sweep(pose=(1.0, 2.0, 0.5)), ["/tf", "/scan"]),
+        (sweep(), ["/scan"]),
+        (ln.LaserScan(WALL, angles=BEARINGS**3), ["/scan/points"]),
+    ],
+)
+def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics):
     publisher = Taken()
     sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log=log))
-    regular, bent = sweep(), ln.LaserScan(WALL, angles=BEARINGS**3)
-    placed = sweep(pose=(1.0, 2.0, 0.5))
-    features = [f"/scan/{below}" for below in ("features", "corners", "markers")]
-    for scan, topics in [
-        (placed, ["/tf", "/scan"]),
-        (regular, ["/scan"]),
-        (bent, ["/scan/points"]),
-    ]:
+    frame = Pipeline(LiveConfig())("a", scan)
+    below = [f"/scan/{name}" for name in ("features", "corners", "markers")]
+    made = below + topics if log else below
+    for heard in (None, [], *([topic] for topic in made)):
+        publisher.heard = heard
         publisher.sent.clear()
-        sink.publish(Pipeline(LiveConfig())("a", scan))
-        assert publisher.sent == [*features, *(topics if log else ())]
+        sink.publish(frame)
+        assert publisher.sent == (made if heard is None else heard)
 
 
 # The pipeline.
@@ -445,9 +426,7 @@ def test_reports_worked_by_hand():
     counters.dropped, counters.malformed = 2, 1
     report = counters.report(11.5, publishers=1, lost=4, unsent=5)
     assert (report.since, report.rate, report.level) == ((3, 2, 4, 1, 5), 2, 1)
-    assert report.latency == pytest.approx((0.002, 0.00298))
-    assert report.invalid == 0.25
-    assert report.features["segments"] == 1
+
     assert report.values == {
         "rate [1/s]": "2.00",
         "latency p50 [ms]": "2.000",
@@ -471,7 +450,6 @@ def test_reports_worked_by_hand():
     counters.add(scan, features, 0.001)
     report = counters.report(12.5, publishers=1, lost=4, unsent=5)
     assert (report.since, report.level) == ((1, 0, 0, 0, 0), 0)
-    assert report.total == (4, 2, 4, 1, 5)
     assert report.totals == "4 scans, 2 dropped, 4 lost, 1 malformed messages"
     counters.add(scan, features, 0.001)
     assert counters.report(13.0, publishers=1, lost=4, unsent=6).level == 1

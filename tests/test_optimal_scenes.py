@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
-from lineament import Extractor, RangeNoise
+from lineament import Extractor
 from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
@@ -59,16 +59,6 @@ def test_vertex_has_its_two_walls(extractor, opening, convex):
         assert (first["first_beam"], second["last_beam"]) == (0, len(angles) - 1)
         assert 1 <= second["first_beam"] - first["last_beam"] <= 4
         assert (features.clusters == 0).all()
-
-
-@pytest.mark.parametrize(("opening", "corners"), [(165, 0), (150, 1)])
-def test_a_shallow_turn_is_a_wall_that_bends(opening, corners):
-    """By 15° with arms of half a metre; by 30° it is a corner."""
-    angles = fan(10)
-    scan = scan_of(noisy(vertex(angles, 3.0, opening, convex=False)), angles)
-    features = AWARE(scan)
-    assert (len(features.corners), len(features.segments)) == (corners, corners + 1)
-    assert (features.segments["misfit"] > 0.01).any() == (corners == 0)
 
 
 @extractors
@@ -201,22 +191,6 @@ def test_bowed_wall_is_one(extractor, waves, amplitude, sigma):
     assert line["covariance"][0, 0] < 0.002**2
 
 
-@extractors
-@pytest.mark.parametrize("behind", [np.nan, np.inf, 5.0])
-def test_doorway_is_not_bridged(extractor, behind):
-    angles = fan(40)
-    door = abs(angles) < math.radians(12)
-    beyond = wall(angles, 5.0, 0.0) if behind == 5.0 else behind
-    ranges = noisy(np.where(door, beyond, wall(angles, 2.0, 0.0)))
-    features = extractor(scan_of(ranges, angles))
-    assert len(features.segments) == (3 if behind == 5.0 else 2)
-    assert features.corners["kind"].tolist() == (["edge"] * 2 if behind == 5.0 else [])
-    for line in features.segments:
-        assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
-    kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
-    assert features.breakpoints["kind"].tolist() == [*kinds, "scan_end", "scan_end"]
-
-
 @pytest.mark.parametrize("beams", [(6, 6), (6, 12), (8, 8), (8, 10), (10, 8), (10, 10)])
 def test_step_of_short_walls_parts_them_wherever_it_is(beams):
     first, n = beams[0], sum(beams)
@@ -336,37 +310,6 @@ def test_drop_outs_do_not_cut_a_wall(extractor):
     assert line["rms"] == pytest.approx(NOISE.sigma, rel=0.2)
 
 
-@pytest.mark.parametrize("max_missing", [0, 3, 6])
-def test_wall_goes_on_over_as_many_missing_beams_as_are_allowed(max_missing):
-    angles, extractor = fan(30), Extractor("optimal", max_missing=max_missing)
-    for missing, pieces in ((max_missing, 1), (max_missing + 1, 2)):
-        ranges = noisy(wall(angles, 2.0, 0.0))
-        ranges[50 : 50 + missing] = np.nan
-        assert len(extractor(scan_of(ranges, angles)).segments) == pieces
-
-
-@extractors
-@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
-def test_wall_ends_at_its_last_measurements(extractor, normal):
-    angles = math.radians(normal) + fan(30)
-    scan = scan_of(noisy(wall(angles, 2.0, normal)), angles)
-    (line,) = extractor(scan).segments
-    direction = [math.cos(line["angle"]), math.sin(line["angle"])]
-    for end, point in ((line["start"], scan.points[0]), (line["end"], scan.points[-1])):
-        assert (end - point) @ direction == pytest.approx(0.0, abs=1e-9)
-        assert np.hypot(*(end - point)) < 4 * NOISE.sigma
-
-
-def test_evidence_is_what_a_corner_must_have():
-    """A faint corner is two walls for who asks for little, one wall for who asks for much."""
-    angles = fan(6)
-    scan = scan_of(noisy(vertex(angles, 3.0, 150, convex=False), 2), angles)
-    (corner,) = Extractor("optimal", evidence=10.0, noise=NOISE)(scan).corners
-    for evidence, corners in ((0.9 * corner["response"], 1), (1.1 * corner["response"], 0)):
-        found = Extractor("optimal", evidence=evidence, noise=NOISE)(scan)
-        assert len(found.corners) == corners
-
-
 # Noise
 
 
@@ -403,18 +346,3 @@ def test_a_room_in_noise_that_grows_with_range_is_closed_too():
         ranges = room(angles, LONG)
         features = UNAWARE(scan_of(ranges * noisy(1.0 + 0.0 * ranges, seed), angles))
         assert len(features.segments) == len(features.corners) == 4, seed
-
-
-def test_noise_is_no_more_than_a_sensor_has():
-    ranges = np.random.default_rng(1).uniform(1.0, 9.0, 500)
-    noise = UNAWARE(scan_of(ranges, full_circle(500))).noise
-    assert math.hypot(noise.sigma, noise.proportional * ranges.max()) <= 0.1 + 1e-9
-
-
-def test_a_given_noise_is_that_of_the_covariances():
-    angles = fan(20)
-    scan = scan_of(noisy(wall(angles, 2.0, 0.0), sigma=0.001), angles)
-    one, two = (
-        Extractor("optimal", noise=RangeNoise(sigma=s))(scan).segments for s in (0.01, 0.02)
-    )
-    np.testing.assert_allclose(two["covariance"], 4 * one["covariance"], rtol=1e-6)

@@ -3,7 +3,7 @@
 import math
 import re
 import xml.etree.ElementTree as ET
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import ezdxf
 import numpy as np
@@ -12,7 +12,7 @@ from handmade import arc, corner, features, segment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lineament import Extractor, LaserScan, LineamentError, open_log
+from lineament import LaserScan, LineamentError
 from lineament.output import open_writer
 from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR
 from lineament.output.floor_plan import Averages, FloorPlan
@@ -20,6 +20,7 @@ from lineament.output.markers import arc_span, ellipses_of, markers_of
 from lineament.output.scene import Layer, layers_of
 
 SVG = "{http://www.w3.org/2000/svg}"
+WALL = (0, 0), (4, 0)
 
 
 def line(start, end, sigma=(0.002, 0.002)):
@@ -27,42 +28,57 @@ def line(start, end, sigma=(0.002, 0.002)):
 
 
 def plan_of(*scans):
+    """Plan of scans, each a list of segments or of their ends."""
     plan = FloorPlan()
-    for segments in scans:
-        plan.add(features(segments=segments))
+    for scan in scans:
+        plan.add(features(segments=[line(*s) if isinstance(s, tuple) else s for s in scan]))
     return plan
-
-
-def walls_of(*scans, min_views=1):
-    walls = plan_of(*scans).walls(min_views)
-    return [(*w["start"].round(3).tolist(), *w["end"].round(3).tolist(), w["views"]) for w in walls]
 
 
 def turned(angle):
     return np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
 
 
-def test_overlapping_views_are_one_wall_with_its_views():
-    scans = [[line((0, 1), (2, 1))], [line((1, 1), (3, 1))], [line((3.1, 1), (4, 1))]]
-    # 1 m once, 1 m twice, 1 m once; the third is not seen to touch, but is near: one line.
-    first, second = walls_of(*scans)
-    assert first == (0, 1, 3, 1, pytest.approx(4 / 3))
-    assert second == (3.1, 1, 4, 1, 1)
-    assert len(plan_of(*scans)._walls) == 1
-    assert walls_of(*scans, min_views=2) == [(1, 1, 2, 1, 2)]
-    assert walls_of(*scans, min_views=3) == []
+# 1 m once, 1 m twice, 1 m once; the third is not seen to touch, but is near: one line.
+OVERLAPPING = [((0, 1), (2, 1))], [((1, 1), (3, 1))], [((3.1, 1), (4, 1))]
+OPEN, SHUT = [((0, 0), (2, 0)), ((3, 0), (5, 0))], [((0, 0), (5, 0))]
+BAD = [
+    line(*WALL, sigma=(0.06, 0.001)),
+    line(*WALL, sigma=(0.001, 0.03)),  # 6 cm at its ends
+    *(((0, 2), (0.1, 2)), ((0, 3), (2000, 3)), ((0, 4), (np.nan, 4)), ((1e300, 5), (1e300, 8))),
+]
+X, Y = 448_000, 5_412_000  # UTM
 
 
-def test_doorway_stays_open_though_the_door_was_shut_once():
-    open_door = [line((0, 0), (2, 0)), line((3, 0), (5, 0))]
-    shut = [line((0, 0), (5, 0))]
-    walls = walls_of(open_door, open_door, shut, open_door, min_views=2)
-    assert walls == [(0, 0, 2, 0, 4), (3, 0, 5, 0, 4)]
-
-
-def test_both_faces_of_a_partition_stay_apart():
-    walls = walls_of([line((0, 0), (4, 0))], [line((4, 0.04), (0, 0.04))])
-    assert walls == [(0, 0, 4, 0, 1), (4, 0.04, 0, 0.04, 1)]
+@pytest.mark.parametrize(
+    ("scans", "least", "walls"),
+    [
+        (OVERLAPPING, 1, [(0, 1, 3, 1, 4 / 3), (3.1, 1, 4, 1, 1)]),
+        (OVERLAPPING, 2, [(1, 1, 2, 1, 2)]),
+        (OVERLAPPING, 3, []),
+        # A door that was shut once stays open.
+        ((OPEN, OPEN, SHUT, OPEN), 2, [(0, 0, 2, 0, 4), (3, 0, 5, 0, 4)]),
+        # Both faces of a partition.
+        (([WALL], [((4, 0.04), (0, 0.04))]), 1, [(0, 0, 4, 0, 1), (4, 0.04, 0, 0.04, 1)]),
+        # The line goes through all metres seen: the mean of 0, 0 and 0.03 is 0.01.
+        (([WALL], [WALL], [((0, 0.03), (4, 0.03))]), 1, [(0, 0.01, 4, 0.01, 3)]),
+        # Copies, 12 cm apart: 6 cm about the middle line, more than the 5 that a wall may spread;
+        # where one was seen ten times, the line lies near it.
+        (([WALL], [((0, 0.12), (4, 0.12))]), 1, [(0, 0, 4, 0, 1), (0, 0.12, 4, 0.12, 1)]),
+        (([WALL],) * 10 + ([((0, 0.12), (4, 0.12))],), 1, [(0, 0.0109, 4, 0.0109, 11)]),
+        # A gap of a cell is rounding.
+        (([((0, 0), (2, 0))], [((2.05, 0), (4, 0))]), 1, [(0, 0, 4, 0, 0.9875)]),
+        (([((0, 0), (2, 0))], [((2.1, 0), (4, 0))]), 1, [(0, 0, 2, 0, 1), (2.1, 0, 4, 0, 1)]),
+        # Uncertain, short and impossible segments are left out, and short pieces.
+        ((BAD,), 1, []),
+        (([*BAD, ((0, 6), (4, 6)), ((4, 6), (4.15, 6))],), 1, [(0, 6, 4, 6, 1)]),
+        (([((X, Y), (X + 3, Y))], [((X + 2, Y), (X + 4, Y))]), 1, [(X, Y, X + 4, Y, 1.25)]),
+    ],
+)
+def test_walls(scans, least, walls):
+    found = plan_of(*scans).walls(least)
+    rows = np.column_stack((found["start"], found["end"], found["views"]))
+    np.testing.assert_allclose(rows, np.reshape(walls, (-1, 5)), rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -70,9 +86,12 @@ def test_both_faces_of_a_partition_stay_apart():
     [
         (((0, 0.04), (4, 0.04)), 1),  # on the line
         (((1, 0.04), (2, 0.04)), 1),
-        (((4.15, 0), (6, 0)), 1),  # touches
+        (((4.1, 0), (5, 0)), 1),  # near
+        (((4.15, 0), (6, 0)), 1),
         (((4.25, 0), (6, 0)), 2),
         (((0, 0.0), (4, 0.2)), 2),  # turned by 2.9 degrees
+        # The same of a short one; three deviations of its angle are 3.4.
+        (segment((1, 0.0), (2, 0.05), 0, 9, sigma=(0.002, 0.02)), 1),
         (((0, 0.09), (4, 0.09)), 1),  # a copy that the poses have moved
         (((4.1, 0.1), (8, 0.1)), 2),  # beside it stands nothing: another wall
         (((2.5, 0.09), (6, 0.09)), 2),  # less than half of it
@@ -82,63 +101,18 @@ def test_both_faces_of_a_partition_stay_apart():
     ],
 )
 def test_what_is_one_wall(other, count):
-    plan = plan_of([line((0, 0), (4, 0))], [line(*other)])
+    plan = plan_of([WALL], [other, ((-20, -20), (-20, 24))])
     plan.walls()
-    assert len(plan._walls) == count
+    assert len(plan._walls) == count + 1
 
 
-def test_uncertain_direction_joins_a_wall_that_is_turned():
-    # By 2.9 degrees; three deviations of its angle are 3.4.
-    short = segment((1, 0.0), (2, 0.05), 0, 9, sigma=(0.002, 0.02))
-    assert len(plan_of([line((0, 0), (4, 0))], [short])._walls) == 1
-
-
-def test_copies_are_one_wall_only_if_all_that_was_seen_lies_on_one_line():
-    # 12 cm apart: 6 cm about the middle line, more than the 5 that one wall may spread.
-    assert len(walls_of([line((0, 0), (4, 0))], [line((0, 0.12), (4, 0.12))])) == 2
-    # Of one seen ten times and one seen once, the line lies near the first.
-    often = [[line((0, 0), (4, 0))]] * 10
-    (wall,) = walls_of(*often, [line((0, 0.12), (4, 0.12))])
-    assert wall == (0, pytest.approx(0.011, abs=1e-3), 4, pytest.approx(0.011, abs=1e-3), 11)
-
-
-def test_line_goes_through_all_metres_seen():
-    # Two views of 3 m at y = 0 and one of 3 m at y = 0.03: the mean is 0.01.
-    wall = [line((0, 0), (3, 0))]
-    assert walls_of(wall, wall, [line((0, 0.03), (3, 0.03))]) == [(0, 0.01, 3, 0.01, 3)]
-    # By definition: the main axis of points spread evenly over what was seen.
+def test_line_is_the_main_axis_of_points_spread_over_what_was_seen():
     views = [((0, 0), (4, 0)), ((0, 0.04), (1, 0.03)), ((3, -0.03), (5, 0.01))]
-    (found,) = plan_of(*([line(*view)] for view in views)).walls()
+    (found,) = plan_of(*([view] for view in views)).walls()
     points = np.vstack([np.linspace(*view, int(1e4 * math.dist(*view))) for view in views])
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     for end in ("start", "end"):
         assert (found[end] - points.mean(axis=0)) @ axes[1] == pytest.approx(0, abs=1e-5)
-
-
-@pytest.mark.parametrize(("start", "pieces"), [(2.05, 1), (2.1, 2)])
-def test_a_gap_of_a_cell_is_rounding(start, pieces):
-    assert len(walls_of([line((0, 0), (2, 0))], [line((start, 0), (4, 0))])) == pieces
-
-
-def test_uncertain_short_or_impossible_segments_are_left_out():
-    bad = [
-        line((0, 0), (4, 0), sigma=(0.06, 0.001)),
-        line((0, 1), (4, 1), sigma=(0.001, 0.03)),  # 6 cm at its ends
-        line((0, 2), (0.1, 2)),
-        line((0, 3), (2000, 3)),
-        line((0, 4), (np.nan, 4)),
-        line((1e300, 5), (1e300, 8)),
-    ]
-    assert walls_of(bad) == []
-    assert walls_of([*bad, line((0, 6), (4, 6)), line((4, 6), (4.15, 6))]) == [(0, 6, 4, 6, 1)]
-
-
-def test_plan_far_from_its_origin_is_as_good():
-    x, y = 448_000.0, 5_412_000.0  # UTM
-    scans = [[line((x, y), (x + 3, y + 0.01))], [line((x + 2, y), (x + 4, y))]]
-    (wall,) = plan_of(*scans).walls()
-    assert wall["start"] == pytest.approx((x, y), abs=0.02)
-    assert wall["end"] == pytest.approx((x + 4, y), abs=0.02)
 
 
 @settings(max_examples=10)
@@ -146,20 +120,20 @@ def test_plan_far_from_its_origin_is_as_good():
 def test_many_noisy_views_give_the_room(seed):
     rng = np.random.default_rng(seed)
     room = np.array([(0, 0), (5, 0), (5, 4), (0, 4), (0, 0)]) @ turned(rng.uniform(0, 6))
+    sides = [
+        (a, b - a, turned(-math.pi / 2) @ (b - a) / math.dist(a, b)) for a, b in pairwise(room)
+    ]
     plan = FloorPlan()
     for _ in range(30):
         seen = []
-        for a, b in pairwise(room):
-            normal = np.array([a[1] - b[1], b[0] - a[0]]) / math.dist(a, b)
+        for start, way, normal in sides:
             along, across = np.sort(rng.uniform(0, 1, 2)), rng.normal(0, 0.008, 2)
-            ends = a + along[:, None] * (b - a) + across[:, None] * normal
-            seen.append(line(*ends))
+            seen.append(line(*start + along[:, None] * way + across[:, None] * normal))
         plan.add(features(segments=seen))
     plan.walls()
     main = sorted(plan._walls, key=lambda wall: -wall.length)[:4]
-    for a, b in pairwise(room):
-        normal = np.array([a[1] - b[1], b[0] - a[0]]) / math.dist(a, b)
-        assert min(np.abs((wall.ends() - a) @ normal).max() for wall in main) < 0.03
+    for start, _, normal in sides:
+        assert min(np.abs((wall.ends() - start) @ normal).max() for wall in main) < 0.03
     assert sum(wall.length for wall in main) > 0.9 * sum(wall.length for wall in plan._walls)
 
 
@@ -175,21 +149,18 @@ def test_plans_are_bounded(monkeypatch):
     np.testing.assert_allclose(plan._corners.seen(299), [(0, 0)])
 
 
-def test_edges_stay_apart_from_corners():
+def test_averages_join_what_is_near_and_edges_stay_apart_from_corners():
+    means = Averages(2, 0.1)
+    means.add(np.array([(0, 0), (1, 0), (np.nan, 0), (1e300, 0)]))
+    means.add(np.array([(0.06, 0), (1.2, 0)]))
+    np.testing.assert_allclose(means.seen(1), [(0.03, 0), (1, 0), (1.2, 0)])
+    np.testing.assert_allclose(means.seen(2), [(0.03, 0)])
     plan = FloorPlan()
     for shift in (0.0, 0.02):
         plan.add(features(corners=[corner(shift, 1), corner(0.05, 1 + shift, kind="edge")]))
     markers, _ = plan.markers(min_views=2)
     np.testing.assert_allclose(markers.corners, [(0.01, 1)])
     np.testing.assert_allclose(markers.edges, [(0.05, 1.01)])
-
-
-def test_averages_join_what_is_near():
-    means = Averages(2, 0.1)
-    means.add(np.array([(0, 0), (1, 0), (np.nan, 0), (1e300, 0)]))
-    means.add(np.array([(0.06, 0), (1.2, 0)]))
-    np.testing.assert_allclose(means.seen(1), [(0.03, 0), (1, 0), (1.2, 0)])
-    np.testing.assert_allclose(means.seen(2), [(0.03, 0)])
 
 
 # Files.
@@ -395,17 +366,6 @@ def test_odd_features_are_drawn_or_left_out(target):
     assert [float(ratio) for ratio in ratios] == [1e-6, 1] * (target.suffix == ".dxf")
 
 
-@pytest.mark.slow
-def test_floor_plan_of_a_recording(tmp_path, data_dir):
-    log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
-    extractor = Extractor("optimal")
-    write(tmp_path / "a.dxf", *((extractor(scan), scan) for scan in islice(log, 300)))
-    walls = shapes(tmp_path / "a.dxf")["walls"]
-    lengths = [math.dist(wall[:2], wall[2:4]) for wall in walls]
-    assert 100 < len(lengths) < 500  # of some 3000 segments
-    assert max(lengths) > 5
-
-
 # Marks, as the plain ways of numpy have them.
 
 
@@ -414,26 +374,24 @@ def test_ellipses_are_those_of_the_eigenvectors(seed):
     rng = np.random.default_rng(seed)
     roots = rng.normal(size=(6, 2, 2)) * 10.0 ** rng.uniform(-6, 1, (6, 1, 1))
     covariances = roots @ roots.swapaxes(1, 2)
-    _, _, longer, shorter, direction = ellipses_of(np.zeros((6, 2)), covariances, 0.5).T
-    variances, axes = np.linalg.eigh(covariances)
-    scale = -2 * math.log(0.5)
-    np.testing.assert_allclose(longer**2, scale * variances[:, 1], rtol=1e-12)
+    _, _, *axes, direction = ellipses_of(np.zeros((6, 2)), covariances, 0.5).T
+    # They are R diag(a², b²) Rᵀ.
+    turns = np.array([turned(-angle) for angle in direction])
+    scaled = turns * np.square(axes).T[:, None] / (-2 * math.log(0.5))
+    sizes = np.trace(covariances, axis1=1, axis2=2)[:, None, None]
     np.testing.assert_allclose(
-        shorter**2 / longer**2, variances[:, 0] / variances[:, 1], atol=1e-14
+        scaled @ turns.swapaxes(1, 2) / sizes, covariances / sizes, atol=1e-12
     )
-    along = np.abs(np.cos(direction) * axes[:, 0, 1] + np.sin(direction) * axes[:, 1, 1])
-    np.testing.assert_allclose(along, 1, rtol=1e-9)
+    assert (axes[0] >= axes[1]).all()
     assert ((direction >= 0) & (direction <= math.pi)).all()
 
 
 def test_ellipses_of_covariances_that_are_none():
-    flat, round_, nowhere = np.diag([4.0, 0.0]), np.eye(2), np.full((2, 2), np.nan)
-    impossible = np.diag([1.0, -1.0])
-    found = ellipses_of(np.zeros((4, 2)), np.stack([flat, round_, nowhere, impossible]), 0.5)
+    nowhere, impossible = np.full((2, 2), np.nan), np.diag([1.0, -1.0])
+    given = np.stack([np.diag([4.0, 0.0]), np.eye(2), nowhere, impossible])
     size = math.sqrt(-2 * math.log(0.5))
-    np.testing.assert_allclose(found[0], [0, 0, 2 * size, 0, 0])
-    np.testing.assert_allclose(found[1, 2:4], size)
-    np.testing.assert_allclose(found[2, 2:4], [size, 0])
+    expected = [[2 * size, 0], [size, size], [size, 0]]
+    np.testing.assert_allclose(ellipses_of(np.zeros((4, 2)), given, 0.5)[:, 2:4], expected)
     assert ellipses_of(np.zeros((0, 2)), np.zeros((0, 2, 2))).shape == (0, 5)
 
 
@@ -457,22 +415,24 @@ def test_edges_are_marks_of_their_own():
     found = features(corners=[corner(k, 1, kind=kind) for k, kind in enumerate(kinds)])
     found.corners["position"][3] = np.nan
     markers = markers_of(found)
-    assert markers.corners.tolist() == [[0, 1], [2, 1]]
-    assert markers.edges.tolist() == [[1, 1]]
+    assert markers.points.tolist() == [[0, 1], [2, 1], [1, 1]]
     assert markers.ellipses[:, 0].tolist() == [0, 1, 2]
-    assert [1, 1] in markers.points.tolist()
     layers = {layer.name: layer for layer in layers_of(markers)}
     corners, edges = layers["corners"], layers["edges"]
-    assert edges.points.tolist() == [[1, 1]]
-    assert edges.size < corners.size
+    assert (corners.points.tolist(), edges.points.tolist()) == ([[0, 1], [2, 1]], [[1, 1]])
     assert min(edges.color) > min(corners.color)  # lighter
+    assert [layer.size for layer in layers.values()] == [0.03, 0.03, 0.08, 0.05, 0.01]
+    assert layers["segments"].color == (0.16, 0.47, 0.84, 1.0)
 
 
 def test_pieces_of_strips_are_the_same_in_one_array():
     strips = np.arange(12.0).reshape(2, 3, 2)
     expected = [[0, 1], [2, 3], [2, 3], [4, 5], [6, 7], [8, 9], [8, 9], [10, 11]]
-    for given_strips in (strips, list(strips)):
-        layer = Layer("a", (0, 0, 0, 1), 0.1, given_strips, np.zeros((0, 2)))
-        assert layer.pairs.tolist() == expected
-    for nothing in (strips[:0], []):
-        assert Layer("a", (0, 0, 0, 1), 0.1, nothing, np.zeros((0, 2))).pairs.shape == (0, 2)
+    for given_strips, pairs in (
+        (strips, expected),
+        (list(strips), expected),
+        (strips[:0], []),
+        ([], []),
+    ):
+        found = Layer("a", (0, 0, 0, 1), 0.1, given_strips).pairs
+        np.testing.assert_array_equal(found, np.reshape(pairs, (-1, 2)))

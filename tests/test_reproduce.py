@@ -297,17 +297,22 @@ class TestVerdicts:
         assert self.judged(numbers)["Figure 5"][1] == "does not"
 
     @pytest.mark.parametrize(
-        ("at_paper", "elsewhere", "word"),
-        [(0.9, 0.8, "holds"), (Spread([0.9, 0.7]), 0.8, "in part"), (0.0, 0.1, "does not")],
+        ("at_paper", "other_reading", "word", "alike"),
+        [
+            (0.79, 0.8, "holds", "2"),
+            (0.79, 0.7, "in part", "1"),
+            (Spread([0.9, 0.7]), 0.7, "in part", "0 (0–1)"),
+            (0.0, 0.0, "does not", "0"),
+        ],
     )
-    def test_figure_9_is_where_the_largest_is(self, at_paper, elsewhere, word):
+    def test_figure_9_is_judged_for_each_reading(self, at_paper, other_reading, word, alike):
         grid = [
-            {"response": "tangent", "support_radius": r, "threshold": t, "of_actual": ar}
-            for r, t, ar in ((6, 0.66, at_paper), (5, 0.66, elsewhere), (6, 0.5, 0), (5, 0.5, 1))
+            {"response": "r", "half_width": h, "support_radius": r, "threshold": t, "of_actual": ar}
+            for h, here in ((2, at_paper), (8, other_reading))
+            for r, t, ar in ((6, 0.66, here), (5, 0.66, 0.8), (6, 0.5, 0), (5, 0.5, 1))
         ]
-        numbers = {"repetition": {"grid": grid, "best": grid[3]}}
-        here, found = self.judged(numbers)["Figure 9"]
-        assert here == "Largest at radius 5, threshold 0.50, form tangent"
+        here, found = self.judged({"repetition": {"grid": grid}})["Figure 9"]
+        assert f"in {alike} of 2 readings" in here
         assert found == word
 
     @pytest.mark.parametrize(
@@ -338,6 +343,7 @@ class TestVerdicts:
                     "liu:paper, paper’s numbers": of(0, 0.1, 3.0),
                     "liu:paper, best of Figure 9": of(0, 0.7, 9.0),
                     "iepf:paper": of(0, 0.6, 4.0),
+                    "iepf:paper, in clusters": of(0, 0.6, 4.0),
                 }
             }
         )

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lineament import LaserScan
 from lineament.rosmsg import definitions
-from lineament.rosmsg.poses import Odometry, odometry, stamped_poses
+from lineament.rosmsg.poses import Odometry, odometry
 from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
 from lineament.rosmsg.wire import WireReader, WireWriter
 
@@ -35,7 +35,7 @@ def packed(encoding, *fields):
 
 
 TABLE = np.arange(6, dtype="<f4").reshape(2, 3)
-ONE = b"\0\0\0\0\0\0\xf0\x3f"
+ONE, MINUS = b"\0\0\0\0\0\0\xf0\x3f", b"\xff\xff\xff\xff"
 BYTE = ("numbers", "B", 7)
 
 
@@ -45,11 +45,7 @@ BYTE = ("numbers", "B", 7)
         # Numbers are aligned to their size in CDR.
         ([BYTE, ("numbers", "d", 1.0)], b"\7" + bytes(7) + ONE, b"\7" + ONE),
         ([BYTE, ("numbers", "I", 2)], b"\7\0\0\0\2\0\0\0", b"\7\2\0\0\0"),
-        (
-            [("numbers", "iI", -1, 2), BYTE],
-            b"\xff" * 4 + b"\2\0\0\0\7",
-            b"\xff" * 4 + b"\2\0\0\0\7",
-        ),
+        ([("numbers", "iI", -1, 2), BYTE], MINUS + b"\2\0\0\0\7", MINUS + b"\2\0\0\0\7"),
         # Strings end with a null byte that counts in CDR; half of a pair is no character.
         ([("text", "hé")], b"\4\0\0\0h\xc3\xa9\0", b"\3\0\0\0h\xc3\xa9"),
         ([("text", "")], b"\1\0\0\0\0", bytes(4)),
@@ -128,9 +124,8 @@ def test_definitions_are_those_of_rosbags(ros):
 
 
 def assert_same(scan: LaserScan, expected: LaserScan) -> None:
-    for name in ("angle_min", "angle_increment", "range_min", "range_max", "stamp", "frame_id"):
-        assert getattr(scan, name) == getattr(expected, name), name
-    for name in ("scan_time", "time_increment", "is_regular", "pose"):
+    names = "angle_min angle_increment range_min range_max stamp frame_id scan_time time_increment"
+    for name in (*names.split(), "is_regular", "pose"):
         assert getattr(scan, name) == getattr(expected, name), name
     np.testing.assert_array_equal(scan.ranges, expected.ranges)
     np.testing.assert_equal(scan.intensities, expected.intensities)
@@ -145,40 +140,32 @@ def test_laser_scan_is_what_rosbags_makes_of_it(
     intensities = ranges[::-1] if has_intensities else ()
     fields = {"time_increment": 1e-5, "scan_time": 0.1}
     message = ros_bags.Messages(ros).scan(stamp + 0.25, ranges, intensities, frame, **fields)
-    data = ros_bags.serialized(message, ros)
-    types = ros_bags.store(ros)
+    data, kind, types = ros_bags.serialized(message, ros), message.__msgtype__, ros_bags.store(ros)
     read = types.deserialize_ros1 if ros == 1 else types.deserialize_cdr
-    expected = LaserScan.from_message(read(data, message.__msgtype__))
+    expected = LaserScan.from_message(read(data, kind))
     assert_same(laser_scan(data, encoding), expected)
     assert_same(laser_scan(memoryview(data), encoding), expected)
-
-
-def test_cdr_of_the_other_byte_order():
-    message = ros_bags.Messages(2).scan(7.5, [1.0, math.inf, 3.0], [9.0, 8.0, 7.0])
-    little, big = (
-        bytes(
-            ros_bags.store(2).serialize_cdr(message, message.__msgtype__, little_endian=is_little)
-        )
-        for is_little in (True, False)
-    )
-    assert little[:2] != big[:2]
-    assert_same(laser_scan(big, "cdr"), laser_scan(little, "cdr"))
+    if ros == 2:
+        big = bytes(types.serialize_cdr(message, kind, little_endian=False))
+        assert big[:2] != data[:2]
+        assert_same(laser_scan(big, encoding), expected)
 
 
 @both
 def test_a_scanner_that_turns_clockwise(ros, encoding):
-    fields = {"angle_min": 1.0, "angle_increment": -0.5, "time_increment": 0.25}
-    message = ros_bags.Messages(ros).scan(10.0, [1.0, 2.0, 4.0], [10.0, 20.0, 40.0], **fields)
-    scan = laser_scan(ros_bags.serialized(message, ros), encoding)
+    def read(*beams):
+        fields = {"angle_min": 1.0, "angle_increment": -0.5, "time_increment": 0.25}
+        message = ros_bags.Messages(ros).scan(10.0, *beams, **fields)
+        return laser_scan(ros_bags.serialized(message, ros), encoding)
+
+    scan = read([1.0, 2.0, 4.0], [10.0, 20.0, 40.0])
     assert scan.ranges.tolist() == [4.0, 2.0, 1.0]
     assert scan.intensities.tolist() == [40.0, 20.0, 10.0]
     assert scan.angles.tolist() == [0.0, 0.5, 1.0]
     # The beam at bearing 1 is the first in time: 10 s.
     assert (scan.stamp, scan.time_increment) == (10.5, -0.25)
-    message = ros_bags.Messages(ros).scan(10.0, [1.0, 2.0], **fields)
-    assert laser_scan(ros_bags.serialized(message, ros), encoding).ranges.tolist() == [2.0, 1.0]
-    message = ros_bags.Messages(ros).scan(10.0, [1.0], **fields)
-    assert laser_scan(ros_bags.serialized(message, ros), encoding).time_increment == 0.25
+    assert read([1.0, 2.0]).ranges.tolist() == [2.0, 1.0]
+    assert read([1.0]).time_increment == 0.25
 
 
 def scan_bytes(ranges=(1.0, 2.0), **fields):
@@ -189,12 +176,7 @@ def scan_bytes(ranges=(1.0, 2.0), **fields):
     ("fields", "problem"),
     [
         ({"ranges": []}, "ranges is empty, expected at least one beam"),
-        ({"angle_increment": math.nan}, "angle_increment is nan"),
         ({"angle_increment": 0.0}, "angle_increment is 0.0, expected > 0"),
-        ({"angle_min": math.inf}, "angle_min is inf"),
-        ({"angle_increment": 10.0}, "more than once around"),
-        ({"range_min": -1.0}, "range_min is -1.0"),
-        ({"range_max": math.nan}, "range_max is nan"),
         ({"intensities": [1.0]}, "intensities has 1 values, expected 2"),
     ],
 )
@@ -336,6 +318,7 @@ def test_ring_of_a_cloud(ros, encoding, order):
         ]],
         dtype=[(n, order + "f4") for n in ("x", "y", "z", "intensity")] + [("ring", order + "u2")],
     )  # fmt: skip
+    points["x"].view(order + "u4")[0, 4] = 0x7F800001  # a NaN that the processor signals
     data = cloud(points, ros, order == ">")
     scan = ring_scan(data, encoding, 1)
     np.testing.assert_allclose(scan.angles, [-0.75 * math.pi, 0.0, 0.5 * math.pi])
@@ -371,50 +354,30 @@ def test_clouds_without_what_is_needed():
         ring_scan(cloud(points[["ring"]]), "cdr", 1)
     with pytest.raises(ValueError, match="has 0 bytes in 1 rows"):
         ring_scan(cloud(points[:, :0]), "cdr", 1)
-    message = ros_bags.Messages(2).cloud(3.5, points)
     for name, value, problem in (
         ("offset", 6, "field y reaches past the 9 bytes of a point"),
         ("datatype", 9, "field y has type 9, expected 1 to 8"),
         ("datatype", 0, "field y has type 0, expected 1 to 8"),
     ):
-        good = getattr(message.fields[2], name)
+        message = ros_bags.Messages(2).cloud(3.5, points)
         object.__setattr__(message.fields[2], name, value)
         with pytest.raises(ValueError, match=problem):
             ring_scan(ros_bags.serialized(message, 2), "cdr", 1)
-        object.__setattr__(message.fields[2], name, good)
 
 
 # --- poses
 
 
 @both
-def test_poses_of_all_types(ros, encoding):
-    messages = ros_bags.Messages(ros)
-    for kind, maker, frame, child in (
-        ("geometry_msgs/PoseStamped", messages.pose_stamped, "map", ""),
-        ("geometry_msgs/PoseWithCovarianceStamped", messages.pose_with_covariance, "map", ""),
-        ("nav_msgs/Odometry", messages.odometry, "odom", "base_link"),
-    ):
-        data = ros_bags.serialized(maker(7.5, 1.0, 2.0, -3.0), ros)
-        (found,) = stamped_poses(data, encoding, kind)
-        assert found[:3] == (7.5, frame, child)
-        assert found.pose == pytest.approx((1.0, 2.0, -3.0))
-    links = [messages.transform(i, "a", f"b{i}", i, 0.0, 0.5) for i in range(3)]
-    data = ros_bags.serialized(messages.transforms(*links), ros)
-    found = list(stamped_poses(data, encoding, "tf2_msgs/TFMessage"))
-    assert [link[:3] for link in found] == [(i, "a", f"b{i}") for i in range(3)]
-    assert [link.pose for link in found] == [pytest.approx((i, 0.0, 0.5)) for i in range(3)]
-
-
-@both
 def test_odometry(ros, encoding):
-    messages = ros_bags.Messages(ros)
-    found = odometry(ros_bags.serialized(messages.odometry(7.5, 1.0, 2.0, 3.0), ros), encoding)
+    def written(x):
+        return ros_bags.serialized(ros_bags.Messages(ros).odometry(7.5, x, 2.0, 3.0), ros)
+
     pose = pytest.approx((1.0, 2.0, 3.0))
+    found = odometry(written(1.0), encoding)
     assert found == Odometry(7.5, (1.5, -0.5, 0.25), pose, "odom", "base_link")
-    data = ros_bags.serialized(messages.odometry(7.5, 1.0, 2.0, 3.0), ros)
     with pytest.raises(ValueError, match="has 4 bytes behind its last field"):
-        odometry(data + bytes(4), encoding)
+        odometry(written(1.0) + bytes(4), encoding)
     for x in (math.nan, -math.inf):
         with pytest.raises(ValueError, match=r"has pose .* and twist .*, expected finite numbers"):
-            odometry(ros_bags.serialized(messages.odometry(7.5, x, 2.0, 3.0), ros), encoding)
+            odometry(written(x), encoding)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lineament as ln
-from lineament.features import BREAKPOINT, TABLES, FeatureBatch, Features
+from lineament.features import TABLES, FeatureBatch, Features
 from lineament.features.tables import SCHEMA, batch_table, features_table
 
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
@@ -33,23 +33,8 @@ def random_features(seed: int, n_beams: int = 40, counts=(3, 2, 1, 2), **fields)
     return Features(**tables, clusters=clusters, stamp=0.1 * seed, **fields)
 
 
-def with_clusters(labels: list[int], *, ends: bool = False) -> Features:
-    features = random_features(0, counts=(0, 0, 0, 0))
-    if ends:
-        features.breakpoints = np.zeros(2, BREAKPOINT)
-        features.breakpoints["kind"] = "scan_end"
-    features.clusters = np.array(labels, dtype=np.int32)
-    return features
-
-
-def cluster_rows(*scans: Features) -> list[tuple[int, int, int, int, int]]:
-    rows = features_table(scans).to_pylist()
-    names = ("scan", "index", "first_beam", "last_beam", "n_points")
-    return [tuple(r[n] for n in names) for r in rows if r["kind"] == "cluster"]
-
-
 def naive_rows(scans: list[Features], first_scan: int) -> list[dict]:
-    """Make the rows of everything but clusters, one at a time."""
+    """Make the rows one at a time."""
     pairs = {"start": "start_x start_y", "end": "end_x end_y", "beam": "first_beam last_beam"}
     pairs |= dict.fromkeys(("centroid", "position", "center"), "x y")
     pairs |= {"segments": "segment_before segment_after"}
@@ -70,6 +55,24 @@ def naive_rows(scans: list[Features], first_scan: int) -> list[dict]:
                     else:
                         row[key] = value
                 rows.append(row)
+        rows += naive_clusters(i, features)
+    return rows
+
+
+def naive_clusters(scan: int, features: Features) -> list[dict]:
+    """Make the rows of clusters: each begins behind the largest hole in it, that of the seam first.
+
+    Nothing lies over the seam of a scan with ends.
+    """
+    labels, rows = features.clusters, []
+    for label in sorted({*labels.tolist()} - {-1}):
+        beams = np.flatnonzero(labels == label)
+        holes = np.diff(beams, append=beams[0] + len(labels))
+        is_open = "scan_end" in features.breakpoints["kind"] or holes[-1] == holes.max()
+        last = -1 if is_open else int(holes.argmax())
+        ends = {"first_beam": int(beams[last + 1]), "last_beam": int(beams[last])}
+        row = {"scan": scan, "stamp": features.stamp, "kind": "cluster", "index": label}
+        rows.append(dict.fromkeys(SCHEMA.names) | row | ends | {"n_points": len(beams)})
     return rows
 
 
@@ -79,16 +82,29 @@ def test_rows_equal_those_of_the_slow_twin():
         random_features(2, n_beams=7, counts=(0, 0, 0, 0)),
         random_features(3, n_beams=0, counts=(2, 0, 4, 1)),
         random_features(4, n_beams=90, counts=(1, 5, 0, 0)),
+        random_features(5, n_beams=1, counts=(0, 0, 0, 0)),
     ]
     table = features_table(scans, first_scan=1000)
-    rows = table.to_pylist()
-    assert [r for r in rows if r["kind"] != "cluster"] == naive_rows(scans, 1000)
-    assert table["scan"].to_pylist() == sorted(table["scan"].to_pylist())
-    order = ["segment", "corner", "arc", "breakpoint", "cluster"]
-    kinds = [order.index(r["kind"]) for r in rows if r["scan"] == 1000]
-    assert kinds == sorted(kinds)
+    assert table.to_pylist() == naive_rows(scans, 1000)
     assert table.schema.equals(SCHEMA)
     table.validate(full=True)
+    for nothing in ([], [random_features(0, n_beams=0, counts=(0, 0, 0, 0))]):
+        assert features_table(nothing).num_rows == 0
+        assert features_table(nothing).schema.equals(SCHEMA)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clusters_lie_over_the_seam_of_scans_without_ends(seed):
+    rng = np.random.default_rng(seed)
+    scans = [random_features(k, counts=(0, 0, 0, k % 3)) for k in range(20)]
+    for scan in scans:
+        # Few labels, with gaps between them, in runs or beam by beam.
+        labels = rng.choice([-1, -1, 0, 1, 3], rng.integers(0, 12))
+        scan.clusters = np.repeat(labels, rng.integers(1, 4)).astype(np.int32)
+        scan.breakpoints["kind"] = rng.choice(["jump", "scan_end"])
+    rows = [row for k, scan in enumerate(scans) for row in naive_clusters(k, scan)]
+    found = features_table(scans).to_pylist()
+    assert [row for row in found if row["kind"] == "cluster"] == rows
 
 
 def test_batch_gives_the_same_table_as_its_scans():
@@ -110,54 +126,6 @@ def test_batch_gives_the_same_table_as_its_scans():
     assert features_table(views).equals(features_table(scans))
 
 
-def test_empty_inputs():
-    for table in (features_table([]), features_table([with_clusters([])])):
-        assert table.num_rows == 0
-        assert table.schema.equals(SCHEMA)
-    assert cluster_rows(with_clusters([-1, -1])) == []
-
-
-def test_clusters_are_spans_of_beams():
-    assert cluster_rows(with_clusters([-1, 0, 0, -1, 0, 1, 1, -1])) == [
-        (0, 0, 1, 4, 3),
-        (0, 1, 5, 6, 2),
-    ]
-
-
-@pytest.mark.parametrize(
-    ("labels", "expected"),
-    [
-        ([0, 0, -1, 1, 1, 1, 0, 0], [(0, 0, 6, 1, 4), (0, 1, 3, 5, 3)]),
-        ([0, -1, -1, -1, 0, -1, 0, -1], [(0, 0, 4, 0, 3)]),
-        ([-1, 0, 0, -1, -1, -1, 0, 0], [(0, 0, 6, 2, 4)]),
-        ([0, 0, 0, 0], [(0, 0, 0, 3, 4)]),
-        ([2, -1, 2, -1], [(0, 2, 0, 2, 2)]),  # a tie lies not over the seam; labels may have gaps
-    ],
-)
-def test_clusters_over_the_seam_begin_behind_their_largest_hole(labels, expected):
-    assert cluster_rows(with_clusters(labels)) == expected
-    assert cluster_rows(with_clusters([]), with_clusters(labels))[0][1:] == expected[0][1:]
-
-
-def test_no_cluster_lies_over_the_seam_of_a_scan_with_ends():
-    labels = [0, 0, -1, -1, 0, 0]
-    assert cluster_rows(with_clusters(labels)) == [(0, 0, 4, 1, 4)]
-    assert cluster_rows(with_clusters(labels, ends=True)) == [(0, 0, 0, 5, 4)]
-
-
-def test_interleaved_clusters_and_ragged_scans():
-    a, b = with_clusters([1, 0, 1, 0, 1, -1, -1, -1]), with_clusters([0])
-    assert cluster_rows(a, b) == [(0, 0, 1, 3, 2), (0, 1, 0, 4, 3), (1, 0, 0, 0, 1)]
-
-
-def test_numbers_stay_what_they_are_nan_too():
-    features = random_features(5)
-    features.segments["rms"] = [np.nan, np.inf, 1e-300]
-    rms = features_table([features])["rms"].to_pylist()[:3]
-    assert np.isnan(rms[0])
-    assert rms[1:] == [np.inf, 1e-300]
-
-
 @pytest.mark.parametrize(
     ("table", "expected"),
     [("corners", "corner, slit, edge"), ("breakpoints", "jump, gap, scan_end")],
@@ -170,12 +138,15 @@ def test_unknown_kind_is_refused(table, expected):
         features_table([features])
 
 
-def test_metadata_name_frames_version_and_units():
+def test_metadata_and_numbers_that_are_not_finite():
     scans = [random_features(i, frame_id=f) for i, f in enumerate(["b", "a", "b"])]
-    schema = features_table(scans).schema
-    assert json.loads(schema.metadata[b"lineament.frame_ids"]) == ["b", "a"]
-    assert schema.metadata[b"lineament.version"].decode() == ln.__version__
-    assert schema.field("x").metadata[b"unit"] == b"m"
+    scans[0].segments["rms"] = [np.nan, np.inf, 1e-300]
+    table = features_table(scans)
+    assert json.loads(table.schema.metadata[b"lineament.frame_ids"]) == ["b", "a"]
+    assert table.schema.metadata[b"lineament.version"].decode() == ln.__version__
+    assert table.schema.field("x").metadata[b"unit"] == b"m"
+    np.testing.assert_array_equal(table["rms"][:3].to_numpy(), [np.nan, np.inf, 1e-300])
+    assert table["rms"][:3].null_count == 0
 
 
 def test_docs_list_every_column_with_its_unit_and_type():

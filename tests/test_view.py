@@ -8,21 +8,27 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from functools import partial
 from importlib.resources import files
+from queue import SimpleQueue
+from types import SimpleNamespace
+from unittest.mock import Mock
 from urllib.request import urlopen
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from text_logs import flaser
 
 from lineament import Extractor, LaserScan
 from lineament.cli import run
 from lineament.errors import LineamentError
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
-from lineament.view import Session, ViewServer
+from lineament.view import Session, ViewServer, serve
 from lineament.view.api import MOST_STAMPS, RequestError, answer
 from lineament.view.store import ScanStore
 
@@ -92,19 +98,9 @@ def asked(server, target):
 
 
 def test_the_log_and_how_far_it_was_read(server):
-    status, facts = asked(server, "/api/log")
-    assert status == 200
-    assert facts == {
-        "name": "wall.npz",
-        "format": "npz",
-        "methods": ["pdbs", "tight"],
-        "scans": 9,
-        "total": 9,
-        "complete": True,
-        "error": "",
-        "skipped": 0,
-        "faults": [],
-    }
+    about = {"name": "wall.npz", "format": "npz", "methods": ["pdbs", "tight"]}
+    read = {"scans": 9, "total": 9, "complete": True, "error": "", "skipped": 0, "faults": []}
+    assert asked(server, "/api/log") == (200, about | read)
 
 
 def test_a_scan_comes_with_its_features(server, log):
@@ -172,11 +168,8 @@ def test_a_bad_question_gets_one_clear_line(server, target, status, words, capfd
 
 @given(st.text(max_size=40))
 def test_any_target_has_an_answer_or_a_refusal(target):
-    class Nobody:
-        extractors = {}  # noqa: RUF012
-
     with pytest.raises(RequestError):
-        answer(Nobody(), "/" + target)
+        answer(SimpleNamespace(extractors={}), "/" + target)
 
 
 # The server.
@@ -272,10 +265,8 @@ def test_a_scan_that_breaks_a_method_breaks_nothing_else(session, capfd):
 
     session.extractors["tight"] = broken
     with served(session) as server:
-        assert asked(server, "/api/scan?i=0&method=tight") == (
-            500,
-            {"error": "RuntimeError: no luck"},
-        )
+        answered = asked(server, "/api/scan?i=0&method=tight")
+        assert answered == (500, {"error": "RuntimeError: no luck"})
         assert asked(server, "/api/scan?i=0&method=pdbs")[0] == 200
     assert capfd.readouterr() == ("", "")
 
@@ -285,16 +276,8 @@ def test_many_at_once_get_what_one_gets(server):
         f"/api/scan?i={k % 9}&method={name}" for k in range(12) for name in ("pdbs", "tight")
     ]
     alone = [asked(server, target) for target in targets]
-    together = {}
-    threads = [
-        threading.Thread(target=lambda k=k: together.update({k: asked(server, targets[k])}))
-        for k in range(len(targets))
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert [together[k] for k in range(len(targets))] == alone
+    with ThreadPoolExecutor(len(targets)) as pool:
+        assert list(pool.map(partial(asked, server), targets)) == alone
 
 
 def test_a_port_that_is_taken_is_one_line(session):
@@ -305,21 +288,16 @@ def test_a_port_that_is_taken_is_one_line(session):
 # The log that is kept.
 
 
-def assert_scans_equal(scan, other):
-    for name in ("ranges", "angles"):
-        np.testing.assert_array_equal(getattr(scan, name), getattr(other, name))
-    fields = "is_regular angle_min angle_increment range_min range_max stamp scan_time"
-    for name in (*fields.split(), "time_increment", "frame_id", "pose"):
-        assert getattr(scan, name) == getattr(other, name), name
+def assert_scans_equal(*scans):
+    names = "ranges angles is_regular angle_min angle_increment range_min range_max stamp scan_time"
+    names = (*names.split(), "time_increment", "frame_id", "pose")
+    np.testing.assert_equal(*({name: getattr(scan, name) for name in names} for scan in scans))
 
 
-def flaser(count, stamp):
-    return f"FLASER {count} {' '.join(['2.0'] * 181)} 0 0 0 0 0 0 {stamp} robot {stamp}\n"
-
-
-def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path):
-    path = tmp_path / "broken.log"
-    path.write_text(flaser(181, 1) + flaser(181, 2) + flaser(190, 3) + flaser(181, 4))
+def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(write):
+    lines = [flaser([2.0] * 181, stamp=stamp) for stamp in (1, 2, 3, 4)]
+    lines[2] = lines[2].replace(" 181 ", " 190 ")
+    path = write("".join(lines), "broken.log")
     with Session(path, {"pdbs": Extractor("pdbs")}) as session:
         assert session.wait(30)
         facts = session.facts()
@@ -346,7 +324,7 @@ def any_scans():
 def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
     scans = list(any_scans())
     items = [(f"scan{k}", scan) for k, scan in enumerate(scans)]
-    with ScanStore(lambda: items, capacity=capacity) as kept:
+    with closing(ScanStore(lambda: items, capacity=capacity)) as kept:
         kept.fill(items)
         assert len(kept) == len(scans)
         for index in (0, 5, 2, 2, 3, 1, 0, 6, 4):
@@ -363,20 +341,12 @@ def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
 
 def test_a_full_disk_is_less_room_and_no_failure(monkeypatch):
     items = [("scan", scan) for scan in walls(4)]
-    with ScanStore(lambda: items) as kept:
+    with closing(ScanStore(lambda: items)) as kept:
         kept.fill(items[:2])
 
-        class Full:
-            def __init__(self, file):
-                self.file = file
-
-            def __getattr__(self, name):
-                return getattr(self.file, name)
-
-            def write(self, _):
-                raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr(kept, "_file", Full(kept._file))
+        full = Mock(wraps=kept._file)
+        full.write.side_effect = OSError(28, "No space left on device")
+        monkeypatch.setattr(kept, "_file", full)
         kept.fill(items[2:])
         for index, (_, scan) in enumerate(items):
             assert_scans_equal(kept.item(index)[1], scan)
@@ -418,6 +388,24 @@ def test_what_is_wrong_is_one_line(log, arguments, status, words, capfd):
     assert out == ""
     assert words in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("host", "name"),
+    [("127.0.0.1", "127.0.0.1"), ("localhost", "localhost"), ("0.0.0.0", "localhost")],
+)
+def test_serving_names_the_address_warns_and_opens_the_page(host, name, log, monkeypatch, capsys):
+    opened, lines = SimpleQueue(), []
+    monkeypatch.setattr("webbrowser.open", opened.put)
+    monkeypatch.setattr(ViewServer, "serve_forever", lambda _: None)
+    serve(Session(log, {"pdbs": Extractor("pdbs")}), host, write=lines.append)
+    address = opened.get(timeout=30)
+    port = int(address.removeprefix(f"http://{name}:").removesuffix("/"))
+    assert port > 1023  # any that is free
+    assert lines == [f"{log}: look at {address} (Ctrl-C ends it)"]
+    serve(Session(log, {"pdbs": Extractor("pdbs")}), host, browser=False, write=lines.append)
+    assert opened.empty()
+    assert ("is not loopback" in capsys.readouterr().err) == (host == "0.0.0.0")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child there")

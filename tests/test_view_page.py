@@ -1,4 +1,4 @@
-"""The page of `view` in headless Chromium: it shows, plays, switches, tells numbers and answers."""
+"""The page of `view` in headless Chromium: it shows, plays, switches, and answers."""
 
 import shutil
 import threading
@@ -42,7 +42,7 @@ return import("/main.js").then(({ app }) => {
   return [box.left + u, box.top + v];
 });
 """
-#: Put a point into the middle, near enough to tell readings apart.
+#: Put a point into the middle, near enough to tell measurements apart.
 LOOK_AT = """
 return import("/main.js").then(({ app }) => {
   [app.plane.x, app.plane.y] = arguments[0];
@@ -110,6 +110,14 @@ class Page:
     def press(self, *keys: str) -> None:
         webdriver.ActionChains(self.driver).send_keys(*keys).perform()
 
+    def change(self, selector: str, value: object, event: str) -> None:
+        """Give an element another value, as a user does."""
+        script = "const e = document.querySelector(arguments[0]); e.value = arguments[1];"
+        self.run(f"{script} e.dispatchEvent(new Event('{event}'))", selector, value)
+
+    def click(self, selector: str) -> None:
+        self.run("document.querySelector(arguments[0]).click()", selector)
+
     def resize(self, width: int, height: int, scheme: str = "light") -> None:
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
@@ -171,40 +179,30 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
     assert colours > 20
 
 
-def test_scrubbing_and_keys_change_the_scan(page):
-    page.run(
-        "const s = document.querySelector('#slider'); s.value = 17;"
-        "s.dispatchEvent(new Event('input'))"
-    )
+def test_scrubbing_keys_and_playing_change_the_scan(page):
+    page.change("#slider", 17, "input")
     shown(page, 17)
     page.wait("document.querySelector('#position').textContent === 'scan 17 / 24, 0.85 s'")
     assert "scan=17" in page.run("return location.hash")
-    for key, index in (
-        (Keys.ARROW_RIGHT, 18),
-        (Keys.ARROW_LEFT, 17),
-        (Keys.HOME, 0),
-        (Keys.END, 24),
-    ):
+    keys = {Keys.ARROW_RIGHT: 18, Keys.ARROW_LEFT: 17, Keys.END: 24, Keys.HOME: 0}
+    for key, index in keys.items():
         page.press(key)
         shown(page, index)
-
-
-def test_playing_goes_on_to_the_end_and_stops(page):
     page.press(" ")
     assert page.run("return document.querySelector('#play').ariaLabel") == "Pause"
     shown(page, 24)
     page.wait("document.querySelector('#play').ariaLabel === 'Play'")
 
 
-def test_hovering_tells_the_numbers_of_a_feature(page, log):
+def test_hovering_shows_the_numbers_of_a_feature(page, log):
     corner = found(log, 0).corners[0]
     page.point(page.run(PLACE, corner["position"].tolist()))
     page.wait("!document.querySelector('.card').hidden")
-    told = page.text(".card")
+    card = page.text(".card")
     x, y = corner["position"]
-    assert "corner 0" in told
-    assert f"kind corner quality {corner['quality']:.2f}" in " ".join(told.split())
-    assert f"{x:.3f}, {y:.3f} m" in told
+    assert "corner 0" in card
+    assert f"kind corner quality {corner['quality']:.2f}" in " ".join(card.split())
+    assert f"{x:.3f}, {y:.3f} m" in card
     segment = found(log, 0).segments[0]
     page.point(page.run(PLACE, segment["centroid"].tolist()))
     page.wait("document.querySelector('.card').innerText.includes('segment 0')")
@@ -218,11 +216,11 @@ def test_a_click_pins_a_feature_once_and_it_can_be_removed(page, log):
     page.wait("document.querySelectorAll('#pins tbody tr').length === 1")
     assert "corner 0" in page.text("#pins tbody")
     assert "scan 0, liu:scale_free" in page.text("#pins tbody")
-    page.run("document.querySelector('#pins tbody button').click()")
+    page.click("#pins tbody button")
     page.wait("document.querySelector('#pins').hidden")
 
 
-def test_a_click_on_a_reading_is_answered(page, log):
+def test_a_click_on_a_measurement_is_answered(page, log):
     scan = open_log(log).scan(0)
     expected = explain(Extractor(METHODS[0]).trace(scan), 25)
     page.run(LOOK_AT, scan.points[25].tolist())
@@ -238,25 +236,20 @@ def test_a_beam_is_asked_for_by_its_number(page):
     page.press("115", Keys.ENTER)
     page.wait("document.querySelector('#why h3')?.textContent.startsWith('beam 115, ')")
     assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
-
-
-def test_a_click_to_where_nothing_came_back_is_answered(page):
+    # A click to where nothing came back is answered, too.
     page.point(page.run(PLACE, [0.6, 0.93]), press=True)
-    page.wait("document.querySelector('#why .summary')")
+    page.wait("!document.querySelector('#why h3').textContent.startsWith('beam 115, ')")
     assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
 
 
 def test_methods_are_switched_and_shown_side_by_side(page):
-    page.run(
-        "const s = document.querySelector('.panel select'); s.value = 'pdbs';"
-        "s.dispatchEvent(new Event('change'))"
-    )
+    page.change(".panel select", "pdbs", "change")
     page.wait("document.querySelector('.panel span').textContent.startsWith('0 segments')")
-    page.run("document.querySelector('#compare').click()")
+    page.click("#compare")
     page.wait("document.querySelectorAll('.panel').length === 2")
     page.wait("document.querySelector('.panel:nth-child(2) span').textContent.includes('1 corner')")
     assert "with=liu" in page.run("return location.hash")
-    page.run("document.querySelector('#compare').click()")
+    page.click("#compare")
     page.wait("document.querySelectorAll('.panel').length === 1")
 
 
@@ -282,7 +275,7 @@ def test_a_narrow_window_needs_no_scrolling_sideways(page):
     page.wait(dark)
 
 
-def test_a_server_that_has_gone_is_told(page):
+def test_a_server_that_has_gone_is_reported(page):
     page.run("window.fetch = () => Promise.reject(new TypeError('gone'))")
     page.press(Keys.ARROW_RIGHT)
     page.wait("!document.querySelector('#problem').hidden")

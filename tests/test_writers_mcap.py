@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from lineament import LaserScan, LineamentError
 from lineament.output import open_writer
 from lineament.output.markers import markers_of
+from lineament.output.scene import layers_of
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)
@@ -96,25 +97,18 @@ def test_foxglove_has_scan_transform_and_scene(tmp_path):
     np.testing.assert_array_equal(scanned["ranges"], np.where(scan.valid, RANGES, np.nan))
     assert scanned["intensities"] == list(range(6))
 
-    markers = markers_of(FOUND, scan)
-    entities = {entity["id"]: entity for entity in scene["entities"]}
-    assert list(entities) == LAYERS
-    for entity in entities.values():
+    layers = layers_of(markers_of(FOUND, scan))
+    for layer, entity in zip(layers, scene["entities"], strict=True):
         assert (entity["timestamp"], entity["frame_id"]) == (stamp, "laser_link")
-    lines = [points_of(line["points"]) for line in entities["segments"]["lines"]]
-    np.testing.assert_array_equal(lines, markers.segments)
-    (strip,) = entities["arcs"]["lines"]
-    np.testing.assert_array_equal(points_of(strip["points"]), markers.arc_strips()[0])
-    ellipses = [points_of(line["points"]) for line in entities["ellipses"]["lines"]]
-    np.testing.assert_array_equal(ellipses, markers.ellipse_strips())
-    assert len(ellipses) == 3
-    for name, x, y, size in (("corners", 1.0, 2.0, 0.08), ("edges", -1.0, 3.0, 0.05)):
-        (sphere,) = entities[name]["spheres"]
-        assert sphere["pose"]["position"] == {"x": x, "y": y}
-        assert sphere["size"] == dict.fromkeys("xyz", size)
-    for line in entities["segments"]["lines"]:
-        color = {"r": 0.16, "g": 0.47, "b": 0.84, "a": 1.0}
-        assert (line["thickness"], line["color"]) == (0.03, color)
+        assert entity["id"] == layer.name
+        color = dict(zip("rgba", layer.color, strict=True))
+        assert len(layer.strips) + len(layer.points) > 0
+        for line, strip in zip(entity["lines"], layer.strips, strict=True):
+            np.testing.assert_array_equal(points_of(line["points"]), strip)
+            assert (line["thickness"], line["color"]) == (layer.size, color)
+        for sphere, (x, y) in zip(entity["spheres"], layer.points, strict=True):
+            assert sphere["pose"]["position"] == {"x": x, "y": y}
+            assert (sphere["size"], sphere["color"]) == (dict.fromkeys("xyz", layer.size), color)
 
 
 def test_ros2_has_scan_transform_and_markers(tmp_path):
@@ -203,6 +197,9 @@ def test_odd_scans_are_written(tmp_path, name, read):
 def test_many_scans_are_in_chunks_with_an_index(tmp_path):
     long = LaserScan(np.full(2000, 2.0), angle_min=0.0, angle_increment=0.003)
     with write(tmp_path / "a.mcap", *[(EMPTY, long)] * 200).open("rb") as file:
-        summary = make_reader(file).get_summary()
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        sequences = [message.sequence for _, _, message in reader.iter_messages()]
+    assert sorted(sequences) == [k // 2 for k in range(400)]
     assert len(summary.chunk_indexes) > 2  # memory does not grow: about 1 MB each
     assert summary.statistics.message_count == 400

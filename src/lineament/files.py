@@ -1,10 +1,12 @@
 """Whole files or none: write beside the target, then rename."""
 
+import json
 import os
 import secrets
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from .errors import LineamentError
 
@@ -62,6 +64,14 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """
     with written_beside(path) as temporary, naming_errors(path):
         temporary.write_bytes(text.encode("utf-8", errors="replace"))
+
+
+def strict_json(value: Any) -> str:
+    """Write a value as JSON, with null in place of numbers that are not finite."""
+    try:
+        return json.dumps(value, allow_nan=False)
+    except ValueError:
+        return json.dumps(json.loads(json.dumps(value), parse_constant=lambda _: None))
 
 
 def ending_of(path: str | os.PathLike[str], endings: Iterable[str]) -> str:

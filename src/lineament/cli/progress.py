@@ -23,25 +23,17 @@ def tracker(quiet: bool) -> Track:
 
 def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task
     from rich.progress import TimeRemainingColumn as TimeLeft
+    from rich.text import Text
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeLeft(),
-    )
-    started, done = time.monotonic(), 0
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(_rate_text(task.speed or 0.0))
+
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Rate(), TimeLeft())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(about, total=total, rate="")
-        for item in items:
-            yield item
-            done += 1
-            if done % 32 == 0 or done == total:
-                rate = done / max(time.monotonic() - started, 1e-9)
-                progress.update(task, completed=done, rate=_rate_text(rate))
+        yield from progress.track(items, total, description=about)
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:

@@ -47,17 +47,8 @@ def explain(trace: Trace, beam: int) -> Explanation:
     Thresholds, responses and evidence are those of the trace. Lines through measurements that are
     in no feature are fitted here.
 
-    Parameters
-    ----------
-    trace : Trace
-        Of one scan, from `Extractor.trace` or `lineament.trace`.
-    beam : int
-        Index of the beam, from 0.
-
-    Raises
-    ------
-    ValueError
-        If there is no such beam.
+    The trace is of one scan, from `Extractor.trace` or `lineament.trace`; beams count from 0. There
+    is a ValueError if the beam is not there.
 
     Examples
     --------
@@ -122,7 +113,7 @@ class _Question:
         off = float(ranges[i] - ranges[sides].mean())
         text = f"off the mean of its neighbours by {_signed(off)}, while these agree"
         self._note("filter", text)
-        return "spike", "A spike: a lone reading before or behind a surface that goes on."
+        return "spike", "A spike: a lone measurement before or behind a surface that goes on."
 
     def _noise(self) -> str:
         self._note("cluster", f"none; {self._sides()}")

@@ -41,8 +41,7 @@ class Features:
     Examples
     --------
     >>> import lineament as ln
-    >>> features = ln.extract(ln.LaserScan([], angle_min=0.0, angle_increment=0.1))
-    >>> features
+    >>> ln.extract(ln.LaserScan([], angle_min=0.0, angle_increment=0.1))
     Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
 
@@ -56,9 +55,8 @@ class Features:
     noise: RangeNoise | None = None
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(getattr(self, name))} {name}" for name in TABLES)
         n_clusters = int(self.clusters.max(initial=-1)) + 1
-        return f"Features({counts}, {n_clusters} clusters, stamp={self.stamp:.3f})"
+        return f"Features({_sizes(self)}, {n_clusters} clusters, stamp={self.stamp:.3f})"
 
     def counts(self) -> dict[str, int]:
         """Return how many features there are, by the names of `COUNTED`.
@@ -66,8 +64,7 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-        >>> ln.extract(scan).counts()
+        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).counts()
         {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
         """
         edges = int(np.count_nonzero(self.corners["kind"] == "edge"))
@@ -80,25 +77,20 @@ class Features:
     ) -> Features:
         """Move the features by a pose: p ↦ R(θ) p + (x, y), and their covariances with them.
 
+        The covariance of a segment is in its own frame and stays as it is.
+
         Parameters
         ----------
-        x, y : float
-            Translation [m].
-        theta : float
-            Rotation, counter-clockwise [rad].
+        x, y, theta : float
+            Translation [m], and rotation counter-clockwise [rad].
         frame_id : str, optional
             Name of the new frame; by default the old one stays.
-
-        Returns
-        -------
-        Features
-            New features; the covariance of a segment is in its own frame and stays as it is.
 
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-        >>> moved = ln.extract(scan).transform(1.0, 0.0, math.pi / 2)
+        >>> features = ln.extract(ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01))
+        >>> moved = features.transform(1.0, 0.0, math.pi / 2)
         >>> moved.segments["centroid"].round(2).tolist()
         [[1.0, 2.0]]
         """
@@ -131,8 +123,7 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-        >>> ln.extract(scan).to_arrow()["kind"].to_pylist()
+        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).to_arrow()["kind"].to_pylist()
         ['segment', 'breakpoint', 'breakpoint', 'cluster']
         """
         from .tables import features_table
@@ -145,8 +136,7 @@ class Features:
         Examples
         --------
         >>> import lineament as ln
-        >>> scan = ln.LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-        >>> ln.extract(scan).to_dict()["clusters"]
+        >>> ln.extract(ln.LaserScan([2.0, 2.0, 2.0], -0.01, 0.01)).to_dict()["clusters"]
         [0, 0, 0]
         """
         return {
@@ -199,8 +189,7 @@ class FeatureBatch:
     frame_id: str = ""
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(getattr(self, name))} {name}" for name in TABLES)
-        return f"FeatureBatch({len(self)} scans: {counts})"
+        return f"FeatureBatch({len(self)} scans: {_sizes(self)})"
 
     def __len__(self) -> int:
         return len(self.clusters)
@@ -238,10 +227,12 @@ def noise_row(noise: RangeNoise | None) -> NDArray[np.float64]:
 
 def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
     """Name the four parts of a noise; None if they are NaN (no valid beam to estimate from)."""
-    sigma, proportional, bearing, quantum = row.tolist()
-    if math.isnan(sigma):
-        return None
-    return RangeNoise(sigma, proportional, bearing, quantum)
+    parts = row.tolist()
+    return None if math.isnan(parts[0]) else RangeNoise(*parts)
+
+
+def _sizes(tables: Features | FeatureBatch) -> str:
+    return ", ".join(f"{len(getattr(tables, name))} {name}" for name in TABLES)
 
 
 def _records(table: NDArray[np.void]) -> list[dict[str, Any]]:

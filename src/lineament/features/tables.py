@@ -49,22 +49,8 @@ SCHEMA = _schema()
 def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     """Make the table of some scans, numbered from `first_scan`; their beam counts may differ.
 
-    Parameters
-    ----------
-    scans : sequence of Features
-        In the order of their log.
-    first_scan : int
-        Index of the first of them.
-
-    Returns
-    -------
-    pyarrow.Table
-        Of schema `SCHEMA`, ordered by scan, then kind. Its metadata name the frames of the scans.
-
-    Raises
-    ------
-    ValueError
-        If a corner or a breakpoint is of a kind that the schema does not have.
+    Its schema is `SCHEMA`, its metadata name the frames of the scans, and its rows are ordered by
+    scan, then kind. Raises ValueError for a corner or a breakpoint of a kind that is not known.
 
     Examples
     --------

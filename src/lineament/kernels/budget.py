@@ -10,6 +10,7 @@ import numpy as np
 
 from . import helper, kernel
 from . import layout as at
+from .rays import add_ray, least_squares, turn
 
 #: How far apart pieces of different clusters may be that become one [m]: the rule of the public
 #: benchmark (Schaefer et al., IROS 2018) for points that a map connects.
@@ -81,27 +82,16 @@ def _add_piece(work, bearings, k, pieces, budget, link, price, costs, follow):
     first, last, before = work.pieces[at.FIRST], work.pieces[at.LAST], work.pieces[at.BEFORE]
     for v in range(budget + 1):
         kept[k, v] = math.inf
-    cosines, sines = bearings[0], bearings[1]
-    cc, cs, ss, uc, us, uu = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    cosines, sines, sums = bearings[0], bearings[1], (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     point, origin = first[k], beam[first[k]]
     # The point of a corner belongs to both pieces, and counts for the one before.
     free = max(first[k], last[k - 1] + 1) if k > 0 else first[k]
     for after in range(k + 1, pieces + 1):
         while point <= last[after - 1]:
-            b = beam[point]
-            # Bearings are taken from the first point: the sums are well conditioned anywhere.
-            c = cosines[b] * cosines[origin] + sines[b] * sines[origin]
-            s = sines[b] * cosines[origin] - cosines[b] * sines[origin]
-            # Inverse-range regression, 1/ρ = A cos φ + B sin φ: its residual times ρ² is the
-            # error in range.
-            r = ranges[b]
-            w = r * r * r * r
-            cc, cs, ss = cc + w * c * c, cs + w * c * s, ss + w * s * s
-            uc, us, uu = uc + w / r * c, us + w / r * s, uu + r * r
+            c, s = turn(bearings, origin, beam[point])
+            sums = add_ray(sums, c, s, ranges[beam[point]])
             point += 1
-        determinant = cc * ss - cs * cs
-        squares = uu - (ss * uc * uc - 2.0 * cs * uc * us + cc * us * us) / determinant
-        cost = max(squares, 0.0) - price * (point - free)
+        cost = max(least_squares(sums), 0.0) - price * (point - free)
         sharp = after < pieces and before[after] >= 0
         for v in range(2, budget + 1):
             if cost + best[after, v - 2] < kept[k, v]:

@@ -17,24 +17,14 @@ def cluster(floats, ints, bearings, step, circular, noise, scale, floor, density
     three spacings (11-13): density only joins. Clusters under `min_points` are noise.
 
     From FILTERED, the points with their thresholds (DENSITY_THRESHOLD is NaN where it is not
-    needed), and the clusters.
-
-    Parameters
-    ----------
-    step : float
-        Δφ [rad].
-    scale, floor, density_k : float
-        λ, the noise floor in units of √2 σ, and k.
-    min_points : int
+    needed), and the clusters. `step` is Δφ [rad]; `scale`, `floor` and `density_k` are λ, the noise
+    floor in units of √2 σ, and k.
     """
     work = at.named(floats, ints)
     points = work.points
     count = list_points(work.beams, points, work.marks, bearings)
-    rho, limit, second = (
-        points[at.RHO],
-        points[at.DISTANCE_THRESHOLD],
-        points[at.DENSITY_THRESHOLD],
-    )
+    rho, limit = points[at.RHO], points[at.DISTANCE_THRESHOLD]
+    second = points[at.DENSITY_THRESHOLD]
     scaled_step, noise_floor = scale * step, floor * math.sqrt(2.0) * noise[0]
     after, limit_after = rho[1:], limit[1:]
     for i in range(count - 1):
@@ -86,12 +76,8 @@ def part_points(work, bearings, circular, count, density_k, min_points):
     On a full circle whose last cluster goes on in the first, the points are turned so that they
     begin with it. Where all are one cluster that closes, the first point is repeated at the end.
     """
-    points, beam, label, counts = (
-        work.points,
-        work.marks[at.BEAM],
-        work.marks[at.LABEL],
-        work.counts,
-    )
+    points, counts = work.points, work.counts
+    beam, label = work.marks[at.BEAM], work.marks[at.LABEL]
     clusters, turn = _label(points, label, count, density_k, circular)
     closed = clusters == 1 and turn == 0
     if turn >= 0:
@@ -115,11 +101,8 @@ def _label(points, label, count, density_k, circular):
     Returns the number of clusters, and the point at which the last begins if it goes on in the
     first (and then has its number), else -1.
     """
-    spacing, t_d, t_k = (
-        points[at.SPACING],
-        points[at.DISTANCE_THRESHOLD],
-        points[at.DENSITY_THRESHOLD],
-    )
+    spacing, t_d = points[at.SPACING], points[at.DISTANCE_THRESHOLD]
+    t_k = points[at.DENSITY_THRESHOLD]
     current, start = -1, 0
     # Sums over the spacings of the cluster, as far as they were needed.
     total, squares, summed = 0.0, 0.0, 0

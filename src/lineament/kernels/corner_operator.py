@@ -37,9 +37,8 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
     float
         TANGENT: Σd to the tangent [m] (equations 20-22); PRODUCT: that times Σd to the chord of
         the support [m²]; RELATIVE: Σd to the tangent over Σ|s|, in 0..1, free of range and scale;
-        CHORD_SCALED: the same over the length of the chord; PRODUCT_SCALED: the sum of the products
-        of both distances of each point, over the square of that length. 0 where the support has no
-        point on one side, or no length.
+        CHORD_SCALED: the same over the length of the chord; PRODUCT_SCALED: PRODUCT over the square
+        of that length. 0 where the support has no point on one side, or no length.
     """
     before, after = _support(i, first, last, radius, closed)
     if before == 0 or after == 0:
@@ -86,17 +85,13 @@ def _accumulate(x, y, i, before, after, first, period, closed, tangent, arcs, ki
     a = _neighbour(i, -before, first, period, closed)
     b = _neighbour(i, after, first, period, closed)
     cx, cy = x[b] - x[a], y[b] - y[a]
-    if kind == PRODUCT:
-        return to_tangent * _distance_sum(x, y, i, before, after, first, period, closed, a, cx, cy)
-    chord = math.sqrt(cx * cx + cy * cy)
-    if kind == CHORD_SCALED or chord == 0.0:
-        return to_tangent / chord if chord > 0.0 else 0.0
-    total, norm = 0.0, math.sqrt(bx * bx + by * by)
-    for k in range(-before, after + 1):
-        j = _neighbour(i, k, first, period, closed)
-        to_chord = (cy * (x[j] - x[a]) - cx * (y[j] - y[a])) / chord
-        total += abs((by * (x[j] - x[i]) - bx * (y[j] - y[i])) * to_chord)
-    return total / (norm * chord * chord)
+    square = cx * cx + cy * cy
+    if kind != PRODUCT and square == 0.0:
+        return 0.0
+    if kind == CHORD_SCALED:
+        return to_tangent / math.sqrt(square)
+    product = to_tangent * _distance_sum(x, y, i, before, after, first, period, closed, a, cx, cy)
+    return product if kind == PRODUCT else product / square
 
 
 @helper

@@ -63,10 +63,7 @@ def cut(floats, ints, radius, threshold, kind, min_points, both_sides, whole_sup
 def next_candidate(points, waiting, depth, min_points):
     """Take the last piece that waits: its farthest point from its chord is a candidate.
 
-    Returns
-    -------
-    depth, first, last, point, distance
-        Pieces that still wait; the ends of this one; the candidate, or -1, and its distance.
+    Returns how many pieces still wait, the ends of this one, the candidate or -1, its distance.
     """
     first, last = waiting[at.FIRST, depth - 1], waiting[at.LAST, depth - 1]
     point, distance = farthest_from_chord(
@@ -96,12 +93,7 @@ def farthest_from_chord(x, y, first, last, margin, away):
 
     Points nearer than `margin` to an end are not taken, so that no piece gets too short. Where
     the chord has no length (a closed cluster) the distance is that to its one point. `away` is
-    scratch.
-
-    Returns
-    -------
-    point, distance : int, float
-        -1 and 0 where there is no such point.
+    scratch. Returns the point and its distance; -1 and 0 where there is none.
     """
     if last - first < 2 * margin:
         return -1, 0.0
@@ -128,12 +120,8 @@ def list_pieces(work, found, threshold):
 
     The response of a corner becomes that of the piece that begins there; NaN where none does.
     """
-    response, pieces, candidates, counts = (
-        work.response,
-        work.pieces,
-        work.candidates,
-        work.counts,
-    )
+    response, pieces = work.response, work.pieces
+    candidates, counts = work.candidates, work.counts
     # By point at first, then by piece: there are never more pieces than points before.
     for i in range(counts[at.POINTS]):
         response[i] = math.nan

@@ -22,17 +22,10 @@ FITS = {
 
 @sums
 def fit_line(x, y, rho, first, last, noise, kind):
-    """Fit a line to the points `first`..`last` (inclusive, two or more).
+    """Fit a line to the points `first`..`last` (inclusive, two or more), `rho` from the sensor.
 
     Parameters
     ----------
-    x, y : float64 arrays
-        Points [m].
-    rho : float64 array
-        Range of each point [m].
-    first, last : int
-    noise : float64 array, shape (4,)
-        (sigma, proportional, bearing, quantum), see `lineament.RangeNoise`.
     kind : int
         TOTAL: least orthogonal distances. Y_OF_X: y = kx + b, or x = ky + b where the points are
         steeper than 45° (equations 23, 24). SLOPE_INTERCEPT: y = kx + b of every line, also of

@@ -36,12 +36,12 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
     options : tuple
         See `Options`.
     tables : tuple of arrays
-        Results. ``segments, corners, breaks`` as words, see `records`, with room for n + 1 features
-        of each kind a row; ``clusters``, int32, shape (m, n); ``offsets``, int64, shape (m + 1, 4),
-        where the rows begin in the tables: the first is 0.
+        Results. ``segments, corners, arcs, breaks`` as words, see `records`, with room for n + 1
+        features of each kind a row; ``clusters``, int32, shape (m, n); ``offsets``, int64, shape
+        (m + 1, 4), where the rows begin in the tables: the first is 0.
     """
     work, how = at.named(floats, ints), Options(*options)
-    segments, corners, breaks, clusters, offsets = tables
+    segments, corners, _, breaks, clusters, offsets = tables
     counts, cut = work.counts, work.pieces
     _place_measured(
         work.beams[how.source], work.points, work.marks, counts, bearings, clusters[row]

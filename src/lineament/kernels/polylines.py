@@ -12,6 +12,7 @@ import numpy as np
 
 from . import helper, kernel
 from . import layout as at
+from .rays import add_ray, least_squares, turn
 from .vertices import BEGIN, HELD, place_vertices
 
 #: Planes of the tables of costs, by point and number of vertices: of the best polylines that come
@@ -45,7 +46,7 @@ def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, cost
     follow : int64 array, shape (n + 2, budget + 1)
         Scratch.
     """
-    work = at.named(floats, ints)
+    work = at.extended(floats, ints)
     points, least, closed = work.counts[at.POINTS], costs[LEAST], costs[CLOSED_COST]
     for v in range(budget + 1):
         closed[0, v] = 0.0
@@ -55,36 +56,27 @@ def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, cost
         for v in range(budget + 1):
             closed[i + 1, v] = min(closed[i, v] + worst * worst, least[i, v])
         _extend(work, bearings, i, budget, max_missing, link, worst, costs, follow)
-    vertices = at.vertices_of(ints)
-    count = _list_vertices(vertices, points, budget, worst * worst, costs, follow)
-    place_vertices(work, vertices, at.rays_of(floats), bearings, count)
+    count = _list_vertices(work.vertices, points, budget, worst * worst, costs, follow)
+    place_vertices(work, bearings, count)
 
 
 @helper
 def _extend(work, bearings, i, budget, max_missing, link, worst, costs, follow):
     """Fit lines from a vertex at point i to each later point that is linked with it."""
-    rho, beam, cosines, sines = work.points[at.RHO], work.marks[at.BEAM], bearings[0], bearings[1]
-    origin, price = beam[i], worst * worst
-    cc, cs, ss, uc, us, uu = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    rho, beam, price, n = work.points[at.RHO], work.marks[at.BEAM], worst * worst, bearings.shape[1]
+    sums = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(i + 1, work.counts[at.POINTS]):
-        b = beam[j]
-        # Bearings are taken from the first point: the sums are well conditioned anywhere.
-        c = cosines[b] * cosines[origin] + sines[b] * sines[origin]
-        s = sines[b] * cosines[origin] - cosines[b] * sines[origin]
-        if s <= 0.0 or not _linked(work.points, beam, j, len(cosines), max_missing, link):
+        c, s = turn(bearings, beam[i], beam[j])
+        if s <= 0.0 or not _linked(work.points, beam, j, n, max_missing, link):
             return
-        inner, determinant = j - i - 1, cc * ss - cs * cs
-        alone = 0.0
-        if inner > 2:
-            alone = uu - (ss * uc * uc - 2.0 * cs * uc * us + cc * us * us) / determinant
-        # The residual of the inverse range times ρ² is the error of the range.
-        w, u = rho[j] ** 4, 1.0 / rho[j]
-        cc, cs, ss = cc + w * c * c, cs + w * c * s, ss + w * s * s
-        uc, us, uu = uc + w * u * c, us + w * u * s, uu + w * u * u
+        inner = j - i - 1
+        alone = least_squares(sums) if inner > 2 else 0.0
+        sums = add_ray(sums, c, s, rho[j])
         if alone > price * inner:
             continue  # No more vertices are needed to leave these points out.
         # By the inverse ranges p and q at both ends the squared error is
         # aa p² + 2 ab p q + bb q² - 2 ua p - 2 ub q + uu.
+        cc, cs, ss, uc, us, uu = sums
         ratio = c / s
         aa, ab, bb = cc - 2.0 * ratio * cs + ratio * ratio * ss, (cs - ratio * ss) / s, ss / (s * s)
         form = aa, ab, bb, uc - ratio * us, us / s

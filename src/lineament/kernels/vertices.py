@@ -10,6 +10,7 @@ import numpy as np
 from ..features import records as col
 from . import helper, kernel
 from . import layout as at
+from .rays import turn
 from .writing import write_end
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
@@ -21,31 +22,32 @@ _ENOUGH = 3
 
 
 @helper
-def place_vertices(work, vertices, rays, bearings, count):
+def place_vertices(work, bearings, count):
     """Place the vertices listed (BEGIN or HELD); the lines between them become the pieces.
 
     X and Y of their points become those of the vertices.
     """
     counts = work.counts
-    ring = counts[at.CLOSED] != 0 and _closes(vertices, counts[at.POINTS], count)
-    _settle(work, vertices, rays, bearings, count, ring)
-    _move_points(work, vertices, rays, bearings, count, ring)
-    counts[at.PIECES] = _list_pieces(vertices, work.pieces, work.response, count, ring)
+    ring = counts[at.CLOSED] != 0 and _closes(work, count)
+    _settle(work, bearings, count, ring)
+    _move_points(work, bearings, count, ring)
+    counts[at.PIECES] = _list_pieces(work, count, ring)
 
 
 @helper
-def _closes(vertices, points, count):
+def _closes(work, count):
     """Whether polylines begin at the first point of a closed cluster, and end there again."""
-    point, kind = vertices[at.AT], vertices[at.KIND]
-    if count < 3 or point[0] != 0 or point[count - 1] != points - 1:
+    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
+    if count < 3 or point[0] != 0 or point[count - 1] != work.counts[at.POINTS] - 1:
         return False
     return kind[1] != BEGIN and kind[count - 1] != BEGIN
 
 
 @helper
-def _list_pieces(vertices, pieces, response, count, ring):
+def _list_pieces(work, count, ring):
     """List the lines from vertex to vertex as pieces. Returns their number."""
-    point, kind, n = vertices[at.AT], vertices[at.KIND], np.int64(0)
+    point, kind, n = work.vertices[at.AT], work.vertices[at.KIND], np.int64(0)
+    pieces, response = work.pieces, work.response
     for k in range(1, count):
         if kind[k] == BEGIN:
             continue
@@ -58,15 +60,15 @@ def _list_pieces(vertices, pieces, response, count, ring):
 
 
 @helper
-def _settle(work, vertices, rays, bearings, count, ring):
+def _settle(work, bearings, count, ring):
     """Find the lines: held together at first, then free where they meet beside a measurement.
 
     The two ends of a ring are one vertex, and free from the start.
     """
-    point, kind = vertices[at.AT], vertices[at.KIND]
+    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
     end = count if ring else count - 1
     for step in range(4):
-        _solve(work, vertices, rays, bearings, count, step > 0)
+        _solve(work, bearings, count, step > 0)
         for k in range(1, end if step < 3 else 1):
             m = _leaves(k, count)
             if kind[k] == BEGIN or kind[m + 1] == BEGIN:
@@ -74,7 +76,7 @@ def _settle(work, vertices, rays, bearings, count, ring):
             if step == 0 and min(point[k] - point[k - 1], point[m + 1] - point[m]) > _ENOUGH:
                 kind[k] = _OPEN
             elif kind[k] != HELD:
-                tangent, _ = _meeting(work.marks[at.BEAM], vertices, rays, bearings, k, m)
+                tangent, _ = _meeting(work, bearings, k, m)
                 kind[k] = _BEFORE if tangent > 0.0 else HELD if math.isnan(tangent) else _AFTER
         if ring:
             kind[0] = kind[count - 1] if kind[count - 1] > HELD else BEGIN
@@ -87,10 +89,10 @@ def _leaves(k, count):
 
 
 @helper
-def _move_points(work, vertices, rays, bearings, count, ring):
+def _move_points(work, bearings, count, ring):
     """Move the points of the vertices to where their lines meet, or end."""
-    point, kind = vertices[at.AT], vertices[at.KIND]
-    before, after = rays[at.U_BEFORE], rays[at.U_AFTER]
+    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
+    before, after = work.rays[at.U_BEFORE], work.rays[at.U_AFTER]
     x, y = work.points[at.X], work.points[at.Y]
     for k in range(count):
         i, b, tangent = point[k], work.marks[at.BEAM, point[k]], 0.0
@@ -101,7 +103,7 @@ def _move_points(work, vertices, rays, bearings, count, ring):
         elif kind[m + 1] == BEGIN or (m != k and not ring):
             u = before[k]
         else:
-            tangent, u = _meeting(work.marks[at.BEAM], vertices, rays, bearings, k, m)
+            tangent, u = _meeting(work, bearings, k, m)
             if kind[k] == HELD or math.isnan(tangent):
                 tangent, u = 0.0, 0.5 * (before[k] + after[m])
         if not u > 0.0:
@@ -113,43 +115,37 @@ def _move_points(work, vertices, rays, bearings, count, ring):
 
 
 @helper
-def _turn(bearings, b, to):
-    """Cosine and sine of the angle from the ray of one beam to that of another."""
-    c = bearings[0, b] * bearings[0, to] + bearings[1, b] * bearings[1, to]
-    return c, bearings[0, b] * bearings[1, to] - bearings[1, b] * bearings[0, to]
-
-
-@helper
-def _meeting(beam, vertices, rays, bearings, k, m):
+def _meeting(work, bearings, k, m):
     """Where the lines that come to vertex k and leave m, on the same ray, meet.
 
     Tangent of the angle from that ray, and 1/ρ times its cosine; NaN if they do not meet between
     the measurements next to it.
     """
-    point = vertices[at.AT]
-    before, after = rays[at.U_BEFORE], rays[at.U_AFTER]
+    point, beam = work.vertices[at.AT], work.marks[at.BEAM]
+    before, after = work.rays[at.U_BEFORE], work.rays[at.U_AFTER]
     b = beam[point[k]]
-    c, s = _turn(bearings, b, beam[point[k - 1]])
+    c, s = turn(bearings, b, beam[point[k - 1]])
     slope = (after[k - 1] - before[k] * c) / s
-    c, s = _turn(bearings, b, beam[point[m + 1]])
+    c, s = turn(bearings, b, beam[point[m + 1]])
     bend = (before[m + 1] - after[m] * c) / s - slope
     if bend == 0.0:
         return math.nan, math.nan
     tangent = (before[k] - after[m]) / bend
-    c1, s1 = _turn(bearings, b, beam[point[k] - 1])
-    c2, s2 = _turn(bearings, b, beam[point[m] + 1])
+    c1, s1 = turn(bearings, b, beam[point[k] - 1])
+    c2, s2 = turn(bearings, b, beam[point[m] + 1])
     if not s1 < tangent * c1 or not tangent * c2 < s2:
         return math.nan, math.nan
     return tangent, before[k] + slope * tangent
 
 
 @helper
-def _solve(work, vertices, rays, bearings, count, again):
+def _solve(work, bearings, count, again):
     """Inverse range of the line before each vertex (U_BEFORE) and of that after it (U_AFTER).
 
     Of least squared range errors; with weights from the lines that are there, if `again`.
     """
-    kind, before, after = vertices[at.KIND], rays[at.U_BEFORE], rays[at.U_AFTER]
+    kind, rays = work.vertices[at.KIND], work.rays
+    before, after = rays[at.U_BEFORE], rays[at.U_AFTER]
     pivot, right, cross = rays[at.PIVOT], rays[at.RIGHT], rays[at.CROSS]
     d, h = 0.0, 0.0
     for k in range(count):
@@ -157,7 +153,7 @@ def _solve(work, vertices, rays, bearings, count, again):
             d, h = 0.0, 0.0
         if k + 1 == count or kind[k + 1] == BEGIN:
             continue
-        aa, ab, bb, ua, ub = _normal_equations(work, vertices, rays, bearings, k, again)
+        aa, ab, bb, ua, ub = _normal_equations(work, bearings, k, again)
         pivot[k], right[k], cross[k] = d + aa, h + ua, ab
         d, h = bb - ab * ab / pivot[k], ub - ab * right[k] / pivot[k]
         if k + 2 == count or kind[k + 2] == BEGIN or kind[k + 1] > HELD:
@@ -171,25 +167,25 @@ def _solve(work, vertices, rays, bearings, count, again):
 
 
 @helper
-def _normal_equations(work, vertices, rays, bearings, k, again):
+def _normal_equations(work, bearings, k, again):
     """Sum up the normal equations of the line from a vertex to the next, in their inverse ranges.
 
     A measurement at a vertex counts once: for the line before it, if both are held together.
     """
-    point, kind = vertices[at.AT], vertices[at.KIND]
+    point, kind = work.vertices[at.AT], work.vertices[at.KIND]
     beam, rho = work.marks[at.BEAM], work.points[at.RHO]
     origin, end = beam[point[k]], beam[point[k + 1]]
-    _, whole = _turn(bearings, origin, end)
+    _, whole = turn(bearings, origin, end)
     aa, ab, bb, ua, ub = 0.0, 0.0, 0.0, 0.0, 0.0
     low = point[k] if kind[k] == BEGIN or kind[k] == _AFTER else point[k] + 1
     high = point[k + 1] if kind[k + 1] == HELD or kind[k + 1] == _BEFORE else point[k + 1] - 1
     for i in range(low, high + 1):
-        _, s = _turn(bearings, origin, beam[i])
-        _, rest = _turn(bearings, beam[i], end)
+        _, s = turn(bearings, origin, beam[i])
+        _, rest = turn(bearings, beam[i], end)
         a, b, r = rest / whole, s / whole, rho[i]
         mapped = r
         if again:
-            u = a * rays[at.U_AFTER, k] + b * rays[at.U_BEFORE, k + 1]
+            u = a * work.rays[at.U_AFTER, k] + b * work.rays[at.U_BEFORE, k + 1]
             mapped = 1.0 / u if u * r > 0.5 else 2.0 * r
         w = r * r * mapped * mapped
         aa, ab, bb = aa + w * a * a, ab + w * a * b, bb + w * b * b

@@ -8,50 +8,34 @@ from typing import TYPE_CHECKING
 from .._lazy import lazily
 
 if TYPE_CHECKING:
-    from ..rosmsg.poses import Odometry
-    from .config import LiveConfig, read_config
-    from .counters import Counts, Report
-    from .node import Node
-    from .pipeline import Frame, Pipeline
-    from .received import Received, Source
-    from .replay import ReplaySource
-    from .running import run_live
-    from .sinks import FoxgloveSink, RosSink, Sink
+    from ..rosmsg.poses import Odometry as Odometry
+    from .config import LiveConfig as LiveConfig
+    from .config import read_config as read_config
+    from .counters import Counts as Counts
+    from .counters import Report as Report
+    from .node import Node as Node
+    from .pipeline import Frame as Frame
+    from .pipeline import Pipeline as Pipeline
+    from .received import Received as Received
+    from .received import Source as Source
+    from .replay import ReplaySource as ReplaySource
+    from .running import run_live as run_live
+    from .sinks import FoxgloveSink as FoxgloveSink
+    from .sinks import RosSink as RosSink
+    from .sinks import Sink as Sink
 
-_HOME = {
-    "Counts": "counters",
-    "FoxgloveSink": "sinks",
-    "Frame": "pipeline",
-    "LiveConfig": "config",
-    "Node": "node",
-    "Odometry": "received",
-    "Pipeline": "pipeline",
-    "Received": "received",
-    "ReplaySource": "replay",
-    "Report": "counters",
-    "RosSink": "sinks",
-    "Sink": "sinks",
-    "Source": "received",
-    "read_config": "config",
-    "run_live": "running",
+_HOMES = {
+    "config": "LiveConfig read_config",
+    "counters": "Counts Report",
+    "node": "Node",
+    "pipeline": "Frame Pipeline",
+    "received": "Odometry Received Source",
+    "replay": "ReplaySource",
+    "running": "run_live",
+    "sinks": "FoxgloveSink RosSink Sink",
 }
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
-__all__ = [
-    "Counts",
-    "FoxgloveSink",
-    "Frame",
-    "LiveConfig",
-    "Node",
-    "Odometry",
-    "Pipeline",
-    "Received",
-    "ReplaySource",
-    "Report",
-    "RosSink",
-    "Sink",
-    "Source",
-    "read_config",
-    "run_live",
-]
+__all__ = [*_HOME]
 
 __getattr__ = lazily(__name__, _HOME)

@@ -1,9 +1,6 @@
 """Foxglove, live: messages are served by WebSocket, the same as in a recording."""
 
-from collections import defaultdict
-
 import foxglove
-from foxglove.websocket import ChannelView, Client, ServerListener
 
 from ..errors import LineamentError
 from ..output.foxglove import FoxgloveMessages
@@ -22,7 +19,7 @@ class FoxgloveServer(Publisher):
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8765, name: str = "lineament") -> None:
         super().__init__()
-        self._messages, self._viewers = FoxgloveMessages(), _Viewers()
+        self._messages = FoxgloveMessages()
         self._context = foxglove.Context()
         try:
             self._server = foxglove.start_server(
@@ -30,7 +27,6 @@ class FoxgloveServer(Publisher):
                 host=host,
                 port=port,
                 context=self._context,
-                server_listener=self._viewers,
                 message_backlog_size=_BACKLOG,
             )
         except (RuntimeError, OverflowError) as error:
@@ -59,17 +55,4 @@ class FoxgloveServer(Publisher):
         topic.log(message.data)
 
     def _count(self, topic: foxglove.Channel) -> int:
-        return len(self._viewers.of[topic.topic()])
-
-
-class _Viewers(ServerListener):
-    """Keeps who is subscribed, by topic; called by the server's threads."""
-
-    def __init__(self) -> None:
-        self.of: defaultdict[str, set[int]] = defaultdict(set)
-
-    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        self.of[channel.topic].add(client.id)
-
-    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
-        self.of[channel.topic].discard(client.id)
+        return int(topic.has_sinks())

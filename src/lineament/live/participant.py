@@ -3,7 +3,7 @@
 import os
 import re
 
-from cyclonedds.core import DDSException, Entity
+from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 
 from ..errors import LineamentError, one_line
@@ -66,15 +66,10 @@ class Participant:
 
     def close(self) -> None:
         """Leave the domain, and close all that is open in it; others see it at once."""
-        close_entity(self.entity)
-        if self._configured is not None:
-            close_entity(self._configured)
-
-
-def close_entity(entity: Entity) -> None:
-    """Delete an entity of Cyclone DDS now, whoever still refers to it."""
-    # It is what the last reference would do, and does nothing a second time.
-    entity.__del__()
+        for entity in (self.entity, self._configured):
+            if entity is not None:
+                # What the last reference would do, whoever else has one; a second time, nothing.
+                entity.__del__()
 
 
 def _domain_of_environment() -> int:

@@ -105,19 +105,7 @@ class Inbox:
 def received_scan(
     publisher: str, data: Buffer, encoding: str, kind: str, echo: str = "first"
 ) -> Received:
-    """Return what a source gives of a serialised scan that has just arrived.
-
-    Parameters
-    ----------
-    publisher : str
-        Who sent it.
-    data : bytes-like
-        The message; `Received.read` decodes it, and raises ValueError if it is malformed.
-    encoding : {"ros1", "cdr"}
-    kind : {"sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan"}
-    echo : {"first", "last", "strongest"}
-        Which echo of the latter.
-    """
+    """Return what a source gives of a serialised scan, of type `kind`, that has just arrived."""
     read = partial(_decoder(kind, echo), data, encoding)
     return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
 

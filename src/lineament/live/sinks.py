@@ -39,7 +39,7 @@ class Publisher(ABC):
         self._send(self._topics[message.topic], message)
 
     def listeners(self, topic: str) -> int:
-        """Return the number of listeners of a topic; 0 if it is not advertised."""
+        """Return the number of listeners of a topic, or 1 if it has some; 0 if not advertised."""
         return self._count(self._topics[topic]) if topic in self._topics else 0
 
     @abstractmethod

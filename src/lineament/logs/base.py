@@ -2,12 +2,12 @@
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from ..errors import LogError
 from ..scan import LaserScan
@@ -174,6 +174,17 @@ class Log(ABC):
         self.skipped += 1
         if len(self.faults) < MAX_FAULTS:
             self.faults.append(str(error))
+
+    def _made(
+        self, topic: str, where: str, make: Callable[..., LaserScan], *arguments: Any
+    ) -> Iterator[tuple[str, LaserScan]]:
+        """Yield the scan that `make` returns, behind its topic; what it raises is a fault."""
+        try:
+            scan = make(*arguments)
+        except (ValueError, OverflowError) as error:
+            self._fault(LogError(self.name, f"{where}{error}"))
+        else:
+            yield topic, scan
 
     def _until_broken(self, items: Iterable[T]) -> Iterator[T]:
         """Pass on what is read from a file; a break in it is a fault, and the end."""

@@ -51,13 +51,8 @@ class CsmLog(Log):
         for i, found in enumerate(json_objects(self.source)):
             if isinstance(found, LogError):
                 self._fault(found)
-                continue
-            try:
-                scan = _scan(found)
-            except (ValueError, OverflowError) as error:
-                self._fault(LogError(self.name, f"scan {i}: {error}"))
             else:
-                yield self.only_topic, scan
+                yield from self._made(self.only_topic, f"scan {i}: ", _scan, found)
 
 
 def _scan(found: dict[str, Any]) -> LaserScan:

@@ -140,17 +140,15 @@ class CsvBeamsLog(_Csv):
         return 1
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        beams = np.array(list(self._beams()), np.float64).reshape(-1, 3)
+        yield from self._made(self.only_topic, "", self._scan, [*self._beams()])
+
+    def _scan(self, rows: list[Iterable[float]]) -> LaserScan:
+        beams = np.array(rows, np.float64).reshape(-1, 3)
         degrees = _DEGREES[self._names[_beam_places(self._names)[0]]] if self._names else None
-        try:
-            order, angles = by_bearing(beams[:, 0], degrees=degrees)
-            ranges, intensities = beams[order, 1], beams[order, 2]
-            known = None if np.isnan(intensities).all() else intensities
-            scan = LaserScan(ranges, **bearing_fields(angles), intensities=known)
-        except ValueError as error:
-            self._fault(LogError(self.name, str(error)))
-        else:
-            yield self.only_topic, scan
+        order, angles = by_bearing(beams[:, 0], degrees=degrees)
+        ranges, intensities = beams[order, 1], beams[order, 2]
+        known = None if np.isnan(intensities).all() else intensities
+        return LaserScan(ranges, **bearing_fields(angles), intensities=known)
 
     def _beams(self) -> Iterator[Iterable[float]]:
         """Yield bearing, range and intensity of each row."""

@@ -4,6 +4,7 @@ import re
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -36,7 +37,6 @@ class LineLog(Log):
 
     def _open(self) -> None:
         self._known = {kind.encode(): kind for kind in self.kinds}
-        self._counts: Counter[str] | None = None
         self._wanted = self.read_kinds if self.topic is None else (self.topic,)
         # Stops at the first scan: a good log opens at once, however long it is.
         known = self.topic is None or self.topic in self.scan_kinds
@@ -80,19 +80,18 @@ class LineLog(Log):
     @property
     def topics(self) -> list[str]:
         """The kinds of lines in the log that hold a scan."""
-        return [name for name in self.scan_kinds if self._all_counts()[name]]
+        return [name for name in self.scan_kinds if self._counts[name]]
 
     def contents(self) -> list[Topic]:
         """Return all kinds of lines in the log."""
-        return [Topic(name, "", count) for name, count in self._all_counts().most_common()]
+        return [Topic(name, "", count) for name, count in self._counts.most_common()]
 
     def __len__(self) -> int:
-        return sum(self._all_counts()[name] for name in self._wanted)
+        return sum(self._counts[name] for name in self._wanted)
 
-    def _all_counts(self) -> Counter[str]:
-        if self._counts is None:
-            self._counts = self._survey(())
-        return self._counts
+    @cached_property
+    def _counts(self) -> Counter[str]:
+        return self._survey(())
 
     def _survey(self, until: Collection[str]) -> Counter[str]:
         """Count the lines of each kind, without parsing, up to the first one of `until`."""

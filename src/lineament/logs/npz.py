@@ -63,12 +63,7 @@ class NpzLog(Log):
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         for i in range(self._n):
-            try:
-                scan = self._scan(i)
-            except ValueError as error:
-                self._fault(LogError(self.name, f"scan {i}: {error}"))
-            else:
-                yield self.only_topic, scan
+            yield from self._made(self.only_topic, f"scan {i}: ", self._scan, i)
 
     def _scan(self, i: int) -> LaserScan:
         arrays = self._arrays

@@ -60,22 +60,17 @@ class RplidarLog(Log):
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         transforms = _read_transforms(self.path.parent / _TRANSFORMS)
-        world = self.topics[0]
         for unit in self._wanted:
-            try:
-                ranges, bearings = _polar(_pairs(self._units[unit]))
-                order, angles = by_bearing(bearings)
-                pose = (0.0, 0.0, 0.0) if unit == world else _pose(transforms, unit, world)
-                scan = LaserScan(
-                    ranges[order],
-                    angles=angles,
-                    frame_id=unit,
-                    pose=pose if transforms else None,
-                )
-            except (ValueError, OverflowError) as error:
-                self._fault(LogError(self.name, f"unit {unit}: {error}"))
-            else:
-                yield unit, scan
+            yield from self._made(unit, f"unit {unit}: ", self._scan, unit, transforms)
+
+    def _scan(self, unit: str, transforms: dict[str, Any]) -> LaserScan:
+        ranges, bearings = _polar(_pairs(self._units[unit]))
+        order, angles = by_bearing(bearings)
+        pose = None
+        if transforms:
+            world = self.topics[0]
+            pose = (0.0, 0.0, 0.0) if unit == world else _pose(transforms, unit, world)
+        return LaserScan(ranges[order], angles=angles, frame_id=unit, pose=pose)
 
 
 def _pairs(values: object) -> NDArray[np.float64]:

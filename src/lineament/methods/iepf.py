@@ -35,7 +35,7 @@ class IEPF(PieceMethod):
     name = "iepf"
     published: ClassVar[dict[str, Any]] = {
         "clusters": "none",
-        "threshold": 0.1,
+        "threshold": 0.15,
         "proportion": 0.0,
         "noise_factor": 0.0,
         "corner": "beam",

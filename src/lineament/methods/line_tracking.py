@@ -31,7 +31,11 @@ class LineTracking(PieceMethod):
     """
 
     name = "line_tracking"
-    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "max_misses": 0}
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "fixed",
+        "noise_factor": 5.0,
+        "max_misses": 0,
+    }
 
     threshold: float = parameter(
         0.0, "distance from its line that a point without noise may have [m]", low=0

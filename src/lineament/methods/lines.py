@@ -21,7 +21,7 @@ class LineMethod(MethodBase):
     what its paper has.
     """
 
-    presets = ("paper",)
+    presets: ClassVar[tuple[str, ...]] = ("paper",)
     #: Parameters of the preset `paper`, where they differ from the defaults.
     published: ClassVar[dict[str, Any]] = {}
 
@@ -115,7 +115,12 @@ class PieceMethod(LineMethod):
 class NearMethod(LineMethod):
     """A method that looks for points near a line, one line after the other."""
 
-    published: ClassVar[dict[str, Any]] = {"clusters": "fixed", "sigmas": 0.0, "fit": "total"}
+    published: ClassVar[dict[str, Any]] = {
+        "clusters": "fixed",
+        "epsilon": 0.02,
+        "sigmas": 0.0,
+        "fit": "total",
+    }
 
     epsilon: float = parameter(
         0.01, "misfit: how far a point may lie from the line without noise [m]", low=0

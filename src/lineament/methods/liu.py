@@ -40,12 +40,12 @@ class Liu(MethodBase):
     """
 
     name = "liu"
-    presets = ("paper", "scale_free")
+    presets = ("paper", "tuned", "scale_free")
 
     sigma_d: float = parameter(4.0, "width of the filter along the scan [beams]", above=0)
     sigma_r: float = parameter(0.3, "width of the filter in range [m]", above=0)
     half_width: int = parameter(
-        8, "beams on either side that the filter takes in; not stated in the paper", low=0
+        2, "beams on either side that the filter takes in; not stated, chosen by Figure 9", low=0
     )
     spacing_scale: float = parameter(
         6.0,
@@ -67,10 +67,9 @@ class Liu(MethodBase):
         0.66, "what the response of a corner exceeds, in the unit of `response`", low=0
     )
     response: str = parameter(
-        "tangent",
+        "product_scaled",
         "interpretation of equation 22: Σd to the tangent [m], that times Σd to the chord [m²], Σd "
-        "over Σ|s| or the length of the chord [-], or Σ of the products of both distances of each "
-        "point over the square of that length [-]",
+        "over Σ|s| or over the length of the chord [-], or the product over its square [-]",
         choices=RESPONSES,
     )
     recursion: str = parameter(
@@ -118,13 +117,22 @@ class Liu(MethodBase):
         return cls(**{**plain, **changes})
 
     @classmethod
+    def tuned(cls, **changes: Any) -> Self:
+        """Make the same steps with other numbers, chosen by F1 of corners in simulated scenes.
+
+        The filter is off. The command is ``python benchmarks/tune_liu.py``.
+        """
+        chosen = {"half_width": 0, "response": "relative", "threshold": 0.5, "support_radius": 7}
+        return cls(**{**chosen, "spacing_scale": 8.0, "density_k": 0.0, **changes})
+
+    @classmethod
     def scale_free(cls, **changes: Any) -> Self:
         """Make the response that does not depend on range, with its own threshold.
 
         In metres, 0.66 finds right angles only farther than some 3 m, less what the filter takes
         away. ``docs/equations.md`` says where the threshold comes from.
         """
-        return cls(**{"response": "relative", "threshold": 0.25, **changes})
+        return cls(**{"half_width": 8, "response": "relative", "threshold": 0.25, **changes})
 
     def own_arrays(self, beams: int) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """Make the parameters as the kernel takes them, and scratch for filter and budget."""

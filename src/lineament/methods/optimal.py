@@ -98,10 +98,9 @@ class Optimal(MethodBase):
             return
         # Plain tuples: named ones take numba a microsecond to recognise.
         limits = block.range_min, block.range_max, block.circular, self.evidence, self.max_missing
-        segments, corners, *others = block.tables
         extract_rows(
             block.ranges, block.rows, block.bearings, block.noise, limits, block.own[0],
-            (segments, corners, block.arcs, *others), block.noises, block.counts,
+            block.tables, block.noises, block.counts,
         )  # fmt: skip
 
     def find(self, block: Block) -> None:

@@ -76,7 +76,7 @@ _EXAMPLE = """Examples
 """
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter,))
+@dataclass_transform(frozen_default=True, kw_only_default=True)
 def method(cls: type[T]) -> type[T]:
     """Make a class of parameters a frozen dataclass, and list them in its docstring.
 

@@ -31,7 +31,7 @@ class RegionGrowing(NearMethod):
     name = "region_growing"
     published: ClassVar[dict[str, Any]] = {
         "clusters": "none",
-        "epsilon": 0.03,
+        "epsilon": 0.05,
         "delta": 0.1,
         "sigmas": 0.0,
         "p_min": 10,

@@ -35,7 +35,7 @@ class SplitAndMerge(PieceMethod):
     name = "split_and_merge"
     published: ClassVar[dict[str, Any]] = {
         "clusters": "fixed",
-        "threshold": 0.03,
+        "threshold": 0.04,
         "noise_factor": 0.0,
         "corner_trim": 0,
     }

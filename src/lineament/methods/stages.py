@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 
 def bilateral_filter(
-    scan: LaserScan, *, sigma_d: float = 4.0, sigma_r: float = 0.3, half_width: int = 8
+    scan: LaserScan, *, sigma_d: float = 4.0, sigma_r: float = 0.3, half_width: int = 2
 ) -> Array:
     """Filter the ranges of a scan over index distance and range difference.
 
@@ -144,7 +144,7 @@ def adaptive_clusters(
 
 
 def corner_response(
-    points: ArrayLike, *, support_radius: int = 6, response: str = "tangent"
+    points: ArrayLike, *, support_radius: int = 6, response: str = "product_scaled"
 ) -> Array:
     """Response of the corner detection operator along one cluster (equations 15-22).
 
@@ -178,7 +178,7 @@ def primary_corners(
     *,
     support_radius: int = 6,
     threshold: float = 0.66,
-    response: str = "tangent",
+    response: str = "product_scaled",
     recursion: str = "both",
     ends: str = "truncated",
     min_points: int = 3,
@@ -204,7 +204,7 @@ def primary_corners(
     --------
     >>> arm = np.linspace(0.2, 0.0, 7)
     >>> right_angle = [(a, 0.0) for a in arm] + [(0.0, a) for a in arm[-2::-1]]
-    >>> found = primary_corners(right_angle, threshold=0.5)
+    >>> found = primary_corners(right_angle, response="relative", threshold=0.5)
     >>> found["beam"][found["accepted"]].tolist()
     [6]
     """

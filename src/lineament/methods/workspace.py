@@ -134,8 +134,9 @@ class Block:
 
     @property
     def tables(self) -> tuple[NDArray[Any], ...]:
-        """Results of the kernels: segments, corners, breakpoints, clusters, offsets."""
-        return self.segments, self.corners, self.breakpoints, self.clusters, self.offsets
+        """Results of the kernels, as in `kernels.optimal.layout.Tables`."""
+        features = self.segments, self.corners, self.arcs, self.breakpoints
+        return *features, self.clusters, self.offsets
 
     def raw(self) -> list[bytes]:
         """Copy the records that the last run wrote, as bytes, in the order of the tables."""

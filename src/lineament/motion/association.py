@@ -71,19 +71,15 @@ def associate(
     Parameters
     ----------
     before, now : Features
-        Features of two frames, each in its sensor's frame.
+        Each in its sensor's frame.
     motion : (x, y, theta)
         Expected pose of the later sensor in the frame of the earlier [m, m, rad].
     covariance : array_like, shape (3, 3), optional
         How well the motion is known [m, m, rad]; exactly where it is not given.
     gate : float
-        Share of the right pairs that are within the gates, between 0 and 1.
+        Share of the right pairs that are within the gates.
     roughness : float
         How far surfaces are from straight and round [m].
-
-    Returns
-    -------
-    Matches
 
     Raises
     ------
@@ -93,8 +89,7 @@ def associate(
     Examples
     --------
     >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01)
-    >>> features = ln.extract(scan)
+    >>> features = ln.extract(ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01))
     >>> associate(features, features).segments.tolist()
     [[0, 0]]
     """

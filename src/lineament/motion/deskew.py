@@ -40,29 +40,25 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
 
     The velocity is taken to be constant over the sweep. Each measurement is moved to where it lies
     as seen from the pose of the sensor at the scan's stamp, and the beams are put in the order of
-    their new bearings, which are irregular. It is then a scan whose beams are all of one time:
-    `scan_time` and `time_increment` are 0, and to deskew it again changes nothing.
+    their new bearings, which are irregular. `scan_time` and `time_increment` are then 0.
 
     A measurement that has come to lie behind two neighbouring beams, farther than both by more than
     they differ, is hidden from that pose, and becomes NaN: else near and far beams would alternate
-    along an edge. What a standing sensor would have seen and the moving one did not stays open. A
-    beam without a return keeps its range, and its place between its neighbours. Where the beams of
-    a full circle go more than once around, the last are put between the first; where a turn the
-    other way leaves a gap, there is one.
+    along an edge. A beam without a return keeps its range, and its place between its neighbours.
+    Where the beams of a full circle go more than once around, the last are put between the first.
 
     Parameters
     ----------
     scan : LaserScan
     twist : (v_x, v_y, omega) or None
-        Velocity of the sensor in its own frame [m/s, m/s, rad/s], given, or from two poses
-        (:func:`~lineament.scan.poses.twist_between`), or of the last scans
+        Velocity of the sensor in its own frame [m/s, m/s, rad/s], from two poses
+        (:func:`~lineament.scan.poses.twist_between`) or of the last scans
         (:attr:`lineament.motion.Tracker.twist`). None where it is not known.
 
     Returns
     -------
     LaserScan
-        With as many beams; the scan itself where its times or the twist are not known, or the
-        twist is 0.
+        With as many beams; the scan itself where times or twist are not known, or the twist is 0.
 
     Raises
     ------

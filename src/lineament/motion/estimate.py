@@ -83,19 +83,13 @@ def estimate_motion(
     Parameters
     ----------
     matches : Matches
-        Pairs of features, each in its sensor's frame. Edges are not among those of
-        `associate`; others are taken as they are.
+        Of two frames; `associate` leaves edges out.
     prior : (x, y, theta)
         The motion as known before [m, m, rad]: from odometry or from the last frames.
     covariance : array_like, shape (3, 3), optional
-        Covariance of the prior; where it is not given, the prior is where the search begins and
-        is known to 10 m and half a turn.
+        Of the prior; where it is not given, to 10 m and half a turn.
     roughness : float
         How far surfaces are from straight and round [m].
-
-    Returns
-    -------
-    Motion
 
     Raises
     ------

@@ -66,10 +66,8 @@ class Tracker:
     ----------
     max_missed : int
         Frames through which a track lasts without being seen.
-    gate : float
-        Share of the right pairs that are within the gates.
-    roughness : float
-        How far surfaces are from straight and round [m]: 0 in a simulation, 1 cm in offices.
+    gate, roughness : float
+        As in `associate`; surfaces are rough by 0 in a simulation, by 1 cm in offices.
 
     Raises
     ------
@@ -126,11 +124,7 @@ class Tracker:
             Those of the next scan, in the frame of its sensor.
         odometry : (x, y, theta), optional
             Pose of the sensor by odometry, in any frame that stays [m, m, rad]. Its change since
-            the last frame is what is made use of, where both have one.
-
-        Returns
-        -------
-        Tracks
+            the last frame is made use of, where both have one.
 
         Raises
         ------

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import TABLES, Features
+from ..features import Features
 from ..features.records import FIELDS, POINTS, kind_codes, numbers
 
 if TYPE_CHECKING:
@@ -33,29 +34,24 @@ FEATURE_POINT = np.dtype(
 )
 
 
-def _moves(table: str, kind: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return which words of a record, all floats or all integers, go to which words of a point."""
-    taken: list[int] = []
-    put: list[int] = []
-    dtype, names = TABLES[table], FEATURE_POINT.names or ()
-    for field in FIELDS:
-        form = np.dtype(field.form)
-        if field.table == table and form.base.kind == kind:
-            first = dtype.fields[field.name][1] // form.base.itemsize  # type: ignore[index]
-            words = [first + i for i in numbers(form.shape)]
-            points = [names.index(name) for name in field.points.split()]
-            taken += words * (len(points) // len(words))
-            put += points
-    return np.array(taken), np.array(put)
-
-
-_MOVES = {table: (_moves(table, "f"), _moves(table, "i")) for table in _TABLES}
-#: Points of which only the kind is known, as words.
+#: A point of each kind of which only the kind is known.
 _EMPTY = np.zeros(3, FEATURE_POINT)
 for _name, _form in _FORMS.items():
     _EMPTY[_name] = {"<f4": np.nan, "<i4": -1, "<u4": 0}[_form]
 _EMPTY["z"], _EMPTY["kind"] = 0.0, range(3)
-_EMPTY_WORDS = _EMPTY.view("<i4").reshape(3, -1)
+
+
+def _moves(table: str) -> list[tuple[str, str, int]]:
+    """List field of a record, field of a point, and which of the numbers of the one it takes."""
+    moves = []
+    for field in FIELDS:
+        if field.table == table and field.form[0] != "U":
+            points, places = field.points.split(), numbers(np.dtype(field.form).shape)
+            moves += [(field.name, *move) for move in zip(points, cycle(places), strict=False)]
+    return moves
+
+
+_MOVES = {table: _moves(table) for table in _TABLES}
 
 
 def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[np.void]:
@@ -67,23 +63,15 @@ def feature_points(features: Features, tracks: Tracks | None = None) -> NDArray[
     """
     tables = [getattr(features, name) for name in _TABLES]
     counts = [len(table) for table in tables]
-    ints = np.repeat(_EMPTY_WORDS, counts, axis=0)
-    floats, points, begin = ints.view("<f4"), ints.view(FEATURE_POINT).reshape(len(ints)), 0
+    points, begin = np.repeat(_EMPTY, counts), 0
     with np.errstate(over="ignore"):  # What no float32 holds is infinite.
         for name, table in zip(_TABLES, tables, strict=True):
-            if len(table) == 0:
-                continue
-            # A copy has no gaps.
-            data, end = table.tobytes(), begin + len(table)
-            (taken, put), (ints_taken, ints_put) = _MOVES[name]
-            words = np.frombuffer(data, "f8").reshape(len(table), -1)
-            floats[begin:end, put] = words[:, taken]
-            words = np.frombuffer(data, "i4").reshape(len(table), -1)
-            ints[begin:end, ints_put] = words[:, ints_taken]
-            begin = end
-    corners = slice(counts[0], counts[0] + counts[1])
-    points["convex"][corners] = features.corners["convex"]
-    points["corner"][corners] = kind_codes("corners", features.corners["kind"])
+            if len(table):
+                rows, begin = points[begin : begin + len(table)], begin + len(table)
+                for field, point, place in _MOVES[name]:
+                    rows[point] = table[field].reshape(len(table), -1)[:, place]
+    corners = points[counts[0] : counts[0] + counts[1]]
+    corners["corner"] = kind_codes("corners", features.corners["kind"])
     if tracks is not None:
         numbers_of = tracks.segments, tracks.corners, tracks.arcs
         if [*map(len, numbers_of)] != counts:

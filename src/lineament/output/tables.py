@@ -1,10 +1,8 @@
 """Tables in files, a row a feature: Parquet and CSV; and JSON lines, a line a scan."""
 
 import json
-import math
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -12,6 +10,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from ..features.tables import SCHEMA, features_table
+from ..files import strict_json
 from .writer import Found, Writer
 
 #: The column that a table has besides those of `SCHEMA` where its scans come from several topics.
@@ -92,17 +91,4 @@ class JsonLinesWriter(Writer):
     def _write(self, found: list[Found], first_scan: int) -> None:
         for i, (features, _, topic) in enumerate(found, first_scan):
             record = {"scan": i} | ({"topic": topic} if topic else {}) | features.to_dict()
-            try:
-                line = json.dumps(record, allow_nan=False)
-            except ValueError:  # a number that JSON does not have
-                line = json.dumps(_without_nan(record), allow_nan=False)
-            self._file.write(line + "\n")
-
-
-def _without_nan(value: Any) -> Any:
-    """Put None in place of every number that is not finite."""
-    if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+            self._file.write(strict_json(record) + "\n")

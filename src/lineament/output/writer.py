@@ -5,8 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from ..features import Features
 from ..files import naming_errors, written_beside
@@ -62,15 +61,10 @@ class Writer(ABC):
         self._written, self._is_open = 0, True
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: Any) -> None:
         self._is_open = False
         if kind is not None:
-            self._stack.__exit__(kind, error, traceback)
+            self._stack.__exit__(kind, *error)
             return
         with self._stack, naming_errors(self.path):
             self._flush()
@@ -85,14 +79,8 @@ class Writer(ABC):
     def write(self, features: Features, scan: LaserScan | None = None, topic: str = "") -> None:
         """Take the features of the next scan.
 
-        Parameters
-        ----------
-        features : Features
-            They must not change until the block ends.
-        scan : LaserScan, optional
-            What they were found in. Formats that draw it need it; tables do without.
-        topic : str
-            The topic of the scan, where its log has several.
+        They must not change until the block ends. The scan is what they were found in: formats that
+        draw it need it. The topic is that of the scan, where its log has several.
 
         Raises
         ------

@@ -26,6 +26,7 @@ EXPERIMENTS: dict[str, tuple[str, ...]] = {
     "scenes": ("fig11",),
     "similarity": ("fig12",),
     "two_corners": ("fig13", "table2"),
+    "sensitivity": ("open",),
     "success": ("table3",),
     "all_methods": ("methods",),
     "tracking": (),

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..evaluation.scores import Scores, evaluate
 from ..simulation import SCENES, SENSORS
-from .contenders import LIU_NOTE, PARTITION_ONLY, every_method
+from .contenders import LIU_NOTE, PARTITION_ONLY, RIVALS_NOTE, every_method
 from .findings import Figure, Findings, Numbers, Progress, Setting, Table, dot_chart, each
 from .scans import batch_of, frame_times, scene_numbers, simulated_frames
 
@@ -48,8 +48,9 @@ def run(setting: Setting, progress: Progress) -> Findings:
         for method, extractor in each(methods, progress, name):
             scores = map(evaluate, batch_of(extractor, scans), (frame.truth for frame in frames))
             of = Scores.total(scores).summary()
-            if method == PARTITION_ONLY:
-                of = {k: v for k, v in of.items() if not k.startswith(("corner", "segment", "arc"))}
+            kinds = ("corner", "segment") if method == PARTITION_ONLY else ("corner",)
+            if method == PARTITION_ONLY or "corner_precision_0.10" not in of:
+                of = {k: v for k, v in of.items() if not k.startswith((*kinds, "arc"))}
             of["time"] = float(np.median(frame_times(extractor, scans[: len(SCENES)])))
             numbers[name][method] = of
     progress("drawing")
@@ -60,7 +61,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     logarithmic = [label for label in _PANELS if "÷" in label or "time" in label]
     return Findings(
         "All methods, by sensor",
-        (_ABOUT, _consistency(numbers), LIU_NOTE, _arcs(numbers)),
+        (_ABOUT, RIVALS_NOTE, LIU_NOTE, _consistency(numbers), _arcs(numbers)),
         tuple(
             Table.of_numbers(
                 f"{name}: {SENSORS[name].n_beams} beams, {len(scenes)} scans",

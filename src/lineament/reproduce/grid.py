@@ -16,12 +16,14 @@ from ..simulation import SCENES, SENSORS, scene, truth
 from .findings import Progress, Setting
 from .scans import batch_of, scene_numbers
 
-#: Forms of the response: what equation 22 may mean.
-FORMS = ("tangent", "product", "relative")
+#: Forms of the response: what equation 22 and the text of Figure 9 may mean.
+FORMS = ("product_scaled", "chord_scaled", "tangent", "product", "relative")
+#: Half-widths of the filter [beams], which the paper does not state: that of `Liu`, and a wide.
+HALF_WIDTHS = (2, 8)
 #: The support radius [beams] and the threshold that the paper takes from its Figure 9.
 RADIUS, THRESHOLD = 6, 0.66
 RADII = (3, 4, 5, 6, 7, 8, 10, 12, 16)
-THRESHOLDS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.66, 0.8, 1.0)
+THRESHOLDS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.66, 0.8, 1.0, 1.5)
 #: A corner is found again, or is an actual one, within this distance [m].
 GATE = 0.10
 #: Scenes for each frame of the setting; turns of the sensor in each scene [beams].
@@ -35,14 +37,23 @@ CRITERIA = {
 
 
 class Parameters(NamedTuple):
-    """What Figure 9 chooses: form of the response, support radius [beams], threshold."""
+    """What Figure 9 chooses: a reading of the paper, support radius [beams], threshold.
+
+    A reading is a form of the response, and a half-width of the filter [beams].
+    """
 
     response: str
+    half_width: int
     support_radius: int
     threshold: float
 
+    @property
+    def reading(self) -> str:
+        """Name of the reading."""
+        return f"{self.response}, half-width {self.half_width}"
+
     def __str__(self) -> str:
-        return f"{self.response}, radius {self.support_radius}, threshold {self.threshold:g}"
+        return f"{self.reading}, radius {self.support_radius}, threshold {self.threshold:g}"
 
     def extractor(self, method: str) -> Extractor:
         """Make `liu` or one of its presets with these parameters."""
@@ -54,7 +65,7 @@ Grid = dict[Parameters, dict[str, float]]
 
 
 def best_parameters(setting: Setting, progress: Progress) -> Parameters:
-    """Return the parameters with the largest AR of the actual corners, over all forms."""
+    """Return the parameters with the largest AR of the actual corners, over all readings."""
     return largest(repetition_grid(setting, progress), "of_actual")
 
 
@@ -73,15 +84,15 @@ def repetition_grid(setting: Setting, progress: Progress) -> Grid:
     """Measure AR of all parameters with the literal pipeline, on scenes that are not reported."""
     numbers = repetition_scenes(setting, reported=False)
     grid = {}
-    for form, radius in product(FORMS, RADII):
-        progress(f"response {form}, support radius {radius}")
-        for threshold in THRESHOLDS:
-            parameters = Parameters(form, radius, threshold)
+    for form, half_width in product(FORMS, HALF_WIDTHS):
+        progress(f"response {form}, half-width {half_width}")
+        for radius, threshold in product(RADII, THRESHOLDS):
+            parameters = Parameters(form, half_width, radius, threshold)
             grid[parameters] = repetition(parameters, numbers)
     return grid
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=8192)
 def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
     """Measure AR of the literal pipeline with some parameters, over some scenes, by `CRITERIA`.
 
@@ -124,7 +135,7 @@ def _mean(values: list[float]) -> float:
     return float(np.nan_to_num(values).mean()) if values else 0.0
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=8)
 def _views(numbers: range) -> list[tuple[LaserScan, float, Features]]:
     """Simulate the view of each scene before the turn, and after the turns: scan, turn, truth."""
     sensor, kinds, views = SENSORS["paper"], list(SCENES), []

@@ -12,6 +12,7 @@ from ..evaluation.counts import ratio, rms
 from ..evaluation.scores import Scores, evaluate
 from ..extractor import Extractor
 from ..features import Features
+from ..methods.liu import Liu
 from ..methods.stages import bilateral_filter
 from ..output import canvas, drawing
 from ..scan import Array, LaserScan
@@ -27,7 +28,7 @@ OFF = 0.10
 #: Noise points by how far they are off [m]: up to about 2 σ_r the filter moves them.
 SIZES = [(0.1, 0.3), (0.3, 0.6), (0.6, 1.2), (1.2, math.inf)]
 #: Beams that the filter uses on either side.
-HALF_WIDTH = 8
+HALF_WIDTH = Liu().half_width
 _RAW, _FILTERED = "#4477aa", "#d1242f"
 
 Mask = NDArray[np.bool_]
@@ -75,7 +76,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     variants = {
         "paper’s numbers, not filtered": Extractor("liu", half_width=0),
         "paper’s numbers, filtered": Extractor("liu"),
-        "best of Figure 9, not filtered": Extractor("liu", half_width=0, **best),
+        "best of Figure 9, not filtered": Extractor("liu", **best | {"half_width": 0}),
         "best of Figure 9, filtered": Extractor("liu", **best),
         "the same, lines fitted to filtered ranges": Extractor("liu", measure="filtered", **best),
     }

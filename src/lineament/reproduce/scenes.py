@@ -19,7 +19,7 @@ from .scans import INDOORS, recorded_scans, scene_numbers, simulated_frames
 
 TRUE = "true features"
 #: What the first picture of a scan shows; the second one has all others.
-FIRST = (TRUE, PDBS_LINES, "iepf", LIU_PAPER, LIU_BEST, "optimal")
+FIRST = (TRUE, PDBS_LINES, "iepf:paper", LIU_PAPER, LIU_BEST, "optimal")
 #: Scans of a recording, one of which is drawn; of the measurements, the share that is shown.
 CHOICE, NEAR = 5, 0.98
 

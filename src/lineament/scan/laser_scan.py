@@ -29,23 +29,16 @@ class RangeNoise:
     """Noise of one range, as standard deviations.
 
     The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
-    each beam is off by ``bearing``.
+    each beam is off by ``bearing``. A part that is negative or not finite is a ValueError.
 
     Parameters
     ----------
-    sigma : float
-        Constant part [m].
-    proportional : float
-        Part that grows with the range [m/m].
+    sigma, proportional : float
+        Constant part [m], and the part that grows with the range [m/m].
     bearing : float
         Noise of the bearing [rad].
     quantum : float
         Step of the lattice on which ranges are reported [m].
-
-    Raises
-    ------
-    ValueError
-        If a part is negative or not finite.
 
     Examples
     --------
@@ -217,9 +210,8 @@ class LaserScan:
 
         Examples
         --------
-        >>> scan = LaserScan([1.0, 2.0], 0.0, 0.1)
-        >>> scan.with_pose((3, 4, 0)).pose, scan.pose
-        ((3.0, 4.0, 0.0), None)
+        >>> LaserScan([1.0, 2.0], 0.0, 0.1).with_pose((3, 4, 0)).pose
+        (3.0, 4.0, 0.0)
         """
         other = self.__class__.__new__(self.__class__)
         other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
@@ -232,8 +224,7 @@ class LaserScan:
         Parameters
         ----------
         message : object
-            Anything with the fields of the ROS message; ``header`` and ``intensities`` may be
-            missing or empty.
+            ``header`` and ``intensities`` may be missing or empty.
         pose : (x, y, theta), optional
             Pose of the sensor, from elsewhere.
 
@@ -246,10 +237,9 @@ class LaserScan:
         --------
         >>> from types import SimpleNamespace as Message
         >>> header = Message(stamp=Message(sec=7, nanosec=500_000_000), frame_id="laser")
-        >>> m = Message(header=header, ranges=[1.0, 1.1], intensities=[], angle_min=0.0,
-        ...             angle_increment=0.1, range_min=0.1, range_max=30.0,
-        ...             scan_time=0.1, time_increment=0.0)
-        >>> LaserScan.from_message(m).stamp
+        >>> LaserScan.from_message(Message(
+        ...     header=header, ranges=[1.0, 1.1], angle_min=0.0, angle_increment=0.1,
+        ...     range_min=0.1, range_max=30.0, scan_time=0.1, time_increment=0.0)).stamp
         7.5
         """
         try:

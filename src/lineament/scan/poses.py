@@ -14,15 +14,7 @@ Twist = tuple[float, float, float]
 def compose(pose: Pose, motion: Pose) -> Pose:
     """Pose after a motion that is given in the frame of the pose.
 
-    Parameters
-    ----------
-    pose, motion : (x, y, theta)
-        [m, m, rad].
-
-    Returns
-    -------
-    (x, y, theta)
-        With theta in [-π, π].
+    Both are (x, y, theta) [m, m, rad]; theta of the result is in [-π, π].
 
     Examples
     --------
@@ -68,10 +60,9 @@ def poses_along(twist: Twist, times: ArrayLike) -> Array:
 
     Parameters
     ----------
-    twist : (v_x, v_y, omega)
-        Velocity forward, to the left [m/s], turn rate [rad/s].
+    twist : Twist
     times : array_like, shape (n,)
-        Times [s], of any sign.
+        [s], of any sign.
 
     Returns
     -------
@@ -110,13 +101,9 @@ def twist_between(pose: Pose, other: Pose, duration: float) -> Twist:
     Parameters
     ----------
     pose, other : (x, y, theta)
-        Poses [m, m, rad]; the turn between them goes the short way round.
+        [m, m, rad]; the turn between them goes the short way round.
     duration : float
-        Time from the one to the other [s], not 0.
-
-    Returns
-    -------
-    (v_x, v_y, omega)
+        Time from the one to the other [s].
 
     Raises
     ------

@@ -12,11 +12,10 @@ Examples
 """
 
 from .drive import drive, drive_poses
-from .presets import SENSORS
 from .raycast import cast_rays
 from .recording import WORLDS, sensor_like, simulate_log
 from .scenes import SCENES, scene
-from .sensor import Sensor
+from .sensor import SENSORS, Sensor
 from .truth import truth
 from .worlds import World, building, room
 

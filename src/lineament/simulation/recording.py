@@ -13,9 +13,8 @@ from ..logs import save_log
 from ..progress import Track, untracked
 from ..scan import LaserScan
 from .drive import drive, drive_poses
-from .presets import SENSORS
 from .scenes import SCENES, scene
-from .sensor import Sensor
+from .sensor import SENSORS, Sensor
 from .worlds import building
 
 #: What a log can be recorded in: the storey is driven through, all others are seen from one place.

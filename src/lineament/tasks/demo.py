@@ -1,6 +1,7 @@
 """A demonstration: a simulated drive, or a log, into a table and a page."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import LineamentError
@@ -40,7 +41,7 @@ def run_demo(
     summary = extract_log(log, target / "features.parquet", extractor, track=track)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
-    figures = _draw(target, log, summary.scans, track)
+    figures = list(track(_draw(target, log, extractor, summary.scans // 2), "drawing", 3))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
         ("log", str(log)),
@@ -68,26 +69,19 @@ _NOTE = (
 
 
 def _draw(
-    target: Path, log: str | os.PathLike[str], n_scans: int, track: Track
-) -> list[tuple[str, Path]]:
+    target: Path, log: str | os.PathLike[str], extractor: Extractor, index: int
+) -> Iterator[tuple[str, Path]]:
+    """Draw a scan, its stages and, if the log has poses, a map; yield captions and files."""
     from ..output.figures import plot_map, plot_scan, plot_trace
 
-    scan = open_log(log).scan(n_scans // 2)
-    extractors = {name: Extractor(name) for name in DEMO_METHODS}
-    figures = [
-        (f"Scan {n_scans // 2}: clusters, segments and corners.", target / "scan.png"),
-        (f"The stages of {DEMO_METHODS[0]} on that scan.", target / "trace.png"),
-    ]
-    steps = iter(track(range(3), "drawing", 3))
-    next(steps)
-    plot_scan(scan, {name: e(scan) for name, e in extractors.items()}, figures[0][1])
-    next(steps)
-    plot_trace(extractors[DEMO_METHODS[0]].trace(scan), figures[1][1])
-    next(steps)
-    extractor = extractors[DEMO_METHODS[0]]
+    scan, path = open_log(log).scan(index), target / "scan.png"
+    plot_scan(scan, {name: Extractor(name)(scan) for name in DEMO_METHODS}, path)
+    yield f"Scan {index}: clusters, segments and corners.", path
+    path = target / "trace.png"
+    plot_trace(extractor.trace(scan), path)
+    yield f"The stages of {DEMO_METHODS[0]} on that scan.", path
     posed = [(s.pose, extractor(s)) for s in open_log(log) if s.pose is not None]
     if posed:
-        figures.append(("All scans, at the poses of the log.", target / "map.png"))
-        plot_map(posed, figures[-1][1], title="What was found on the whole drive")
-    next(steps, None)
-    return figures
+        path = target / "map.png"
+        plot_map(posed, path, title="What was found on the whole drive")
+        yield "All scans, at the poses of the log.", path

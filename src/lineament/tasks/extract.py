@@ -15,7 +15,7 @@ from ..output import open_writer
 from ..progress import Track, untracked
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Extraction:
     """Result of the extraction of one log.
 
@@ -25,12 +25,12 @@ class Extraction:
     """
 
     log: str
-    output: str
-    topics: list[str]
-    scans: int
-    features: dict[str, int]
-    invalid: float
-    seconds: float
+    output: str = ""
+    topics: list[str] = field(default_factory=list)
+    scans: int = 0
+    features: dict[str, int] = field(default_factory=dict)
+    invalid: float = 0.0
+    seconds: float = 0.0
     skipped: int = 0
     faults: list[str] = field(default_factory=list)
 

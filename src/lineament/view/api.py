@@ -1,8 +1,8 @@
 """Requests of the page and their answers, as JSON; what is wrong with a request."""
 
-import json
 from urllib.parse import parse_qsl
 
+from ..files import strict_json
 from .session import Session
 
 #: Most stamps in one answer.
@@ -51,7 +51,7 @@ def answer(session: Session, target: str) -> bytes:
         raise RequestError(404, f"scan {values['i']} is not there: {read}") from None
     except ValueError as error:
         raise RequestError(404, str(error)) from None
-    return json.dumps(found, allow_nan=False).encode()
+    return strict_json(found).encode()
 
 
 def _split(target: str) -> tuple[str, dict[str, str]]:

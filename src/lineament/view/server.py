@@ -47,18 +47,7 @@ class ViewServer(ThreadingHTTPServer):
     It answers only requests that name it as loopback or by the host that it was bound to: a page
     from elsewhere cannot read the log by rebinding its own name (DNS rebinding).
 
-    Parameters
-    ----------
-    session : Session
-    host : str
-        Address to listen on.
-    port : int
-        0 for any that is free.
-
-    Raises
-    ------
-    LineamentError
-        If it cannot listen there.
+    It listens on an address and a port, 0 for any that is free; a LineamentError if it cannot.
     """
 
     daemon_threads = True
@@ -162,22 +151,9 @@ def serve(
     browser: bool = True,
     write: Callable[[str], None] = print,
 ) -> None:
-    """Serve the page of a session until interrupted, and open it in the browser.
+    """Serve the page of a session until interrupted, and open it in a browser where asked for.
 
-    Parameters
-    ----------
-    session : Session
-    host, port
-        As in `ViewServer`.
-    browser : bool
-        Whether to open the page.
-    write : callable
-        Called with a line that has the address.
-
-    Raises
-    ------
-    LineamentError
-        If the server cannot listen there.
+    `write` is called with a line that has the address. Raises as `ViewServer` does.
     """
     with session, ViewServer(session, host, port) as server:
         address = _address(host)

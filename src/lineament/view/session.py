@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import threading
 from collections.abc import Mapping
@@ -23,19 +22,8 @@ from .store import ScanStore
 class Session:
     """A log that is looked at, with one extractor for each method.
 
-    Parameters
-    ----------
-    path : path-like
-        The log, of any format that `lineament.open_log` reads.
-    extractors : mapping of str to Extractor
-        By the name under which the page shows them; the first is shown first.
-    **reading
-        How to read the log, as in `lineament.open_log`.
-
-    Raises
-    ------
-    LogError
-        If the log cannot be read, up to its first scan.
+    The page shows the extractors by their names, the first of them first. The log is read as by
+    `lineament.open_log`; a LogError if it cannot be read up to its first scan.
     """
 
     def __init__(
@@ -80,15 +68,14 @@ class Session:
 
     def stamps(self, first: int, count: int) -> dict[str, Any]:
         """Return the stamps of some scans [s]."""
-        return {"first": first, "stamps": _plain(self._store.stamps(first, count))}
+        return {"first": first, "stamps": self._store.stamps(first, count)}
 
     def scan(self, index: int, method: str) -> dict[str, Any]:
         """Return a scan and what a method finds in it; IndexError if it was not read."""
         topic, scan = self._store.item(index)
         with self._busy[method]:
             features = self.extractors[method](scan).to_dict()
-        asked = {"index": index, "method": method, "topic": topic}
-        return {name: _plain(value) for name, value in (asked | _beams(scan) | features).items()}
+        return {"index": index, "method": method, "topic": topic} | _beams(scan) | features
 
     def trace(self, index: int, method: str, beam: int) -> dict[str, Any]:
         """Return what became of a beam; ValueError if it is not there, IndexError for the scan."""
@@ -108,7 +95,7 @@ class Session:
 
 
 def _beams(scan: LaserScan) -> dict[str, Any]:
-    """Beams of a scan; the range of an invalid one is None."""
+    """Beams of a scan; the range of an invalid one is NaN."""
     bearings: dict[str, Any] = {"angles": scan.angles.tolist()}
     if scan.is_regular:
         bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
@@ -119,14 +106,3 @@ def _beams(scan: LaserScan) -> dict[str, Any]:
         **bearings,
         **{name: getattr(scan, name) for name in names},
     }
-
-
-def _plain(value: Any) -> Any:
-    """Replace what is not finite by None, in nested lists and dicts, since JSON has no NaN."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return value

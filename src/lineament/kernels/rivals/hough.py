@@ -22,28 +22,21 @@ Parameters = namedtuple("Parameters", "resolution min_points min_length max_miss
 def find_by_votes(floats, ints, noise, parameters, votes, normals):
     """Find the lines of a scan: from points and clusters, the ends of pieces.
 
-    Parameters
-    ----------
-    parameters : tuple
-        See `Parameters`, and `methods.hough.Hough`.
-    votes : int32 array, shape (A, D)
-        The accumulator; scratch.
-    normals : float64 array, shape (A, 2)
-        Unit normals of the lines that are voted for, over half a turn.
+    `parameters` are a tuple, see `Parameters`, and `methods.hough.Hough`; `votes` is the
+    accumulator, an int32 array of shape (A, D); `normals`, shape (A, 2), are the unit normals of
+    the lines that are voted for, over half a turn.
     """
-    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
-    prepare(work, moments, noise, p.epsilon, p.sigmas)
+    work, p = at.extended(floats, ints), Parameters(*parameters)
+    prepare(work, noise, p.epsilon, p.sigmas)
     work.counts[at.PIECES] = 0
     for c in range(work.counts[at.CLUSTERS]):
         first, last = work.clusters[at.FIRST, c], work.clusters[at.LAST, c]
         sigma = math.sqrt(range_variance(work.points[at.RHO, first], noise))
-        _find_in_cluster(
-            work, moments, first, last, max(p.resolution, 2.0 * sigma), p, votes, normals
-        )
+        _find_in_cluster(work, first, last, max(p.resolution, 2.0 * sigma), p, votes, normals)
 
 
 @helper
-def _find_in_cluster(work, moments, start, stop, width, p, votes, normals):
+def _find_in_cluster(work, start, stop, width, p, votes, normals):
     """Find the lines of one cluster, from `start` to `stop`."""
     x, y, free = work.points[at.X], work.points[at.Y], work.marks[at.FREE]
     ox, oy, radius = _circle(x, y, start, stop)
@@ -59,7 +52,7 @@ def _find_in_cluster(work, moments, start, stop, width, p, votes, normals):
             return
         nx, ny = normals[a, 0], normals[a, 1]
         line = nx, ny, nx * ox + ny * oy + (k + 0.5) * width - radius
-        near, i, j = refined_run(work, moments, start, stop, line, 0.5 * width, p.max_misses, 4)
+        near, i, j = refined_run(work, start, stop, line, 0.5 * width, p.max_misses, 4)
         if near == 0:
             votes[a, k] = 0
             continue

@@ -72,19 +72,9 @@ def distance_threshold(before, rho, cosine, sine, noise, rule):
     S = ρ_i + ρ_{i-1} and D = ρ_i - ρ_{i-1}, the cosine rule gives d² = D² cos² Δφ/2 + S² sin² Δφ/2,
     so that |D| ≤ r S and d² ≤ S² (r² cos² Δφ/2 + sin² Δφ/2) are the same.
 
-    Parameters
-    ----------
-    before, rho : float
-        ρ_{i-1} and ρ_i [m].
-    cosine, sine : float
-        Of the angle Δφ between their beams.
-    rule : tuple
-        (rule, constant, angle): D_0 or C_0 [m], r, or k; β or λ [rad].
-
-    Returns
-    -------
-    float
-        NaN where by the rule no surface meets both beams.
+    `before` and `rho` are ρ_{i-1} and ρ_i [m], `cosine` and `sine` those of Δφ, and `rule` is
+    (rule, constant, angle): D_0 or C_0 [m], r, or k; β or λ [rad]. NaN where by the rule no surface
+    meets both beams.
     """
     kind, constant, angle = rule
     if kind == FIXED:

@@ -27,21 +27,21 @@ def find_by_consensus(floats, ints, noise, parameters):
 
     `parameters` are a tuple, see `Parameters`, and `methods.ransac.Ransac`.
     """
-    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
-    prepare(work, moments, noise, p.epsilon, p.sigmas)
+    work, p = at.extended(floats, ints), Parameters(*parameters)
+    prepare(work, noise, p.epsilon, p.sigmas)
     work.counts[at.PIECES] = 0
     state = p.seed
     for c in range(work.counts[at.CLUSTERS]):
         first, last = work.clusters[at.FIRST, c], work.clusters[at.LAST, c]
         while True:
-            near, a, b, state = _consensus(work, moments, first, last, p, state)
+            near, a, b, state = _consensus(work, first, last, p, state)
             if not is_piece(work.points, near, a, b, p.min_points, p.min_length):
                 break
             take_run(work, a, b)
 
 
 @helper
-def _consensus(work, moments, first, last, p, state):
+def _consensus(work, first, last, p, state):
     """Find the longest run of free points of one cluster that agree with a line through two.
 
     Pairs are drawn from the free points and are `window` points apart at most. The best of their
@@ -75,7 +75,7 @@ def _consensus(work, moments, first, last, p, state):
             best, line = near, through
     if best == 0:
         return best, first, first, state
-    near, a, b = refined_run(work, moments, first, last, line, 0.0, p.max_misses, 3)
+    near, a, b = refined_run(work, first, last, line, 0.0, p.max_misses, 3)
     return near, a, b, state
 
 

@@ -21,21 +21,21 @@ def grow_regions(floats, ints, noise, parameters):
     From points and clusters, the ends of pieces. `parameters` are a tuple, see `Parameters`, and
     `methods.region_growing.RegionGrowing`.
     """
-    work, moments, p = at.named(floats, ints), at.moments_of(floats), Parameters(*parameters)
-    prepare(work, moments, noise, p.epsilon, p.sigmas)
+    work, p = at.extended(floats, ints), Parameters(*parameters)
+    prepare(work, noise, p.epsilon, p.sigmas)
     work.counts[at.PIECES] = 0
     for c in range(work.counts[at.CLUSTERS]):
-        _grow_in_cluster(work, moments, work.clusters[at.FIRST, c], work.clusters[at.LAST, c], p)
+        _grow_in_cluster(work, work.clusters[at.FIRST, c], work.clusters[at.LAST, c], p)
 
 
 @helper
-def _grow_in_cluster(work, moments, start, stop, p):
+def _grow_in_cluster(work, start, stop, p):
     """Find the regions of one cluster, from `start` to `stop`."""
     points, pieces, counts = work.points, work.pieces, work.counts
     i, floor, delta = start, start, p.delta
     while i + p.s_num - 1 <= stop:
         a, b = i, i + p.s_num - 1
-        line = stretch_line(points, moments, a, b)
+        line = stretch_line(work, a, b)
         while a <= b and _is_near(points, a, line, delta):
             a += 1
         if a <= b:
@@ -44,10 +44,10 @@ def _grow_in_cluster(work, moments, start, stop, p):
         a = i
         while b < stop and _is_near(points, b + 1, line, delta):
             b += 1
-            line = stretch_line(points, moments, a, b)
+            line = stretch_line(work, a, b)
         while a > floor and _is_near(points, a - 1, line, delta):
             a -= 1
-            line = stretch_line(points, moments, a, b)
+            line = stretch_line(work, a, b)
         if is_piece(points, b - a + 1, a, b, p.p_min, p.l_min):
             n = counts[at.PIECES]
             pieces[at.FIRST, n], pieces[at.LAST, n] = a, b

@@ -44,26 +44,26 @@ def settle(floats, ints, noise, epsilon, reach):
     reach : float
         How many spacings the lines' intersection may lie from the ends of both pieces.
     """
-    work, moments = at.named(floats, ints), at.moments_of(floats)
+    work = at.extended(floats, ints)
     pieces, counts = work.pieces, work.counts
-    fill_moments(work, moments)
-    _merge(work, moments, noise, epsilon)
+    fill_moments(work)
+    _merge(work, noise, epsilon)
     for _ in range(2):
         for k in range(1, counts[at.PIECES]):
             if _are_neighbours(work, k):
-                _cut(work.points, moments, pieces, k)
-    _merge(work, moments, noise, epsilon)
+                _cut(work, k)
+    _merge(work, noise, epsilon)
     n, count = counts[at.PIECES], counts[at.POINTS]
     is_ring = counts[at.CLOSED] != 0 and n > 1
     for _ in range(2 if is_ring else 0):
-        _leave_opening(work.points, moments, pieces, n)
+        _leave_opening(work, n)
     for k in range(n):
         pieces[at.BEFORE, k], work.response[k] = -1, math.nan
         if k > 0 and _are_neighbours(work, k):
-            _join(work, moments, k - 1, k, reach)
+            _join(work, k - 1, k, reach)
     # A closed cluster may have a corner where it was opened; its last point is its first again.
     if is_ring and pieces[at.FIRST, 0] + count - 1 - pieces[at.LAST, n - 1] <= _BETWEEN + 1:
-        _join(work, moments, n - 1, np.int64(0), reach)
+        _join(work, n - 1, np.int64(0), reach)
 
 
 @kernel
@@ -72,24 +72,24 @@ def merge_alike(floats, ints, noise, epsilon):
 
     The second half of split-and-merge, and no more than that.
     """
-    work, moments = at.named(floats, ints), at.moments_of(floats)
-    fill_moments(work, moments)
-    _merge(work, moments, noise, epsilon)
+    work = at.extended(floats, ints)
+    fill_moments(work)
+    _merge(work, noise, epsilon)
     for k in range(work.counts[at.PIECES]):
         work.pieces[at.BEFORE, k], work.response[k] = -1, math.nan
     for k in range(1, work.counts[at.PIECES]):
         if work.pieces[at.FIRST, k] == work.pieces[at.LAST, k - 1] and _are_neighbours(work, k):
-            _join(work, moments, k - 1, k, math.inf)
+            _join(work, k - 1, k, math.inf)
 
 
 @kernel
 def divide_overlaps(floats, ints):
     """Give each point of two overlapping neighbours to the nearer line (Gao et al. 2018)."""
-    work, moments = at.named(floats, ints), at.moments_of(floats)
-    fill_moments(work, moments)
+    work = at.extended(floats, ints)
+    fill_moments(work)
     for k in range(1, work.counts[at.PIECES]):
         if work.pieces[at.FIRST, k] <= work.pieces[at.LAST, k - 1]:
-            _cut(work.points, moments, work.pieces, k)
+            _cut(work, k)
 
 
 @helper
@@ -100,7 +100,7 @@ def _are_neighbours(work, k):
 
 
 @helper
-def _merge(work, moments, noise, epsilon):
+def _merge(work, noise, epsilon):
     """Merge neighbours that one line fits."""
     points = work.points
     first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
@@ -110,9 +110,9 @@ def _merge(work, moments, noise, epsilon):
         if kept > 0 and _are_neighbours(work, kept):
             a, b, c, d = first[kept - 1], last[kept - 1], first[kept], last[kept]
             c = max(c, b + 1)
-            _, _, distance, both = joint_line(points, moments, a, b, c, d)
-            _, _, _, one = stretch_line(points, moments, a, b)
-            _, _, _, other = stretch_line(points, moments, c, d)
+            _, _, distance, both = joint_line(work, a, b, c, d)
+            _, _, _, one = stretch_line(work, a, b)
+            _, _, _, other = stretch_line(work, c, d)
             variance = normal_variance(distance, points[at.RHO, b], noise) + epsilon * epsilon
             if both - one - other <= _SAME * variance:
                 last[kept - 1] = d
@@ -122,21 +122,22 @@ def _merge(work, moments, noise, epsilon):
 
 
 @helper
-def _cut(points, moments, pieces, k):
+def _cut(work, k):
     """Move the border of a piece and the one before it to where least squares to both lines are.
 
     Both keep three points if they can; points between them that had no piece get one. The later
     may begin before the earlier does, where that has just been cut itself.
     """
-    first, last, x, y = pieces[at.FIRST], pieces[at.LAST], points[at.X], points[at.Y]
+    first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
+    x, y = work.points[at.X], work.points[at.Y]
     a, b, c, d = first[k - 1], last[k - 1], first[k], last[k]
     near, far = max(min(b, c - 1), a + 1), max(b, c - 1)
     low, high = max(near - _MARGIN, a + 2), min(far + _MARGIN, d - 3)
     if low > high:
         last[k - 1], first[k] = near, max(c, near + 1)
         return
-    n1x, n1y, d1, _ = stretch_line(points, moments, a, near)
-    n2x, n2y, d2, _ = stretch_line(points, moments, far + 1, d)
+    n1x, n1y, d1, _ = stretch_line(work, a, near)
+    n2x, n2y, d2, _ = stretch_line(work, far + 1, d)
     total, least, border = 0.0, 0.0, low
     for i in range(low + 1, high + 1):
         e1, e2 = n1x * x[i] + n1y * y[i] - d1, n2x * x[i] + n2y * y[i] - d2
@@ -147,15 +148,16 @@ def _cut(points, moments, pieces, k):
 
 
 @helper
-def _leave_opening(points, moments, pieces, n):
+def _leave_opening(work, n):
     """Leave out the ends of the first and the last piece of a closed cluster on the other's line.
 
     The cluster was opened at a measurement, a beam or two from the vertex; no piece goes over that.
     """
-    first, last, x, y = pieces[at.FIRST], pieces[at.LAST], points[at.X], points[at.Y]
+    first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
+    x, y = work.points[at.X], work.points[at.Y]
     a, b, c, d = first[n - 1], last[n - 1], first[0], last[0]
-    n1x, n1y, d1, _ = stretch_line(points, moments, a, b)
-    n2x, n2y, d2, _ = stretch_line(points, moments, c, d)
+    n1x, n1y, d1, _ = stretch_line(work, a, b)
+    n2x, n2y, d2, _ = stretch_line(work, c, d)
     while c < d - 2 and abs(n1x * x[c] + n1y * y[c] - d1) < abs(n2x * x[c] + n2y * y[c] - d2):
         c += 1
     while b > a + 2 and abs(n2x * x[b] + n2y * y[b] - d2) < abs(n1x * x[b] + n1y * y[b] - d1):
@@ -164,12 +166,12 @@ def _leave_opening(points, moments, pieces, n):
 
 
 @helper
-def _join(work, moments, before, after, reach):
+def _join(work, before, after, reach):
     """Join two pieces at a corner if their lines meet near their ends."""
     points, pieces = work.points, work.pieces
     x, y, b, c = points[at.X], points[at.Y], pieces[at.LAST, before], pieces[at.FIRST, after]
-    n1x, n1y, d1, _ = stretch_line(points, moments, pieces[at.FIRST, before], b)
-    n2x, n2y, d2, _ = stretch_line(points, moments, c, pieces[at.LAST, after])
+    n1x, n1y, d1, _ = stretch_line(work, pieces[at.FIRST, before], b)
+    n2x, n2y, d2, _ = stretch_line(work, c, pieces[at.LAST, after])
     sine = n1x * n2y - n1y * n2x
     if abs(sine) < _LEAST_SINE:
         return

@@ -14,13 +14,13 @@ from ..line_fit import range_variance
 
 
 @helper
-def fill_moments(work, moments):
+def fill_moments(work):
     """Sum x, y, xx, xy, yy over the points of a cluster before each of its points.
 
     About the first point of the cluster, not the far origin, so that they keep their digits; the
     last two columns are that point.
     """
-    x, y, label = work.points[at.X], work.points[at.Y], work.marks[at.LABEL]
+    x, y, label, moments = work.points[at.X], work.points[at.Y], work.marks[at.LABEL], work.moments
     x0, y0 = 0.0, 0.0
     sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(work.counts[at.POINTS]):
@@ -39,14 +39,14 @@ def fill_moments(work, moments):
 
 
 @helper
-def prepare(work, moments, noise, epsilon, sigmas):
+def prepare(work, noise, epsilon, sigmas):
     """Fill the moments, and how far each point may lie from its line: ``slack + slope |d|``.
 
     The noise of a range moves a point by σ_r cos ψ = σ_r |d|/ρ off a line at distance d; `sigmas`
     times that, as much of the bearing's, and the misfit `epsilon` [m] are allowed. All points are
     free.
     """
-    fill_moments(work, moments)
+    fill_moments(work)
     rho, slack, slope = work.points[at.RHO], work.points[at.SLACK], work.points[at.SLOPE]
     for i in range(work.counts[at.POINTS]):
         slack[i] = epsilon + sigmas * noise[2] * rho[i]
@@ -55,10 +55,10 @@ def prepare(work, moments, noise, epsilon, sigmas):
 
 
 @helper
-def _sums(points, moments, first, last):
+def _sums(work, first, last):
     """Return the sums over the points `first`..`last` (inclusive) of one cluster."""
-    a, b = moments[first], moments[last]
-    dx, dy = points[at.X, last] - b[5], points[at.Y, last] - b[6]
+    a, b = work.moments[first], work.moments[last]
+    dx, dy = work.points[at.X, last] - b[5], work.points[at.Y, last] - b[6]
     return (
         b[0] - a[0] + dx,
         b[1] - a[1] + dy,
@@ -72,12 +72,7 @@ def _sums(points, moments, first, last):
 def line_of_sums(x0, y0, n, sx, sy, sxx, sxy, syy):
     """Line n · p = d of least squares of orthogonal distances, from sums about (x0, y0).
 
-    Returns
-    -------
-    nx, ny, d : float
-        Unit normal, and distance of the sensor from the line along it [m].
-    squares : float
-        Sum of the squared distances [m²].
+    Returns nx, ny, d [m] and the sum of the squared distances [m²].
     """
     mx, my = sx / n, sy / n
     sxx -= sx * mx
@@ -100,20 +95,20 @@ def line_of_sums(x0, y0, n, sx, sy, sxx, sxy, syy):
 
 
 @helper
-def stretch_line(points, moments, first, last):
+def stretch_line(work, first, last):
     """Line through the points `first`..`last` (inclusive) of one cluster, as `line_of_sums`."""
-    sx, sy, sxx, sxy, syy = _sums(points, moments, first, last)
-    x0, y0 = moments[first, 5], moments[first, 6]
+    sx, sy, sxx, sxy, syy = _sums(work, first, last)
+    x0, y0 = work.moments[first, 5], work.moments[first, 6]
     return line_of_sums(x0, y0, last - first + 1, sx, sy, sxx, sxy, syy)
 
 
 @helper
-def joint_line(points, moments, first, last, other_first, other_last):
+def joint_line(work, first, last, other_first, other_last):
     """Line through two stretches of one cluster, without the points between."""
-    ax, ay, axx, axy, ayy = _sums(points, moments, first, last)
-    bx, by, bxx, bxy, byy = _sums(points, moments, other_first, other_last)
+    ax, ay, axx, axy, ayy = _sums(work, first, last)
+    bx, by, bxx, bxy, byy = _sums(work, other_first, other_last)
     n = last - first + 1 + other_last - other_first + 1
-    x0, y0 = moments[first, 5], moments[first, 6]
+    x0, y0 = work.moments[first, 5], work.moments[first, 6]
     return line_of_sums(x0, y0, n, ax + bx, ay + by, axx + bxx, axy + bxy, ayy + byy)
 
 
@@ -122,12 +117,8 @@ def longest_run(points, free, first, last, line, margin, max_misses):
     """Find the run of free points near a line n · p = d that has the most of them.
 
     A run ends at a point that is not free, or where more than `max_misses` points in a row are
-    farther from the line than their tolerance and `margin` allow.
-
-    Returns
-    -------
-    near, begin, end : int
-        Number of near points, and the first and last of them (0, -1, -1 where there are none).
+    farther from the line than their tolerance and `margin` allow. Returns the number of near
+    points, and the first and last of them (0, -1, -1 where there are none).
     """
     x, y, slack, slope = points[at.X], points[at.Y], points[at.SLACK], points[at.SLOPE]
     nx, ny, d = line
@@ -145,7 +136,7 @@ def longest_run(points, free, first, last, line, margin, max_misses):
 
 
 @helper
-def refined_run(work, moments, first, last, line, margin, max_misses, passes):
+def refined_run(work, first, last, line, margin, max_misses, passes):
     """Find the longest run near a line; fit a line to it, and find that line's, again and again.
 
     `margin` is for the first line only, which may be a coarse one. Returns as `longest_run`.
@@ -155,7 +146,7 @@ def refined_run(work, moments, first, last, line, margin, max_misses, passes):
     for _ in range(passes):
         if near < 3:
             break
-        nx, ny, d, _ = stretch_line(points, moments, a, b)
+        nx, ny, d, _ = stretch_line(work, a, b)
         near, a, b = longest_run(points, free, first, last, (nx, ny, d), 0.0, max_misses)
     return near, a, b
 

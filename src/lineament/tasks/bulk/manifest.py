@@ -14,34 +14,26 @@ from urllib.parse import quote
 from ...files import naming_errors, write_text
 from ...logs.lines import reading
 from ...logs.sources import is_address
+from ..extract import Extraction
 
 #: File name in the folder: Arrow, Hive and Spark skip what begins with "_".
 MANIFEST = "_manifest.jsonl"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """What became of one log.
+class Row(Extraction):
+    """What became of one log, and what was extracted from it.
 
     The log is a full path or an address; the name, that in the column ``log``. The outcome is
     ``pending`` (not reached, or interrupted), ``done`` or ``failed``, with the error. The output is
     relative to the data set, of size `bytes`. `log_bytes` is None if unknown, `log_state` the time
-    of the last change, or what the store reports. The rest is as in `Extraction`.
+    of the last change, or what the store reports.
     """
 
-    log: str
     name: str
     outcome: str = "pending"
     error: str = ""
-    output: str = ""
     bytes: int = 0
-    topics: list[str] = field(default_factory=list)
-    scans: int = 0
-    features: dict[str, int] = field(default_factory=dict)
-    invalid: float = 0.0
-    skipped: int = 0
-    faults: list[str] = field(default_factory=list)
-    seconds: float = 0.0
     log_bytes: int | None = None
     log_state: str = ""
     version: str = ""

@@ -23,6 +23,9 @@ Report = Callable[[int, int], None]
 #: Seconds between two reports.
 _PERIOD = 0.2
 
+#: What a row keeps of an extraction.
+_FOUND = ("topics", "scans", "features", "invalid", "skipped", "faults")
+
 
 @dataclass(frozen=True, slots=True)
 class Task:
@@ -64,17 +67,8 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
     except Exception as error:
         row = failed(row, f"{row.log}: {type(error).__name__}: {error}")
     else:
-        row = replace(
-            row,
-            outcome="done",
-            bytes=written,
-            topics=found.topics,
-            scans=found.scans,
-            features=found.features,
-            invalid=found.invalid,
-            skipped=found.skipped,
-            faults=found.faults,
-        )
+        kept = {name: getattr(found, name) for name in _FOUND}
+        row = replace(row, outcome="done", bytes=written, **kept)
     finally:
         with suppress(OSError):
             part.parent.rmdir()  # if there is nothing in it

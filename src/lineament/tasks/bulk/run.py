@@ -166,33 +166,27 @@ class _Progress:
         # A log weighs its size, or that of a typical one, in the time left.
         self._weights = {log: size or typical for log, size in sizes.items()}
         self._started = time.monotonic()
-        self._under_way: dict[str, tuple[int, int]] = {}
-        self._done, self._failed, self._scans, self._weight_done = 0, 0, 0, 0.0
+        self._scans, self._shares = dict.fromkeys(sizes, 0), dict.fromkeys(sizes, 0.0)
+        self._done, self._failed = 0, 0
 
     def report(self, log: str, scans: int, total: int) -> None:
         """Note how far a log is, from any thread."""
-        self._under_way[log] = scans, total
+        self._scans[log], self._shares[log] = scans, scans / max(total, 1)
 
     def finish(self, row: Row) -> None:
         """Note that a log is done or has failed."""
-        self._under_way.pop(row.log, None)
+        self._scans[row.log], self._shares[row.log] = row.scans, 1.0
         self._done += 1
         self._failed += row.outcome != "done"
-        self._scans += row.scans
-        self._weight_done += self._weights[row.log]
 
     def __str__(self) -> str:
         seconds = max(time.monotonic() - self._started, 1e-9)
-        under_way = list(self._under_way.items())
-        scans = self._scans + sum(done for _, (done, _) in under_way)
-        weight = self._weight_done + sum(
-            self._weights[log] * done / max(total, 1) for log, (done, total) in under_way
-        )
+        weight = sum(self._weights[log] * share for log, share in self._shares.items())
         share = weight / sum(self._weights.values())
         parts = [f"{self._done}/{len(self._weights)} logs"]
         if self._failed:
             parts.append(f"{self._failed} failed")
-        parts.append(f"{scans / seconds:.0f} scans/s")
+        parts.append(f"{sum(self._scans.values()) / seconds:.0f} scans/s")
         if share > 0:
             parts.append(f"{_duration(seconds * max(1 / share - 1, 0.0))} left")
         return ", ".join(parts)

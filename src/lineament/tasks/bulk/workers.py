@@ -38,20 +38,21 @@ class Threads(ThreadPoolExecutor):
 
     def begin(self, task: Task, report: Report) -> Future[Row]:
         """Submit a task; `report` is called from its thread."""
-        return self.submit(extract_part, task, self._stoppable(report))
 
-    def stop(self) -> None:
-        """End all work promptly and wait; partial files are removed."""
-        self._stopping.set()
-        self.shutdown(cancel_futures=True)
-
-    def _stoppable(self, report: Report) -> Report:
         def stoppable(scans: int, total: int) -> None:
             if self._stopping.is_set():
                 raise KeyboardInterrupt
             report(scans, total)
 
-        return stoppable
+        return self.submit(self._work, task, stoppable)
+
+    def _work(self, task: Task, report: Report) -> Row:
+        return extract_part(task, report)
+
+    def stop(self) -> None:
+        """End all work promptly and wait; partial files are removed."""
+        self._stopping.set()
+        self.shutdown(cancel_futures=True)
 
 
 class Processes(Threads):
@@ -65,11 +66,7 @@ class Processes(Threads):
         super().__init__(count)
         self._idle: list[_Worker] = []
 
-    def begin(self, task: Task, report: Report) -> Future[Row]:
-        """Submit a task; `report` is called from its thread."""
-        return self.submit(self._hand_over, task, self._stoppable(report))
-
-    def _hand_over(self, task: Task, report: Report) -> Row:
+    def _work(self, task: Task, report: Report) -> Row:
         deaths: list[str] = []
         while len(deaths) < 2:
             worker = self._free_worker()

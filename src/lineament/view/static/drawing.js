@@ -1,6 +1,6 @@
 // A scan and its features on a canvas.
 
-import { trace } from "./plane.js";
+import { roundLength } from "./plane.js";
 
 // Colours of clusters, those of the figures: easy to tell apart, also with colour blindness.
 export const PALETTE = [
@@ -92,14 +92,40 @@ export class Drawing {
     for (const c of scan.corners) if (shown[layerOf(c)]) this.#corner(c, sigmas, scan.reach);
   }
 
+  grid() {
+    const { plane, size, theme } = this, step = roundLength(plane.scale, 56);
+    const [left, top] = plane.toMetres([0, 0], size);
+    const [right, bottom] = plane.toMetres([size.width, size.height], size);
+    for (let k = Math.ceil(left / step); k * step <= right; k++) {
+      const u = Math.round(this.at([k * step, 0])[0]) + 0.5;
+      this.#pen(k === 0 ? theme.axis : theme.grid);
+      this.#path([[u, 0], [u, size.height]]);
+    }
+    for (let k = Math.ceil(bottom / step); k * step <= top; k++) {
+      const v = Math.round(this.at([0, k * step])[1]) + 0.5;
+      this.#pen(k === 0 ? theme.axis : theme.grid);
+      this.#path([[0, v], [size.width, v]]);
+    }
+  }
+
+  scaleBar() {
+    const { ctx, plane, size, theme } = this, length = roundLength(plane.scale, 70);
+    const u = 14.5, v = size.height - 14.5, w = length * plane.scale;
+    this.#pen(theme.ink, 1.5);
+    this.#path([[u, v - 5], [u, v], [u + w, v], [u + w, v - 5]]);
+    ctx.fillStyle = theme.ink;
+    ctx.font = "12px system-ui, sans-serif";
+    ctx.textAlign = "left";
+    ctx.fillText(metresText(length), u + 6, v - 6);
+  }
+
   /** Make a feature stand out, with the band or ellipse of its covariance. */
   highlight({ kind, feature }, scan, sigmas) {
     const { ctx, theme } = this;
     ctx.save();
     ctx.lineCap = "round";
-    ctx.lineWidth = 6;
     ctx.globalAlpha = 0.35;
-    ctx.strokeStyle = theme.accent;
+    this.#pen(theme.accent, 6);
     if (kind === "segment") {
       this.#stroke([feature.start, feature.end]);
       this.#band(feature, sigmas);
@@ -118,7 +144,7 @@ export class Drawing {
     const far = (size.width + size.height) / plane.scale + Math.hypot(plane.x, plane.y);
     const a = scan.bearings[i];
     ctx.save();
-    ctx.strokeStyle = theme.accent;
+    this.#pen(theme.accent);
     ctx.setLineDash([2, 4]);
     this.#stroke([[0, 0], scan.points[i] ?? [far * Math.cos(a), far * Math.sin(a)]]);
     if (scan.points[i]) {
@@ -132,18 +158,15 @@ export class Drawing {
   /** Where the pointer is in the other panel. */
   cursor(point) {
     const [u, v] = this.at(point);
-    this.ctx.strokeStyle = this.theme.accent;
-    this.ctx.lineWidth = 1;
+    this.#pen(this.theme.accent);
     this.#path([[u - 7, v], [u + 7, v]]);
     this.#path([[u, v - 7], [u, v + 7]]);
   }
 
   // Short ticks on a ring about the sensor, in the directions from which nothing usable came.
   #invalid(scan) {
-    const { ctx, theme } = this;
     const [u, v] = this.at([0, 0]);
-    ctx.strokeStyle = theme.faint;
-    ctx.lineWidth = 1;
+    this.#pen(this.theme.faint);
     scan.points.forEach((point, i) => {
       if (point) return;
       const c = Math.cos(scan.bearings[i]), s = -Math.sin(scan.bearings[i]);
@@ -152,10 +175,8 @@ export class Drawing {
   }
 
   #segment({ start, end }) {
-    const { ctx, theme } = this;
     if (!isKnown([start, end])) return;
-    ctx.strokeStyle = theme.ink;
-    ctx.lineWidth = 1.2;
+    this.#pen(this.theme.ink, 1.2);
     this.#stroke([start, end]);
     const [p, q] = [this.at(start), this.at(end)];
     const length = Math.hypot(q[0] - p[0], q[1] - p[1]) || 1;
@@ -177,9 +198,7 @@ export class Drawing {
       upper.push([x - half * s, y + half * c]);
       lower.unshift([x + half * s, y - half * c]);
     }
-    this.ctx.fillStyle = this.theme.accent;
-    trace(this.ctx, [...upper, ...lower].map((p) => this.at(p)));
-    this.ctx.fill();
+    this.#area([...upper, ...lower].map((p) => this.at(p)), this.theme.accent);
   }
 
   // A diamond; of an edge a square, smaller and lighter.
@@ -187,8 +206,7 @@ export class Drawing {
     const { ctx, theme, plane } = this, isEdge = kind === "edge";
     if (!isKnown(position)) return;
     const [u, v] = this.at(position), color = isEdge ? theme.edge : theme.corner;
-    ctx.strokeStyle = color;
-    ctx.lineWidth = isEdge ? 1.2 : 1.6;
+    this.#pen(color, isEdge ? 1.2 : 1.6);
     if (isEdge) ctx.strokeRect(u - 3, v - 3, 6, 6);
     else this.#path([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
     if (!sigmas || !isKnown(covariance)) return;
@@ -210,8 +228,7 @@ export class Drawing {
     const { ctx, theme } = this;
     if (!isKnown([arc.center, arc.radius])) return;
     ctx.save();
-    ctx.strokeStyle = theme.arc;
-    ctx.lineWidth = 0.8;
+    this.#pen(theme.arc, 0.8);
     ctx.setLineDash([3, 4]);
     this.#circle(arc, 0, 2 * Math.PI);
     ctx.setLineDash([]);
@@ -230,8 +247,7 @@ export class Drawing {
     const { ctx, theme } = this;
     if (!isKnown(position)) return;
     ctx.fillStyle = theme.page;
-    ctx.strokeStyle = theme.break;
-    ctx.lineWidth = 1.2;
+    this.#pen(theme.break, 1.2);
     this.#round(position, 3.4);
     ctx.fill();
     ctx.stroke();
@@ -240,9 +256,7 @@ export class Drawing {
   // A triangle at the origin that looks along the x axis.
   #sensor() {
     const [u, v] = this.at([0, 0]);
-    this.ctx.fillStyle = this.theme.ink;
-    trace(this.ctx, [[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]]);
-    this.ctx.fill();
+    this.#area([[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]], this.theme.ink);
   }
 
   #round(point, radius) {
@@ -257,8 +271,7 @@ export class Drawing {
 
   #cross(point, half) {
     const [u, v] = this.at(point);
-    this.ctx.strokeStyle = this.theme.faint;
-    this.ctx.lineWidth = 1;
+    this.#pen(this.theme.faint);
     this.#path([[u - half, v - half], [u + half, v + half]]);
     this.#path([[u - half, v + half], [u + half, v - half]]);
   }
@@ -268,7 +281,27 @@ export class Drawing {
   }
 
   #path(pixels) {
-    trace(this.ctx, pixels);
+    this.#trace(pixels);
     this.ctx.stroke();
   }
+
+  #area(pixels, color) {
+    this.#trace(pixels);
+    this.ctx.fillStyle = color;
+    this.ctx.fill();
+  }
+
+  #trace(pixels) {
+    this.ctx.beginPath();
+    pixels.forEach(([u, v], k) => (k ? this.ctx.lineTo(u, v) : this.ctx.moveTo(u, v)));
+  }
+
+  #pen(color, width = 1) {
+    Object.assign(this.ctx, { strokeStyle: color, lineWidth: width });
+  }
+}
+
+function metresText(metres) {
+  if (metres >= 1) return `${metres} m`;
+  return metres >= 0.01 ? `${Math.round(metres * 100)} cm` : `${+(metres * 1000).toPrecision(1)} mm`;
 }

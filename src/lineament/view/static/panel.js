@@ -2,7 +2,6 @@
 
 import { describe, element, listOf } from "./details.js";
 import { Drawing, layerOf } from "./drawing.js";
-import { drawGrid, drawScaleBar } from "./plane.js";
 
 const NEAR = 12; // pixels within which something is meant
 const STILL = 4; // pixels that a click may move
@@ -66,16 +65,16 @@ export class Panel {
     canvas.height = Math.round(size.height * ratio);
     const ctx = canvas.getContext("2d");
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    drawGrid(ctx, app.plane, size, app.theme);
+    const drawing = new Drawing(ctx, app.plane, size, app.theme);
+    drawing.grid();
     if (scan) {
-      const drawing = new Drawing(ctx, app.plane, size, app.theme);
       drawing.scan(scan, app.shown);
       drawing.features(scan, app.shown, app.sigmas);
       if (app.asked?.panel === this) drawing.beam(scan, app.asked.beam);
       if (this.hovered) drawing.highlight(this.hovered, scan, app.sigmas);
       if (app.cursor && app.cursor.panel !== this) drawing.cursor(app.cursor.point);
     }
-    drawScaleBar(ctx, app.plane, size, app.theme);
+    drawing.scaleBar();
   }
 
   #listen() {

@@ -1,4 +1,4 @@
-// The view of the plane that all panels share: metres to pixels, and the grid.
+// The view of the plane that all panels share: metres to pixels.
 
 const LEAST_SCALE = 0.2, MOST_SCALE = 50000; // pixels a metre
 
@@ -49,47 +49,4 @@ export function roundLength(scale, pixels) {
   const least = pixels / scale;
   const power = 10 ** Math.floor(Math.log10(least));
   return power * [1, 2, 5, 10].find((m) => m * power >= least * (1 - 1e-9));
-}
-
-export function drawGrid(ctx, plane, size, theme) {
-  const step = roundLength(plane.scale, 56);
-  const line = (isAxis, ...ends) => {
-    ctx.strokeStyle = isAxis ? theme.axis : theme.grid;
-    trace(ctx, ends);
-    ctx.stroke();
-  };
-  const [left, top] = plane.toMetres([0, 0], size);
-  const [right, bottom] = plane.toMetres([size.width, size.height], size);
-  ctx.lineWidth = 1;
-  for (let k = Math.ceil(left / step); k * step <= right; k++) {
-    const u = Math.round(plane.toPixels([k * step, 0], size)[0]) + 0.5;
-    line(k === 0, [u, 0], [u, size.height]);
-  }
-  for (let k = Math.ceil(bottom / step); k * step <= top; k++) {
-    const v = Math.round(plane.toPixels([0, k * step], size)[1]) + 0.5;
-    line(k === 0, [0, v], [size.width, v]);
-  }
-}
-
-export function drawScaleBar(ctx, plane, size, theme) {
-  const length = roundLength(plane.scale, 70);
-  const u = 14.5, v = size.height - 14.5, w = length * plane.scale;
-  ctx.lineWidth = 1.5;
-  ctx.strokeStyle = ctx.fillStyle = theme.ink;
-  trace(ctx, [[u, v - 5], [u, v], [u + w, v], [u + w, v - 5]]);
-  ctx.stroke();
-  ctx.font = "12px system-ui, sans-serif";
-  ctx.textAlign = "left";
-  ctx.fillText(metresText(length), u + 6, v - 6);
-}
-
-function metresText(metres) {
-  if (metres >= 1) return `${metres} m`;
-  return metres >= 0.01 ? `${Math.round(metres * 100)} cm` : `${+(metres * 1000).toPrecision(1)} mm`;
-}
-
-/** Begin a path through pixels. */
-export function trace(ctx, pixels) {
-  ctx.beginPath();
-  pixels.forEach(([u, v], k) => (k ? ctx.lineTo(u, v) : ctx.moveTo(u, v)));
 }

@@ -1,0 +1,148 @@
+"""`liu:paper` reproduces the script written from the paper: stage by stage, and end to end."""
+
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+from liu_2023 import Paper, bilateral_filter, distances, liu_2023, polar
+from worlds import degenerate_scans, random_scan
+
+from lineament import Extractor, LaserScan, open_log
+from lineament.simulation import SCENES, SENSORS, scene
+
+#: The filter of the kernels sums in float32 [m].
+FILTER = 5e-5
+#: The kernels take σ_K from running sums: where it is nearly 0, half its digits are left [m].
+ROOT = 1e-7
+DEGENERATE = degenerate_scans()
+LOGS = (
+    "carmen/intel-corrected.log.gz",
+    "carmen/csail-corrected.log.gz",
+    "rosbag1/scans_demo.bag",
+    "rosbag2/ld19",
+    "rosbag2/jackal_mocap",
+    "text/tinyslam_exp1.dat.gz",
+)
+RESPONSES = ("tangent", "product", "relative", "product_scaled", "chord_scaled")
+THRESHOLDS = (0.0, 0.02, 0.05, 0.1, 0.2)
+VARIANTS = {
+    "the paper's numbers": {},
+    "more corners": {"threshold": 0.1},
+    "product": {"response": "product", "threshold": 0.05},
+    "relative": {"response": "relative", "threshold": 0.15, "support_radius": 10},
+    "scaled by the chord": {"response": "chord_scaled", "threshold": 0.2},
+    "product, scaled": {"response": "product_scaled", "threshold": 0.05},
+    "to the letter": {"recursion": "after", "fit": "slope_intercept", "threshold": 0.1},
+    "whole supports": {"ends": "excluded", "threshold": 0.1},
+    "narrow": {"half_width": 2, "sigma_d": 1.5, "sigma_r": 0.1, "threshold": 0.2},
+    "unfiltered": {"half_width": 0, "support_radius": 1, "threshold": 0.02},
+    "clusters": {"spacing_scale": 2.0, "density_k": 1.0, "min_points": 5, "threshold": 0.1},
+    "pairs": {"spacing_scale": 9.0, "density_k": 0.0, "min_points": 2, "threshold": 0.05},
+}
+
+
+def equal(actual, expected, off=1e-9):
+    """Compare to 1 nm; of ranges of 10⁹ m, 12 digits are asked."""
+    np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=off)
+
+
+def simulated(sensor):
+    """One scan of each kind of scene."""
+    worlds = (scene(kind, 3) for kind in SCENES)
+    return [SENSORS[sensor].scan(*world, np.random.default_rng(5)) for world in worlds]
+
+
+def by_the_paper(scan, filtered, paper):
+    return liu_2023(filtered, scan.angles, scan.angle_increment, scan.is_full_circle, paper)
+
+
+def assert_reproduced(scan, **changes):
+    """Compare each stage on the ranges that the kernels filtered, and the corners end to end."""
+    paper = Paper(**changes)
+    trace = Extractor("liu:paper", **changes).trace(scan)
+    features = trace.features
+    ranges = np.where(scan.valid, scan.ranges, np.nan)
+    filtered = bilateral_filter(ranges, scan.is_full_circle, paper)
+    equal(trace.filtered, filtered, FILTER)
+
+    found = by_the_paper(scan, trace.filtered, paper)
+    clusters = found.clusters
+    np.testing.assert_array_equal(trace.clusters, clusters.labels())
+    equal(trace.spacing, clusters.spacing)
+    equal(trace.distance_threshold, clusters.linear)
+    equal(trace.density_threshold, clusters.density, ROOT)
+
+    beams, to_chord, responses = np.reshape(found.candidates, (-1, 3)).T
+    np.testing.assert_array_equal(trace.candidates["beam"], beams)
+    equal(trace.candidates["chord_distance"], to_chord)
+    equal(trace.candidates["response"], responses)
+    points = polar(trace.filtered, scan.angles)
+    np.testing.assert_array_equal(trace.cuts, np.sort(found.corners))
+    if found.lines:  # A corner is between two lines; a ring with one corner has none.
+        np.testing.assert_array_equal(np.sort(features.corners["beam"]), trace.cuts)
+    corners = points[features.corners["beam"]]
+    equal(features.corners["position"], corners)
+
+    assert len(features.segments) == len(found.lines)
+    for segment, (piece, centroid, direction) in zip(features.segments, found.lines, strict=True):
+        assert (segment["first_beam"], segment["last_beam"]) == (piece[0], piece[-1])
+        assert segment["n_points"] == len(piece)
+        equal(segment["centroid"], centroid)
+        across = np.array([-np.sin(segment["angle"]), np.cos(segment["angle"])])
+        equal(across @ direction / np.hypot(*direction), 0)
+        off = distances(points[piece], centroid, direction)
+        equal(segment["rms"], np.sqrt(np.mean(off**2)))
+
+    alone = by_the_paper(scan, filtered, paper)
+    np.testing.assert_array_equal(alone.clusters.labels(), trace.clusters)
+    assert alone.corners == found.corners
+    return found
+
+
+@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
+@pytest.mark.parametrize("sensor", ["paper", "utm30lx", "lms361", "rplidar", "ld19"])
+def test_simulated_scans_are_reproduced(sensor, changes):
+    found = [assert_reproduced(scan, **changes) for scan in simulated(sensor)]
+    assert sum(len(one.lines) for one in found) > len(found)
+
+
+@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
+@pytest.mark.parametrize("log", LOGS)
+def test_recorded_scans_are_reproduced(data_dir, log, changes):
+    scans = islice(open_log(data_dir / log), 0, 100, 20)
+    found = [assert_reproduced(scan, **changes) for scan in scans]
+    assert sum(len(one.lines) for one in found) > len(found)
+
+
+@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
+def test_degenerate_scans_are_reproduced(scan):
+    for changes in VARIANTS.values():
+        assert_reproduced(scan, **changes)
+
+
+@pytest.mark.parametrize("n", range(3, 20))
+def test_rings_of_few_beams_are_reproduced(n):
+    scan = LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
+    for changes in VARIANTS.values():
+        assert_reproduced(scan, **changes)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_scans_are_reproduced(seed):
+    for changes in VARIANTS.values():
+        assert_reproduced(random_scan(seed), **changes)
+
+
+@pytest.mark.parametrize("recursion", ["both", "after"])
+@pytest.mark.parametrize("response", RESPONSES)
+def test_corners_are_nested_in_the_threshold(response, recursion):
+    """What a higher threshold finds, a lower one finds as well, and more."""
+    form = {"response": response, "recursion": recursion}
+    found = np.zeros(len(THRESHOLDS), int)
+    for seed in range(20):
+        scan = random_scan(seed)
+        traces = [Extractor("liu:paper", threshold=t, **form).trace(scan) for t in THRESHOLDS]
+        cuts = [set(trace.cuts.tolist()) for trace in traces]
+        assert all(higher <= lower for lower, higher in pairwise(cuts))
+        found += [len(beams) for beams in cuts]
+    assert (np.diff(found) < 0).all()
