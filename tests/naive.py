@@ -125,7 +125,8 @@ def clusters(scan, ranges, noise_sigma, *, scale, floor, density_k, min_points) 
 
 
 def polar(ranges, angles):
-    return np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
+    with np.errstate(invalid="ignore"):  # of infinite ranges
+        return np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
 
 
 def chord_distances(points):
@@ -185,13 +186,17 @@ def distances_to_line(points, through, direction):
     return np.linalg.norm(offset - np.outer(offset @ u, u), axis=1)
 
 
-def primary_corners(points, closed, *, radius, threshold, reading, min_points):
+def primary_corners(
+    points, closed, *, radius, threshold, reading, min_points, recursion="both", ends="truncated"
+):
     """Steps 5-7 by recursion: (point, distance, response) of each candidate, in their order."""
     found = []
 
     def candidate(i, distance):
-        found.append((i, distance, response(points, i, radius, reading, closed)))
-        return found[-1][2] > threshold
+        may_be = closed or radius <= i < len(points) - radius or ends == "truncated"
+        value = response(points, i, radius, reading, closed) if may_be else 0.0
+        found.append((i, distance, value))
+        return value > threshold
 
     def search(a, b):
         margin = min_points - 1
@@ -200,7 +205,8 @@ def primary_corners(points, closed, *, radius, threshold, reading, min_points):
             return
         c = a + margin + int(np.argmax(inner))
         if candidate(c, inner[c - a - margin]):
-            search(a, c)
+            if recursion == "both":
+                search(a, c)
             search(c, b)
 
     if closed:
@@ -255,6 +261,8 @@ def liu(scan, method, noise=None, filtered=None):
             threshold=method.threshold,
             reading=method.response,
             min_points=method.min_points,
+            recursion=method.recursion,
+            ends=method.ends,
         )
         candidates += [(beams[i], distance, value) for i, distance, value in examined]
         strong = {i: value for i, _, value in examined if value > method.threshold}
