@@ -3,8 +3,6 @@
 They take scans and the parameters of a method, by its attributes, and know no kernel.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise

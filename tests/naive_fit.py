@@ -1,7 +1,5 @@
 """Slow twins of what is measured: lines, corners, breakpoints."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

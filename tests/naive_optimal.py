@@ -1,7 +1,5 @@
 """Slow twins of method optimal: the model of ``docs/optimal.md``, with numbers of their own."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import NamedTuple
@@ -30,10 +28,12 @@ def variance_of(rho, noise):
 # Noise
 
 
-def third_of(errors):
-    """Variance by the third of the squared errors that is least, of normal ones."""
-    least = np.sort(errors)[len(errors) // 3]
-    return 1.03 * errors[errors <= 9 * least / 0.4307**2].mean()
+def third_of(errors, squares):
+    """Variance of normal errors by the third that is least; mean square of range, and number."""
+    if len(errors) == 0:
+        return 0.0, 0.0, 0
+    kept = errors <= 9 * np.sort(errors)[len(errors) // 3] / 0.4307**2
+    return 1.03 * errors[kept].mean(), squares[kept].mean(), int(kept.sum())
 
 
 def estimated_noise(scan: LaserScan) -> tuple[float, float]:
@@ -49,15 +49,8 @@ def estimated_noise(scan: LaserScan) -> tuple[float, float]:
     through = (through + np.sin(bearing[i] - bearing[i - 1]) / rho[i + 1]) / whole
     errors, squares = (rho[i] ** 2 * (through - 1 / rho[i])) ** 2 / 1.5, rho[i] ** 2
     far = squares >= squares.mean()
-    constant, growth = 0.0, 0.0
-    halves = [(errors[half], squares[half]) for half in (~far, far)]
-    v = [third_of(e) if len(e) else 0.0 for e, _ in halves]
-    count, square = np.zeros(2), np.zeros(2)
-    for k, (e, s) in enumerate(halves):
-        if len(e):
-            kept = e <= 9 * np.sort(e)[len(e) // 3] / 0.4307**2
-            count[k], square[k] = kept.sum(), s[kept].mean()
-    constant = (v @ count) / count.sum()
+    v, square, count = np.transpose([third_of(errors[h], squares[h]) for h in (~far, far)])
+    constant, growth = (v @ count) / count.sum(), 0.0
     if count.all() and v[1] > v[0] * (1 + 3 * math.sqrt(2 * 1.94 * (1 / count[0] + 1 / count[1]))):
         growth = (v[1] - v[0]) / (square[1] - square[0])
         constant = v[0] - growth * square[0]

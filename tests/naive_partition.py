@@ -1,16 +1,18 @@
 """Slow twins of how scans are parted, split and tracked: lists, recursion, a fit at every step."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
 import numpy as np
 from naive import Clusters, chord_distances, pieces_of, polar, sigma, valid
-from naive_fit import normal_variances, principal_line, range_variance
+from naive_fit import breakpoints, normal_variances, principal_line, range_variance
 
 from lineament import LaserScan
+from lineament.features import noise_row
+from lineament.kernels import layout as at
+from lineament.kernels.rivals.line_tracking import track_lines
 from lineament.methods.pdbs import PDBS
+from lineament.methods.workspace import Block
 
 
 def untied(scan: LaserScan) -> LaserScan:
@@ -207,3 +209,85 @@ def is_predicted(scan, points, gained, b, noise, method):
     variance *= 1 + 1 / len(own) + (lever**2 / (t @ t) if t @ t > 0 else 0.0)
     allowed = method.threshold + method.noise_factor * math.sqrt(variance)
     return abs((points[b] - centroid) @ normal) <= allowed
+
+
+# The methods themselves
+
+
+def assert_same_partition(scan, extractor):
+    trace = extractor.trace(scan)
+    found = parted(scan, extractor.method, noise_of(scan, extractor))
+    assert trace.clusters.tolist() == found.labels(len(scan)).tolist()
+    for kernel, slow in (
+        (trace.spacing, found.spacing),
+        (trace.distance_threshold, found.distance_threshold),
+    ):
+        expected = np.full(len(scan), np.nan)
+        expected[list(slow)] = list(slow.values())
+        # Near its pole the rule of Santos has thresholds beyond all distances, and no digits.
+        kernel, expected = np.minimum(kernel, 1e6), np.minimum(expected, 1e6)
+        np.testing.assert_allclose(kernel, expected, rtol=1e-6, atol=1e-12)
+    assert np.isnan(trace.density_threshold).all()
+    features = trace.features
+    assert len(features.segments) == len(features.corners) == len(trace.candidates) == 0
+    gap = extractor.method.max_missing + 1
+    points = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))
+    points *= scan.ranges[:, np.newaxis]
+    expected = breakpoints(scan, found, scan.ranges, points, gap)
+    assert [
+        (tuple(b["beam"].tolist()), str(b["kind"]), int(b["occluder"]))
+        for b in features.breakpoints
+    ] == [(beams, kind, occluder) for beams, _, kind, occluder in expected]
+    return len(found.groups)
+
+
+def assert_same_split(scan, extractor):
+    """Hold candidates equal to the twin's, and pieces if none are merged. Returns the cuts."""
+    method, noise = extractor.method, noise_of(scan, extractor)
+    by_line = method.name == "split_and_merge"
+
+    def tolerance(rho):
+        sigma = np.sqrt(range_variance(rho, noise))
+        growing = 0.0 if by_line else method.proportion * rho
+        return method.threshold + growing + method.noise_factor * sigma
+
+    found = parted(scan, clusters_of(method), noise)
+    candidates, pieces = split(
+        scan, found, noise, tolerance=tolerance, min_piece=method.min_piece, by_line=by_line
+    )
+    trace = extractor.trace(scan)
+    assert trace.candidates["beam"].tolist() == [beam for beam, _, _ in candidates]
+    for name, k in (("chord_distance", 1), ("response", 2)):
+        expected = [candidate[k] for candidate in candidates]
+        rtol, atol = (1e-6, 1e-7) if by_line else (1e-7, 1e-9)
+        np.testing.assert_allclose(trace.candidates[name], expected, rtol=rtol, atol=atol)
+    assert len(trace.cuts) == sum(excess > 1 for _, _, excess in candidates)
+    if not by_line:
+        segments, corners = trace.features.segments, trace.features.corners
+        ends = list(zip(segments["first_beam"], segments["last_beam"], strict=True))
+        assert ends == [(first, last) for first, last, _ in pieces]
+        assert corners["segments"].tolist() == [
+            [before, k] for k, (_, _, before) in enumerate(pieces) if before >= 0
+        ]
+    return len(trace.cuts)
+
+
+def tracked(scan, extractor):
+    """First and last beam of the lines that the kernel tracks, before they are merged."""
+    method, block = extractor.method, Block(scan, noise_row(extractor.noise), 1)
+    block.load(scan.ranges)
+    block.take(0)
+    method.part(block, method.min_points)
+    track_lines(
+        *block.workspace, method.threshold, method.noise_factor, method.max_misses,
+        method.min_piece,
+    )  # fmt: skip
+    ends = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
+    return list(map(tuple, block.work.marks[at.BEAM][ends].T.tolist()))
+
+
+def assert_same_lines(scan, extractor):
+    noise = noise_of(scan, extractor)
+    lines = track(scan, parted(scan, clusters_of(extractor.method), noise), noise, extractor.method)
+    assert tracked(scan, extractor) == lines
+    return len(lines)

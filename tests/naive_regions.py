@@ -3,8 +3,6 @@
 They take the points of the clusters of a scan, and find lines by eigenvectors and loops.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The vertex budget: fewer pieces, by the least squared error, never more vertices than allowed."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,8 +1,7 @@
 """What every method of lines must do, whatever its way: scenes whose features are known."""
 
-from __future__ import annotations
-
 import math
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from worlds import (
     STEP,
     fan,
     full_circle,
+    random_scan,
     room,
     scan_of,
     vertex,
@@ -19,6 +19,7 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan
+from lineament.features import TABLES
 from lineament.methods import get_method
 
 NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing"]
@@ -40,17 +41,21 @@ def noisy(ranges, seed=0):
 
 @and_others
 @pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
-def test_wall_has_its_ends_along_an_axis_too(extractor, normal):
+def test_wall_ends_at_its_last_measurements_along_an_axis_too(extractor, normal):
     angles = math.radians(normal) + fan(30)
-    scan = scan_of(wall(angles, 2.0, normal), angles)
-    (line,) = extractor(scan).segments
     # On filtered ranges, whose ends are drawn inwards, a wall is not quite straight.
     atol = 0.02 if extractor.method == get_method("liu:paper") else 1e-9
-    np.testing.assert_allclose(line["start"], scan.points[0], atol=atol)
-    np.testing.assert_allclose(line["end"], scan.points[-1], atol=atol)
-    assert np.isfinite(line["covariance"]).all()
-    assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
-    assert line["n_points"] == len(angles)
+    ideal = wall(angles, 2.0, normal)
+    for ranges, off in ((ideal, atol), (noisy(ideal), 4 * NOISE.sigma)):
+        scan = scan_of(ranges, angles)
+        (line,) = extractor(scan).segments
+        direction = [math.cos(line["angle"]), math.sin(line["angle"])]
+        for end, point in ((line["start"], scan.points[0]), (line["end"], scan.points[-1])):
+            assert (end - point) @ direction == pytest.approx(0.0, abs=atol)
+            assert np.hypot(*(end - point)) < off
+        assert np.isfinite(line["covariance"]).all()
+        assert (line["first_beam"], line["last_beam"]) == (0, len(angles) - 1)
+        assert line["n_points"] == len(angles)
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.01])
@@ -113,14 +118,16 @@ def test_one_missing_or_false_beam_does_not_end_a_segment(extractor, false):
     assert len(features.corners) == 0
 
 
-@pytest.mark.parametrize(("missing", "lines"), [(1, 1), (5, 1), (6, 2)])
-def test_a_segment_goes_over_as_many_missing_beams_as_it_may(extractor, missing, lines):
-    angles = fan(30)
-    ranges = wall(angles, 2.0, 10.0)
-    ranges[60 : 60 + missing] = np.nan
-    segments = extractor(scan_of(ranges, angles)).segments
-    assert len(segments) == lines
-    assert segments["n_points"].sum() == len(angles) - missing
+@pytest.mark.parametrize("name", [*NAMES, "optimal"])
+@pytest.mark.parametrize("max_missing", [0, 3, 6])
+def test_a_segment_goes_over_as_many_missing_beams_as_it_may(name, max_missing):
+    extractor, angles = Extractor(name, max_missing=max_missing), fan(30)
+    for missing, lines in ((max_missing, 1), (max_missing + 1, 2)):
+        ranges = noisy(wall(angles, 2.0, 10.0))
+        ranges[60 : 60 + missing] = np.nan
+        segments = extractor(scan_of(ranges, angles)).segments
+        assert len(segments) == lines
+        assert segments["n_points"].sum() == len(angles) - missing
 
 
 @and_others
@@ -131,7 +138,10 @@ def test_walls_on_either_side_of_a_doorway_are_not_bridged(extractor, behind, li
     ranges = noisy(np.where(door, wall(angles, behind, 0.0), wall(angles, 2.0, 0.0)))
     features = extractor(scan_of(ranges, angles))
     assert len(features.segments) == lines
-    assert (features.corners["kind"] == "edge").all()  # Of `optimal`, beside the jump.
+    is_optimal = extractor.method.name == "optimal"
+    assert features.corners["kind"].tolist() == ["edge"] * 2 * (is_optimal and lines == 3)
+    kinds = ["jump", "jump"] if lines == 3 else ["gap"]
+    assert features.breakpoints["kind"].tolist() == [*kinds, "scan_end", "scan_end"]
     for line in features.segments:
         assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
 
@@ -213,19 +223,25 @@ def test_covariances_of_corners_have_the_lever_arm(name):
     assert 1.7 < np.mean(nees) < 2.6
 
 
-def test_batches_are_those_of_scans_alone(extractor):
-    """Also what a block held before, and the order of scans, change nothing."""
-    rng = np.random.default_rng(1)
+@pytest.mark.parametrize("noise", [None, NOISE], ids=["estimated", "given"])
+@pytest.mark.parametrize("name", [*NAMES, "liu", "pdbs", "optimal", "maps"])
+def test_features_do_not_depend_on_how_they_are_asked_for(name, noise):
+    """What a block held before, the order of scans and the number of threads change nothing."""
+    method = get_method("optimal", max_vertices=12) if name == "maps" else get_method(name)
+    extractor, rng = Extractor(method, noise=noise), np.random.default_rng(1)
     rows = room(full_circle(360), BOX) + 0.02 * rng.normal(size=(12, 360))
     rows[rng.random(rows.shape) < 0.03] = np.nan
+    rows[7], rows[8], rows[9] = rng.uniform(0, 5, 360), np.nan, random_scan(1, 360).ranges
     bearings = {"angle_min": -math.pi, "angle_increment": 2 * math.pi / 360}
-    batch = extractor.batch(rows, **bearings, workers=2)
-    backwards = extractor.batch(rows[::-1], **bearings)
-    for i, row in enumerate(rows):
-        alone = Extractor(extractor.method, noise=NOISE)(LaserScan(row, **bearings))
-        for name in ("segments", "corners", "breakpoints", "clusters"):
-            for other in (batch[i], backwards[11 - i]):
-                np.testing.assert_array_equal(getattr(other, name), getattr(alone, name))
+    scans = [LaserScan(row, **bearings) for row in rows]
+    alone = [Extractor(method, noise=noise)(scan) for scan in scans]
+    ways = [list(map(extractor, scans)), list(map(extractor, scans[::-1]))[::-1]]
+    ways += [list(extractor.batch(rows, **bearings, workers=k)) for k in (1, 2, 3)]
+    ways += [list(extractor.batch(rows[::-1], **bearings))[::-1]]
+    for one, other in zip(alone * len(ways), chain(*ways), strict=True):
+        np.testing.assert_equal(other.noise, one.noise)
+        for table in (*TABLES, "clusters"):
+            assert getattr(other, table).tobytes() == getattr(one, table).tobytes()
 
 
 def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):

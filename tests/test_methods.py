@@ -1,7 +1,5 @@
 """Methods by name, and what their parameters may be."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -176,7 +174,7 @@ def test_presets():
     assert get_method("pdbs:paper").grazing_angle == math.radians(10)
 
 
-def test_every_method_is_there_and_lists_its_parameters():
+def test_every_method_is_there():
     assert DEFAULT_METHOD in METHODS
     assert set(METHODS) == set(BOUNDS)
     scan = ln.LaserScan([2.0] * 20, 0.0, 0.01)
@@ -184,8 +182,6 @@ def test_every_method_is_there_and_lists_its_parameters():
         method = get_method(name)
         assert method.name == name
         assert len(ln.extract(scan, method=name).segments) == (name != "pdbs")
-        for field in dataclasses.fields(method):
-            assert f"\n{field.name} : " in method.__doc__
         for preset in method.presets:
             assert get_method(f"{name}:{preset}").name == name
 

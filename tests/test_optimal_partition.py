@@ -1,7 +1,5 @@
 """Method optimal against its slow twins: the partition is the least of all, the fits are right."""
 
-from __future__ import annotations
-
 import math
 
 import naive_optimal as naive

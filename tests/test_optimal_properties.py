@@ -163,21 +163,14 @@ def all_hostile():
 
 
 @every_extractor
-def test_features_of_hostile_scans_are_sound(extractor):
-    for scan in [*all_hostile(), *degenerate_scans().values()]:
+@pytest.mark.parametrize("source", ["hostile", "random", *SENSORS])
+def test_features_are_sound(extractor, source):
+    if source == "hostile":
+        scans = [*all_hostile(), *degenerate_scans().values()]
+    else:
+        scans = map(random_scan, range(40)) if source == "random" else simulated(source)
+    for scan in scans:
         assert_sound(scan, extractor(scan), extractor)
-
-
-@every_extractor
-def test_features_of_random_scans_are_sound(extractor):
-    for scan in map(random_scan, range(40)):
-        assert_sound(scan, extractor(scan), extractor)
-
-
-@pytest.mark.parametrize("sensor", SENSORS)
-def test_features_of_simulated_scans_are_sound(sensor):
-    for scan in simulated(sensor):
-        assert_sound(scan, EXTRACTORS["default"](scan), EXTRACTORS["default"])
 
 
 @pytest.mark.slow
@@ -231,36 +224,6 @@ def test_ranges_that_no_scanner_reports_are_no_features():
 
 
 # However they are asked for
-
-
-def assert_equal_features(one, other):
-    for name in TABLES:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-    np.testing.assert_equal(one.noise, other.noise)
-
-
-@every_extractor
-def test_a_scan_has_the_same_features_each_time(extractor):
-    """Whatever came before: nothing of the last scan is left in the workspace."""
-    scans = [random_scan(k, n=150) for k in range(15)]
-    first = [extractor(scan) for scan in scans]
-    fresh = [Extractor(extractor.method, noise=extractor.noise)(scan) for scan in scans]
-    again = [extractor(scan) for scan in reversed(scans)][::-1]
-    for one, other, third in zip(first, fresh, again, strict=True):
-        assert_equal_features(one, other)
-        assert_equal_features(one, third)
-
-
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_batches_are_those_of_scans_alone(workers):
-    extractor, n = EXTRACTORS["default"], 360
-    rng, step = np.random.default_rng(1), 2 * math.pi / n
-    rows = room(full_circle(n), BOX) + 0.02 * rng.normal(size=(20, n))
-    rows[rng.random(rows.shape) < 0.03] = np.nan
-    rows[7], rows[8] = rng.uniform(0, 5, n), np.nan
-    batch = extractor.batch(rows, angle_min=-math.pi, angle_increment=step, workers=workers)
-    for features, row in zip(batch, rows, strict=True):
-        assert_equal_features(features, extractor(LaserScan(row, -math.pi, step)))
 
 
 # Seen in another way

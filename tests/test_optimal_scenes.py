@@ -201,22 +201,6 @@ def test_bowed_wall_is_one(extractor, waves, amplitude, sigma):
     assert line["covariance"][0, 0] < 0.002**2
 
 
-@extractors
-@pytest.mark.parametrize("behind", [np.nan, np.inf, 5.0])
-def test_doorway_is_not_bridged(extractor, behind):
-    angles = fan(40)
-    door = abs(angles) < math.radians(12)
-    beyond = wall(angles, 5.0, 0.0) if behind == 5.0 else behind
-    ranges = noisy(np.where(door, beyond, wall(angles, 2.0, 0.0)))
-    features = extractor(scan_of(ranges, angles))
-    assert len(features.segments) == (3 if behind == 5.0 else 2)
-    assert features.corners["kind"].tolist() == (["edge"] * 2 if behind == 5.0 else [])
-    for line in features.segments:
-        assert len(set(door[line["first_beam"] : line["last_beam"] + 1])) == 1
-    kinds = ["jump", "jump"] if behind == 5.0 else ["gap"]
-    assert features.breakpoints["kind"].tolist() == [*kinds, "scan_end", "scan_end"]
-
-
 @pytest.mark.parametrize("beams", [(6, 6), (6, 12), (8, 8), (8, 10), (10, 8), (10, 10)])
 def test_step_of_short_walls_parts_them_wherever_it_is(beams):
     first, n = beams[0], sum(beams)
@@ -334,27 +318,6 @@ def test_drop_outs_do_not_cut_a_wall(extractor):
     (line,) = extractor(scan_of(ranges, angles)).segments
     assert line["n_points"] == (~lost).sum()
     assert line["rms"] == pytest.approx(NOISE.sigma, rel=0.2)
-
-
-@pytest.mark.parametrize("max_missing", [0, 3, 6])
-def test_wall_goes_on_over_as_many_missing_beams_as_are_allowed(max_missing):
-    angles, extractor = fan(30), Extractor("optimal", max_missing=max_missing)
-    for missing, pieces in ((max_missing, 1), (max_missing + 1, 2)):
-        ranges = noisy(wall(angles, 2.0, 0.0))
-        ranges[50 : 50 + missing] = np.nan
-        assert len(extractor(scan_of(ranges, angles)).segments) == pieces
-
-
-@extractors
-@pytest.mark.parametrize("normal", [0, 90, 180, 270, 30])
-def test_wall_ends_at_its_last_measurements(extractor, normal):
-    angles = math.radians(normal) + fan(30)
-    scan = scan_of(noisy(wall(angles, 2.0, normal)), angles)
-    (line,) = extractor(scan).segments
-    direction = [math.cos(line["angle"]), math.sin(line["angle"])]
-    for end, point in ((line["start"], scan.points[0]), (line["end"], scan.points[-1])):
-        assert (end - point) @ direction == pytest.approx(0.0, abs=1e-9)
-        assert np.hypot(*(end - point)) < 4 * NOISE.sigma
 
 
 def test_evidence_is_what_a_corner_must_have():

@@ -4,8 +4,6 @@ They may neither fall nor rise by more than about their bootstrap error over the
 moves them looks at what moved, and makes the table anew: python tests/test_optimal_scores.py
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,76 +1,13 @@
 """Method pdbs: its kernel equals its slow twin; every rule by hand; what it does not do."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from naive_fit import breakpoints
-from naive_partition import noise_of, parted
-from worlds import NOISE, degenerate_scans, fan, full_circle, random_scan, scan_of, wall
+from worlds import NOISE, fan, full_circle, scan_of, wall
 
-from lineament import Extractor, LaserScan, RangeNoise
-from lineament.methods.pdbs import PDBS, RULES
-
-DEGENERATE = degenerate_scans()
-EXTRACTORS = {rule: Extractor("pdbs", rule=rule) for rule in RULES}
-# Not 0.05, that measurements in whole centimetres have exactly.
-EXTRACTORS["lee"] = Extractor("pdbs", rule="lee", ratio=math.pi / 60)
-EXTRACTORS["paper"] = Extractor("pdbs:paper")
-EXTRACTORS["changed"] = Extractor(
-    PDBS(max_missing=0, min_points=1, noise_factor=0.0, grazing_angle=0.4),
-    noise=RangeNoise(0.01, 0.01, 0.002, 0.01),
-)
-EXTRACTORS["wide santos"] = Extractor(PDBS(rule="santos", beta=1.2, c0=0.0, max_missing=200))
-
-
-def assert_same_partition(scan, extractor):
-    trace = extractor.trace(scan)
-    found = parted(scan, extractor.method, noise_of(scan, extractor))
-    assert trace.clusters.tolist() == found.labels(len(scan)).tolist()
-    for kernel, slow in (
-        (trace.spacing, found.spacing),
-        (trace.distance_threshold, found.distance_threshold),
-    ):
-        expected = np.full(len(scan), np.nan)
-        expected[list(slow)] = list(slow.values())
-        # Near its pole the rule of Santos has thresholds beyond all distances, and no digits.
-        kernel, expected = np.minimum(kernel, 1e6), np.minimum(expected, 1e6)
-        np.testing.assert_allclose(kernel, expected, rtol=1e-6, atol=1e-12)
-    assert np.isnan(trace.density_threshold).all()
-    features = trace.features
-    assert len(features.segments) == len(features.corners) == len(trace.candidates) == 0
-    gap = extractor.method.max_missing + 1
-    points = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))
-    points *= scan.ranges[:, np.newaxis]
-    expected = breakpoints(scan, found, scan.ranges, points, gap)
-    assert [
-        (tuple(b["beam"].tolist()), str(b["kind"]), int(b["occluder"]))
-        for b in features.breakpoints
-    ] == [(beams, kind, occluder) for beams, _, kind, occluder in expected]
-
-
-@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
-@pytest.mark.parametrize("extractor", EXTRACTORS.values(), ids=EXTRACTORS)
-def test_degenerate_scans_equal_the_slow_twin(extractor, scan):
-    assert_same_partition(scan, extractor)
-
-
-@settings(max_examples=25)
-@given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(EXTRACTORS)))
-def test_random_scans_equal_the_slow_twin(seed, name):
-    assert_same_partition(random_scan(seed), EXTRACTORS[name])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EXTRACTORS)
-def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
-    for scan in recorded_scans:
-        assert_same_partition(scan, EXTRACTORS[name])
-
+from lineament import Extractor, LaserScan
+from lineament.methods.pdbs import RULES
 
 # The rules by hand
 

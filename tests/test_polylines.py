@@ -1,7 +1,5 @@
 """Maps of method `optimal`: polylines of a budget of vertices, against every choice of vertices."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations, pairwise, product
 
@@ -225,16 +223,3 @@ def test_garbage_makes_no_vertex_that_is_not_finite(ranges):
         polylines = polylines_of(ln.extract(scan, max_vertices=budget), scan)
         assert sum(map(len, polylines)) <= budget
         assert all(np.isfinite(polyline).all() for polyline in polylines)
-
-
-def test_scan_by_scan_and_in_a_batch():
-    angles = full_circle(180)
-    ranges = room(angles, BOX) + np.random.default_rng(5).normal(0, 0.02, (4, 180))
-    extractor = ln.Extractor("optimal", max_vertices=12)
-    step = float(angles[1] - angles[0])
-    batch = extractor.batch(ranges, angle_min=float(angles[0]), angle_increment=step, workers=2)
-    for k, row in enumerate(ranges):
-        alone = extractor(ln.LaserScan(row, float(angles[0]), step))
-        np.testing.assert_array_equal(alone.segments, batch[k].segments)
-        for name in ("position", "covariance", "beam", "segments"):
-            np.testing.assert_array_equal(alone.corners[name], batch[k].corners[name])

@@ -1,20 +1,14 @@
-"""The methods of lines equal their slow twins; what is special to each, by hand."""
-
-from __future__ import annotations
+"""What is special to each method of lines, by hand."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from naive_fit import range_variance
-from naive_partition import clusters_of, noise_of, parted, split, track, untied
-from naive_regions import assert_same_pieces, grow, sample, vote
+from naive_partition import tracked
+from naive_regions import assert_same_pieces, grow
 from worlds import (
     BOX,
     NOISE,
-    degenerate_scans,
     fan,
     full_circle,
     random_scan,
@@ -25,143 +19,10 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.features import noise_row
 from lineament.kernels import layout as at
-from lineament.kernels.rivals.line_tracking import track_lines
 from lineament.methods.hough import Hough
 from lineament.methods.ransac import Ransac
 from lineament.methods.region_growing import RegionGrowing
-from lineament.methods.workspace import Block
-
-DEGENERATE = degenerate_scans()
-SENSOR = RangeNoise(0.01, 0.01, 0.002, 0.01)
-CHANGED = {"threshold": 0.02, "min_piece": 2, "noise": SENSOR}
-SPLITTERS = {
-    "iepf": Extractor("iepf", settling=False),
-    "iepf:paper": Extractor("iepf:paper"),
-    "iepf, changed": Extractor("iepf", settling=False, **CHANGED),
-    "split_and_merge": Extractor("split_and_merge"),
-    "split_and_merge, changed": Extractor("split_and_merge", **CHANGED),
-}
-TRACKERS = {
-    "line_tracking": Extractor("line_tracking"),
-    "line_tracking, changed": Extractor(
-        "line_tracking", **CHANGED | {"min_piece": 6}, noise_factor=2.0, max_misses=0
-    ),
-}
-SMALL_NOISE = RangeNoise(0.01, 0.002, 0.001, 0.01)
-FINDERS = {
-    "hough": (vote, Extractor(Hough())),
-    "hough, coarse": (
-        vote,
-        Extractor(Hough(angles=30, distances=16, min_length=0.3, max_misses=0)),
-    ),
-    "hough, bearings": (vote, Extractor(Hough(angles=60, min_points=8), noise=SMALL_NOISE)),
-    "ransac": (sample, Extractor(Ransac())),
-    "ransac, narrow": (
-        sample,
-        Extractor(Ransac(trials=7, window=6, min_length=0.3, max_misses=0, seed=12345)),
-    ),
-    "ransac, bearings": (sample, Extractor(Ransac(trials=5, min_points=8), noise=SMALL_NOISE)),
-    "region_growing": (grow, Extractor(RegionGrowing())),
-    "region_growing, metres": (
-        grow,
-        Extractor(RegionGrowing(sigmas=0.0, epsilon=0.03, p_min=10, l_min=0.3)),
-    ),
-    "region_growing, bearings": (grow, Extractor(RegionGrowing(s_num=4, p_min=5), noise=SENSOR)),
-}
-
-
-def assert_same_split(scan, extractor):
-    """Hold candidates equal to the twin's, and pieces if none are merged. Returns the cuts."""
-    method, noise = extractor.method, noise_of(scan, extractor)
-    by_line = method.name == "split_and_merge"
-
-    def tolerance(rho):
-        sigma = np.sqrt(range_variance(rho, noise))
-        growing = 0.0 if by_line else method.proportion * rho
-        return method.threshold + growing + method.noise_factor * sigma
-
-    found = parted(scan, clusters_of(method), noise)
-    candidates, pieces = split(
-        scan, found, noise, tolerance=tolerance, min_piece=method.min_piece, by_line=by_line
-    )
-    trace = extractor.trace(scan)
-    assert trace.candidates["beam"].tolist() == [beam for beam, _, _ in candidates]
-    for name, k in (("chord_distance", 1), ("response", 2)):
-        expected = [candidate[k] for candidate in candidates]
-        rtol, atol = (1e-6, 1e-7) if by_line else (1e-7, 1e-9)
-        np.testing.assert_allclose(trace.candidates[name], expected, rtol=rtol, atol=atol)
-    assert len(trace.cuts) == sum(excess > 1 for _, _, excess in candidates)
-    if not by_line:
-        segments, corners = trace.features.segments, trace.features.corners
-        ends = list(zip(segments["first_beam"], segments["last_beam"], strict=True))
-        assert ends == [(first, last) for first, last, _ in pieces]
-        assert corners["segments"].tolist() == [
-            [before, k] for k, (_, _, before) in enumerate(pieces) if before >= 0
-        ]
-    return len(trace.cuts)
-
-
-def tracked(scan, extractor):
-    """First and last beam of the lines that the kernel tracks, before they are merged."""
-    method, block = extractor.method, Block(scan, noise_row(extractor.noise), 1)
-    block.load(scan.ranges)
-    block.take(0)
-    method.part(block, method.min_points)
-    track_lines(
-        *block.workspace, method.threshold, method.noise_factor, method.max_misses,
-        method.min_piece,
-    )  # fmt: skip
-    ends = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
-    return list(map(tuple, block.work.marks[at.BEAM][ends].T.tolist()))
-
-
-def assert_same_lines(scan, extractor):
-    noise = noise_of(scan, extractor)
-    lines = track(scan, parted(scan, clusters_of(extractor.method), noise), noise, extractor.method)
-    assert tracked(scan, extractor) == lines
-    return len(lines)
-
-
-def assert_same(name, scan):
-    """Hold a method equal to its twin on a scan. Returns how much was compared."""
-    if name in SPLITTERS:
-        return assert_same_split(scan, SPLITTERS[name])
-    if name in TRACKERS:
-        return assert_same_lines(scan, TRACKERS[name])
-    find, extractor = FINDERS[name]
-    return assert_same_pieces(extractor.method, scan, find, extractor.noise)
-
-
-QUICK = [*SPLITTERS, *TRACKERS, "ransac, bearings", "hough, coarse", "region_growing"]
-
-
-@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
-@pytest.mark.parametrize("name", QUICK)
-def test_degenerate_scans_equal_the_slow_twin(name, scan):
-    assert_same(name, untied(scan) if name in SPLITTERS else scan)
-
-
-@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS, *list(FINDERS)[-3:]])
-@settings(max_examples=15)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_random_scans_equal_the_slow_twin(name, seed):
-    assert_same(name, random_scan(seed))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS, *FINDERS])
-def test_many_random_scans_equal_the_slow_twin(name):
-    seeds = range(10) if name in FINDERS else range(100, 160)
-    assert sum(assert_same(name, random_scan(seed)) for seed in seeds) > 20
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*SPLITTERS, *TRACKERS])
-def test_recorded_scans_equal_the_slow_twin(recorded_scans, name):
-    assert sum(assert_same(name, scan) for scan in recorded_scans) > 50
-
 
 # The iterative end point fit, split-and-merge
 
