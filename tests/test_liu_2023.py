@@ -69,8 +69,8 @@ def assert_reproduced(scan, **changes):
     clusters = found.clusters
     np.testing.assert_array_equal(trace.clusters, clusters.labels())
     equal(trace.spacing, clusters.spacing)
-    equal(trace.distance_threshold, clusters.linear)
-    equal(trace.density_threshold, clusters.density, ROOT)
+    equal(trace.distance_threshold, clusters.distance_threshold)
+    equal(trace.density_threshold, clusters.density_threshold, ROOT)
 
     beams, to_chord, responses = np.reshape(found.candidates, (-1, 3)).T
     np.testing.assert_array_equal(trace.candidates["beam"], beams)
