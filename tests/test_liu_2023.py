@@ -1,4 +1,8 @@
-"""`liu:paper` reproduces the script written from the paper: stage by stage, and end to end."""
+"""`liu:paper` reproduces the script written from the paper: stage by stage, and end to end.
+
+End to end, the float32 sums of the filter decide which of two points is farther from a chord where
+both are equally far to 10⁻⁸ m, as on an arc about the sensor: no scan here has such a tie.
+"""
 
 from itertools import islice, pairwise
 
