@@ -10,6 +10,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,7 @@ def _measure_store(some: list[LaserScan]) -> None:
         return (("scan", some[k % len(some)]) for k in range(count))
 
     for count in (SCANS, 4 * SCANS):
-        with ScanStore(lambda: ()) as store:
+        with closing(ScanStore(lambda: ())) as store:
             started = time.perf_counter()
             store.fill(items(count))
             seconds = time.perf_counter() - started

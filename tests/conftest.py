@@ -58,12 +58,13 @@ def recorded_scans(data_dir: Path) -> list[LaserScan]:
 
 
 @pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Folder of temporary files, which must be empty when all logs are gone."""
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Folder of temporary files, which must be empty when all logs are gone, after the test."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
+    yield folder
+    assert list(folder.iterdir()) == []
 
 
 @pytest.fixture

@@ -35,7 +35,8 @@ class Paper:
 
 def polar(ranges, bearings):
     """Points of ranges, shape (n, 2) (2, 3)."""
-    return np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
+    with np.errstate(invalid="ignore"):  # of infinite ranges
+        return np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
 
 
 def bilateral_filter(ranges, full, paper):

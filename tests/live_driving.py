@@ -9,16 +9,16 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 import lineament as ln
-from lineament.live import LiveConfig, Pipeline, Report, run_live
+from lineament.live import LiveConfig, Pipeline, Received, Report, Source, run_live
 
 #: How long anything may take on a slow machine [s]; nothing waits so long if it goes well.
 DEADLINE = 120.0
@@ -116,15 +116,23 @@ class LiveNode:
 
 
 class Running:
-    """A node in a thread: what it wrote, and its report once it has ended."""
+    """A node with some options, in a thread until the block ends; `lines` is what it wrote."""
 
-    def __init__(self, config: LiveConfig) -> None:
+    def __init__(self, **options: Any) -> None:
+        config = LiveConfig(**options)
+        pipeline = Pipeline(config)
+        for _ in range(2):  # Nothing that has a deadline should wait for a compiler.
+            pipeline("", scan_of(scan_message(0, scene(), time_increment=1e-6)))
         self.lines: list[str] = []
-        self.reports: list[Report] = []
         self._stopped = threading.Event()
-        to, kept = self._stopped.is_set, {"write": self.lines.append, "show": self.reports.append}
-        self._thread = threading.Thread(target=run_live, args=(config, to), kwargs=kept)
-        self._thread.start()
+        write, is_stopped = self.lines.append, self._stopped.is_set
+        self._ended = ThreadPoolExecutor(1).submit(run_live, config, is_stopped, write=write)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
 
     def stop(self) -> Report:
         """Stop it; return its last report."""
@@ -133,24 +141,7 @@ class Running:
 
     def end(self) -> Report:
         """Wait until it ends; return its last report."""
-        self._thread.join(DEADLINE)
-        assert not self._thread.is_alive()
-        return self.reports[-1]
-
-
-@contextmanager
-def running(**options: Any) -> Iterator[Running]:
-    """Run a node with some options until the block ends."""
-    config = LiveConfig(**options)
-    pipeline = Pipeline(config)
-    for _ in range(2):  # Nothing that has a deadline should wait for a compiler.
-        pipeline("", scan_of(scan_message(0, scene(), time_increment=1e-6)))
-    node = Running(config)
-    try:
-        yield node
-    finally:
-        node._stopped.set()
-        node._thread.join(DEADLINE)
+        return self._ended.result(DEADLINE)
 
 
 def scan_message(stamp: int = 0, ranges: Any = (1.0, 2.0, 3.0), **fields: float) -> dict:
@@ -241,3 +232,17 @@ def heard(peer: Any, topic: str, publish: Callable[[], object] = lambda: None) -
         return peer.take(topic)[-1:]
 
     return eventually(newest, pause=0.02)[0]
+
+
+def connected(peer: Any, source: Source, topic: str, *kind: Any) -> None:
+    """Let a peer publish, and wait until both sides know it."""
+    before = source.publishers
+    peer.publish(topic, *kind)
+    eventually(lambda: peer.listeners(topic) and source.publishers > before)
+
+
+def received(source: Source, n: int = 1) -> list[Received]:
+    """Take the next messages, `n` at least."""
+    found: list[Received] = []
+    eventually(lambda: found.extend(source.receive(0.1)) or len(found) >= n, pause=0)
+    return found

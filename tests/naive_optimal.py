@@ -200,16 +200,3 @@ def arc_residuals(circle, xy, rho, noise, at):
     cosine = np.sum(normal * xy, axis=1) / rho
     deviation = np.sqrt(variance * (cosine**2 + np.sqrt(variance) / (2 * at[2])))
     return (np.linalg.norm(xy - circle[:2], axis=1) - circle[2]) / deviation
-
-
-def meeting(first, second):
-    """Where two segments cross, and Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ of that place."""
-    normals = np.array([[-math.sin(s["angle"]), math.cos(s["angle"])] for s in (first, second)])
-    offsets = [n @ s["centroid"] for n, s in zip(normals, (first, second), strict=True)]
-    place = np.linalg.solve(normals, offsets)
-    variances = []
-    for s in (first, second):
-        t = (place - s["centroid"]) @ [math.cos(s["angle"]), math.sin(s["angle"])]
-        variances.append([1, t] @ s["covariance"] @ [1, t])
-    inverse = np.linalg.inv(normals)
-    return place, inverse @ np.diag(variances) @ inverse.T

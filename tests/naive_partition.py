@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from liu_2023 import Clusters, distances, pieces_of, polar
 from naive import sigma, valid
-from naive_fit import breakpoints, normal_variances, principal_line, range_variance
+from naive_fit import breakpoints, estimate, principal_line, range_variance
 
 from lineament import LaserScan
 from lineament.features import noise_row
@@ -157,10 +157,7 @@ def off_line(points, bearings, rho, noise, allowed):
     """Return by how much of their tolerances two neighbours are off one side of the fitted line."""
     if not np.ptp(points, axis=0).any():
         return 0.0
-    centroid, angle = principal_line(points, np.ones(len(points)))
-    for _ in range(2):
-        weights = 1 / normal_variances(angle, bearings, rho, noise)
-        centroid, angle = principal_line(points, weights)
+    centroid, angle, _ = estimate(points, bearings, rho, noise, "weighted")
     off = (points - centroid) @ [-math.sin(angle), math.cos(angle)] / allowed
     pairs = [min(abs(a), abs(b)) for a, b in pairwise(off) if a * b > 0]
     return max(pairs, default=0.0)

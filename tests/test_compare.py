@@ -35,11 +35,11 @@ def test_table_counts_and_errors():
     table = comparison.table()
     liu, pdbs = table.rows
     assert table.columns[:5] == ("method", "segments", "corners", "arcs", "clusters")
-    assert liu[:6] == ("liu", 2, 0, 0, 2, 1.0)
-    assert liu[6] == pytest.approx(0.0, abs=1e-6)  # points on their own lines
-    assert liu[8] > 0
-    assert pdbs[:6] == ("pdbs", 0, 0, 0, 2, 0.0)
-    assert np.isnan(pdbs[6])
+    assert liu[:6] == ("liu", 2, 0, 0, 2, 100.0)
+    assert liu[6:10] == pytest.approx([0.0] * 4, abs=1e-6)  # points on their own lines
+    assert liu[10] > 0
+    assert (table.columns[11], liu[11]) == ("÷ liu", "1.00 (1.00–1.00)")
+    assert pdbs[:10] == ("pdbs", 0, 0, 0, 2, 0.0, *[None] * 4)
     assert str(table).splitlines()[2].split()[:6] == ["pdbs", "0", "0", "0", "2", "0"]
 
 
@@ -70,7 +70,7 @@ def test_default_is_every_method(log):
 
     comparison = compare_log(log)
     assert list(comparison.features) == list(METHODS)
-    assert comparison.timed == 3
+    assert {taken.shape[1] for taken in comparison.seconds.values()} == {3}
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.html", "a.svg"])

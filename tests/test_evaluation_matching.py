@@ -18,7 +18,7 @@ from lineament.evaluation.beams import (
     shared_beams,
     with_neighbours,
 )
-from lineament.evaluation.consistency import largest_variance, tolerance, usable_covariances
+from lineament.evaluation.consistency import largest_variance, tolerance
 from lineament.evaluation.icp import icp
 from lineament.evaluation.matching import distances_from_segments
 from lineament.evaluation.ple import score_map
@@ -109,11 +109,32 @@ def test_errors_by_hand():
     normalised = NormalisedErrors.of(np.array([[1.0, 3.0], [3.0, 4.0]]), covariances)
     np.testing.assert_allclose(normalised.squares, [2 - 2 * 3 + 9, 25])
     assert normalised.mean_ratio == pytest.approx(30 / 4)
-    assert normalised.over_bound == pytest.approx(math.sqrt(7.5))
     # The median of chi-square with two degrees of freedom is 2 ln 2.
-    assert normalised.median_ratio == pytest.approx(15 / (2 * math.log(2)))
-    both = normalised + normalised
-    assert (both.whitened.shape, both.mean_ratio) == ((4, 2), normalised.mean_ratio)
+    median = 15 / (2 * math.log(2))
+    bound = {"x_over_bound": math.sqrt(7.5), "x_over_bound_median": math.sqrt(median)}
+    for both in (normalised, normalised + normalised):
+        assert (both.mean_ratio, both.median_ratio) == pytest.approx((30 / 4, median))
+        assert both.bound_summary("x_") == pytest.approx(bound)
+
+
+@pytest.mark.parametrize(
+    ("error", "covariance"),
+    [
+        ((1, 1), np.zeros((2, 2))),
+        ((1, 1), -np.eye(2)),
+        ((1, 1), np.ones((2, 2))),
+        ((1, 1), np.full((2, 2), math.nan)),
+        ((1, math.inf), np.eye(2)),
+    ],
+)
+def test_errors_without_a_usable_covariance_are_counted(error, covariance):
+    normalised = NormalisedErrors.of(np.array([error, (1, 1)]), np.stack((covariance, np.eye(2))))
+    assert (normalised.whitened.tolist(), normalised.unusable) == ([[1, 1]], 1)
+    none = NormalisedErrors.of(np.array([error]), np.array([covariance]))
+    for empty in (none, NormalisedErrors.none(2)):
+        assert empty.whitened.shape == (0, 2)
+        figures = (*empty.bound_summary().values(), *empty.interval, empty.share_within(0.5))
+        assert all(map(math.isnan, figures))
 
 
 def test_quantiles_are_those_of_the_tables():
@@ -122,43 +143,6 @@ def test_quantiles_are_those_of_the_tables():
     assert (10 * low, 10 * high) == (pytest.approx(3.247, abs=1e-3), pytest.approx(20.483, 1e-4))
     errors = np.sqrt([[5.98, 0.0], [0.0, 6.0], [3.0, 2.9], [3.0, 3.1]])
     assert NormalisedErrors(errors).share_within(0.95) == 0.5
-
-
-@pytest.mark.parametrize("k", [1, 2, 3])
-def test_errors_with_their_own_covariance_are_consistent(k):
-    rng = np.random.default_rng(k)
-    root = rng.normal(size=(k, k)) * 10.0 ** rng.uniform(-4, 0, (k, 1))
-    errors = rng.normal(size=(4000, k)) @ root.T
-    normalised = NormalisedErrors.of(errors, np.broadcast_to(root @ root.T, (4000, k, k)))
-    low, high = normalised.interval
-    assert low < normalised.mean_ratio < high
-    assert high - low < 0.1
-    assert normalised.median_ratio == pytest.approx(1, abs=0.07)
-    # Half the deviation that there is: twice the bound, and not consistent.
-    bold = NormalisedErrors.of(errors, np.broadcast_to(root @ root.T / 4, (4000, k, k)))
-    assert bold.over_bound == pytest.approx(2 * normalised.over_bound)
-    assert bold.mean_ratio > high
-
-
-def test_errors_without_a_usable_covariance_are_counted():
-    covariances = np.array([np.eye(2), np.zeros((2, 2)), -np.eye(2), np.ones((2, 2))])
-    covariances = np.vstack((covariances, np.full((1, 2, 2), np.nan), [np.eye(2)]))
-    assert usable_covariances(covariances).tolist() == [True, *[False] * 4, True]
-    errors = np.ones((6, 2))
-    errors[5, 0] = np.inf
-    normalised = NormalisedErrors.of(errors, covariances)
-    assert (len(normalised.whitened), normalised.unusable) == (1, 5)
-    assert normalised.mean_ratio == 1
-
-
-def test_errors_of_nothing():
-    for none in (
-        NormalisedErrors.none(3),
-        NormalisedErrors.of(np.ones((0, 3)), np.ones((0, 3, 3))),
-    ):
-        figures = (none.mean_ratio, none.over_bound_median, *none.interval, none.share_within(0.5))
-        assert all(map(math.isnan, figures))
-        assert none.whitened.shape == (0, 3)
 
 
 def test_largest_variance_and_tolerance():

@@ -60,6 +60,7 @@ def test_partition_by_hand():
         (labels(11, 14), labels(6, 5, 14), Counts(1, 2, 2)),
         (labels(6, 10, 9), labels(6, 5, 5, 9), Counts(2, 2, 2)),  # made of two small ones
         (labels(11, 9), labels(6, -5, 9), Counts(1, 2, 2)),  # not half of it is in no cluster
+        (labels(10, 5), labels(5, 10), Counts(0, 1, 1)),  # half of it is in a small one
         (np.array([7, 2, 5])[labels(8, 8, 9)], labels(8, 8, 9), Counts(3, 3, 3)),
     ],
 )

@@ -205,9 +205,10 @@ def test_ranked_corners_are_matched_one_to_one_within_the_gate(found, others, ga
 
 
 @pytest.mark.parametrize(
-    ("beams", "view", "chance"), [(720, 2 * math.pi, 1 / 24), (361, math.pi, 1 / 12)]
+    ("beams", "view", "chance", "turn"),
+    [(720, 2 * math.pi, 1 / 24, 0.0), (720, 2 * math.pi, 1 / 24, 1.0), (361, math.pi, 1 / 12, 0.0)],
 )
-def test_chance_is_the_share_of_turns_in_sight_that_find_something(beams, view, chance):
+def test_chance_is_the_share_of_turns_in_sight_that_find_something(beams, view, chance, turn):
     """One of 24 turns puts (2, 0) near the second corner; half of them are in half a circle.
 
     The third corner is at the middle of them, 180°, which is no turn, and the fourth is at one that
@@ -217,6 +218,7 @@ def test_chance_is_the_share_of_turns_in_sight_that_find_something(beams, view, 
     behind = [] if beams == 720 else [at(2.0, FIRST + 10 * STEP)]
     found = corners_at((2.05, 0.0), at(2.095, FIRST), (-2.0, 0.0), *behind, n=beams)
     others = corners_at((2.0, 0.0), (3.0, 0.0), n=beams)
+    found, others = (some.transform(0, 0, turn) for some in (found, others))
     ranks = ranked_repeats(scan, found, scan, others, np.ones(2))
     assert ranks.chance == pytest.approx([chance, 0.0])
     assert ranks.repeated.tolist() == [True, False]

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from handmade import corner, features, segment
 
-from lineament import LaserScan, RangeNoise
+from lineament import LaserScan, LogError, RangeNoise
 from lineament.evaluation.icp import icp
-from lineament.evaluation.tracking import MotionErrors, motion_errors, track_scores
+from lineament.evaluation.relations import read_relations
+from lineament.evaluation.tracking import MotionErrors, chained, motion_errors, track_scores
 from lineament.motion import Tracks
 from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, room
@@ -28,20 +29,72 @@ def test_motion_errors_by_hand():
     turn = math.pi / 2
     poses = [(0.0, 0.0, 0.0), (1.0, 0.0, turn), (1.0, 1.0, 2 * turn)]
     motions = [(1.0, 0.0, turn), (1.1, 0.0, turn - 0.02)]
+    np.testing.assert_allclose(chained(motions)[1:], [motions[0], (1, 1.1, math.pi - 0.02)])
     errors, over_both = (motion_errors(motions, poses, step) for step in (1, 2))
     np.testing.assert_allclose(errors.ways, [0.0, 0.1], atol=1e-12)
     np.testing.assert_allclose(errors.turns, [0.0, 0.02], atol=1e-12)
     np.testing.assert_allclose(over_both.ways, [0.1], atol=1e-12)
+    # Two of three are off by 0.1 m and 0.02: the variance is 2/3 - 4/9 of the square of that.
+    shares = {"rmse": math.sqrt(2 / 3), "mean": 2 / 3, "std": math.sqrt(2) / 3}
+    shares |= {"median": 1, "p95": 1}
     assert (errors + over_both).summary() == pytest.approx(
-        {
-            "way_rmse": math.sqrt(0.02 / 3), "way_median": 0.1, "way_p95": 0.1,
-            "turn_rmse": math.sqrt(0.0008 / 3), "turn_median": 0.02, "turn_p95": 0.02,
-        }
-    )  # fmt: skip
-    nothing = [MotionErrors(), motion_errors(motions, poses, 3)]
-    assert all(math.isnan(value) for none in nothing for value in none.summary().values())
+        {"motions": 3}
+        | {f"way_{key}": 0.1 * share for key, share in shares.items()}
+        | {f"turn_{key}": 0.02 * share for key, share in shares.items()}
+    )
+    for nothing in (MotionErrors(), motion_errors(motions, poses, 3)):
+        count, *figures = nothing.summary().values()
+        assert count == 0
+        assert all(map(math.isnan, figures))
     with pytest.raises(ValueError, match="there are 3 poses, expected one more than motions"):
         motion_errors(motions[:1], poses)
+
+
+def test_relations_by_hand(tmp_path):
+    """Scans out of order in time, of which two have stamps that are nearly the same."""
+    stamps = np.array([200.0, 100.0, 130.0, 130.0015, 160.1])
+    rows = [
+        *("100.0009 200 1 2 9 9 9 1.5", "130 100 0.1 0 0 0 0 0.2", ""),
+        *("100 160.1001 0 0 0 0 0 -3", "100 160 0 0 0 0 0 0", "99.9989 200 0 0 0 0 0 0"),
+        "130.0011 130.0004 0 0 0 0 0 0",
+    ]
+    path = tmp_path / "log.relations"
+    path.write_text("\n".join(rows))
+    relations = read_relations(path, stamps)
+    assert relations.scans.tolist() == [[1, 0], [2, 1], [1, 4], [3, 2]]
+    assert relations.motions[:2].tolist() == [[1, 2, 1.5], [0.1, 0, 0.2]]
+    assert relations.seconds == pytest.approx([99.9991, 30, 60.1001, 0.0007])
+    far = relations.far_apart()
+    assert far.scans.tolist() == [[1, 0], [1, 4]]
+    # Of the first 0.5 m and 0.1 rad, of the second a turn of 3.2 rad, which is 2π less 3.2.
+    poses = [(0.0, 0.0, 0.0)] * 5
+    poses[1] = (4.0, 1.0, math.pi / 2)
+    poses[0] = (4.0 - 2.3, 1.0 + 1.4, math.pi / 2 + 1.6)
+    poses[4] = (4.0, 1.0, math.pi / 2 + 0.2)
+    errors = far.errors(poses)
+    np.testing.assert_allclose(errors.ways, [0.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(errors.turns, [0.1, 2 * math.pi - 3.2])
+
+
+@pytest.mark.parametrize("text", ["1 2 3\n", "1 2 0 0 0 0 0 x\n", "1 2 0 0 0 0 0 0\n1\n"])
+def test_no_file_of_relations(tmp_path, text):
+    (tmp_path / "a").write_text(text)
+    with pytest.raises(LogError, match="a: is no file of relations: expected eight numbers a l"):
+        read_relations(tmp_path / "a", np.arange(3.0))
+    with pytest.raises(LogError, match="b: "):
+        read_relations(tmp_path / "b", np.arange(3.0))
+
+
+def test_relations_of_the_corrected_poses_are_those_known(data_dir):
+    """350 of Intel are of its scans, and its corrected poses are .0313 ± .0225 m off."""
+    from lineament.reproduce.scans import archived_scans
+
+    scans = archived_scans(data_dir / "truth/intel_graph.npz")
+    stamps = np.array([scan.stamp for scan in scans])
+    relations = read_relations(data_dir / "graph/intel-lab.relations", stamps)
+    figures = relations.errors([scan.pose for scan in scans]).summary()
+    found = [figures[name] for name in ("motions", "way_mean", "way_std")]
+    assert found == pytest.approx([350, 0.0313, 0.0225], abs=5e-5)
 
 
 def test_switches_losses_and_lengths_by_hand():
@@ -91,13 +144,34 @@ def test_segments_are_the_same_if_they_lie_side_by_side(start, end, pairs):
         assert track_scores(both, [tracks_of([0])] * 2, STILL)["segments"].pairs == pairs
 
 
-def test_icp_finds_the_motion():
+@pytest.mark.parametrize("motion", [(0.12, -0.05, 0.08), (-0.1, 0.2, -0.2)])
+def test_icp_finds_the_motion_of_the_least_squares(motion):
     sensor = replace(SENSORS["utm30lx"], noise=RangeNoise(0.005), outlier=0.0)
-    rng, motion = np.random.default_rng(0), (0.12, -0.05, 0.08)
-    pose = (-1.0, 0.5, 0.3)
+    rng, pose = np.random.default_rng(0), (-1.0, 0.5, 0.3)
     before, now = (sensor.scan(room(), at, rng) for at in (pose, compose(pose, motion)))
-    np.testing.assert_allclose(icp(before, now), motion, atol=2e-3)
+    found = icp(before, now)
+    np.testing.assert_allclose(found, motion, atol=2e-3)
     np.testing.assert_allclose(icp(now, before), relative(motion, (0, 0, 0)), atol=2e-3)
+    # Of the pairs that it ends with, within 10 cm: any other motion has a greater sum.
+    points = before.points[before.valid]
+    arms = np.diff(points, axis=0)
+    near = np.hypot(*arms.T) < 0.3
+    anchors, normals = (points[1:] + points[:-1])[near] / 2, arms[near] @ [[0, 1], [-1, 0]]
+    normals /= np.hypot(*normals.T)[:, np.newaxis]
+
+    def moved(x, y, theta):
+        c, s = math.cos(theta), math.sin(theta)
+        return now.points[now.valid] @ [[c, s], [-s, c]] + (x, y)
+
+    apart = np.linalg.norm(moved(*found)[:, np.newaxis] - anchors, axis=2)
+    nearest, kept = apart.argmin(axis=1), apart.min(axis=1) <= 0.1
+
+    def squares(at):
+        off = (moved(*at) - anchors[nearest]) * normals[nearest]
+        return np.square(off.sum(axis=1)[kept]).sum()
+
+    for step in 1e-5 * np.vstack((np.eye(3), -np.eye(3))):
+        assert squares(found + step) > squares(found)
 
 
 def test_icp_without_points_stays_where_it_began():

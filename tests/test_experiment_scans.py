@@ -14,12 +14,14 @@ from lineament.reproduce.arena import ARENAS, arena_scores, load_arena
 from lineament.reproduce.scans import (
     batch_of,
     frame_times,
+    interleaved_times,
     scan_pairs,
     scene_numbers,
     simulated_frames,
     still_pairs,
+    time_ratio,
 )
-from lineament.simulation import SENSORS, Sensor, World, truth
+from lineament.simulation import SENSORS, Sensor, World, building, drive, truth
 
 
 def test_frames_are_of_the_kinds_in_turn_and_can_be_repeated():
@@ -42,12 +44,22 @@ def test_scans_at_once_give_what_each_alone_gives():
         assert np.array_equal(found.clusters, extractor(scan).clusters)
 
 
-def test_time_of_a_scan_is_the_median_of_batches_of_copies(monkeypatch):
-    """A clock by which the batches take 8, 16, 800 ... s: one scan takes an eighth."""
-    clock = iter([0, 8, 0, 16, 0, 800, 0, 24, 0, 4])
-    monkeypatch.setattr(scans.time, "perf_counter", lambda: float(next(clock)))
+def test_methods_are_timed_in_turns(monkeypatch):
+    """A clock by which each call takes twice as long as the one before it.
+
+    Two methods on two scans are four calls a round, of which the first round does not count: a scan
+    of a batch takes an eighth of 16, 32, 64, 128 s, then of 16 times that.
+    """
+    clock = iter([t for k in (*range(12), 9, 3, 4) for t in (0.0, 2.0**k)])
+    monkeypatch.setattr(scans.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(scans, "_BATCHES", 2)
     scan = LaserScan([2.0] * 9, angle_min=0.0, angle_increment=0.01)
-    assert frame_times(Extractor("pdbs"), [scan]).tolist() == [2.0]
+    taken = interleaved_times({"a": Extractor("pdbs"), "b": Extractor("pdbs")}, [scan, scan])
+    assert taken["a"].tolist() == [[2.0, 8.0], [32.0, 128.0]]
+    assert taken["b"].tolist() == [[4.0, 16.0], [64.0, 256.0]]
+    taken["b"][1] += 4 * taken["a"][1]
+    assert time_ratio(taken["b"], taken["a"]) == (4.0, 2.0, 6.0)
+    assert frame_times(Extractor("pdbs"), [scan]).tolist() == [1.5]
 
 
 def test_recorded_scans_are_spread_over_the_log(tmp_path, monkeypatch):
@@ -98,6 +110,20 @@ def test_pairs_of_a_sensor_that_stands(tmp_path):
     assert stamps(10, standing=True) == [(k, k + 1) for k in range(8)]
     assert stamps(3) == [still[0], still[2], still[5]]
     assert stamps(0) == []
+
+
+def test_the_simulated_building_and_the_speed_of_a_drive_are_those_of_the_results():
+    world, way = building()
+    for part, total in (
+        (world.segments, 1488.1661717670454),
+        (world.circles, 54.63541666666666),
+        (way, 128.0544117647059),
+    ):
+        values = np.ravel(part)
+        weights = np.arange(1, len(values) + 1) / len(values)
+        assert values @ weights == pytest.approx(total, rel=1e-12)
+    (scan, *_, last) = drive(world, [(0, 0), (3, 0), (3, 0.6)], SENSORS["lms181"], rate=10)
+    assert (scan.stamp, last.stamp) == (0.0, pytest.approx(5.0 + math.pi / 2 + 1.0, abs=0.1))
 
 
 #: A room of 4 m x 3 m whose fitted walls leave gaps at two corners; a board ends on a wall.

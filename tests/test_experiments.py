@@ -61,7 +61,7 @@ def small(monkeypatch):
         (success, {"MORE": 2}),
         (two_corners, {"SCANS_A_FRAME": 2}),
         (scenes, {"INDOORS": ("room",)}),
-        (similarity, {"INDOORS": ("room",)}),
+        (similarity, {"INDOORS": ("room",), "SHOWN": ("iepf", "pdbs, fitted")}),
         (layers, {"RULES": ("fixed", "dietmayer")}),
         (real, {"SHOWN": "iepf"}),
     ):
@@ -74,8 +74,9 @@ def data(tmp_path, monkeypatch):
     """A folder of recordings: a simulated room from some places, as a log and as an arena."""
     poses = np.array([(-1.0, 0.0, 0.0), (-0.6, 0.0, 0.3), (-0.2, 0.1, -0.2)])
     rng, sensor = np.random.default_rng(0), SENSORS["lms181"]
-    found = [sensor.scan(room(), tuple(pose), rng) for pose in poses]
+    found = [sensor.scan(room(), tuple(pose), rng, 40.0 * k) for k, pose in enumerate(poses)]
     save_npz(tmp_path / "room.npz", found)
+    (tmp_path / "room.relations").write_text("0 80 0.8 0.1 0 0 0 -0.2\n0 40 0.4 0.03 0 0 0 0.3\n")
     np.savez(
         tmp_path / "arena.npz",
         ranges=[scan.ranges for scan in found],
@@ -89,6 +90,7 @@ def data(tmp_path, monkeypatch):
     for module, name, value in (
         (scans, "LOGS", {"Office": "room.npz"}),
         (tracking, "LOGS", {"Office": ("room.npz", 0.0), "none": ("no.npz", 0.0)}),
+        (tracking, "RELATIONS", {"Office": "room.relations"}),
         (real, "ARENAS", {"arena": "arena.npz"}),
         (real, "LOGS", {"Office": "room.npz", "none": "no.npz"}),
         (real, "STANDING", ("room.npz",)),
@@ -163,6 +165,9 @@ PINNED: dict[str, dict[str, float]] = {
         "lms181/pdbs/partition_success": 0.9,
     },
     "tracking": {
+        "Office/relations/the log’s corrected poses/way_mean": 0.015,
+        "Office/far_apart/the log’s corrected poses/motions": 1,
+        "Office/far_apart/features/way_mean": 0.002978,
         "Office/motion/features/way_median": 0.0016062,
         "Office/motion/ICP/way_rmse": 0.0016927,
         "Office/tracks/features/segments/kept": 1.0,
@@ -442,17 +447,20 @@ class TestTexts:
 
     @pytest.mark.parametrize(("largest", "verdict"), [(0.009, "holds"), (0.5, "does not hold")])
     def test_claim_of_figure_12(self, largest, verdict):
-        true, liu = (SimilarityScores(np.array([0.0, error]), 2) for error in (0.03, largest))
+        true, liu = (
+            SimilarityScores(np.array([0.0, 0.01, error, error]), 4) for error in (0.03, largest)
+        )
         text = similarity._text(true, liu)
+        assert "100 % are explained" in text[-1]
         assert f"{largest:.2f} m: the claim {verdict} here" in text[-1]
         assert "50 % of the points are more than 0.01 m" in text[1]
 
     def test_table_of_similarity(self):
         scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
         (row,) = similarity._table("x", {"iepf": scores}).rows
-        assert row[:3] == ("iepf", "up to 0.25 m", 0.03)
-        assert row[3:] == ("lost", pytest.approx(15), "lost", *row[6:])
-        assert row[6:] == pytest.approx((1e6 * scores.variance, 50, 80))
+        rms = math.sqrt((100 + 900 + 25 + 225) / 4)
+        assert row[:6] == ("iepf", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
+        assert row[6:] == ("up to 250 mm", 50)
 
     def test_claims_of_table_3(self):
         frames = list(scans.simulated_frames(PAPER, ["room"], range(2)))
@@ -515,7 +523,9 @@ class TestTracking:
         found = tracking.load_recording(path, 12, 0.5)
         every = tracking.load_recording(path, 99)
         assert found[0].stamp == every[len(every) // 2].stamp
-        motions, tracks = tracking.measure("small", found, 0, silent)
+        numbers = tracking.measure("small", found, 0, silent)
+        motions, tracks = numbers["motion"], numbers["tracks"]
+        assert numbers["relations"] == numbers["far_apart"] == {}
         assert list(motions) == [
             *("odometry, synthetic", "features", "ICP"),
             *("features, no odometry", "ICP, no odometry"),
@@ -579,11 +589,15 @@ class TestReal:
         assert found["segments_expected"] == 28
         assert found["corner_rmse"] < 0.02
         assert findings.numbers["arena"] == {}
-        assert len(findings.tables) == len(real.FREE_SPACE) + 5
-        covered = findings.tables[3]
-        assert covered.columns == ("recording", "optimal", "iepf", "scans")
-        assert [row[0] for row in covered.rows] == ["wedge.npz", "all"]
-        assert covered.rows[1][1::2] == (100.0, 2)
+        measures = len(real.FREE_SPACE), 2 * len(real.STANDING_STILL), len(real.REPEATS), 1
+        assert len(findings.tables) == sum(measures)
+        assert {table.columns for table in findings.tables[:-1]} == {
+            ("recording", "optimal", "iepf")
+        }
+        assert findings.tables[3].rows[1][:2] == ("all", 100.0)
+        again = findings.tables[6]
+        assert again.title == "Standing still, segments: found again [%]"
+        assert [row[:2] for row in again.rows[:1]] == [("wedge.npz", 100.0)]
         json.dumps(findings.to_dict(), allow_nan=False)
 
     @pytest.mark.slow
@@ -596,6 +610,6 @@ class TestReal:
         unread = set(findings.text[-1].rstrip(".").split(": ")[1].split(", "))
         assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
         assert set(scans.STANDING) < set(findings.numbers["standing"])
-        assert list(findings.numbers["repeats"]) == list(logs)
+        assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
         assert list(findings.numbers["arena"]) == list(real.ARENAS)
         json.dumps(findings.to_dict(), allow_nan=False)

@@ -60,6 +60,22 @@ def test_merging_joins_what_was_split_by_noise():
     assert len(Extractor("iepf", noise_factor=3.0, noise=NOISE)(scan).segments) == 1
 
 
+@pytest.mark.parametrize(("opening", "corners"), [(120, 1), (179, 0)])
+def test_published_merging_leaves_corners_where_pieces_touch(opening, corners):
+    """Two pieces of what is one wall but for the noise become one again."""
+    angles = fan(25)
+    ranges = vertex(angles, 2.0, opening, convex=False)
+    ranges += 0.01 * np.random.default_rng(3).normal(size=len(angles))
+    published = Extractor("split_and_merge:paper", threshold=0.01, noise=NOISE)
+    trace = published.trace(scan_of(ranges, angles))
+    assert len(trace.cuts) > corners
+    assert len(trace.features.corners) == len(trace.features.segments) - 1 == corners
+    for corner in trace.features.corners:
+        first, second = trace.features.segments[corner["segments"]]
+        assert math.dist(corner["position"], (2.0, 0.0)) < 0.03
+        assert first["last_beam"] == second["first_beam"]
+
+
 @pytest.mark.parametrize(
     ("off", "by", "factor", "is_cut"),
     [

@@ -14,7 +14,12 @@ from lineament.simulation import SCENES, SENSORS, scene
 FILTER = 5e-5
 #: The kernels take σ_K from running sums: where it is nearly 0, half its digits are left [m].
 ROOT = 1e-7
-DEGENERATE = degenerate_scans()
+OTHERS = degenerate_scans()
+OTHERS |= {
+    f"ring of {n}": LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
+    for n in range(3, 20)
+}
+OTHERS |= {f"random {seed}": random_scan(seed) for seed in range(12)}
 LOGS = (
     "carmen/intel-corrected.log.gz",
     "carmen/csail-corrected.log.gz",
@@ -128,23 +133,10 @@ def test_recorded_scans_are_reproduced(data_dir, log, changes):
     assert ties <= 2
 
 
-@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
-def test_degenerate_scans_are_reproduced(scan):
+@pytest.mark.parametrize("scan", OTHERS.values(), ids=OTHERS)
+def test_other_scans_are_reproduced(scan):
     for changes in VARIANTS.values():
         assert_reproduced(scan, **changes)
-
-
-@pytest.mark.parametrize("n", range(3, 20))
-def test_rings_of_few_beams_are_reproduced(n):
-    scan = LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
-    for changes in VARIANTS.values():
-        assert_reproduced(scan, **changes)
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_random_scans_are_reproduced(seed):
-    for changes in VARIANTS.values():
-        assert_reproduced(random_scan(seed), **changes)
 
 
 @pytest.mark.parametrize("recursion", ["both", "after"])

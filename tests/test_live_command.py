@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_driving import (
+    Running,
     eventually,
     heard,
     points_of,
-    running,
     scan_message,
     scan_of,
     scene,
@@ -65,7 +65,7 @@ def test_features_are_published_with_the_stamp_of_the_scan(peer, domain):
     message = scan_message(1_700_000_000, scene())
     features = ln.extract(scan_of(message))
     assert min(map(len, (features.segments, features.corners, features.arcs))) > 0
-    with running(domain=domain) as node:
+    with Running(domain=domain) as node:
 
         def publish() -> None:
             peer.write("/scan", message)
@@ -106,7 +106,7 @@ def test_one_echo_a_namespace_and_tracks(peer, domain):
 
     options = {"type": "MultiEchoLaserScan", "echo": "last", "method": "iepf", "noise": 0.004}
     parameters = {"noise_factor": 3.0, "min_points": 6}
-    with running(
+    with Running(
         domain=domain,
         topic="front/scan",
         namespace="robot1",
@@ -128,7 +128,7 @@ def test_a_log_is_played_until_its_end(peer, domain, log):
     for topic, kind in kinds.items():
         peer.listen(topic, kind, 1000)
     scans = list(ln.open_log(log))
-    with running(domain=domain, log=log, rate=20.0) as node:
+    with Running(domain=domain, log=log, rate=20.0) as node:
         counts = node.end().total
         assert counts.scans + counts.dropped == len(scans)
         eventually(lambda: peer._readers["/scan/features"].read(1))
@@ -155,7 +155,7 @@ def test_a_log_is_shown_in_foxglove(log):
     pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
     from foxglove_client import FoxgloveClient
 
-    with running(log=log, loop=True, ros=0, foxglove=0, deskew="poses") as node:
+    with Running(log=log, loop=True, ros=0, foxglove=0, deskew="poses") as node:
         address = eventually(lambda: node.lines[:1])[0]
         assert address.startswith("Foxglove: open a connection to ws://127.0.0.1:")
         with closing(FoxgloveClient(int(address.rpartition(":")[2]))) as viewer:

@@ -14,9 +14,11 @@ from live_driving import (
     DEADLINE,
     Remote,
     cdr_scan,
+    connected,
     eventually,
     garbage,
     odometry_message,
+    received,
     scan_message,
 )
 from ros_bags import store
@@ -29,7 +31,6 @@ from lineament.errors import LineamentError
 from lineament.live import LiveConfig
 from lineament.live.dds import DdsPublisher, DdsSource
 from lineament.live.participant import Participant, type_hash
-from lineament.live.received import Received
 from lineament.output.scene import Message
 
 SCAN = "sensor_msgs/msg/LaserScan"
@@ -51,20 +52,6 @@ def source_of(participant: Participant, depth: int = 64, **options: object) -> D
     return DdsSource(participant, LiveConfig(**options), depth)
 
 
-def receive(source: DdsSource, n: int = 1) -> list[Received]:
-    """The next messages, n at least."""
-    received: list[Received] = []
-    eventually(lambda: received.extend(source.receive(0.1)) or len(received) >= n, pause=0)
-    return received
-
-
-def connected(peer: Peer | Remote, source: DdsSource, kind: str = "LaserScan") -> None:
-    """Let a peer publish, and wait until both sides know it."""
-    before = source.publishers
-    peer.publish("/scan", kind)
-    eventually(lambda: peer.listeners("/scan") == 1 and source.publishers > before)
-
-
 def test_hashes_are_those_of_ros():
     from rosbags.typesys import Stores, get_typestore
 
@@ -77,16 +64,16 @@ def test_hashes_are_those_of_ros():
 def test_scan(participant, peer):
     source = source_of(participant)
     assert source.receive(0.0) == []
-    connected(peer, source)
+    connected(peer, source, "/scan", "LaserScan")
     ranges = [1.0, math.inf, 2.5, 3.0]
     peer.write("/scan", scan_message(7, ranges))
-    (received,) = receive(source)
-    scan = received.read()
+    (came,) = received(source)
+    scan = came.read()
     np.testing.assert_array_equal(scan.ranges, ranges)
     assert (scan.stamp, scan.frame_id) == (7.500000001, "laser")
-    assert received.time == (7, 500_000_001)
+    assert came.time == (7, 500_000_001)
     assert (scan.angle_min, scan.angle_increment, scan.scan_time) == (-0.75, 0.5, 0.125)
-    assert not received.is_odometry
+    assert not came.is_odometry
     assert (source.publishers, source.lost, source.ended, source.problems()) == (1, 0, False, [])
     source_of(participant, topic="other")
     assert peer.listeners("/scan") == 1
@@ -96,7 +83,7 @@ def test_scan(participant, peer):
 
 def test_odometry_comes_before_the_scan(participant, peer):
     source = source_of(participant, namespace="robot", deskew="odom", topic="/scan")
-    connected(peer, source)
+    connected(peer, source, "/scan", "LaserScan")
     peer.publish("/robot/odom", "Odometry")
     eventually(lambda: peer.listeners("/robot/odom") == 1)
     peer.write("/scan", scan_message())
@@ -108,7 +95,7 @@ def test_odometry_comes_before_the_scan(participant, peer):
     assert first.read() == (3.5, (0.5, -1.0, 0.25), pose, "odom", "base")
     peer.write("/robot/odom", odometry_message(math.nan))
     with pytest.raises(ValueError, match="expected finite numbers"):
-        receive(source)[0].read()
+        received(source)[0].read()
 
 
 def test_garbage_comes_and_is_refused_in_one_line(participant, peer):
@@ -121,54 +108,46 @@ def test_garbage_comes_and_is_refused_in_one_line(participant, peer):
     eventually(lambda: peer.listeners("/scan") == source.publishers == 1)
     for data in (*messages, good):
         peer.write("/scan", data)
-    *received, last = receive(source, len(messages) + 1)
-    for one in received:
+    *bad, last = received(source, len(messages) + 1)
+    for one in bad:
         with pytest.raises(ValueError, match=r"^[ -~]+$"):
             one.read()
     assert len(last.read()) == 3
-    assert (len(received), source.lost) == (len(messages), 0)
+    assert (len(bad), source.lost) == (len(messages), 0)
 
 
-def test_two_publishers_of_which_one_is_killed_and_comes_again(participant, peer, remote, domain):
+def test_a_publisher_that_is_killed_and_comes_again_beside_another(
+    participant, peer, remote, domain
+):
     source = source_of(participant)
-    connected(peer, source)
-    connected(remote, source)
-    peer.write("/scan", scan_message(1))
-    remote.write("/scan", scan_message(2))
-    names = {m.time[0]: m.publisher for m in receive(source, 2)}
-    assert set(names) == {1, 2}
-    assert names[1] != names[2]
-    remote.close()
-    eventually(lambda: source.publishers == 1)  # when its lease has ended
-    with closing(Remote("dds_peer", domain)) as again:
-        connected(again, source)
-        again.write("/scan", scan_message(3))
-        assert receive(source)[0].time[0] == 3
-
-
-def test_the_end_of_the_only_publisher_is_no_message(participant, remote):
-    source = source_of(participant)
-    connected(remote, source)
+    connected(remote, source, "/scan", "LaserScan")
     remote.write("/scan", scan_message(1))
-    receive(source)
+    assert [m.time[0] for m in received(source)] == [1]
     remote.close()
-    eventually(lambda: source.publishers == 0)
-    assert source.receive(0.0) == []
+    eventually(lambda: source.publishers == 0)  # when its lease has ended
+    assert source.receive(0.0) == []  # its end is no message
+    with closing(Remote("dds_peer", domain)) as again:
+        for stamp, publisher in enumerate((peer, again)):
+            connected(publisher, source, "/scan", "LaserScan")
+            publisher.write("/scan", scan_message(stamp))
+        names = {m.time[0]: m.publisher for m in received(source, 2)}
+    assert set(names) == {0, 1}
+    assert names[0] != names[1]
 
 
 @pytest.mark.parametrize("reliability", ["best-effort", "reliable"])
 def test_a_burst_is_accounted_for(participant, remote, reliability):
     source, n = source_of(participant, depth=8, reliability=reliability), 50
-    connected(remote, source)
+    connected(remote, source, "/scan", "LaserScan")
     remote.write_scans("/scan", n, 1e4, scan_message(0, [2.0] * 10))
     if reliability == "best-effort":  # drops the newest, and counts them
         eventually(lambda: source.lost == n - 8)
-        assert [m.time[0] for m in receive(source)] == list(range(8))
+        assert [m.time[0] for m in received(source)] == list(range(8))
         assert source.receive(0.0) == []
     else:  # forgets the oldest
-        stamps = [m.time[0] for m in receive(source)]
+        stamps = [m.time[0] for m in received(source)]
         while stamps[-1] != n - 1:
-            stamps += [m.time[0] for m in receive(source)]
+            stamps += [m.time[0] for m in received(source)]
         assert stamps == sorted(set(stamps))
 
 
@@ -178,7 +157,7 @@ def test_a_flood_of_a_million_beams_is_bounded(participant, peer):
     eventually(lambda: peer.listeners("/scan") == source.publishers == 1)
     for _ in range(5):
         peer.write("/scan", cdr_scan(1_000_000, increment=1e-6))
-    assert [len(one.read()) for one in receive(source)] == [1_000_000] * 2
+    assert [len(one.read()) for one in received(source)] == [1_000_000] * 2
 
 
 @pytest.mark.parametrize(

@@ -17,17 +17,18 @@ import pytest
 from live_driving import (
     DEADLINE,
     Remote,
+    connected,
     eventually,
     heard,
     odometry_message,
     points_of,
+    received,
     scan_message,
 )
 
 import lineament as ln
 from lineament import LineamentError
 from lineament.live import LiveConfig, Pipeline, RosSink
-from lineament.live.received import Received
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.feature_points import feature_points
 from lineament.output.ros_messages import RosMessages
@@ -105,23 +106,9 @@ def topic(request: pytest.FixtureRequest) -> str:
     return f"/{request.node.name}/scan"
 
 
-def connected(peer: Remote, source: Ros1Source, kind: str = SCAN, raw: bool = False) -> None:
-    (topic, *_), before = source._subscribed, source.publishers
-    peer.publish(topic, kind, raw)
-    eventually(lambda: source.publishers > before and peer.listeners(topic))
-
-
-def received(source: Ros1Source, n: int) -> list[Received]:
-    """Take the next `n` messages."""
-    found: list[Received] = []
-    eventually(lambda: found.extend(source.receive(0.1)) or len(found) >= n, pause=0)
-    assert len(found) == n
-    return found
-
-
 def test_scan_of_a_genuine_publisher(node, scanner, topic):
     source = Ros1Source(node, LiveConfig(topic=topic))
-    connected(scanner, source)
+    connected(scanner, source, topic, SCAN)
     scanner.write(topic, {**scan_message(12, [1.0, 2.5, 0.0]), "intensities": [7.0, 8.0, 9.0]})
     (came,) = received(source, 1)
     scan = came.read()
@@ -135,7 +122,7 @@ def test_scan_of_a_genuine_publisher(node, scanner, topic):
 def test_echo_that_is_asked_for(node, scanner, topic):
     kind = "MultiEchoLaserScan"
     source = Ros1Source(node, LiveConfig(topic=topic, type=kind, echo="strongest"))
-    connected(scanner, source, f"sensor_msgs/{kind}")
+    connected(scanner, source, topic, f"sensor_msgs/{kind}")
     ranges = [{"echoes": [1.0, 4.0]}, {"echoes": []}, {"echoes": [2.0]}]
     intensities = [{"echoes": [5.0, 6.0]}, {"echoes": []}, {"echoes": [5.0]}]
     scanner.write(topic, {**scan_message(), "ranges": ranges, "intensities": intensities})
@@ -145,7 +132,7 @@ def test_echo_that_is_asked_for(node, scanner, topic):
 
 def test_odometry_comes_with_the_scans(node, scanner, topic):
     source = Ros1Source(node, LiveConfig(topic=topic, deskew="/odom"))
-    connected(scanner, source)
+    connected(scanner, source, topic, SCAN)
     scanner.publish("/odom", "nav_msgs/Odometry")
     eventually(lambda: scanner.listeners("/odom"))
     scanner.write("/odom", odometry_message(0.5, 3))
@@ -158,8 +145,8 @@ def test_odometry_comes_with_the_scans(node, scanner, topic):
 
 def test_a_flood_of_one_publisher_leaves_the_scan_of_another(node, scanner, peer, topic):
     source = Ros1Source(node, LiveConfig(topic=topic, depth=3))
-    connected(scanner, source)
-    connected(peer, source)
+    connected(scanner, source, topic, SCAN)
+    connected(peer, source, topic, SCAN)
     peer.write(topic, scan_message(1))
     scanner.write(topic, *(scan_message(k) for k in range(50)))
     eventually(lambda: source.lost == 47 and len(source._inbox._waiting) == 2)
@@ -174,7 +161,7 @@ def raw_scan(number: int, ranges: tuple[float, ...] = (1.0, 2.0)) -> bytes:
 
 def test_gaps_in_the_numbers_are_lost_scans(node, scanner, topic):
     source = Ros1Source(node, LiveConfig(topic=topic))
-    connected(scanner, source, raw=True)
+    connected(scanner, source, topic, SCAN, True)
     # Three are missing; then another begins to count; then none is numbered.
     numbers = [7, 8, 12, 1, 2_000_000_000, 0, 0]
     scanner.write(topic, *map(raw_scan, numbers))
@@ -184,7 +171,7 @@ def test_gaps_in_the_numbers_are_lost_scans(node, scanner, topic):
 
 def test_garbage_comes_and_is_refused_in_one_line(node, scanner, topic):
     source = Ros1Source(node, LiveConfig(topic=topic))
-    connected(scanner, source, raw=True)
+    connected(scanner, source, topic, SCAN, True)
     good = raw_scan(1)
     many = good[:-16] + struct.pack("<I", 1_000_000)
     garbage = [b"", b"\xff", good[:-5], good + b"12345", raw_scan(1, ()), many]
@@ -201,7 +188,7 @@ def test_a_publisher_that_is_killed_is_waited_for(node, topic):
     source = Ros1Source(node, LiveConfig(topic=topic))
     for stamp in (1, 2):
         with closing(Remote("ros1_peer", "dying")) as dying:
-            connected(dying, source)
+            connected(dying, source, topic, SCAN)
             dying.write(topic, scan_message(stamp))
             (came,) = received(source, 1)
             assert came.time[0] == stamp

@@ -6,6 +6,7 @@ from itertools import product
 import naive_optimal as naive
 import numpy as np
 import pytest
+from naive_fit import intersection
 from scipy.optimize import least_squares
 from worlds import (
     NOISE,
@@ -240,7 +241,7 @@ def test_corners_are_where_their_lines_cross_and_know_it():
     for seed in range(60):
         features = Extractor("optimal", noise=NOISE)(random_scan(seed))
         for corner in features.corners[features.corners["kind"] != "edge"]:
-            place, covariance = naive.meeting(*features.segments[corner["segments"]])
+            place, covariance = intersection(*features.segments[corner["segments"]], 0.0, math.inf)
             np.testing.assert_allclose(corner["position"], place, atol=1e-9)
             np.testing.assert_allclose(corner["covariance"], covariance, rtol=1e-6, atol=1e-15)
             checked += 1

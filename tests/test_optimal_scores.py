@@ -4,6 +4,8 @@ They may neither fall nor rise by more than about their bootstrap error over the
 moves them looks at what moved, and makes the table anew: python tests/test_optimal_scores.py
 """
 
+import math
+
 import numpy as np
 import pytest
 
@@ -71,8 +73,8 @@ def figures(parts):
         segments.counts.f1,
         scores.partition.regions.f1,
         arcs.f1 if arcs.true else 1.0 - arcs.found / scores.scans,
-        corners.over_bound[""].over_bound_median,
-        segments.over_bound["offset_"].over_bound_median,
+        math.sqrt(corners.over_bound[""].median_ratio),
+        math.sqrt(segments.over_bound["offset_"].median_ratio),
         corners.consistency.median_ratio,
         segments.consistency.median_ratio,
     )

@@ -12,6 +12,8 @@ from naive_regions import assert_same_pieces, grow, sample, vote
 from worlds import NOISE, degenerate_scans, random_scan
 
 from lineament import Extractor, RangeNoise, open_log
+from lineament.kernels.corner_operator import RESPONSES
+from lineament.kernels.line_fit import FITS
 from lineament.methods.pdbs import RULES
 
 SENSOR, SMALL_NOISE = RangeNoise(0.01, 0.01, 0.002, 0.01), RangeNoise(0.01, 0.002, 0.001, 0.01)
@@ -43,10 +45,12 @@ SPLITTERS = {
     "iepf:paper": Extractor("iepf:paper"),
     "iepf, changed": Extractor("iepf", settling=False, **CHANGED),
     "split_and_merge": Extractor("split_and_merge"),
+    "split_and_merge:paper": Extractor("split_and_merge:paper"),
     "split_and_merge, changed": Extractor("split_and_merge", **CHANGED),
 }
 TRACKERS = {
     "line_tracking": Extractor("line_tracking"),
+    "line_tracking:paper": Extractor("line_tracking:paper"),
     "line_tracking, changed": Extractor(
         "line_tracking", **CHANGED | {"min_piece": 6}, noise_factor=2.0, max_misses=0
     ),
@@ -69,6 +73,9 @@ FINDERS = {
         grow,
         Extractor("region_growing", sigmas=0.0, epsilon=0.03, p_min=10, l_min=0.3),
     ),
+    "hough:paper": (vote, Extractor("hough:paper")),
+    "ransac:paper": (sample, Extractor("ransac:paper")),
+    "region_growing:paper": (grow, Extractor("region_growing:paper")),
     "region_growing, bearings": (grow, Extractor("region_growing", s_num=4, p_min=5, noise=SENSOR)),
 }
 DEGENERATE = degenerate_scans()
@@ -95,11 +102,36 @@ def test_degenerate_scans(name, scan):
     assert_same(name, untied(scan) if name in SPLITTERS else scan)
 
 
-@pytest.mark.parametrize("name", [*FAST, *list(FINDERS)[-3:]])
+@pytest.mark.parametrize("name", [*FAST, *(n for n in FINDERS if "region" in n or "paper" in n)])
 @settings(max_examples=15)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_random_scans(name, seed):
     assert_same(name, random_scan(seed))
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.fixed_dictionaries(
+        {
+            "sigma_d": st.floats(0.3, 20),
+            "sigma_r": st.floats(0.01, 2),
+            "half_width": st.integers(0, 20),
+            "spacing_scale": st.floats(1, 10),
+            "noise_floor": st.floats(0, 5),
+            "density_k": st.floats(0, 6),
+            "min_points": st.integers(2, 9),
+            "support_radius": st.integers(1, 9),
+            "threshold": st.floats(0.02, 0.5),
+            "response": st.sampled_from(sorted(RESPONSES)),
+            "recursion": st.sampled_from(["both", "after"]),
+            "ends": st.sampled_from(["truncated", "excluded"]),
+            "fit": st.sampled_from(sorted(FITS)),
+        }
+    ),
+)
+def test_liu_of_any_parameters(seed, parameters):
+    assert_same_run(random_scan(seed, 120), Extractor("liu", **parameters))
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from importlib.resources import files
 from queue import SimpleQueue
@@ -324,7 +324,7 @@ def any_scans():
 def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
     scans = list(any_scans())
     items = [(f"scan{k}", scan) for k, scan in enumerate(scans)]
-    with ScanStore(lambda: items, capacity=capacity) as kept:
+    with closing(ScanStore(lambda: items, capacity=capacity)) as kept:
         kept.fill(items)
         assert len(kept) == len(scans)
         for index in (0, 5, 2, 2, 3, 1, 0, 6, 4):
@@ -341,7 +341,7 @@ def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
 
 def test_a_full_disk_is_less_room_and_no_failure(monkeypatch):
     items = [("scan", scan) for scan in walls(4)]
-    with ScanStore(lambda: items) as kept:
+    with closing(ScanStore(lambda: items)) as kept:
         kept.fill(items[:2])
 
         full = Mock(wraps=kept._file)

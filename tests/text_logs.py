@@ -90,6 +90,12 @@ def zipped(**files):
     return data.getvalue()
 
 
+def check_refused(problem, *path_and_topic, **options):
+    """Check that opening a log is an error."""
+    with pytest.raises(LogError, match=problem):
+        open_log(*path_and_topic, **options)
+
+
 def check_fault(path, problem, good, skipped=1):
     """Return the scans around faults: the first is an error, all are skipped when asked for."""
     with pytest.raises(LogError, match=f"^{re.escape(str(path))}{problem}"):

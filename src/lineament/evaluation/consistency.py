@@ -21,18 +21,10 @@ _DEVIATIONS = 3.0
 class NormalisedErrors(Summable):
     """Errors e of k components, as L⁻¹ e with the covariance Σ = L Lᵀ.
 
-    If Σ is that of the errors, the squares e'Σ⁻¹e are chi-square distributed with k degrees of
-    freedom. With the covariance that a method gives they are its normalised estimation error
-    squared (NEES; Bar-Shalom, Li, Kirubarajan 2001, section 5.4): a method with `mean_ratio` above
-    `interval` is too sure of itself, with one below it not sure enough. With the Cramér-Rao bound,
-    `over_bound` is the error in multiples of the least possible.
-
-    Attributes
-    ----------
-    whitened : ndarray, shape (m, k)
-        L⁻¹ e of each error.
-    unusable : int
-        Errors left out, as their covariance is not finite or not positive definite.
+    If Σ is that of the errors, the squares e'Σ⁻¹e are chi-square distributed. With the covariance
+    that a method gives they are its normalised estimation error squared (NEES; Bar-Shalom, Li,
+    Kirubarajan 2001, section 5.4): above `interval`, `mean_ratio` says that it is too sure of
+    itself. With the Cramér-Rao bound they are multiples of the least possible.
 
     Examples
     --------
@@ -42,7 +34,9 @@ class NormalisedErrors(Summable):
     ([4.0, 9.0], 3.25)
     """
 
+    #: L⁻¹ e of each error, shape (m, k).
     whitened: Array
+    #: Errors left out, as their covariance is not finite or not positive definite.
     unusable: int = 0
 
     @classmethod
@@ -79,16 +73,6 @@ class NormalisedErrors(Summable):
         return ratio(int((self.squares <= limit).sum()), len(self.whitened))
 
     @property
-    def over_bound(self) -> float:
-        """Root of `mean_ratio`: RMSE ÷ bound."""
-        return math.sqrt(self.mean_ratio)
-
-    @property
-    def over_bound_median(self) -> float:
-        """Root of `median_ratio`."""
-        return math.sqrt(self.median_ratio)
-
-    @property
     def interval(self) -> tuple[float, float]:
         """Interval of `mean_ratio` with 95 % probability if the covariance is right."""
         size = self.whitened.size
@@ -96,11 +80,11 @@ class NormalisedErrors(Summable):
             return math.nan, math.nan
         return _chi_square(0.025, size) / size, _chi_square(0.975, size) / size
 
-    def bound_summary(self, prefix: str) -> dict[str, float]:
-        """List the figures of errors over the bound."""
+    def bound_summary(self, prefix: str = "") -> dict[str, float]:
+        """List the figures of errors over the bound: RMSE ÷ bound, and the same by the median."""
         return {
-            f"{prefix}over_bound": self.over_bound,
-            f"{prefix}over_bound_median": self.over_bound_median,
+            f"{prefix}over_bound": math.sqrt(self.mean_ratio),
+            f"{prefix}over_bound_median": math.sqrt(self.median_ratio),
         }
 
     def nees_summary(self) -> dict[str, float]:

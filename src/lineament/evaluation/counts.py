@@ -65,10 +65,9 @@ class Counts(Summable):
     def of(
         cls, matched: NDArray[np.intp], excused: NDArray[np.bool_], demanded: NDArray[np.bool_]
     ) -> Self:
-        """Count one scan.
+        """Count one scan: those `matched` with a demanded one are right, the `excused` no mistake.
 
-        `matched` are found ones that are paired with a demanded one, `excused` (F,) those that are
-        no mistake if they are not paired, `demanded` (T,) which true ones are large enough.
+        `excused` (F,) are found ones, `demanded` (T,) true ones that are large enough.
         """
         judged = ~excused
         judged[matched] = True

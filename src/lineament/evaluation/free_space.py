@@ -24,21 +24,14 @@ STRETCH = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSpaceScores(Summable):
-    """Phantom walls of some scans, and how many of their measurements are covered.
+    """Phantom walls of some scans, and how many of their measurements are covered."""
 
-    Attributes
-    ----------
-    drawn, phantom : float
-        Length of all segments, and of their phantom samples [m].
-    longest : ndarray, shape (scans,)
-        Longest phantom stretch of each scan [m].
-    covered, valid : int
-        Valid measurements near a segment or an arc, and all valid ones.
-    """
-
+    #: Length of all segments, and of their phantom samples [m].
     drawn: float = 0.0
     phantom: float = 0.0
+    #: Longest phantom stretch of each scan [m].
     longest: Array = field(default_factory=lambda: np.empty(0))
+    #: Valid measurements near a segment or an arc, and all valid ones.
     covered: int = 0
     valid: int = 0
 

@@ -44,29 +44,19 @@ _FIGURES: dict[str, tuple[str, Callable[[Array], float]]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeatureScores(Summable):
-    """Scores of the features of one kind in some scans.
+    """Scores of the features of one kind in some scans."""
 
-    Attributes
-    ----------
-    by_gate : dict of float to Counts
-        Found, true and paired features by distance [m]: 0.10, of corners 0.05 and 0.25 too.
-    pieces : dict of str to int
-        Of segments "fragmentation", true ones found in several pieces, and "merging", found ones
-        that are several true ones.
-    errors : dict of str to ndarray, shape (m,)
-        Of the pairs within 0.10 m: distance of the "position" of corners [m]; "offset" of the
-        found line at the true centroid to the left [m], "angle" [rad] and distances of both "end"
-        points [m] of segments; distance of the "center", and "radius" of arcs [m].
-    over_bound : dict of str to NormalisedErrors
-        Errors by the bound of the true feature, as "", of segments as "offset_" and "angle_".
-    consistency : NormalisedErrors
-        Errors by the found covariance; of segments offset at the found centroid, and angle.
-    """
-
+    #: Found, true and paired features by distance [m]: 0.10, of corners 0.05 and 0.25 too.
     by_gate: dict[float, Counts]
+    #: Of segments "fragmentation", true ones in several pieces, and "merging", several in one.
     pieces: dict[str, int]
+    #: Of the pairs within 0.10 m: distance of the "position" of corners [m]; "offset" of the found
+    #: line at the true centroid to the left [m], "angle" [rad] and distances of both "end" points
+    #: [m] of segments; distance of the "center", and "radius" of arcs [m].
     errors: dict[str, Array]
+    #: Errors by the bound of the true feature, as "", of segments as "offset_" and "angle_".
     over_bound: dict[str, NormalisedErrors]
+    #: Errors by the found covariance; of segments offset at the found centroid, and angle.
     consistency: NormalisedErrors
 
     @classmethod

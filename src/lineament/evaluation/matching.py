@@ -12,24 +12,8 @@ Indices = NDArray[np.intp]
 def match(cost: Array, allowed: NDArray[np.bool_]) -> tuple[Indices, Indices]:
     """Pair rows with columns one to one: as many pairs as possible, then at the least cost.
 
-    Parameters
-    ----------
-    cost : ndarray, shape (F, T)
-        Cost of each pair; finite where it is allowed.
-    allowed : ndarray of bool, shape (F, T)
-        Which pairs lie within the gate.
-
-    Returns
-    -------
-    rows, columns : ndarray of int, shape (P,)
-        The pairs, by increasing row.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ, or an allowed pair has no finite cost.
-    LineamentError
-        If scipy is not installed.
+    Both arguments have the shape (F, T); the pairs come by increasing row. Raises ValueError if
+    the shapes differ, or an allowed pair has no finite cost, LineamentError without scipy.
 
     Examples
     --------

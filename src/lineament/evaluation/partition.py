@@ -19,20 +19,12 @@ BREAK_BEAMS = 1
 
 @dataclass(frozen=True, slots=True)
 class PartitionScores(Summable):
-    """Scores of the clusters and breakpoints of some scans.
-
-    Attributes
-    ----------
-    regions, breakpoints : Counts
-        Found, true and right clusters; found, true and paired breakpoints.
-    pairs : int
-        Pairs of beams of a scan, of those beams that are in a found or a true cluster.
-    together_found, together_true, together : int
-        Pairs in one found cluster, in one true cluster, and in one of both.
-    """
+    """Scores of the clusters and breakpoints of some scans."""
 
     regions: Counts = field(default_factory=Counts)
     breakpoints: Counts = field(default_factory=Counts)
+    #: Pairs of beams of a scan, of those beams that are in a found or a true cluster; of these,
+    #: pairs in one found cluster, in one true cluster, and in one of both.
     pairs: int = 0
     together_found: int = 0
     together_true: int = 0

@@ -62,16 +62,7 @@ class Repeatability(Summable):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedRepeats(Summable):
-    """Corners of one view that are in sight of another, ranked by a score.
-
-    Attributes
-    ----------
-    scores : ndarray, shape (m,)
-        What they are ranked by: the highest first.
-    repeated : bool array, shape (m,)
-        Whether each is found again.
-    chance : ndarray, shape (m,)
-        Probability that something is found in its place by chance.
+    """Corners of one view that are in sight of another, ranked by a score, the highest first.
 
     Examples
     --------
@@ -82,6 +73,7 @@ class RankedRepeats(Summable):
     """
 
     scores: Array = field(default_factory=lambda: np.empty(0))
+    #: Whether each is found again, and the probability that something is in its place by chance.
     repeated: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     chance: Array = field(default_factory=lambda: np.empty(0))
 
@@ -143,19 +135,8 @@ def repeatability(
     sight; it is found again as one whose direction differs by at most 10° and which is within the
     gate of at least half of those in sight. Both are matched one to one, edges at jumps left out.
 
-    Parameters
-    ----------
-    scan, features
-        Where features are looked for, with its pose.
-    other_scan, other_features
-        Whose features are looked for, with its pose.
-    gate : float
-        Largest distance of what is found again [m]; the errors of the poses count.
-
-    Raises
-    ------
-    ValueError
-        If a scan has no pose, or the gate is not more than 0.
+    The gate [m] must allow for the errors of the poses. Raises ValueError if a scan has no pose,
+    or the gate is not more than 0.
 
     Examples
     --------

@@ -47,18 +47,8 @@ class Scores(Summable):
 def evaluate(found: Features, truth: Features) -> Scores:
     """Score the features found in one scan against the true ones.
 
-    Parameters
-    ----------
-    found : Features
-        Output of a method.
-    truth : Features
-        What a perfect method would find, in the same frame, with the Cramér-Rao bounds as
-        covariances.
-
-    Raises
-    ------
-    ValueError
-        If the two are of scans with different numbers of beams.
+    The truth is what a perfect method would find, in the same frame, with the Cramér-Rao bounds as
+    covariances. Raises ValueError if the two are of scans with different numbers of beams.
 
     Examples
     --------

@@ -1,6 +1,8 @@
-"""Similarity error: how far each point is from the line that was fitted to it (Figure 12)."""
+"""Similarity error (Figure 12): how far points are from the line that explains them, and how many.
 
-import math
+One number misleads: many short pieces have small errors, and what has no line has none.
+"""
+
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,22 +10,16 @@ import numpy as np
 from ..features import Features
 from ..scan import Array, LaserScan
 from .beams import beams_of, check_beams
-from .counts import Summable, finite_figures, quantile, ratio
+from .counts import Summable, finite_figures, quantile, ratio, rms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimilarityScores(Summable):
-    """Similarity errors of some scans.
+    """Similarity errors of some scans: how many measurements are explained, and how well."""
 
-    Attributes
-    ----------
-    errors : ndarray, shape (m,)
-        Distance of each point that belongs to a segment or an arc to it [m].
-    valid : int
-        Valid beams: a method that explains few of them has small errors.
-    """
-
+    #: Distance of each explained measurement from its segment or arc [m].
     errors: Array = field(default_factory=lambda: np.empty(0))
+    #: All valid measurements.
     valid: int = 0
 
     @property
@@ -32,32 +28,35 @@ class SimilarityScores(Summable):
         return ratio(float(self.errors.sum()), len(self.errors))
 
     @property
-    def variance(self) -> float:
-        """Variance of the errors [m²]."""
-        return float(self.errors.var()) if len(self.errors) else math.nan
-
-    @property
     def maximum(self) -> float:
         """Largest error [m]."""
         return quantile(self.errors, 1.0)
 
     @property
     def explained(self) -> float:
-        """Share of the valid beams that belong to a segment or an arc."""
+        """Share of the valid measurements that a segment or an arc explains."""
         return ratio(len(self.errors), self.valid)
 
     def summary(self) -> dict[str, float]:
         """List all figures by name; those that nothing defines are left out."""
-        names = ("mean", "variance", "maximum", "explained")
-        return finite_figures({f"similarity_{name}": getattr(self, name) for name in names})
+        figures = {
+            "explained": self.explained,
+            "mean": self.mean,
+            "rms": rms(self.errors),
+            "p95": quantile(self.errors, 0.95),
+            "maximum": self.maximum,
+        }
+        return finite_figures({f"similarity_{name}": value for name, value in figures.items()})
 
 
 def similarity_errors(scan: LaserScan, features: Features) -> Array:
-    """Distance of each beam's point from its fitted line or circle [m], shape (n,).
+    """Distance of each measurement from the line or circle that explains it [m], shape (n,).
 
-    That is the segment or arc whose beams, `first_beam` to `last_beam`, contain the beam, the
-    nearest of several; NaN if there is none or the beam is not valid. The features are in the
-    frame of the scan; ValueError if they are of another number of beams.
+    A segment or an arc says how many measurements it has, `n_points`: it explains so many of those
+    of its beams, the nearest. What a method itself leaves out between two ends, as noise, is not
+    held against it, nor to its credit. Of several that explain a measurement the nearest counts;
+    NaN where none does. The features are in the frame of the scan; ValueError if they are of
+    another number of beams.
 
     Examples
     --------
@@ -73,9 +72,11 @@ def similarity_errors(scan: LaserScan, features: Features) -> Array:
     to_lines = points @ normals - (lines["centroid"] * normals.T).sum(axis=1)
     from_center = points[:, np.newaxis] - arcs["center"]
     to_arcs = np.hypot(from_center[..., 0], from_center[..., 1]) - arcs["radius"]
-    distance = abs(np.hstack((to_lines, to_arcs))).T
     own = np.vstack((beams_of(lines, n), beams_of(arcs, n))) & scan.valid
-    nearest = np.min(distance, axis=0, initial=np.inf, where=own)
+    distance = np.where(own, abs(np.hstack((to_lines, to_arcs))).T, np.inf)
+    rank = np.argsort(np.argsort(distance, axis=1, kind="stable"), axis=1)
+    explained = rank < np.concatenate((lines["n_points"], arcs["n_points"]))[:, np.newaxis]
+    nearest = np.min(distance, axis=0, initial=np.inf, where=explained)
     return np.where(np.isfinite(nearest), nearest, np.nan)
 
 

@@ -25,40 +25,34 @@ OVERLAP, GATE, DEVIATIONS = 0.5, 0.10, 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScatterScores(Summable):
-    """How features of one kind scatter.
+    """How features of one kind scatter."""
 
-    Attributes
-    ----------
-    differences : NormalisedErrors
-        Difference between the two sightings of each pair, by the sum of their covariances.
-    arms : int32 array, shape (m,)
-        Measurements of the shorter arm of each pair.
-    seen : int32 array, shape (f,)
-        Measurements of the shorter arm of each feature that is looked for in the next scan.
-    again : bool array, shape (f,)
-        Whether it is found there.
-    """
-
+    #: Difference between the two sightings of each pair (m,), by the sum of their covariances.
     differences: NormalisedErrors = field(default_factory=lambda: NormalisedErrors.none(2))
+    #: Measurements of the shorter arm: of each pair (m,), of each feature that is looked for (f,).
     arms: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
     seen: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    #: Whether each is found in the next scan (f,).
     again: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+
+    def figures(self, low: float = 0, high: float = math.inf) -> dict[str, float]:
+        """List the figures of features whose shorter arm has `low` to below `high` measurements."""
+        of_bin = (self.arms >= low) & (self.arms < high)
+        looked_for = (self.seen >= low) & (self.seen < high)
+        differences = NormalisedErrors(self.differences.whitened[of_bin])
+        return {
+            "pairs": int(of_bin.sum()),
+            "nees_median": differences.median_ratio,
+            "in_95_ellipse": differences.share_within(0.95),
+            "found_again": ratio(int(self.again[looked_for].sum()), int(looked_for.sum())),
+        }
 
     def bins(self) -> dict[str, dict[str, float]]:
         """List the figures of each bin of arm lengths by the name of the bin, as "5-9"."""
-        figures = {}
-        for low, high in pairwise((*ARM_BINS, math.inf)):
-            name = f"{low}-{high - 1}" if math.isfinite(high) else f"{low}-"
-            of_bin = (self.arms >= low) & (self.arms < high)
-            looked_for = (self.seen >= low) & (self.seen < high)
-            differences = NormalisedErrors(self.differences.whitened[of_bin])
-            figures[name] = {
-                "pairs": int(of_bin.sum()),
-                "nees_median": differences.median_ratio,
-                "in_95_ellipse": differences.share_within(0.95),
-                "found_again": ratio(int(self.again[looked_for].sum()), int(looked_for.sum())),
-            }
-        return figures
+        return {
+            f"{low}-{high - 1}" if math.isfinite(high) else f"{low}-": self.figures(low, high)
+            for low, high in pairwise((*ARM_BINS, math.inf))
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,15 +72,8 @@ def standing_scores(scans: Iterable[Features]) -> StandingScores:
     deviations. The shorter arm of a corner is the shorter of its two segments in either scan.
     Edges at jumps are left out.
 
-    Parameters
-    ----------
-    scans : iterable of Features
-        Features of scans with the same number of beams, in the sensor's own frame.
-
-    Raises
-    ------
-    ValueError
-        If two scans in a row have different numbers of beams.
+    All are in the sensor's frame. Raises ValueError if two in a row have different numbers of
+    beams.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,19 +24,34 @@ _GATE, _OVERLAP = 0.10, 0.5
 class MotionErrors(Summable):
     """Relative pose errors: how far estimated motions are from the true ones."""
 
-    #: Length of the error of the way [m], shape (m,).
+    #: Errors of the way [m] and of the turn [rad], without their signs, (m,).
     ways: Array = field(default_factory=lambda: np.empty(0))
-    #: Error of the turn, without its sign [rad], shape (m,).
     turns: Array = field(default_factory=lambda: np.empty(0))
 
+    @classmethod
+    def of(cls, off: Sequence[Pose]) -> "MotionErrors":
+        """Return those of estimated motions in the frames of the true ones."""
+        x, y, turn = np.array(off).reshape(-1, 3).T
+        return cls(np.hypot(x, y), abs(turn))
+
     def summary(self) -> dict[str, float]:
-        """List the figures by name."""
-        figures = {}
+        """List the figures by name; `std` is the scatter about the mean."""
+        figures: dict[str, float] = {"motions": len(self.ways)}
         for name, errors in (("way", self.ways), ("turn", self.turns)):
-            figures[f"{name}_rmse"] = rms(errors)
-            figures[f"{name}_median"] = quantile(errors, 0.5)
-            figures[f"{name}_p95"] = quantile(errors, 0.95)
+            mean = ratio(float(errors.sum()), len(errors))
+            figures |= {
+                f"{name}_rmse": rms(errors),
+                f"{name}_mean": mean,
+                f"{name}_std": rms(errors - mean),
+                f"{name}_median": quantile(errors, 0.5),
+                f"{name}_p95": quantile(errors, 0.95),
+            }
         return figures
+
+
+def chained(motions: Sequence[Pose]) -> list[Pose]:
+    """Put motions between successive frames together: the pose of each, from (0, 0, 0) on."""
+    return list(accumulate(motions, compose, initial=(0.0, 0.0, 0.0)))
 
 
 def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1) -> MotionErrors:
@@ -46,27 +62,23 @@ def motion_errors(motions: Sequence[Pose], poses: Sequence[Pose], step: int = 1)
     """
     if len(poses) != len(motions) + 1:
         raise ValueError(f"there are {len(poses)} poses, expected one more than motions")
-    way: list[Pose] = [(0.0, 0.0, 0.0)]
-    for motion in motions:
-        way.append(compose(way[-1], motion))
-    errors = np.array(
+    way = chained(motions)
+    return MotionErrors.of(
         [
             relative(relative(poses[i], poses[i + step]), relative(way[i], way[i + step]))
             for i in range(len(poses) - step)
         ]
-    ).reshape(-1, 3)
-    return MotionErrors(np.hypot(errors[:, 0], errors[:, 1]), abs(errors[:, 2]))
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackScores(Summable):
     """How the tracks of one kind last."""
 
-    #: Features that are the same in two successive frames by the known poses.
+    #: Features that are the same in two successive frames by the known poses; of these, those whose
+    #: number changes to one that was given before, an *id switch*, or to a new one.
     pairs: int = 0
-    #: Of these, those whose number changes to one that was given before: an *id switch*.
     switched: int = 0
-    #: Of these, those that get a new number.
     lost: int = 0
     #: Frames in which each track is seen, shape (m,).
     lengths: Array = field(default_factory=lambda: np.empty(0))

@@ -5,8 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from ..features import Features
 from ..files import naming_errors, written_beside
@@ -62,15 +61,10 @@ class Writer(ABC):
         self._written, self._is_open = 0, True
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: Any) -> None:
         self._is_open = False
         if kind is not None:
-            self._stack.__exit__(kind, error, traceback)
+            self._stack.__exit__(kind, *error)
             return
         with self._stack, naming_errors(self.path):
             self._flush()

@@ -1,14 +1,13 @@
 """Methods side by side on a scan of a log: what they find, how well it fits, and their times."""
 
 import os
-import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from statistics import median
 
 import matplotlib.figure
+import numpy as np
 
 from ..evaluation.similarity import similarity_errors, similarity_scores
 from ..extractor import Extractor
@@ -19,53 +18,65 @@ from ..output import canvas
 from ..output.figures import scan_figure
 from ..output.page import write_parts
 from ..progress import Track, untracked
-from ..scan import LaserScan
-from .findings import Figure, Findings, Table
+from ..scan import Array, LaserScan
+from .findings import Columns, Figure, Findings, Table, cells
 from .report import findings_parts, machine
+from .scans import interleaved_times, time_ratio
 
 #: The endings that `write_comparison` knows.
 ENDINGS = (".html", *canvas.PICTURE_ENDINGS)
 #: Scans of a log that methods are timed on.
 _TIMED = 50
+#: How many measurements a method explains, and how far they are from its lines and arcs.
+SIMILARITY: Columns = {
+    "explained [%]": ("similarity_explained", 100),
+    "mean error [mm]": ("similarity_mean", 1e3),
+    "RMS [mm]": ("similarity_rms", 1e3),
+    "95 % [mm]": ("similarity_p95", 1e3),
+    "largest [mm]": ("similarity_maximum", 1e3),
+}
+SIMILARITY_NOTE = (
+    "Explained: share of the valid measurements that a segment or an arc has, as it says itself. "
+    "Error: their distance from it; what a method calls noise has none."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Methods side by side on one scan: features by method, and time of a call by method [s].
+    """Methods side by side on one scan: by method its features, and its times [s].
 
-    Times are medians over `timed` scans.
+    Times are those of calls in turns, shape (rounds, scans): see `interleaved_times`.
     """
 
     title: str
     scan: LaserScan
     features: dict[str, Features]
-    seconds: dict[str, float]
-    timed: int
+    seconds: dict[str, Array]
 
     def table(self, times: bool = True) -> Table:
         """List counts, similarity errors and, if asked for, times: a row for each method."""
-        records = []
+        records, first = [], next(iter(self.features))
         for name, features in self.features.items():
-            similarity = similarity_scores(self.scan, features)
             record: dict[str, object] = {
                 "method": name,
                 "segments": len(features.segments),
                 "corners": len(features.corners),
                 "arcs": len(features.arcs),
                 "clusters": int(features.clusters.max(initial=-1)) + 1,
-                "explained": similarity.explained,
-                "mean error [mm]": 1e3 * similarity.mean,
-                "largest [mm]": 1e3 * similarity.maximum,
+                **cells(similarity_scores(self.scan, features).summary(), SIMILARITY),
             }
             if times:
-                record["time [µs]"] = 1e6 * self.seconds[name]
+                ratios = time_ratio(self.seconds[name], self.seconds[first])
+                record["time [µs]"] = 1e6 * float(np.median(self.seconds[name]))
+                record[f"÷ {first}"] = "{:.2f} ({:.2f}–{:.2f})".format(*ratios)
             records.append(record)
-        note = (
-            "Error: distance of a point from its own line. Explained: share of the valid beams "
-            "that have one."
-        )
+        note = SIMILARITY_NOTE
         if times:
-            note += f" Time: median of {self.timed} calls, {machine()}."
+            rounds, scans = self.seconds[first].shape
+            note += (
+                f" Time: median of {scans} scans, {rounds} rounds of all methods in turns, with "
+                f"the range of the ratio over the rounds; {machine()}."
+            )
         return Table.of_records(self.title, records, note)
 
     def figure(self) -> matplotlib.figure.Figure:
@@ -86,13 +97,10 @@ def compare_scan(
     They are timed on the scans `timed`, or on the scan itself; ``track(methods, about, total)``
     iterates over the methods and shows the progress.
     """
-    scans = list(timed) or [scan]
-    features, seconds = {}, {}
-    for name in track(list(extractors), "comparing", len(extractors)):
-        extract = extractors[name]
-        features[name] = extract(scan)  # What happens at the first call is not timed.
-        seconds[name] = median(_seconds(extract, one) for one in scans)
-    return Comparison(title, scan, features, seconds, len(scans))
+    names = track(list(extractors), "comparing", len(extractors))
+    features = {name: extractors[name](scan) for name in names}
+    seconds = interleaved_times(extractors, list(timed) or [scan], kernels=False)
+    return Comparison(title, scan, features, seconds)
 
 
 def compare_log(
@@ -123,9 +131,3 @@ def write_comparison(comparison: Comparison, path: str | os.PathLike[str]) -> No
     caption = f"{title}: what each method finds, and the similarity error of each beam."
     found = Findings(title, (), (comparison.table(),), (Figure("compare", caption, png),))
     write_parts(path, title, findings_parts(found))
-
-
-def _seconds(extract: Callable[[LaserScan], Features], scan: LaserScan) -> float:
-    started = time.perf_counter()
-    extract(scan)
-    return time.perf_counter() - started

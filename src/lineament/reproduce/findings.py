@@ -76,10 +76,7 @@ class Table:
         >>> Table.of_numbers("Errors", found, {"RMSE [mm]": ("rmse", 1e3)}).rows
         (('liu', 4.0), ('pdbs', None))
         """
-        rows = (
-            (name, *(factor * of[key] if key in of else None for key, factor in columns.values()))
-            for name, of in numbers.items()
-        )
+        rows = ((name, *cells(of, columns).values()) for name, of in numbers.items())
         return cls(title, (first, *columns), tuple(rows), note)
 
     def __str__(self) -> str:
@@ -99,6 +96,14 @@ class Table:
             "rows": plain(self.rows),
             "note": self.note,
         }
+
+
+def cells(numbers: Mapping[str, Any], columns: Columns) -> dict[str, object]:
+    """Return the cells of a row by their columns, None where a number is missing."""
+    return {
+        label: factor * numbers[key] if key in numbers else None
+        for label, (key, factor) in columns.items()
+    }
 
 
 class Figure(NamedTuple):

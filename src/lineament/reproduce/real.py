@@ -1,7 +1,6 @@
 """All methods on all recordings, by measures that need no truth; the corners of an arena."""
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,67 +16,83 @@ from ..evaluation.repeatability import (
     ranked_repeats,
     repeatability,
 )
-from ..evaluation.standing import StandingScores, standing_scores
+from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
 from ..extractor import Extractor
 from ..logs import find_logs
+from ..output import canvas
 from ..scan import LaserScan
 from .arena import ARENAS, arena_figure, arena_scores, load_arena
 from .contenders import feature_methods
-from .findings import NO_RECORDINGS, Columns, Findings, Progress, Setting, Table, each
+from .findings import (
+    NO_RECORDINGS,
+    Columns,
+    Figure,
+    Findings,
+    Numbers,
+    Progress,
+    Setting,
+    Table,
+    cells,
+    each,
+)
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
 #: Method whose quality is compared with the repeats.
 SHOWN = "optimal"
-#: Logs with corrected poses, in which corners are looked for again.
+#: Logs with corrected poses, in which corners are looked for again: those that the quality was
+#: fitted to, and further ones.
 LOGS = {
     "Intel lab": "truth/intel_graph.npz",
     "fr079": "truth/fr079_graph.npz",
     "MIT CSAIL": "carmen/csail-corrected.log.gz",
     "ACES": "carmen/aces-corrected.log.gz",
 }
+FURTHER_LOGS = {
+    "Acapulco": "carmen/acapulco-corrected.log.gz",
+    "MIT Killian Court": "graph/killian.g2o.zip",
+    "arena, moving": "truth/jackal_mocap_02171554.npz",
+}
 #: For each frame of the setting: scans of each recording, pairs of successive scans of a sensor
 #: that stands, pairs of scans from different places, scans of each arena.
 SCANS_A_FRAME, STILL_A_FRAME, PAIRS_A_FRAME, ARENA_A_FRAME = 3, 10, 12, 10
+#: The curves of repeated corners begin behind so many, as a few scatter.
+FIRST = 9
 #: Share of the corners that must be repeated, and the bounds of the bins of quality.
 RATE, QUALITIES = 0.8, (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
-#: Titles of the tables of free space, and the numbers that they show.
+#: Titles of the tables, and the numbers that they show.
 FREE_SPACE: Columns = {
     "Phantom metres in 100 m of segments": ("phantom_in_100m", 1),
     "Longest phantom stretch [m]": ("longest_phantom", 1),
     "Scans with a phantom stretch of more than 0.3 m [%]": ("phantom_scans", 100),
     "Covered measurements [%]": ("covered", 100),
 }
-_STANDING: Columns = {
-    "NEES": ("nees_median", 1),
-    "in 95 % ellipse [%]": ("in_95_ellipse", 100),
+STANDING_STILL: Columns = {
+    "NEES, median": ("nees_median", 1),
+    "in the 95 % ellipse [%]": ("in_95_ellipse", 100),
     "found again [%]": ("found_again", 100),
     "pairs": ("pairs", 1),
 }
-_AT = f"repeated at {100 * RATE:.0f} %"
-_REPEATS: Columns = {
-    "corners expected": ("expected", 1),
-    "repeated [%]": ("rate", 100),
-    "by chance [%]": ("chance", 100),
-    "AUC of quality": ("auc", 1),
-    _AT: ("count", 1),
-    "without edges: AUC": ("auc_without_edges", 1),
-    f"without edges: {_AT}": ("count_without_edges", 1),
+_AT = f"repeated among the best, of which {100 * RATE:.0f} % are"
+REPEATS: Columns = {
+    "Corners: expected in the other scan": ("expected", 1),
+    "Corners: repeated, less chance [%]": ("rate", 100),
+    "Corners: repeated by chance [%]": ("chance", 100),
+    "Corners: AUC of the quality": ("auc", 1),
+    f"Corners: {_AT}": ("count", 1),
+    "Corners but edges: AUC of the quality": ("auc_without_edges", 1),
+    f"Corners but edges: {_AT}": ("count_without_edges", 1),
+    "Corners but edges: in a scan": ("corners_per_scan", 1),
+    "Corners but edges: repeated [%]": ("corner_rate", 100),
+    "Corners but edges: distance, RMS [mm]": ("corner_rmse", 1e3),
+    "Segments: repeated [%]": ("segment_rate", 100),
+    "Segments: distance, RMS [mm]": ("segment_rmse", 1e3),
 }
-_REPEATABILITY: Columns = {
-    "corners a scan": ("corners_per_scan", 1),
-    "corners expected": ("corners_expected", 1),
-    "corners repeated [%]": ("corner_rate", 100),
-    "distance of corners, RMS [mm]": ("corner_rmse", 1e3),
-    "segments expected": ("segments_expected", 1),
-    "segments repeated [%]": ("segment_rate", 100),
-    "distance of segments, RMS [mm]": ("segment_rmse", 1e3),
-}
-_ARENA: Columns = {
-    "recall": ("recall", 1),
-    "median error [mm]": ("median_error", 1e3),
-    "at no real corner, of those found": ("false", 1),
-    "corners a scan": ("corners_per_scan", 1),
+ARENA: Columns = {
+    "Corners of the arena: recall [%]": ("recall", 100),
+    "Corners of the arena: error, median [mm]": ("median_error", 1e3),
+    "Corners of the arena: at no real corner, of those found [%]": ("false", 100),
+    "Corners of the arena: in a scan": ("corners_per_scan", 1),
 }
 
 S = TypeVar("S", bound=Summable)
@@ -123,55 +138,39 @@ def run(setting: Setting, progress: Progress) -> Findings:
         lambda pair, extract: standing_scores(map(extract, pair)),
     )
     repeats: dict[str, dict[str, dict[str, float]]] = {}
-    ranked: dict[str, RankedRepeats] = {}
-    for log, path in setting.recordings(LOGS).items():
+    ranked: dict[str, dict[str, RankedRepeats]] = {}
+    for log, path in setting.recordings(LOGS | FURTHER_LOGS).items():
         pairs = scan_pairs(path, PAIRS_A_FRAME * frames)
         for method, extract in each(methods, progress, f"repeated corners, {log}") if pairs else ():
-            every, numbers = _repeats(pairs, extract)
-            repeats.setdefault(log, {})[method] = numbers
-            if method == SHOWN:
-                ranked[log] = every
-    arenas, arena_tables, figures = {}, [], []
+            found = _repeats(pairs, extract)
+            ranked.setdefault(log, {})[method], repeats.setdefault(log, {})[method] = found
+    arenas, figures = {}, []
     for name, path in setting.recordings(ARENAS).items():
         arena = load_arena(path, ARENA_A_FRAME * frames)
         scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
         arenas[name] = {method: of for method, (of, _) in scores.items()}
-        about = f"Corners of the {name}: {len(arena.scans)} scans"
-        arena_tables.append(Table.of_numbers(about, arenas[name], _ARENA))
         figures.append(arena_figure(name, arena, scores))
+    numbers = {
+        "free_space": _numbers(free, FreeSpaceScores.summary),
+        "standing": _numbers(
+            standing, lambda of: {"segments": of.segments.bins(), "corners": of.corners.bins()}
+        ),
+        "repeats": repeats,
+        "arena": arenas,
+    }
+    every_free = {**free, "all": _totals(free, FreeSpaceScores)}
     return Findings(
         title,
         (*_TEXT, *([f"Left out, as they hold no scans: {', '.join(unread)}."] if unread else [])),
         (
-            *_free_space_tables(free),
-            *_standing_tables(standing),
-            *(
-                Table.of_numbers(f"{log}: {about}", found, columns)
-                for log, found in repeats.items()
-                for about, columns in (
-                    ("repeated corners, ranked by quality", _REPEATS),
-                    ("features but edges found again", _REPEATABILITY),
-                )
-            ),
+            *_tables(_numbers(every_free, FreeSpaceScores.summary), FREE_SPACE),
+            *(table for kind in ("segments", "corners") for table in _standing(standing, kind)),
+            *_tables(repeats, REPEATS),
             *_quality_table(ranked),
-            *arena_tables,
+            *_tables(arenas, ARENA),
         ),
-        tuple(figures),
-        {
-            "free_space": {
-                log: {method: of.summary() for method, of in found.items()}
-                for log, found in free.items()
-            },
-            "standing": {
-                log: {
-                    method: {"segments": of.segments.bins(), "corners": of.corners.bins()}
-                    for method, of in found.items()
-                }
-                for log, found in standing.items()
-            },
-            "repeats": repeats,
-            "arena": arenas,
-        },
+        (*_curves(ranked), *figures),
+        numbers,
     )
 
 
@@ -186,7 +185,8 @@ _TEXT = (
     "quality, chance subtracted. The count is how many are repeated among the best of which "
     f"{100 * RATE:.0f} % are. AUC: probability that a repeated corner has the higher quality. The "
     "errors of the corrected poses, some 2 to 5 cm, are part of the distances. A method that finds "
-    "a corner at every other point repeats many by chance: see the corners per scan.",
+    "a corner at every other point repeats many, as there is always one near, and turns about the "
+    "sensor do not show that: see the corners per scan.",
     "Arena: corners of which a scan shows both walls, found within 0.1 m. Walls and poses are "
     "known to about 1 cm, and the walls bow by 13 to 23 mm rms: smaller errors mean nothing, and "
     "where a wall bends there may be a corner that is not listed.",
@@ -209,37 +209,34 @@ def _totals(scored: Scored[S], kind: type[S]) -> dict[str, S]:
     return {m: kind.total(found[m] for found in scored.values()) for m in methods}
 
 
-def _free_space_tables(scored: Scored[FreeSpaceScores]) -> list[Table]:
-    """Make one table for each number: a row for each recording, and one for all of them."""
-    rows = {**scored, "all": _totals(scored, FreeSpaceScores)}
-    methods, tables = list(rows["all"]), []
-    for title, (key, factor) in FREE_SPACE.items():
-        records = [
-            {"recording": log}
-            | {m: factor * found[m].summary().get(key, math.nan) for m in methods}
-            | {"scans": len(found[methods[0]].longest)}
-            for log, found in rows.items()
-            if methods
-        ]
-        tables += [Table.of_records(title, records)] if records else []
-    return tables
+def _numbers(scored: Scored[S], figures: Callable[[S], Any]) -> dict[str, dict[str, Any]]:
+    return {log: {m: figures(of) for m, of in found.items()} for log, found in scored.items()}
 
 
-def _standing_tables(scored: Scored[StandingScores]) -> list[Table]:
-    """Make tables of all methods on all recordings together, by kind of feature."""
-    totals, tables = _totals(scored, StandingScores), []
-    for kind in ("segments", "corners") if totals else ():
-        records = [
-            {"method": name}
-            | {
-                f"{bin_}: {label}": factor * of[key]
-                for bin_, of in getattr(scores, kind).bins().items()
-                for label, (key, factor) in _STANDING.items()
-            }
-            for name, scores in totals.items()
-        ]
-        tables.append(Table.of_records(f"Standing still: {kind}, by measurements", records))
-    return tables
+def _tables(numbers: Numbers, columns: Columns, about: str = "") -> list[Table]:
+    """Make one table for each measure: recordings are its rows, methods its columns."""
+    return [
+        Table.of_records(
+            f"{about}{title}",
+            [
+                {"recording": log} | {m: cells(of, {m: column})[m] for m, of in found.items()}
+                for log, found in numbers.items()
+            ],
+        )
+        for title, column in columns.items()
+        if any(numbers.values())
+    ]
+
+
+def _standing(scored: Scored[StandingScores], kind: str) -> list[Table]:
+    """Make the tables of one kind of feature; the last rows are of all recordings, by arms."""
+    totals = _totals(scored, StandingScores)
+    rows = _numbers(scored, lambda of: getattr(of, kind).figures())
+    for name in ScatterScores().bins() if totals else ():
+        rows[f"all, {name} measurements"] = {
+            method: getattr(of, kind).bins()[name] for method, of in totals.items()
+        }
+    return _tables(rows, STANDING_STILL, f"Standing still, {kind}: ")
 
 
 def _repeats(
@@ -275,12 +272,37 @@ def _repeats(
     }
 
 
-def _quality_table(ranked: Mapping[str, RankedRepeats]) -> list[Table]:
+def _quality_table(ranked: Scored[RankedRepeats]) -> list[Table]:
     """Compare the share that is found again with what the quality promises."""
     records = [
-        {"log": log}
-        | {f"{a:.1f}–{b:.1f}": 100 * every.rate_between(a, b) for a, b in pairwise(QUALITIES)}
-        for log, every in ranked.items()
+        {"recording": log}
+        | {f"{a:.1f}–{b:.1f}": 100 * of[SHOWN].rate_between(a, b) for a, b in pairwise(QUALITIES)}
+        for log, of in ranked.items()
     ]
     title = f"Corners of {SHOWN} found again [%], by their quality"
     return [Table.of_records(title, records)] if records else []
+
+
+def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
+    """Draw how many corners are repeated against the share of them, as less certain ones come."""
+    if not ranked:
+        return []
+    figure = canvas.new_figure(11, 3.6 * -(-len(ranked) // 2))
+    panels = figure.subplots(-(-len(ranked) // 2), 2, squeeze=False).ravel()
+    for axes, (log, found) in zip(panels, ranked.items(), strict=False):
+        canvas.style(axes, log, "", "corners repeated", "share repeated [%]")
+        for k, (method, of) in enumerate(found.items()):
+            count, rate = (part[FIRST:] for part in of.curve())
+            line = {"linestyle": "-" if k < len(canvas.PALETTE) else "--", "label": method}
+            color = canvas.PALETTE[k % len(canvas.PALETTE)]
+            axes.plot(count, 100 * rate, color=color, linewidth=1.6, **line)
+        axes.set_ylim(0, 100)
+    for axes in panels[len(ranked) :]:
+        axes.remove()
+    canvas.add_legend(figure)
+    caption = (
+        "Corners found again from another place, less chance, ranked by their quality: how many "
+        f"of the best, and which share of them, from the {FIRST + 1}th on. Further to the upper "
+        "right is better."
+    )
+    return [Figure("repeated-corners", caption, canvas.figure_bytes(figure))]

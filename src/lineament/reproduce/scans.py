@@ -2,7 +2,8 @@
 
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -42,8 +43,8 @@ _STILL = 1e-3, 1e-3
 
 #: Scenes of one seed; parameters are chosen on the first half, and results are of the second.
 _SCENES = 20_000
-#: A scan is timed as a batch of copies, to time the kernels and not the call from Python; the
-#: result is the median over several batches.
+#: A scan is timed as a batch of copies, to time the kernels and not the call from Python, in
+#: several rounds.
 _COPIES, _BATCHES = 8, 5
 
 
@@ -75,19 +76,43 @@ def batch_of(extractor: Extractor, scans: Iterable[LaserScan]) -> list[Features]
     return list(_batch(extractor, np.stack([scan.ranges for scan in rows]), rows[0]))
 
 
+def interleaved_times(
+    extractors: Mapping[str, Callable[[LaserScan], Features]],
+    scans: Sequence[LaserScan],
+    *,
+    kernels: bool = True,
+) -> dict[str, Array]:
+    """Time methods in turns: what the machine does meanwhile, it does to all of them.
+
+    Returns the time that each method takes in each round for each scan [s], (rounds, scans), by
+    its name: in the kernels alone, which only an `Extractor` has, or of a call from Python.
+    """
+    calls = [
+        partial(_batch, extract, np.tile(scan.ranges, (_COPIES, 1)), scan)
+        if kernels and isinstance(extract, Extractor)
+        else partial(extract, scan)
+        for scan in scans
+        for extract in extractors.values()
+    ]
+    taken = np.empty((_BATCHES + 1, len(calls)))
+    for place in np.ndindex(taken.shape):
+        started = time.perf_counter()
+        calls[place[1]]()
+        taken[place] = time.perf_counter() - started
+    # The first round compiles, and touches the buffers.
+    rounds = taken[1:].reshape(_BATCHES, len(scans), -1) / (_COPIES if kernels else 1)
+    return {name: rounds[:, :, k] for k, name in enumerate(extractors)}
+
+
+def time_ratio(seconds: Array, others: Array) -> tuple[float, float, float]:
+    """Ratio of two methods' `interleaved_times`: median, least and largest of the rounds."""
+    of_rounds = np.median(seconds / others, axis=1)
+    return float(np.median(of_rounds)), float(of_rounds.min()), float(of_rounds.max())
+
+
 def frame_times(extractor: Extractor, scans: Iterable[LaserScan]) -> Array:
-    """Measure the time that each scan takes in the kernels [s], shape (m,)."""
-    medians = []
-    for scan in scans:
-        copies = np.tile(scan.ranges, (_COPIES, 1))
-        _batch(extractor, copies, scan)  # Compiles, and touches the buffers.
-        times = []
-        for _ in range(_BATCHES):
-            started = time.perf_counter()
-            _batch(extractor, copies, scan)
-            times.append(time.perf_counter() - started)
-        medians.append(float(np.median(times)) / _COPIES)
-    return np.array(medians)
+    """Measure the time that each scan takes in the kernels [s], the median of rounds, (m,)."""
+    return np.median(interleaved_times({"": extractor}, list(scans))[""], axis=0)
 
 
 def _batch(extractor: Extractor, ranges: Array, like: LaserScan) -> FeatureBatch:

@@ -1,7 +1,7 @@
 """Features that are followed through real logs, and the motion that they give, beside ICP."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,25 @@ import numpy as np
 
 from ..evaluation.counts import ratio
 from ..evaluation.icp import icp
-from ..evaluation.tracking import motion_errors, track_scores
+from ..evaluation.relations import read_relations
+from ..evaluation.tracking import chained, motion_errors, track_scores
 from ..extractor import Extractor
 from ..methods import DEFAULT_METHOD
 from ..motion import Tracker, Tracks
 from ..scan import LaserScan, Pose
 from ..scan.poses import compose, relative
-from .findings import NO_RECORDINGS, Columns, Figure, Findings, Progress, Setting, Table, dot_chart
+from .findings import (
+    NO_RECORDINGS,
+    Columns,
+    Figure,
+    Findings,
+    Numbers,
+    Progress,
+    Setting,
+    Table,
+    cells,
+    dot_chart,
+)
 from .scans import archived_scans
 
 #: The recordings, and the share that is left out at the beginning: the first half of fr079 is
@@ -27,14 +39,29 @@ LOGS = {
     "arena, moving": ("truth/jackal_mocap_02171554.npz", 0.0),
     "arena, static": ("truth/jackal_static_data.npz", 0.0),
 }
+#: Their verified relations, in the folder of the recordings or beside it.
+RELATIONS = {
+    "Intel lab": "graph/intel-lab.relations",
+    "fr079, second half": "../relations/fr079.relations",
+}
 #: Successive scans of each log for each frame of the setting.
-SCANS_A_FRAME = 30
+SCANS_A_FRAME = 300
 #: Errors of the synthetic odometry: deviations [m, rad], and their growth with way and turn.
 _WAY, _TURN = (0.02, 0.1), (0.01, 0.1)
 #: Relative pose errors are given over one frame, and over so many.
 _FAR = 10
 ODOMETRY, FEATURES, ICP = "odometry, synthetic", "features", "ICP"
+CORRECTED = "the log’s corrected poses"
 
+_RELATIONS = {
+    "relations": ("motions", 1),
+    "way, mean [mm]": ("way_mean", 1e3),
+    "std": ("way_std", 1e3),
+    "median": ("way_median", 1e3),
+    "turn, mean [°]": ("turn_mean", math.degrees(1)),
+    "std ": ("turn_std", math.degrees(1)),
+    "median ": ("turn_median", math.degrees(1)),
+}
 _MOTION = {
     "way, RMSE [mm]": ("way_rmse", 1e3),
     "median": ("way_median", 1e3),
@@ -63,51 +90,61 @@ def run(setting: Setting, progress: Progress) -> Findings:
     """Follow the features of all logs."""
     title = "Tracking and motion in real logs"
     paths = setting.recordings({name: file for name, (file, _) in LOGS.items()})
+    verified = setting.recordings(RELATIONS)
     if not paths:
         return Findings(title, (NO_RECORDINGS,))
-    motions, tracks = {}, {}
+    found = {}
     for log, path in paths.items():
         progress(f"{log}: reading")
         scans = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
-        motions[log], tracks[log] = measure(log, scans, setting.seed, progress)
+        found[log] = measure(log, scans, setting.seed, progress, verified.get(log))
+    motions = {log: of["motion"] for log, of in found.items()}
+    kinds = {
+        log: {f"{name}: {kind}": of_kind for name, of in every["tracks"].items()
+              for kind, of_kind in of.items()}
+        for log, every in found.items()
+    }  # fmt: skip
+    near, far = ({log: of[key] for log, of in found.items()} for key in ("relations", "far_apart"))
     return Findings(
         title,
         _TEXT,
         (
-            Table.of_records(
-                "Relative pose errors",
-                [
-                    {"log": log, "motion from": name, **_cells(of, _MOTION)}
-                    for log, found in motions.items()
-                    for name, of in found.items()
-                ],
-            ),
-            Table.of_records(
-                "Tracks",
-                [
-                    {"log": log, "tracker": name, "of": kind, **_cells(of, _TRACKS)}
-                    for log, found in tracks.items()
-                    for name, kinds in found.items()
-                    for kind, of in kinds.items()
-                ],
-            ),
+            *_table("Motion against verified relations", near, _RELATIONS, "motion from"),
+            *_table("Of these, those over a minute apart", far, _RELATIONS, "motion from"),
+            *_table("Motion against the log’s corrected poses", motions, _MOTION, "motion from"),
+            *_table("Tracks", kinds, _TRACKS, "tracker: of"),
         ),
         (
             Figure(
                 "tracking",
-                "Relative pose errors from scan to scan, by log (colours).",
+                "Motion against the corrected poses, from scan to scan, by log (colours).",
                 dot_chart(motions, _PANELS, _PANELS),
             ),
         ),
-        {log: {"motion": motions[log], "tracks": tracks[log]} for log in motions},
+        found,
     )
 
 
+def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table]:
+    """Make a table with a row for each log and source; none without a row."""
+    records = [
+        {"log": log, what: name, **cells(numbers, columns)}
+        for log, found in logs.items()
+        for name, numbers in found.items()
+    ]
+    return [Table.of_records(title, records)] if records else []
+
+
 _TEXT = (
-    "Relative pose errors: the motion between successive scans against that of the corrected "
-    f"poses, and composed over {_FAR} scans. The corrected poses of the two offices are right to a "
-    "few centimetres only, which limits the errors there; those of the arena come from motion "
-    "capture, refined on its walls. ICP is point-to-line from scan to scan, with all points.",
+    "Verified relations come first: relative poses of pairs of scans that people aligned by hand "
+    "(Kümmerle et al. 2009), where both scans are in the log to the millisecond. Motions are put "
+    "together from the one scan to the other. The relations are between neighbours for the most; "
+    "those over a minute apart, where motions drift and nothing here closes a loop, are repeated "
+    "by themselves.",
+    "The log’s corrected poses are a reference second to them: they are off the relations by "
+    "themselves, in the two offices by a few centimetres. Those of the arena come from motion "
+    "capture, refined on its walls. Errors are from scan to scan, and over "
+    f"{_FAR} scans. ICP is point-to-line from scan to scan, with all points.",
     "The odometry in the two office logs repeats the corrected poses. A synthetic one is made of "
     f"the known poses, with normal errors of {1e3 * _WAY[0]:.0f} mm + {100 * _WAY[1]:.0f} % of the "
     f"way (in x and y) and {_TURN[0]} rad + {100 * _TURN[1]:.0f} % of the turn in each step. "
@@ -116,10 +153,6 @@ _TEXT = (
     "A feature keeps its number if two successive scans have the same number for what is the same "
     "by the known poses; a switch is another number that was given before, lost is a new one.",
 )
-
-
-def _cells(numbers: Mapping[str, float], columns: Columns) -> dict[str, object]:
-    return {label: factor * numbers[key] for label, (key, factor) in columns.items()}
 
 
 def load_recording(path: Path, count: int, skipped: float = 0.0) -> list[LaserScan]:
@@ -143,12 +176,16 @@ def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
 
 
 def measure(
-    name: str, scans: Sequence[LaserScan], seed: int, progress: Progress
-) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, dict[str, float]]]]:
+    name: str,
+    scans: Sequence[LaserScan],
+    seed: int,
+    progress: Progress,
+    verified: Path | None = None,
+) -> dict[str, dict[str, Any]]:
     """Follow the features of a log, with an odometry and without, and run ICP on it.
 
-    Returns the numbers of relative pose errors by what the motion is from, and those of tracks by
-    tracker and kind of feature.
+    Returns errors of motions by what they are from, against the poses as "motion", against the
+    relations of a file as "relations" and "far_apart", and "tracks" by tracker and kind of feature.
     """
     poses = [scan.pose for scan in scans if scan.pose is not None]
     extract = Extractor(DEFAULT_METHOD)
@@ -166,13 +203,19 @@ def measure(
         tracks[features] = _track_numbers(frames, found, poses)
         progress(f"{name}: ICP{about}")
         motions[ICP + about] = _icp_motions(scans, None if about else steps)
-    numbers = {
+    numbers: dict[str, dict[str, Any]] = {"relations": {}, "far_apart": {}, "tracks": tracks}
+    if verified is not None:
+        every = read_relations(verified, np.array([scan.stamp for scan in scans]))
+        ways = {CORRECTED: poses} | {source: chained(of) for source, of in motions.items()}
+        for key, relations in (("relations", every), ("far_apart", every.far_apart())):
+            numbers[key] = {by: relations.errors(way).summary() for by, way in ways.items()}
+    numbers["motion"] = {
         source: motion_errors(motion, poses).summary()
         | {"far_" + k: v for k, v in motion_errors(motion, poses, _FAR).summary().items()}
         | {"unobserved": unobserved.get(source, math.nan)}
         for source, motion in motions.items()
     }
-    return numbers, tracks
+    return numbers
 
 
 def _track_numbers(frames: Any, tracks: Sequence[Tracks], poses: Any) -> dict[str, Any]:

@@ -40,12 +40,6 @@ class ScanStore:
         self._ahead: Iterator[Item] = iter(())
         self._at = 0  # index of the next item of `_ahead`
 
-    def __enter__(self) -> ScanStore:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def __len__(self) -> int:
         """Return the number of scans that were read so far."""
         return len(self._starts)

@@ -6,8 +6,17 @@ polygons, each mapped by polylines with at most 10, 20, … 50 vertices in all.
 """
 
 from .benchmark import Benchmark, BenchmarkResult, load_benchmark, run_benchmark
-from .maps import MapMaker, benchmark_iepf, iepf_map, method_map, polylines_of, sparing_map
-from .scores import MapScore, cast_map, score_map
+from .maps import (
+    MapMaker,
+    MapScore,
+    benchmark_iepf,
+    cast_map,
+    iepf_map,
+    method_map,
+    polylines_of,
+    score_map,
+    sparing_map,
+)
 
 __all__ = [
     "Benchmark",

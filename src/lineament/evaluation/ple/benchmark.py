@@ -15,8 +15,7 @@ from ...logs.lines import reading
 from ...progress import Track, untracked
 from ...scan import Array, LaserScan
 from ..counts import plain
-from .maps import MapMaker, method_map
-from .scores import score_map
+from .maps import MapMaker, method_map, score_map
 
 #: Scores that the authors give; the last of the simulated set alone.
 _GIVEN = ("rmse", "f", "fnr", "area_error")
@@ -103,21 +102,10 @@ def run_benchmark(
 ) -> BenchmarkResult:
     """Map all scans with all budgets, and score the maps.
 
-    Parameters
-    ----------
-    benchmark : Benchmark
-    method : str or MapMaker
-        Name of a method (see `method_map`), or a function of a scan and a number of vertices that
-        makes polylines, such as `iepf_map`.
-    name : str, optional
-        Name of the result; by default that of the method or function.
-    track : callable
-        ``track(scans, name, total)`` yields the scans, and shows the progress.
-
-    Raises
-    ------
-    ValueError
-        If there is no such method, or a map has more vertices than allowed.
+    The method is the name of one (see `method_map`), or a function of a scan and a number of
+    vertices that makes polylines, such as `iepf_map`; the result has its name, or the one given.
+    ``track(scans, name, total)`` yields the scans, and shows the progress. Raises ValueError if
+    there is no such method, or a map has more vertices than allowed.
 
     Examples
     --------
@@ -153,19 +141,11 @@ def _means(values: Array) -> list[float]:
 def load_benchmark(path: str | os.PathLike[str]) -> Benchmark:
     """Read one of the two files of the benchmark.
 
-    Parameters
-    ----------
-    path : path-like
-        A NumPy archive with the keys ``azimuth`` rad and ``radius`` m (N, M), the first ``beams``
-        (N,) of each row in use, ``radius_limits`` (N, 2) m, ``max_vertices`` (J,), ``methods``
-        (K,), ``rmse``, ``f``, ``fnr`` (N, K, J); for the simulated set ``polygon`` (N, V, 2),
-        padded with NaN, ``pose`` (N, 3) and ``area_error`` (N, K, J).
-
-    Raises
-    ------
-    LogError
-        If the file cannot be read, a key is missing, or its shape or a scan is wrong. The message
-        names the file and the key.
+    It is a NumPy archive with the keys ``azimuth`` rad and ``radius`` m (N, M), the first ``beams``
+    (N,) of each row in use, ``radius_limits`` (N, 2) m, ``max_vertices`` (J,), ``methods`` (K,),
+    ``rmse``, ``f``, ``fnr`` (N, K, J); for the simulated set ``polygon`` (N, V, 2), padded with
+    NaN, ``pose`` (N, 3) and ``area_error`` (N, K, J). LogError names the file and the key that is
+    missing or wrong.
     """
     path = Path(path)
     with reading(path), path.open("rb") as file:
