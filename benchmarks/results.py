@@ -15,7 +15,6 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
@@ -87,34 +86,37 @@ def markdown(columns: Sequence[str], rows: Rows) -> str:
     return "\n".join(f"|{'|'.join(map(str, line))}|" for line in lines)
 
 
-def of_seeds(values: Sequence[float], digits: int = 2) -> str:
-    """Return median and range over the seeds."""
-    numbers = (f"{v:.{digits}f}" for v in (median(values), min(values), max(values)))
-    return "{} ({}–{})".format(*numbers)
+def two_digits(value: Any) -> str:
+    """Write a number, and its range over the seeds, with two digits after the point."""
+    return "–" if value is None or math.isnan(value) else f"{value:.2f}"
 
 
 class Results:
-    """Runs experiments once each, and makes the tables of their numbers."""
+    """Runs experiments once each, with all seeds, and makes the tables of their numbers."""
 
     def __init__(self, frames: int) -> None:
         from lineament.reproduce import Setting
 
         data = DATA if DATA.is_dir() else None
-        self.settings = [Setting(frames, seed, data) for seed in SEEDS]
-        self.found: dict[tuple[str, int], Any] = {}
+        self.setting = Setting(frames, SEEDS[0], data, seeds=len(SEEDS))
+        self.found: dict[str, Any] = {}
 
-    def numbers(self, name: str, seed: int = 0) -> Any:
+    def findings(self, name: str) -> Any:
+        """Return what an experiment found: numbers that differ by seed have their range."""
+        from lineament.reproduce import run_experiments
+
+        if name not in self.found:
+            print(name, file=sys.stderr, flush=True)
+            self.found |= run_experiments([name], self.setting, str)
+        return self.found[name]
+
+    def numbers(self, name: str) -> Any:
         """Return all numbers of an experiment."""
-        if (name, seed) not in self.found:
-            print(f"{name}, seed {seed}", file=sys.stderr, flush=True)
-            module = import_module(f"lineament.reproduce.{name}")
-            findings = module.run(self.settings[seed], str)
-            self.found[name, seed] = findings.numbers
-        return self.found[name, seed]
+        return self.findings(name).numbers
 
-    def simulation(self) -> str:
-        """All methods with the paper's sensor."""
-        seeds = [self.numbers("all_methods", seed)["paper"] for seed in SEEDS]
+    def simulation(self, methods: Sequence[str] = ()) -> str:
+        """All methods, or some, with the paper's sensor."""
+        found = self.numbers("all_methods")["paper"]
         columns = {
             "corner F1": "corner_f1_0.10",
             "error ÷ bound": "corner_over_bound_median",
@@ -122,37 +124,27 @@ class Results:
             "clusters right": "partition_success",
         }
         rows = [
-            (
-                method,
-                *(
-                    of_seeds([seed[method].get(key, math.nan) for seed in seeds])
-                    for key in columns.values()
-                ),
-            )
-            for method in seeds[0]
-            if method != "pdbs"
+            (method, *(two_digits(found[method].get(key)) for key in columns.values()))
+            for method in methods or found
         ]
         return markdown(("method", *columns), rows)
 
+    def summary(self) -> str:
+        """The table of README: some methods with the paper's sensor."""
+        return self.simulation(BY_SENSOR)
+
     def sensors(self) -> str:
-        """F1 of corners of all methods with each sensor, median over the seeds."""
-        seeds = [self.numbers("all_methods", seed) for seed in SEEDS]
-        methods = [method for method in seeds[0]["paper"] if method != "pdbs"]
+        """F1 of corners of some methods with each sensor."""
+        found = self.numbers("all_methods")
         rows = [
-            (
-                m,
-                *(
-                    median(seed[name][m].get("corner_f1_0.10", math.nan) for seed in seeds)
-                    for name in seeds[0]
-                ),
-            )
-            for m in methods
+            (method, *(two_digits(of[method].get("corner_f1_0.10")) for of in found.values()))
+            for method in BY_SENSOR
         ]
-        return markdown(("method", *seeds[0]), rows)
+        return markdown(("method", *found), rows)
 
     def optimal(self) -> str:
         """More numbers of the default method, by sensor."""
-        seeds = [self.numbers("all_methods", seed) for seed in SEEDS]
+        found = self.numbers("all_methods")
         shown = {
             "corner error ÷ bound, RMS": "corner_over_bound",
             "corner NEES, mean": "corner_nees",
@@ -164,21 +156,10 @@ class Results:
             "arc F1": "arc_f1",
         }
         rows = [
-            (
-                label,
-                *(
-                    median(seed[name]["optimal"].get(key, math.nan) for seed in seeds)
-                    for name in seeds[0]
-                ),
-            )
+            (label, *(two_digits(of["optimal"].get(key)) for of in found.values()))
             for label, key in shown.items()
         ]
-        return markdown(("optimal", *seeds[0]), rows)
-
-    @staticmethod
-    def middle_of(seeds: Sequence[Any], sensor: str, method: str, key: str) -> float:
-        """Return the median of a number over the seeds."""
-        return median(seed[sensor][method].get(key, math.nan) for seed in seeds)
+        return markdown(("optimal", *found), rows)
 
     def real(self) -> str:
         """All methods on all recordings, by measures that need no truth."""
@@ -257,30 +238,28 @@ class Results:
         return markdown(columns, rows.values())
 
     def claims(self) -> str:
-        """The paper's claims, and what is found here, over the seeds."""
-        return markdown(
-            ("paper", "here"),
-            [(claim, re.sub(r"{(.*?)}", self._value, here)) for claim, here in CLAIMS],
-        )
+        """The paper's figures and tables, what is found here, and the verdict."""
+        from lineament.reproduce.claims import bands, verdicts
 
-    def _value(self, match: re.Match[str]) -> str:
-        """Return "path", "path ÷ path" or "path|factor|digits" of `CLAIMS` over the seeds."""
-        paths, factor, digits = (*match[1].split("|"), "100", "0")[:3]
+        names = "definitions", "noise", "layers", "repetition", "scenes", "similarity"
+        names += "two_corners", "sensitivity", "success"
+        found = {name: self.findings(name) for name in names}
+        of_open = bands(found)
+        rows = [
+            (claim.place, claim.paper, here, of_open.get(claim.place), verdict)
+            for claim, here, verdict in verdicts(found)
+            if claim.experiment != "definitions"
+        ]
+        return markdown(("", "paper", "here", "by what it leaves open", "verdict"), rows)
 
-        def at(seed: int, path: str) -> float:
-            experiment, *keys = path.split("/")
-            found = self.numbers(experiment, seed)
-            for key in keys:
-                found = found[int(key) if isinstance(found, list) else key]
-            if hasattr(found, "__len__"):
-                return float(median(found))
-            return math.nan if found is None else float(found)
-
-        values = []
-        for seed in SEEDS:
-            part, *whole = (at(seed, path) for path in paths.split(" ÷ "))
-            values.append(float(factor) * part / math.prod(whole))
-        return of_seeds(values, int(digits))
+    def similarity(self) -> str:
+        """Share of measurements that methods explain, and the error of these."""
+        found = next(iter(self.numbers("similarity").values()))
+        rows = [
+            (method, f"{100 * of['similarity_explained']:.0f}", f"{1e3 * of['similarity_rms']:.0f}")
+            for method, of in found.items()
+        ]
+        return markdown(("method", "explained [%]", "RMS error of these [mm]"), rows)
 
     def speed(self) -> str:
         """Times of methods in turns in one run, as ratios to that of `liu`."""
@@ -288,20 +267,19 @@ class Results:
 
         from lineament import Extractor
         from lineament.methods import METHODS
-        from lineament.reproduce.scans import INDOORS, frame_times, scene_numbers, simulated_frames
+        from lineament.reproduce import scans as recorded
         from lineament.simulation import SENSORS
 
-        rows: dict[str, list[object]] = {name: [name] for name in METHODS}
+        methods = {name: Extractor(name) for name in METHODS}
+        rows: dict[str, list[object]] = {name: [name] for name in methods}
         for sensor in ("paper", "utm30lx"):
-            frames = simulated_frames(SENSORS[sensor], INDOORS, scene_numbers(30, 0))
-            scans = [frame.scan for frame in frames]
-            times: dict[str, list[float]] = {name: [] for name in METHODS}
-            for _ in range(5):
-                for name, taken in times.items():
-                    taken.append(float(np.median(frame_times(Extractor(name), scans))))
+            scenes = recorded.scene_numbers(30, 0)
+            frames = recorded.simulated_frames(SENSORS[sensor], recorded.INDOORS, scenes)
+            times = recorded.interleaved_times(methods, [frame.scan for frame in frames])
             for name, taken in times.items():
-                each = [a / b for a, b in zip(taken, times["liu"], strict=True)]
-                rows[name] += [1e6 * median(taken), of_seeds(each, 1)]
+                middle, least, most = recorded.time_ratio(taken, times["liu"])
+                ratio = f"{middle:.1f} ({least:.1f}–{most:.1f})"
+                rows[name] += [1e6 * float(np.median(taken)), ratio]
         columns = [f"{beams} beams{what}" for beams in (481, 1081) for what in (" [µs]", " ÷ liu")]
         return markdown(("method", *columns), rows.values())
 
@@ -325,59 +303,14 @@ class Results:
         return markdown(("what", "measured"), rows)
 
 
-#: Claims of the paper, and what to say of them: paths are into the numbers of experiments.
-CLAIMS = (
-    (
-        "Fig. 2, 3: noise points are filtered away",
-        "points off by 0.1–0.3 m that stay off: {noise/ranges/0.1–0.3 m/off_after} %; off by "
-        "0.6–1.2 m: {noise/ranges/0.6–1.2 m/off_after} %",
-    ),
-    (
-        "Fig. 5: clusters 95 %, PDBS 84 %",
-        "its scanner: {layers/paper/liu/success} %, PDBS {layers/paper/pdbs, fixed/success} %; "
-        "mixed pixels: {layers/utm30lx/liu/success} %, PDBS {layers/utm30lx/pdbs, fixed/success} %",
-    ),
-    (
-        "Fig. 9: AR is largest at radius 6, threshold 0.66",
-        "of actual corners, over all forms: at radius {repetition/best/support_radius|1|0}, "
-        "threshold {repetition/best/threshold|1|2}",
-    ),
-    (
-        "Fig. 12: errors up to 0.01 m, IEPF 0.25 m",
-        "liu {similarity/simulated rooms, corridors and halls/liu, paper’s numbers/"
-        "similarity_maximum|1|2} m, IEPF {similarity/simulated rooms, corridors and halls/iepf/"
-        "similarity_maximum|1|2} m",
-    ),
-    (
-        "Table 2: two corners 2.302 m apart",
-        "both found with its numbers: {two_corners/places/liu, paper’s numbers/0/found} %; with "
-        "the best of Figure 9 {two_corners/places/liu, best of Figure 9/0/mean|1|3} m, IEPF "
-        "{two_corners/places/iepf/0/mean|1|3} m",
-    ),
-    (
-        "Table 3: partition 95 %, PDBS 84 %",
-        "{success/liu:paper, no corners/many/partition_success} %, PDBS "
-        "{success/pdbs, fixed 0.3 m/many/partition_success} %",
-    ),
-    (
-        "Table 3: corners 93 %, IEPF 73 %",
-        "its numbers {success/liu:paper, paper’s numbers/many/corner_recall_0.10} %; best of "
-        "Figure 9 {success/liu:paper, best of Figure 9/many/corner_recall_0.10} % at precision "
-        "{success/liu:paper, best of Figure 9/many/corner_precision_0.10} %; IEPF "
-        "{success/iepf:paper/many/corner_recall_0.10} % at "
-        "{success/iepf:paper/many/corner_precision_0.10} %",
-    ),
-    (
-        "half the time of PDBS; of IEPF",
-        "{success/liu:paper, no corners/seconds ÷ success/pdbs, fixed 0.3 m/seconds|1|2}; "
-        "{success/liu:paper, paper’s numbers/seconds ÷ success/iepf:paper/seconds|1|2}",
-    ),
-)
-
-
 TABLES = (
     *("speed", "process", "maps", "tracking", "real", "arena"),
-    *("simulation", "sensors", "optimal", "claims"),
+    *("simulation", "summary", "sensors", "optimal", "similarity", "claims"),
+)
+#: Rows of the table by sensor.
+BY_SENSOR = (
+    *("optimal", "liu:paper, paper’s numbers", "liu:tuned", "iepf:paper", "split_and_merge:paper"),
+    *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
 )
 #: Tables of recordings.
 RECORDED = ("maps", "tracking", "real", "arena")
@@ -400,7 +333,7 @@ def main() -> None:
     parser.add_argument("--print", nargs="+", metavar="TABLE", help="print these, write nothing")
     given = parser.parse_args()
     started, results = datetime.now(UTC), Results(given.frames)
-    missing = RECORDED if results.settings[0].data is None else ()
+    missing = RECORDED if results.setting.data is None else ()
     tables = {
         name: "Not measured: no recordings." if name in missing else getattr(results, name)()
         for name in given.print or TABLES

@@ -1,6 +1,7 @@
 """Corners, segments and arcs against the truth: cases worked by hand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,6 +63,8 @@ def test_corner_with_a_small_side_is_neither_demanded_nor_punished(sides):
     assert corner_scores(corners(), truth).counts == Counts(0, 0, 0)
     scores = corner_scores(corners((2, 0.01)), truth)
     assert (scores.counts, len(scores.errors["position"])) == (Counts(0, 0, 0), 0)
+    six = replace(truth, segments=np.array([SIDE, segment((5, 0), (5, 0.1), 70, 75)]))
+    assert corner_scores(corners(), six).counts == Counts(0, 0, sides != (0, -1))
     # It excuses one only.
     assert corner_scores(corners((2, 0.01), (2, 0.02)), truth).counts == Counts(0, 1, 0)
 

@@ -66,6 +66,7 @@ def test_relations_by_hand(tmp_path):
     assert relations.seconds == pytest.approx([99.9991, 30, 60.1001, 0.0007])
     far = relations.far_apart()
     assert far.scans.tolist() == [[1, 0], [1, 4]]
+    assert relations.far_apart(False).scans.tolist() == [[2, 1], [3, 2]]
     # Of the first 0.5 m and 0.1 rad, of the second a turn of 3.2 rad, which is 2π less 3.2.
     poses = [(0.0, 0.0, 0.0)] * 5
     poses[1] = (4.0, 1.0, math.pi / 2)

@@ -14,6 +14,7 @@ from lineament.evaluation import Counts, FeatureScores, Scores, SimilarityScores
 from lineament.evaluation.consistency import NormalisedErrors
 from lineament.logs import save_npz
 from lineament.methods import METHODS
+from lineament.methods.stages import corner_response
 from lineament.output import canvas, drawing
 from lineament.reproduce import (
     EXPERIMENTS,
@@ -21,8 +22,10 @@ from lineament.reproduce import (
     all_methods,
     contenders,
     controls,
+    definitions,
     grid,
     layers,
+    museum,
     noise,
     real,
     repetition,
@@ -34,7 +37,9 @@ from lineament.reproduce import (
     tracking,
     two_corners,
 )
+from lineament.reproduce.claims import WORDS, verdicts
 from lineament.reproduce.grid import Parameters
+from lineament.reproduce.seeds import Spread
 from lineament.reproduce.two_corners import DISTANCE, POSES, WORLD, A, B
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, drive, room, truth
@@ -102,6 +107,13 @@ def data(tmp_path, monkeypatch):
 #: Some numbers of each experiment, in the small setting, as they are: what changes them is to be
 #: explained. Paths are into `Findings.numbers`.
 PINNED: dict[str, dict[str, float]] = {
+    "definitions": {
+        "fig1/corners": 1,
+        "fig1/noise": 1.0,
+        "fig4/ratio": 21.237,
+        "fig6/corners": 2,
+        "fig8/sum": 1.27076,
+    },
     "noise": {
         "ranges/planes/beams": 1616,
         "ranges/planes/raw": 0.010006,
@@ -127,10 +139,10 @@ PINNED: dict[str, dict[str, float]] = {
         "choices/7/corners_per_view": 10,
     },
     "scenes": {
-        "One scan of a simulated room/1/1": 1,
-        "One scan of a simulated room/1/2": 0,
-        "One scan of a simulated room/5/6": 1.0,
-        "Office, one scan/0/1": 9,
+        "room/iepf/segments_found": 3,
+        "room/iepf/corners_right": 2,
+        "Office/iepf/segments": 5,
+        "segment_f1/iepf": 1.0,
     },
     "similarity": {
         "simulated rooms, corridors and halls/the true lines/similarity_mean": 0.0069737,
@@ -164,11 +176,14 @@ PINNED: dict[str, dict[str, float]] = {
         "lms181/liu, paper’s numbers/segment_f1": 0.72,
         "lms181/pdbs/partition_success": 0.9,
     },
+    "museum": {},
     "tracking": {
         "Office/relations/the log’s corrected poses/way_mean": 0.015,
+        "Office/near/the log’s corrected poses/way_mean": 0.03,
         "Office/far_apart/the log’s corrected poses/motions": 1,
         "Office/far_apart/features/way_mean": 0.002978,
         "Office/motion/features/way_median": 0.0016062,
+        "Office/motion/features/unobserved": 0.0,
         "Office/motion/ICP/way_rmse": 0.0016927,
         "Office/tracks/features/segments/kept": 1.0,
     },
@@ -187,16 +202,18 @@ PINNED: dict[str, dict[str, float]] = {
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
     reports = []
-    found = run_experiments([name], Setting(frames=1, data=data), reports.append)
+    found = run_experiments([name], Setting(frames=1, data=data, seeds=1), reports.append)
     assert list(found) == [name]
     assert reports[0] == f"{name} (1/1): starting"
-    assert len(reports) > 1
+    assert len(reports) > (name != "museum")
     findings = found[name]
     assert findings.text
     for table in findings.tables:
         assert table.rows
         assert {len(row) for row in table.rows} == {len(table.columns)}
     assert all(figure.png.startswith(b"\x89PNG") for figure in findings.figures)
+    words = [word for claim, _, word in verdicts(found) if claim.experiment == name]
+    assert set(words) <= set(WORDS)
     names = {figure.name for figure in findings.figures}
     assert len(names) == len(findings.figures)
     numbers = json.loads(json.dumps(findings.to_dict(), allow_nan=False))["numbers"]
@@ -208,12 +225,116 @@ def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
     assert here == pytest.approx(PINNED[name], rel=1e-3)
 
 
+@pytest.mark.usefixtures("small")
+def test_seeds_are_merged_and_recordings_are_read_once(data):
+    reports, setting = [], Setting(1, 4, data, seeds=2)
+    found = run_experiments(["similarity", "two_corners", "tracking"], setting, reports.append)
+    starts = [report.split(":")[0] for report in reports if report.endswith("starting")]
+    twice = "similarity (1/3)", "two_corners (2/3)"
+    names = [f"{name}, seed {seed}" for name in twice for seed in (4, 5)]
+    assert starts == [*names, "tracking (3/3)"]
+    alone = [two_corners.run(one, silent) for one in setting.by_seed()]
+    mean = found["two_corners"].numbers["places"]["iepf"][0]["mean"]
+    assert mean.values == tuple(one.numbers["places"]["iepf"][0]["mean"] for one in alone)
+    overall = {row[0]: row[4:6] for row in found["two_corners"].tables[0].rows}
+    assert all(isinstance(cell, Spread) for cell in overall["iepf"])
+    assert not any(isinstance(cell, Spread) for cell in overall["bound"])
+    assert found["two_corners"].figures == alone[0].figures
+    simulated, office = found["similarity"].tables
+    assert isinstance(simulated.rows[0][2], Spread)
+    assert not any(isinstance(cell, Spread) for row in office.rows for cell in row)
+    json.dumps(found["similarity"].to_dict(), allow_nan=False)
+
+
 @pytest.mark.parametrize("name", ["tracking", "real"])
 def test_without_recordings_nothing_is_measured(name, tmp_path):
     for setting in (Setting(), Setting(1, 0, tmp_path)):
         findings = run_experiments([name], setting, silent)[name]
         assert findings.text == ("The recordings are missing: nothing is measured.",)
         assert findings.tables == findings.figures == ()
+
+
+@pytest.mark.parametrize("figure", ["fig1", "fig6"])
+def test_figures_of_definitions_show_what_is_there(figure):
+    assert definitions.run(Setting(), silent).numbers[figure]["off"] < 0.01
+
+
+def test_operator_by_definition_is_that_of_the_code():
+    """Equations 15 to 22 by least squares of NumPy, and the stage, on a noisy corner."""
+    rng, arm = np.random.default_rng(3), np.linspace(0.3, 0.02, 8)
+    points = np.vstack([np.column_stack((arm, 0 * arm)), np.column_stack((0 * arm, arm))[::-1]])
+    points += rng.normal((2.0, 1.0), 0.01, points.shape)
+    response = corner_response(points, support_radius=6, response="tangent")
+    for at in range(6, 10):
+        s, slopes, bends = definitions.fitted(points, at, 6)
+        assert (s[6], len(s)) == (0, 13)
+        assert (np.diff(s) > 0).all()
+        normal = np.array((-slopes[1], slopes[0])) / np.hypot(*slopes)
+        off = points[at - 6 : at + 7] - points[at]
+        assert response[at] == pytest.approx(abs(off @ normal).sum())
+        fit = np.outer(s, slopes) + np.outer(s**2, bends)
+        np.testing.assert_allclose(np.vstack((s, s**2)) @ (off - fit), 0, atol=1e-9)
+
+
+class TestMuseum:
+    """A bag of the layout of the museum's: echoes of a drive past the two corners of Table 2."""
+
+    @pytest.fixture
+    def bag(self, tmp_path):
+        pytest.importorskip("rosbags")
+        from ros_bags import Messages, write
+
+        messages, way = Messages(1), [(0.7, 0.9), (3.0, 1.3), (1.6, 2.4)]
+        items = []
+        for scan in drive(WORLD, way, SENSORS["utm30lx"], speed=0.8, rate=10):
+            echoes = [[r, r + 0.5] if r > 0 else [] for r in np.nan_to_num(scan.ranges, posinf=0)]
+            beams = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
+            message = messages.echoes(5 + scan.stamp, echoes, **beams)
+            items.append(("horizontal_laser_2d", int(1e9 * scan.stamp), message))
+            other = messages.scan(5 + scan.stamp, [1.0] * 9)
+            items.append(("another", int(1e9 * scan.stamp), other))
+        return write(tmp_path, "rosbag1", items, "museum")
+
+    @pytest.mark.usefixtures("small")
+    def test_bag_gives_figures_11_to_13_and_tables_2_and_3(self, bag, monkeypatch):
+        monkeypatch.setattr(museum, "SCANS_A_FRAME", 20)
+        findings = museum.run(Setting(2, museum=bag), silent)
+        names = [figure.name for figure in findings.figures]
+        assert names == [f"museum-{name}" for name in ("fig11", "fig12", "fig13")]
+        methods, distance = (findings.numbers[key] for key in ("methods", "distance"))
+        assert list(methods) == list(distance)
+        assert methods["iepf"]["corners"] > 3
+        assert methods["iepf"]["mean"] < 0.01 < methods["pdbs, fitted"]["mean"]
+        assert distance["iepf"]["mean"] == pytest.approx(DISTANCE, abs=0.01)
+        assert distance["iepf"]["found"] > 0.8
+        assert distance["pdbs, fitted"]["found"] == 0
+        assert len(distance["iepf"]["places"]) == 5
+        first = dict(zip(findings.tables[1].columns, findings.tables[1].rows[0], strict=True))
+        assert (first["paper: mean [m]"], first["here: mean [m]"]) == ("2.302", None)
+        json.dumps(findings.to_dict(), allow_nan=False)
+
+    def test_scans_are_of_the_museums_topic_and_apart(self, bag):
+        frames, in_row = museum.read(bag, 3)
+        assert [len(scan) for scan in frames] == [1081] * 3
+        assert frames[2].stamp - frames[1].stamp == pytest.approx(frames[1].stamp - frames[0].stamp)
+        assert (np.diff([scan.stamp for scan in in_row]) > 0.09).all()
+        assert in_row[0].stamp > frames[0].stamp
+
+    def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
+        def view(way, **corners):
+            places = {"a": (0, True), "b": (2, False), "c": (2.5, False), "f": (9, False)}
+            shown = {ord(n): (np.array((places[n][0], 0.0)), places[n][1]) for n in corners}
+            return museum.View(None, None, way, shown)
+
+        several = [view(0.1 * k, a=1, b=1, f=1) for k in range(6)]
+        several += [view(1.0 + 0.3 * k, a=1, c=1) for k in range(5)]
+        views, a, b = museum.views_of_two(several)
+        assert (chr(a), chr(b), len(views)) == ("a", "c", 5)
+        assert [v.way for v in museum._at_places(views)] == [v.way for v in views]
+        places = [several.index(v) for v in museum._at_places(several)]
+        assert places == [0, 5, 6, 8, 10]
+        assert museum.views_of_two(several[:4]) is None
+        assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
 
 
 class TestMethods:
@@ -426,9 +547,21 @@ class TestTwoCorners:
         assert liu["share of scans with both"] == pytest.approx(2 / 20)
         assert iepf["here: mean [m]"] is iepf["paper: mean [m]"] is None
         assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
-        by_place = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
-        assert by_place.rows[0][1:] == ("−12.5 ± 0.0 (50 %)", None)
-        assert by_place.rows[2][1:] == ("± 3.0", "± 4.0")
+        off, spread, share = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
+        assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
+        assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
+        assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
+
+    def test_drawn_is_the_scan_with_the_median_error(self, monkeypatch):
+        """Errors of 1, 3 and 2 cm, and one without both corners, which is the worst."""
+        along, (x, y, turn) = (B - A) / DISTANCE, POSES[0]
+        rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        found = [
+            features(corners=[corner(*((place - (x, y)) @ rotation)) for place in places])
+            for places in [(A, B + off * along) for off in (0.01, 0.03, 0.02)] + [(A,)]
+        ]
+        monkeypatch.setattr(two_corners, "batch_of", lambda *_: found)
+        assert two_corners._median_view(None, range(4), POSES[0]) == (2, found[2])
 
     @pytest.mark.slow
     def test_good_method_spreads_like_the_bound_and_none_spreads_less(self):
@@ -525,7 +658,7 @@ class TestTracking:
         assert found[0].stamp == every[len(every) // 2].stamp
         numbers = tracking.measure("small", found, 0, silent)
         motions, tracks = numbers["motion"], numbers["tracks"]
-        assert numbers["relations"] == numbers["far_apart"] == {}
+        assert numbers["relations"] == numbers["near"] == numbers["far_apart"] == {}
         assert list(motions) == [
             *("odometry, synthetic", "features", "ICP"),
             *("features, no odometry", "ICP, no odometry"),

@@ -130,7 +130,8 @@ def test_scan_and_its_features(drawn):
     counts = "2 segments · 1 corner · 1 edge · 1 arc · 2 breakpoints · 2 clusters"
     assert texts_of(axes) == {counts, "12.5"}  # the edge has no number
     labels = {"no return", "noise", "sensor", "arc", "segment", "breakpoint", "corner", "edge"}
-    assert {t.get_text() for t in figure.legends[0].get_texts()} == {*labels, "3 σ of a corner"}
+    labels.add("3 σ of a corner, cut at 0.5 m")
+    assert {t.get_text() for t in figure.legends[0].get_texts()} == labels
     assert axes.get_aspect() == 1
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
     shown = by_label(axes)
@@ -150,10 +151,10 @@ def test_scan_and_its_features(drawn):
     assert colors == canvas.PALETTE[features.clusters[known]].tolist()
     walls = [line.get_xydata() for line in axes.lines if line.get_marker() == (2, 0, 90.0)]
     np.testing.assert_allclose(walls, [[features.segments["start"][0], [2, 2]]])
-    # Three deviations, the longer along y.
+    # Three deviations, the longer along y, cut.
     (ellipse,) = [patch for patch in axes.patches if isinstance(patch, Ellipse)]
     size = (ellipse.width, ellipse.height, ellipse.angle % 180)
-    assert size == pytest.approx((1.2, 0.6, 90))
+    assert size == pytest.approx((1.0, 0.6, 90))
     seen = shown["arc"].get_xydata() - (1, 1)
     np.testing.assert_allclose(np.hypot(*seen.T), 0.3)
     # The same hue as a corner, nearer to the white of the paper.
@@ -181,12 +182,28 @@ def test_beams_without_return_are_ticks_outside_what_was_seen(drawn):
         assert (points < high).all()
 
 
-@pytest.mark.parametrize("size", [0.004, 0.5, 50.0])
-def test_ellipses_are_drawn_where_they_can_be_seen(size):
+@pytest.mark.parametrize(
+    ("size", "widths"), [(0.004, []), (0.3, [0.6]), (50.0, [2 * drawing.LARGEST_ELLIPSE])]
+)
+def test_ellipses_are_drawn_where_they_can_be_seen_and_are_cut(size, widths):
     scan, features = room()
     features.corners["covariance"] = np.diag([(size / 3) ** 2, 1e-8])
     (axes,) = figures.scan_figure(scan, {"a": features}).axes
-    assert len(axes.patches) == (size == 0.5)
+    assert [patch.width for patch in axes.patches] == pytest.approx(widths)
+
+
+def test_narrow_panels_say_less_and_leave_out_what_is_far():
+    scan, features = room()
+    ranges = scan.ranges.copy()
+    ranges[60] = 25.0
+    scan = ln.LaserScan(ranges, angles=scan.angles, range_max=30.0)
+    wide, narrow = (
+        figures.scan_figure(scan, {"a": features}, **given).axes[0]
+        for given in ({}, {"panel": 3.0, "farthest": 10.0})
+    )
+    assert texts_of(narrow) == {"2 segments · 1 corner · 2 clusters"}
+    assert max(*wide.get_xlim(), *wide.get_ylim()) > 15
+    assert max(*narrow.get_xlim(), *narrow.get_ylim()) < 11
 
 
 def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):

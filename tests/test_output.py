@@ -1,9 +1,11 @@
 """Writers: whole files or none, tables that read back the same, recordings of rerun, pages."""
 
+import base64
 import json
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import textwrap
@@ -23,7 +25,7 @@ from test_writers_mcap import FOUND
 from lineament import LaserScan, LineamentError, RangeNoise
 from lineament.features.tables import SCHEMA, features_table
 from lineament.files import written_beside
-from lineament.output import ENDINGS, open_writer, page
+from lineament.output import ENDINGS, canvas, open_writer, page
 from lineament.output.tables import TOPIC
 from lineament.output.writer import Writer
 
@@ -367,29 +369,37 @@ class _Page(HTMLParser):
 
 
 def test_page_is_one_file_with_its_images(tmp_path):
-    path = tmp_path / "index.html"
+    path, png = tmp_path / "index.html", canvas.figure_bytes(canvas.new_figure(5, 2))
+    row = [page.Cell("<x>", href="#y"), page.Cell("3 (2–4)", "number")]
+    row.append(page.Cell("does not", "verdict"))
     parts = [
         page.list_part([("scans", "331"), ('<b> & "c"', "µ")]),
         page.list_part([]),
         page.contents_part([("x<", "Where <it> is")]),
         page.heading_part("x<", "There <it> is"),
-        page.table_part("T <1>", ["a&b"], [[("<x>", False), ("3", True)]], "N <2>"),
-        page.image_part('a "room" & <more>', b"\x89PNG\r\n\x1a\n rest"),
+        page.table_part("T <1>", ["a&b", "n", "w"], [row], "N <2>"),
+        page.image_part('a "room" & <more>', png, "fig<1>"),
         *page.text_parts(["Note <1>."]),
     ]
     page.write_parts(path, "A <demo>", parts)
     text = path.read_text(encoding="utf-8")
     parsed = _Page(text)
     (image,) = (attributes for tag, attributes in parsed.tags if tag == "img")
-    data = "data:image/png;base64,iVBORw0KGgogcmVzdA=="
-    assert image == {"src": data, "alt": 'a "room" & <more>'}
-    shown = {"A <demo>", '<b> & "c"', "Note <1>.", "µ", "T <1>", "a&b", "<x>", "3", "N <2>"}
+    assert base64.b64decode(image["src"].removeprefix("data:image/png;base64,")) == png
+    width, height = struct.unpack(">2I", png[16:24])
+    assert abs(int(image["width"]) / width - int(image["height"]) / height) < 0.01
+    assert image["alt"] == 'a "room" & <more>'
+    shown = {"A <demo>", '<b> & "c"', "Note <1>.", "µ", "T <1>", "a&b", "<x>", "N <2>"}
     assert {*shown, "Where <it> is", "There <it> is"} <= set(parsed.text)
-    assert ("a", {"href": "#x<"}) in parsed.tags
-    assert ("h2", {"id": "x<"}) in parsed.tags
-    assert [a for tag, a in parsed.tags if tag == "td"] == [{}, {"class": "number"}]
+    assert {"3", "(2–4)", "does not"} <= {text.strip() for text in parsed.text}
+    for link in (("a", "href", "#x<"), ("h2", "id", "x<"), ("a", "href", "#y")):
+        assert (link[0], dict([link[1:]])) in parsed.tags
+    assert ("figure", {"id": "fig<1>"}) in parsed.tags
+    cells = [{}, {"class": "number"}, {"class": "verdict does"}]
+    assert [a for tag, a in parsed.tags if tag == "td"] == cells
+    assert [a for tag, a in parsed.tags if tag == "th"] == [{}, {"class": "number"}, {}]
     tags = [tag for tag, _ in parsed.tags]
-    assert not {"b", "demo", "link", "script", "it"} & set(tags)
-    assert tags.count("dl") == 1
+    assert not {"b", "demo", "link", "it"} & set(tags)
+    assert tags.count("dl") == tags.count("script") == 1
     assert "http" not in text
     assert "prefers-color-scheme: dark" in text

@@ -1,10 +1,16 @@
 """The report of experiments: names, what is written, and that it can be repeated."""
 
+import copy
 import json
+import math
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.keys import Keys
+from test_view_page import CHROMIUM, DRIVER, FLAGS
 
 from lineament import LineamentError
 from lineament.evaluation.counts import plain
@@ -19,8 +25,10 @@ from lineament.reproduce import (
     Table,
     experiment_names,
 )
-from lineament.reproduce.findings import cell_text, dot_chart
+from lineament.reproduce.claims import CLAIMS, WORDS, verdicts
+from lineament.reproduce.findings import cell_text, dot_chart, median_of, merged_findings
 from lineament.reproduce.report import benchmark_tables, reproduce, write_report
+from lineament.reproduce.seeds import Spread, merged, merged_text
 
 
 def findings():
@@ -51,24 +59,27 @@ class _Page(HTMLParser):
 def test_names_are_those_of_the_experiments_and_of_the_paper():
     assert experiment_names([]) == list(EXPERIMENTS)
     assert experiment_names(["fig12", "noise", "fig2"]) == ["noise", "similarity"]
-    with pytest.raises(ValueError, match="experiment 'fig1' is unknown, expected one of: noise, "):
-        experiment_names(["fig1"])
+    with pytest.raises(ValueError, match="'fig0' is unknown, expected one of: definitions, "):
+        experiment_names(["fig0"])
     assert experiment_names(["repeatability"]) == ["real"]
     others = [other for names in EXPERIMENTS.values() for other in names]
     assert len({*EXPERIMENTS, *others}) == len(EXPERIMENTS) + len(others)
 
 
 def test_report_is_one_page_and_one_file_of_numbers(tmp_path):
-    page = write_report(tmp_path, {"noise": findings()}, Setting(frames=3, seed=5))
+    setting = Setting(frames=3, seed=5, seeds=2)
+    page = write_report(tmp_path, {"extra": findings()}, setting)
     parsed = _Page(page.read_text(encoding="utf-8"))
-    assert parsed.links == ["#noise"]
-    assert parsed.places == ["noise"]
+    assert parsed.links == ["#verdicts", "#extra"]
+    assert parsed.places == ["verdicts", "extra", "fig1"]
     assert {"All is <well>.", "Corners < 0.1 m", "lost", "–", 'a "b" & c'} <= set(parsed.text)
-    assert not {"well", "script", "link"} & set(parsed.tags)
+    assert not {"well", "link"} & set(parsed.tags)
+    assert {claim.place for claim in CLAIMS} <= set(parsed.text)
     assert "http" not in page.read_text(encoding="utf-8")
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
-    assert (figures["frames"], figures["seed"], figures["recordings"]) == (3, 5, False)
-    noise = figures["experiments"]["noise"]
+    assert (figures["frames"], figures["seeds"], figures["recordings"]) == (3, [5, 6], False)
+    assert set(figures["verdicts"].values()) == {""}
+    noise = figures["experiments"]["extra"]
     assert noise["numbers"] == {"f1": 0.5, "errors": [1.0, None], "n": 3}
     assert noise["tables"][0]["rows"] == [["liu", "lost", None]]
     assert noise["figures"] == {"fig1": 'a "b" & c'}
@@ -84,7 +95,7 @@ def test_cells():
         Table.of_records("A", [{"b": 1}, {"c": 1}])
 
 
-@pytest.mark.parametrize("field", [{"frames": 0}, {"seed": -1}])
+@pytest.mark.parametrize("field", [{"frames": 0}, {"seed": -1}, {"seeds": 0}])
 def test_setting_is_checked(field):
     with pytest.raises(ValueError, match=next(iter(field))):
         Setting(**field)
@@ -114,7 +125,7 @@ def test_nothing_is_run_for_a_folder_that_cannot_be(tmp_path):
     with pytest.raises(LineamentError, match="cannot make this folder"):
         reproduce(tmp_path / "file", ["noise"])
     with pytest.raises(ValueError, match="unknown"):
-        reproduce(tmp_path / "folder", ["fig1"])
+        reproduce(tmp_path / "folder", ["fig0"])
     assert not (tmp_path / "folder").exists()
 
 
@@ -135,3 +146,271 @@ def test_benchmark_table_tells_the_authors_method_of_the_same_name():
         ("ple (authors)", 0.5),
         ("iepf (authors)", 0.75),
     )
+
+
+class TestSeeds:
+    def test_spread_calculates_seed_by_seed_and_compares_by_median(self):
+        one, other = Spread([1.0, 5.0, 3.0]), Spread([2.0, 4.0, 8.0])
+        assert (float(one), one < other, max(one, other)) == (3.0, True, other)
+        assert (other - one).values == (1.0, -1.0, 5.0)
+        assert (1 - one).values == (0.0, -4.0, -2.0)
+        assert (one - 1).values == (0.0, 4.0, 2.0)
+        assert (10 * one).values == (one * 10).values == (10.0, 50.0, 30.0)
+        assert (other / one).values == (2.0, 0.8, 8 / 3)
+        assert math.isnan((one / Spread([0.0, 1.0, 1.0])).values[0])
+        assert repr(one) == "Spread([1.0, 5.0, 3.0])"
+
+    @pytest.mark.parametrize(
+        ("values", "text"),
+        [
+            ([0.5, 0.25, 0.75], "0.50 (0.25–0.75)"),
+            ([0.5, 0.501], "0.50"),
+            ([-1.0, 1.0], "0.00 (-1.00 to 1.00)"),
+            ([0.5, math.nan, 0.25], "0.38 (0.25–0.50, 2 of 3 seeds)"),
+            ([math.nan, 2.0], "2.00 (1 of 2 seeds)"),
+            ([math.nan, math.nan], "nan"),
+        ],
+    )
+    def test_spread_is_written_as_median_and_range(self, values, text):
+        assert f"{Spread(values):.2f}" == text
+
+    def test_cells_and_json_of_a_spread(self):
+        assert cell_text(Spread([0.12345, 0.2, 3000.0])) == "0.2 (0.123–3000)"
+        assert cell_text(Spread([math.nan] * 2)) == "–"
+        assert plain({"a": Spread([1.0, math.nan])}) == {"a": {"median": 1.0, "seeds": [1.0, None]}}
+
+    @pytest.mark.parametrize(
+        ("values", "expected"),
+        [
+            ([1, 1, 1], 1),
+            ([1, None, 3], Spread([1, math.nan, 3])),
+            ([math.nan, math.nan], math.nan),
+            ([None, None], None),
+            ([{"a": 1}, {"b": 2}], {"a": Spread([1, math.nan]), "b": Spread([math.nan, 2])}),
+            ([{"log": {"a": 1}}, {}], {"log": {"a": 1}}),
+            ([(1, "x"), (2, "x")], [Spread([1, 2]), "x"]),
+            ([np.array([1.0, 2.0]), np.array([1.0, 4.0])], [1.0, Spread([2.0, 4.0])]),
+            ([[1], [1, 2]], [[1], [1, 2]]),
+            ([True, True], True),
+        ],
+    )
+    def test_merging_by_kind(self, values, expected):
+        assert repr(merged(values)) == repr(expected)
+
+    @pytest.mark.parametrize(
+        ("texts", "expected"),
+        [
+            (["a 1", "a 1"], "a 1"),
+            (["3 of 9", "5 of 8", "4 of 7"], "4 (3–5) of 8 (7–9)"),
+            (["−1.5 ± 2", "+0.5 ± 2", "-0.1 ± 2"], "-0.1 (−1.5 to +0.5) ± 2"),
+            (["10", "9"], "9 (9–10)"),
+            (["F1 0.50 of liu2", "F1 0.75 of liu2"], "F1 0.50 (0.50–0.75) of liu2"),
+            (
+                ["A 1. It holds.", "A 2. It fails."],
+                "A 1 (1–2). It holds. (1 of 2 seeds); It fails. (1 of 2 seeds)",
+            ),
+            (["9.6 – 25.3", "9.7 – 20.0"], "9.6 (9.6–9.7) – 20.0 (20.0–25.3)"),
+        ],
+    )  # fmt: skip
+    def test_texts_differ_in_their_numbers_or_as_a_whole(self, texts, expected):
+        assert merged_text(texts) == expected
+
+    def test_tables_are_merged_by_title_and_rows_by_name(self):
+        def of_seed(value, names, *more):
+            rows = tuple((name, value, None) for name in names)
+            tables = (Table("T", ("m", "v", "w"), rows, f"{value} scans."), *more)
+            return Findings("F", (f"It is {value}.",), tables, (value,), {"v": value})
+
+        extra = Table("Log", ("m",), (("x",),))
+        found = merged_findings([of_seed(1, "aab", extra), of_seed(4, "ba")])
+        assert found.text == ("It is 1 (1–4).",)
+        assert found.figures == (1,)
+        assert repr(found.numbers) == "{'v': Spread([1.0, 4.0])}"
+        table, log = found.tables
+        assert log is extra or log == extra
+        assert table.note == "1 (1–4) scans."
+        assert [row[0] for row in table.rows] == ["a", "a", "b"]
+        both, alone = Spread([1, 4]), Spread([1, math.nan])
+        assert repr([row[1] for row in table.rows]) == repr([both, alone, both])
+        only = of_seed(1, "a")
+        assert merged_findings([only]) is only
+
+    def test_recordings_are_read_with_the_first_seed_only(self, tmp_path):
+        settings = Setting(2, 7, tmp_path, seeds=3).by_seed()
+        assert [(s.seed, s.data, s.seeds, s.frames) for s in settings] == [
+            *((7, tmp_path, 1, 2), (8, None, 1, 2), (9, None, 1, 2)),
+        ]
+
+    def test_median_is_an_item_and_the_lower_one_of_two(self):
+        assert median_of(["ccc", "a", "bb"], len) == "bb"
+        assert median_of(["ccc", "a", "bb", "dddd"], len) == "bb"
+
+
+#: Of some experiments, by name.
+NUMBERS = {
+    "definitions": {
+        "fig1": {"off": 0.01},
+        "fig4": {"ratio": 2.0, "beyond": 0.0},
+        "fig6": {"off": 0.5},
+        "fig7": {"off": 0.0},
+        "fig8": {"sum": 1.0, "stage": 1.0},
+    },
+    "layers": {
+        "paper": {"liu": {"success": 1.0}, "pdbs, fixed": {"success": 1.0}},
+        "utm30lx": {
+            "liu": {"success": Spread([0.9, 0.8])},
+            "pdbs, fixed": {"success": Spread([0.8, 0.9])},
+        },
+        "example": {
+            "true features": {"clusters": 11, "corners": 5},
+            "liu, paper’s numbers": {"clusters": 11, "corners": Spread([1, 4])},
+        },
+    },
+}
+
+
+class TestVerdicts:
+    """Verdicts follow from numbers, over all seeds."""
+
+    def judged(self, numbers):
+        found = {name: Findings("", (), numbers=of) for name, of in numbers.items()}
+        return {claim.place: (here, word) for claim, here, word in verdicts(found)}
+
+    def test_each_is_one_of_the_words_or_not_run(self):
+        judged = self.judged(NUMBERS)
+        assert {word for _, word in judged.values()} - set(WORDS) == {""}
+        assert judged["Figure 1"][1] == judged["Figure 4"][1] == judged["Figure 8"][1] == "holds"
+        assert judged["Figure 6"][1] == "does not"
+        assert judged["Table 1"][1] == "undecided"
+        assert judged["Figure 12"] == ("", "")
+        # No better with its scanner, better with one of two seeds with the other.
+        assert judged["Figure 5"] == (
+            "Clusters right, its scanner: 100 %, PDBS 100 %; mixed pixels: 85 (80–90) %, "
+            "PDBS 85 (80–90) %",
+            "in part",
+        )
+        assert judged["Figure 10"][1] == "in part"
+
+    def test_the_same_is_not_better(self):
+        numbers = copy.deepcopy(NUMBERS)
+        numbers["layers"]["utm30lx"] = numbers["layers"]["paper"]
+        assert self.judged(numbers)["Figure 5"][1] == "does not"
+
+    @pytest.mark.parametrize(
+        ("at_paper", "other_reading", "word", "alike"),
+        [
+            (0.79, 0.8, "holds", "2"),
+            (0.79, 0.7, "in part", "1"),
+            (Spread([0.9, 0.7]), 0.7, "in part", "0 (0–1)"),
+            (0.0, 0.0, "does not", "0"),
+        ],
+    )
+    def test_figure_9_is_judged_for_each_reading(self, at_paper, other_reading, word, alike):
+        grid = [
+            {"response": "r", "half_width": h, "support_radius": r, "threshold": t, "of_actual": ar}
+            for h, here in ((2, at_paper), (8, other_reading))
+            for r, t, ar in ((6, 0.66, here), (5, 0.66, 0.8), (6, 0.5, 0), (5, 0.5, 1))
+        ]
+        here, found = self.judged({"repetition": {"grid": grid}})["Figure 9"]
+        assert f"in {alike} of 2 readings" in here
+        assert found == word
+
+    @pytest.mark.parametrize(
+        ("means", "word"),
+        [
+            *(([None], "undecided"), ([2.3, None], "holds")),
+            *(([2.3, 2.25], "in part"), ([2.0], "does not")),
+        ],
+    )
+    def test_table_2_is_of_what_is_found(self, means, word):
+        places = [{"mean": mean, "found": 0.4 + 0.2 * (mean is not None)} for mean in means]
+        judged = self.judged({"two_corners": {"places": {"liu, paper’s numbers": places}}})
+        assert judged["Table 2"][1] == word
+        found = {place["found"] >= 0.5 for place in places}
+        words = {frozenset([True]): "holds", frozenset([False]): "does not"}
+        assert judged["Figure 13"][1] == words.get(frozenset(found), "in part")
+
+    def test_table_3_compares_what_the_paper_compares(self):
+        def of(partition, recall, seconds):
+            many = {"partition_success": partition, "corner_recall_0.10": recall}
+            return {"many": many, "seconds": [seconds]}
+
+        judged = self.judged(
+            {
+                "success": {
+                    "liu:paper, no corners": of(0.8, 0, 1.0),
+                    "pdbs, fixed 0.3 m": of(0.9, 0, 2.0),
+                    "liu:paper, paper’s numbers": of(0, 0.1, 3.0),
+                    "liu:paper, best of Figure 9": of(0, 0.7, 9.0),
+                    "iepf:paper": of(0, 0.6, 4.0),
+                    "iepf:paper, in clusters": of(0, 0.6, 4.0),
+                }
+            }
+        )
+        assert judged["Table 3: partition"][1] == "does not"
+        assert judged["Table 3: corners"][1] == "in part"
+        assert judged["Table 3: time"] == ("0.50 of PDBS, 0.75 of IEPF", "in part")
+
+
+@pytest.mark.slow
+class TestInABrowser:
+    """The page in headless Chromium: sorted by keyboard, as wide as the window, in the dark."""
+
+    @pytest.fixture
+    def driver(self, tmp_path):
+        if not (CHROMIUM and DRIVER):
+            pytest.skip("no chromium or chromedriver: make browser")
+        cells = ("b", 10.0), ("c", None), ("a", Spread([9, 8]))
+        rows = tuple((*two, *[0.125] * 20) for two in cells)
+        table = Table("T", ("method", "n", *(f"a long name {k}" for k in range(20))), rows)
+        picture = Figure("wide", "A wide picture.", figure_bytes(new_figure(9, 2)))
+        found = {"extra": Findings("Extra", ("A text.",), (table,), (picture,))}
+        page = write_report(tmp_path, found, Setting(seeds=1))
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        for flag in FLAGS:
+            options.add_argument(flag)
+        driver = webdriver.Chrome(options, Service(DRIVER))
+        driver.get(page.as_uri())
+        yield driver
+        driver.quit()
+
+    def first_column(self, driver):
+        rows = driver.find_elements("css selector", "#extra ~ .table tbody tr")
+        return "".join(row.find_element("tag name", "td").text for row in rows)
+
+    def test_columns_sort_up_down_and_back(self, driver):
+        name, number = driver.find_elements("css selector", "#extra ~ .table th button")[:2]
+        orders = []
+        for button in (number, number, number, name, number):
+            button.send_keys(Keys.ENTER)
+            orders.append(self.first_column(driver))
+        # What is missing is last, whichever way.
+        assert orders == ["abc", "bac", "bca", "abc", "abc"]
+        sorted_by = driver.find_elements("css selector", "th[aria-sort]")
+        assert [th.text.split()[0] for th in sorted_by] == ["n"]
+
+    @pytest.mark.parametrize("width", [400, 1400])
+    def test_nothing_is_wider_than_the_window(self, driver, width):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        root = "return document.documentElement."
+        assert driver.execute_script(root + "scrollWidth") <= width
+        image = driver.find_element("tag name", "img").size
+        assert image["width"] >= 600  # legible: it scrolls where the window is narrower
+        assert image["width"] / image["height"] > 3
+
+    def test_dark_and_print(self, driver):
+        def colors(media, scheme):
+            features = [{"name": "prefers-color-scheme", "value": scheme}]
+            given = {"media": media, "features": features}
+            driver.execute_cdp_cmd("Emulation.setEmulatedMedia", given)
+            body = driver.find_element("tag name", "body")
+            return [body.value_of_css_property(name) for name in ("background-color", "color")]
+
+        white = "rgba(255, 255, 255, 1)"
+        assert colors("", "light")[0] == colors("print", "dark")[0] == white
+        assert colors("print", "dark")[1] == "rgba(0, 0, 0, 1)"
+        assert colors("", "dark") == ["rgba(13, 17, 23, 1)", "rgba(230, 237, 243, 1)"]
+        card = driver.find_element("class name", "card")
+        assert card.value_of_css_property("background-color") == white

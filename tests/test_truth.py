@@ -245,21 +245,19 @@ def test_a_column_in_front_of_a_wall():
 
 
 @pytest.mark.parametrize(
-    ("circle", "sensor", "n_points", "known", "label"),
+    ("circle", "sensor", "n_points", "in_cluster"),
     [
-        ((3, 0, 0.04), fan(10), 2, False, -1),
-        ((3, 3 * tan(0.5), 0.07), fan(10), 3, True, None),
-        ((0.3, 0.2, 2), ring(90), 90, True, 0),
+        ((3, 0, 0.04), fan(10), 2, 0),
+        ((3, 3 * tan(0.5), 0.07), fan(10), 3, 3),
+        ((0.3, 0.2, 2), ring(90), 90, 90),
     ],
 )
-def test_a_column_of_two_beams_has_no_bound_and_a_round_room_no_end(
-    circle, sensor, n_points, known, label
-):
+def test_a_column_of_two_beams_has_no_bound_and_no_cluster(circle, sensor, n_points, in_cluster):
     features = truth(World([], [circle]), ORIGIN, sensor)
     assert counts(features)[:3] == (0, 0, 1)
     assert features.arcs["n_points"].tolist() == [n_points]
-    assert np.isfinite(features.arcs["covariance"]).all() == known
-    assert label is None or (features.clusters == label).all()
+    assert np.isfinite(features.arcs["covariance"]).all() == (n_points > 2)
+    assert (features.clusters == 0).sum() == in_cluster
 
 
 # In every scene

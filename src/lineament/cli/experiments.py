@@ -44,15 +44,21 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
 )
 @SEED
 @click.option(
+    "--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds in a row."
+)
+@click.option(
     "--data",
     envvar="LINEAMENT_DATA",
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     help="Folder of the recordings.  [default: LINEAMENT_DATA if set]",
 )
+@click.option(
+    "--museum",
+    type=click.Path(path_type=Path, exists=True),
+    help="A bag of the Deutsches Museum, by Cartographer.",
+)
 @QUIET
-def reproduce(
-    output: Path, names: tuple[str, ...], frames: int, seed: int, data: Path | None, quiet: bool
-) -> None:
+def reproduce(output: Path, names: tuple[str, ...], quiet: bool, **setting: Any) -> None:
     """Run the paper's experiments: a page, and all numbers as JSON."""
     from ..reproduce import Setting, experiment_names
     from ..reproduce.report import reproduce
@@ -61,7 +67,7 @@ def reproduce(
     with wrong_usage():
         chosen = experiment_names(names)
     with status(quiet) as show:
-        page = reproduce(output, chosen, Setting(frames, seed, data), show)
+        page = reproduce(output, chosen, Setting(**setting), show)
     if not quiet:
         click.echo(str(page))
 

@@ -178,13 +178,6 @@ def arc_scores(found: Features, truth: Features) -> FeatureScores:
 
     As `segment_scores`, with centre and radius each within 0.10 m, or three deviations of the
     bound if that is more.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> nothing = ln.extract(ln.LaserScan([2.0] * 9, angle_min=-0.04, angle_increment=0.01))
-    >>> arc_scores(nothing, nothing).counts
-    Counts(correct=0, found=0, true=0)
     """
     one, other = (np.column_stack((f.arcs["center"], f.arcs["radius"])) for f in (found, truth))
     spread = _deviations(truth.arcs)

@@ -36,10 +36,10 @@ class Relations:
     #: Time between them [s], shape (m,).
     seconds: Array
 
-    def far_apart(self) -> "Relations":
-        """Return those over a minute apart, which show whether a way closes."""
-        far = self.seconds > FAR_APART
-        return Relations(self.scans[far], self.motions[far], self.seconds[far])
+    def far_apart(self, far: bool = True) -> "Relations":
+        """Return those over a minute apart, which show whether a way closes, or the others."""
+        kept = (self.seconds > FAR_APART) == far
+        return Relations(self.scans[kept], self.motions[kept], self.seconds[kept])
 
     def errors(self, poses: Sequence[Pose]) -> MotionErrors:
         """How far the motions between these poses of all scans are off."""

@@ -24,14 +24,7 @@ TURNS, LEAST_TURN = 24, math.radians(11.25)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repeats(Summable):
-    """Features of one view that are found again in another.
-
-    Examples
-    --------
-    >>> repeats = Repeats(4, np.array([0.03, 0.04, 0.0]))
-    >>> repeats.repeated, repeats.rate, round(repeats.rmse, 4)
-    (3, 0.75, 0.0289)
-    """
+    """Features of one view that are expected in another, and how far those found there are [m]."""
 
     expected: int = 0
     distances: Array = field(default_factory=lambda: np.empty(0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -38,6 +39,8 @@ _METADATA: dict[str, dict[str, Any]] = {
 #: The endings of pictures.
 PICTURE_ENDINGS = tuple(_METADATA)
 DPI = 150
+#: Of the pictures of pages; those of this width [inch] are legible in print, on 7 inches.
+PAGE_DPI, PAGE_WIDTH = 200, 9.0
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
@@ -68,7 +71,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         _write(figure, temporary, ending, DPI)
 
 
-def figure_bytes(figure: Figure, dpi: int = DPI) -> bytes:
+def figure_bytes(figure: Figure, dpi: int = PAGE_DPI) -> bytes:
     """Return a figure as the bytes of a PNG file, and free its memory."""
     buffer = io.BytesIO()
     _write(figure, buffer, ".png", dpi)
@@ -147,11 +150,12 @@ def add_legend(figure: Figure) -> None:
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
+    width = sum(0.6 + 0.08 * len(label) for label in handles)  # of one line [inch], about
     figure.legend(
         list(handles.values()),
         list(handles),
         loc="outside lower center",
-        ncols=8,
+        ncols=max(1, math.ceil(len(handles) / math.ceil(width / figure.get_figwidth()))),
         fontsize=9,
         frameon=False,
     )

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 LEAST_ERROR = 2e-4
 #: Share of the errors of a corner that lie within three deviations.
 THREE_SIGMA = 1 - math.exp(-4.5)
+#: Half axes of drawn ellipses are cut at this length [m].
+LARGEST_ELLIPSE = 0.5
 #: More positions than this get no texts.
 MAX_LABELS = 29
 
@@ -116,9 +118,12 @@ def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
         shape = {"marker": "D", "ms": size, "mfc": "none", "mec": color, "mew": size / 4}
         _draw_points(axes, drawn["position"], name, **shape, zorder=5)
     corners = corners[~is_edge]
-    label = "3 σ of a corner"
-    for x, y, a, b, turn in ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA):
-        if 0.012 * extent < a < extent:  # else hidden by the marker, or no knowledge at all
+    ellipses = ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA)
+    is_cut = bool((ellipses[:, 2] > LARGEST_ELLIPSE).any())
+    label = "3 σ of a corner" + is_cut * f", cut at {LARGEST_ELLIPSE} m"
+    for x, y, a, b, turn in ellipses:
+        if a > 0.012 * extent:  # else hidden by the marker
+            a, b = min(a, LARGEST_ELLIPSE), min(b, LARGEST_ELLIPSE)
             shape = {"facecolor": CORNER_COLOR + "22", "edgecolor": CORNER_COLOR, "linewidth": 0.8}
             turned = math.degrees(turn)
             axes.add_patch(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from ..methods.trace import Trace
 
-_PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch]
+PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch]
 
 
 def plot_scan(
@@ -38,13 +38,17 @@ def scan_figure(
     scan: LaserScan,
     features_by_method: Mapping[str, Features],
     errors_by_method: Mapping[str, Array] | None = None,
+    *,
+    panel: float = PANEL,
+    farthest: float = math.inf,
 ) -> Figure:
     """Draw what some methods found in one scan, one panel a method, side by side.
 
     Points have the colour of their cluster, noise is a grey cross, and ticks on a ring outside the
     data show where nothing came back. The number beside a corner is its response. Edges are drawn
     lighter than corners, without a number. The similarity errors of the beams (n,) [m], if given,
-    are drawn below the panel of the method.
+    are drawn below the panel of the method. Panels are so wide [inch]; narrow ones have no numbers,
+    and points beyond `farthest` [m] are not shown.
 
     Raises a ValueError if there is no method, or features do not have the scan's number of beams.
     """
@@ -55,9 +59,9 @@ def scan_figure(
     n_methods = len(features_by_method)
     columns = min(n_methods, 3 if n_methods <= 9 else 4)
     rows = math.ceil(n_methods / columns)
-    height = _height(scan, _PANEL) + 0.9
+    height = _height(scan, panel, farthest) + 0.9
     heights = [height] if errors_by_method is None else [height, _STRIP]
-    figure = canvas.new_figure(_PANEL * columns, sum(heights) * rows + 0.3)
+    figure = canvas.new_figure(panel * columns, sum(heights) * rows + 0.3)
     grid = figure.subplots(
         len(heights) * rows, columns, squeeze=False, height_ratios=heights * rows
     )
@@ -66,11 +70,15 @@ def scan_figure(
         axes.remove()
     for k, (method, features) in enumerate(features_by_method.items()):
         shown = drawing.draw_beams(panels[k], scan, features.clusters)
-        canvas.style_plane(panels[k], method, _about(features), shown)
+        shown = shown[np.hypot(*shown.T) <= farthest]
+        about = _about(features, () if panel >= PANEL else ("segments", "corners", "clusters"))
+        canvas.style_plane(panels[k], method, about, shown)
         drawing.draw_features(panels[k], features, scan, _extent(panels[k]))
         if errors_by_method is not None:
             drawing.draw_errors(strips[k], scan, errors_by_method[method])
     canvas.add_legend(figure)
+    if panel < PANEL:
+        return figure
     canvas.settle(figure)
     for axes, features in zip(panels, features_by_method.values(), strict=False):
         corners = features.corners[features.corners["response"] != 0]  # edges and truth have none
@@ -248,8 +256,9 @@ def _check_beams(scan: LaserScan, clusters: NDArray[np.int32], method: str) -> N
         raise ValueError(f"{method}: clusters of {len(clusters)} beams, the scan has {len(scan)}")
 
 
-def _height(scan: LaserScan, width: float) -> float:
-    return canvas.plane_height(np.vstack([scan.points[scan.valid], np.zeros((1, 2))]), width)
+def _height(scan: LaserScan, width: float, farthest: float = math.inf) -> float:
+    shown = scan.points[scan.valid & (scan.ranges <= farthest)]
+    return canvas.plane_height(np.vstack([shown, np.zeros((1, 2))]), width)
 
 
 def _extent(axes: Axes) -> float:
@@ -261,8 +270,10 @@ def _n_clusters(clusters: NDArray[np.int32]) -> int:
     return len(np.unique(clusters[clusters >= 0]))
 
 
-def _about(features: Features) -> str:
-    return _counts(features.counts() | {"clusters": _n_clusters(features.clusters)})
+def _about(features: Features, kinds: Iterable[str] = ()) -> str:
+    """Write how many features there are of some kinds, or of all."""
+    counts = features.counts() | {"clusters": _n_clusters(features.clusters)}
+    return _counts({kind: counts[kind] for kind in kinds or counts})
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from importlib import import_module
 
 from ..errors import needed_by
-from .findings import Figure, Findings, Progress, Setting, Table
+from .findings import Figure, Findings, Progress, Setting, Table, merged_findings
 
 __all__ = [
     "EXPERIMENTS",
@@ -19,6 +19,7 @@ __all__ = [
 
 #: Module of each experiment, in the order of the report, and the paper's names of its results.
 EXPERIMENTS: dict[str, tuple[str, ...]] = {
+    "definitions": ("fig1", "fig4", "fig6", "fig7", "fig8", "table1"),
     "noise": ("fig2", "fig3"),
     "layers": ("fig5", "fig10"),
     "repetition": ("fig9", "fig9a", "fig9b"),
@@ -30,7 +31,10 @@ EXPERIMENTS: dict[str, tuple[str, ...]] = {
     "all_methods": ("methods",),
     "tracking": (),
     "real": ("repeatability",),
+    "museum": (),
 }
+#: Experiments that are run once: on recordings, or on nothing random.
+ONCE = ("definitions", "tracking", "real", "museum")
 
 
 def experiment_names(names: Iterable[str]) -> list[str]:
@@ -59,7 +63,9 @@ def experiment_names(names: Iterable[str]) -> list[str]:
 def run_experiments(
     names: Iterable[str], setting: Setting, progress: Progress
 ) -> dict[str, Findings]:
-    """Run some experiments.
+    """Run some experiments, the simulated ones with each seed of the setting.
+
+    Numbers, texts and tables that differ between the seeds have median and range: see `Spread`.
 
     Parameters
     ----------
@@ -85,10 +91,14 @@ def run_experiments(
     findings = {}
     for k, name in enumerate(chosen, 1):
         module = import_module(f".{name}", __name__)
+        found = []
+        for one in setting.by_seed()[: 1 if name in ONCE else None]:
+            seed = f", seed {one.seed}" if setting.seeds > 1 and name not in ONCE else ""
 
-        def report(about: str, where: str = f"{name} ({k}/{len(chosen)})") -> None:
-            progress(f"{where}: {about}")
+            def report(about: str, where: str = f"{name} ({k}/{len(chosen)}){seed}") -> None:
+                progress(f"{where}: {about}")
 
-        report("starting")
-        findings[name] = module.run(setting, report)
+            report("starting")
+            found.append(module.run(one, report))
+        findings[name] = merged_findings(found)
     return findings

@@ -1,13 +1,16 @@
 """What an experiment gets and returns: a setting; text, tables, figures and numbers."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple, Self, TypeVar
 
 from ..evaluation.counts import plain
 from ..output import canvas
+from .seeds import Spread, merged, merged_text
 
 T = TypeVar("T")
 
@@ -134,6 +137,48 @@ class Findings(NamedTuple):
         }
 
 
+def merged_findings(found: Sequence[Findings]) -> Findings:
+    """Merge what an experiment found with several seeds; the figures are those of the first.
+
+    Tables are the same if they have the same title. One that only the first seed has, such as that
+    of a recording, stays as it is.
+    """
+    if len(found) == 1:
+        return found[0]
+    first = found[0]
+    tables = []
+    for table in first.tables:
+        same = [other for each in found for other in each.tables if other.title == table.title]
+        tables.append(_merged_table(same))
+    numbers = merged([each.numbers for each in found])
+    texts = (merged_text(texts) for texts in zip(*(each.text for each in found), strict=False))
+    return first._replace(text=tuple(texts), tables=tuple(tables), numbers=numbers)
+
+
+def _merged_table(tables: Sequence[Table]) -> Table:
+    """Merge the cells of tables: rows are the same if they begin alike."""
+    by_name = [_named(table.rows) for table in tables]
+    rows = (
+        tuple(merged(cells) for cells in zip(*(of.get(name, blank) for of in by_name), strict=True))
+        for name, row in by_name[0].items()
+        for blank in [(row[0], *[None] * (len(row) - 1))]
+    )
+    first = tables[0]
+    return Table(
+        first.title, first.columns, tuple(rows), merged_text([table.note for table in tables])
+    )
+
+
+def _named(rows: Iterable[tuple[object, ...]]) -> dict[tuple[object, int], tuple[object, ...]]:
+    """Name each row by its first cell, and how many before it begin so."""
+    seen: Counter[object] = Counter()
+    named = {}
+    for row in rows:
+        named[row[0], seen[row[0]]] = row
+        seen[row[0]] += 1
+    return named
+
+
 @dataclass(frozen=True, slots=True)
 class Setting:
     """How much an experiment measures. The same setting gives the same numbers, but for times.
@@ -143,20 +188,31 @@ class Setting:
     frames : int
         Scans of each kind; all other counts follow from it.
     seed : int
-        Seed of all worlds and all noise, not negative.
+        Seed of all worlds and all noise, not negative; the first one.
     data : Path or None
         Folder of the recordings; without it the experiments only simulate.
+    seeds : int
+        How many seeds in a row the simulated experiments are run with.
+    museum : Path or None
+        Bag of the museum that the paper's recordings are from.
     """
 
     frames: int = 10
     seed: int = 0
     data: Path | None = None
+    seeds: int = 5
+    museum: Path | None = None
 
     def __post_init__(self) -> None:
-        if self.frames < 1:
-            raise ValueError(f"frames is {self.frames}, expected at least 1")
-        if self.seed < 0:
-            raise ValueError(f"seed is {self.seed}, expected a number ≥ 0")
+        for name, least in (("frames", 1), ("seed", 0), ("seeds", 1)):
+            value = getattr(self, name)
+            if value < least:
+                raise ValueError(f"{name} is {value}, expected a number ≥ {least}")
+
+    def by_seed(self) -> list[Self]:
+        """Return the setting of each seed; recordings, which are always the same, in the first."""
+        others = (replace(self, seed=self.seed + k, data=None) for k in range(1, self.seeds))
+        return [replace(one, seeds=1) for one in (self, *others)]
 
     def recordings(self, files: Mapping[str, str]) -> dict[str, Path]:
         """Return the paths of those recordings that exist, by their names."""
@@ -171,8 +227,16 @@ def each(items: Mapping[str, T], progress: Progress, what: str) -> Iterator[tupl
         yield name, item
 
 
+def median_of(items: Iterable[T], score: Callable[[T], float]) -> T:
+    """Return the item with the median score, of an even number the lower one: to be drawn."""
+    in_order = sorted(items, key=score)
+    return in_order[(len(in_order) - 1) // 2]
+
+
 def cell_text(cell: object) -> str:
-    """Write a cell of a table: fractions with three digits."""
+    """Write a cell of a table: fractions with three digits, and their range over the seeds."""
+    if isinstance(cell, Spread):
+        return cell.written(cell_text)
     value = plain(cell)
     if not isinstance(value, float):
         return "–" if value is None else str(value)
@@ -187,27 +251,28 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
     Only finite ones are drawn; `log_axes` are the labels of the logarithmic axes.
     """
     rows = list(next(iter(numbers.values())))[::-1]
-    figure = canvas.new_figure(1.8 + 3.4 * len(panels), 1.1 + 0.32 * len(rows))
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 1.2 + 0.24 * len(rows))
     all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (label, (key, factor)) in zip(all_axes, panels.items(), strict=True):
-        canvas.style(axes, "")
+        canvas.style(axes, "", xlabel=fill(label, 22))
         for color, (name, methods) in zip(canvas.PALETTE, numbers.items(), strict=False):
             values = [factor * methods.get(row, {}).get(key, math.nan) for row in rows]
-            dots = {"color": color, "markersize": 6, "alpha": 0.85, "label": name}
+            dots = {"color": color, "markersize": 5, "alpha": 0.85, "label": name}
             axes.plot(values, range(len(rows)), "o", **dots)
         if label in log_axes:
-            axes.set_xscale("log")
-        axes.set_xlabel(label, fontsize=9)
-        axes.set_yticks(range(len(rows)), rows, fontsize=9)
-    legend_below(figure, axes)
+            log_axis(axes.xaxis)
+        axes.set_yticks(range(len(rows)), rows, fontsize=8)
+    canvas.add_legend(figure)
     return canvas.figure_bytes(figure)
 
 
-def legend_below(figure: Any, *panels: Any) -> None:
-    """Write one legend of all panels below a figure."""
-    handles: dict[str, Any] = {}
-    for axes in panels:
-        of_axes, labels = axes.get_legend_handles_labels()
-        handles |= dict(zip(labels, of_axes, strict=True))
-    given = {"loc": "outside lower center", "ncols": 8, "fontsize": 9, "frameon": False}
-    figure.legend(list(handles.values()), list(handles), **given)
+def log_axis(axis: Any) -> None:
+    """Make an axis logarithmic, with a number at each 1, 2 and 5 while these are few."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
+    low, high = axis.get_view_interval()
+    digits = (1, 2, 5) if high < 100 * low else (1,)
+    axis.set_major_locator(LogLocator(10, digits))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())

@@ -4,7 +4,7 @@ from itertools import product
 from typing import Any
 
 from ..output import canvas
-from .findings import Figure, Findings, Progress, Setting, Table, legend_below
+from .findings import Figure, Findings, Progress, Setting, Table
 from .grid import (
     CRITERIA,
     FORMS,
@@ -167,7 +167,7 @@ def _figures(setting: Setting, progress: Progress) -> tuple[Figure, ...]:
 
 def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) -> Figure:
     """Draw AR along one of the two parameters; a panel for each half-width."""
-    figure = canvas.new_figure(11, 4.2)
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.8)
     panels = figure.subplots(1, len(HALF_WIDTHS), sharey=True)
     for axes, half_width in zip(panels, HALF_WIDTHS, strict=True):
         canvas.style(axes, f"half-width of the filter: {half_width} beams")
@@ -189,5 +189,5 @@ def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) 
             ticks = (0.05, 0.1, 0.2, 0.5, 1.0)
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     panels[0].set_ylabel("AR of the actual corners", fontsize=10)
-    legend_below(figure, panels[0])
+    canvas.add_legend(figure)
     return Figure(name, caption, canvas.figure_bytes(figure))

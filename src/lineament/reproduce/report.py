@@ -11,6 +11,7 @@ from ..evaluation.counts import plain
 from ..evaluation.ple import BenchmarkResult
 from ..files import made_folder, write_text
 from ..output.page import (
+    Cell,
     contents_part,
     heading_part,
     image_part,
@@ -20,13 +21,18 @@ from ..output.page import (
     write_parts,
 )
 from . import experiment_names, run_experiments
+from .claims import WORDS, Claim, verdicts
 from .findings import Findings, Progress, Setting, Table, cell_text
+from .seeds import Spread
 
 _INTRODUCTION = (
     "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
     "The values of its tables and of its Figure 12 are not available: where one stands only there, "
     "the column “paper” says “lost”. Its recording, ten frames of the Deutsches Museum, is not "
-    "used: the methods are compared on simulated scans and on other recordings if present.",
+    "used, unless a bag of that museum is given: the methods are compared on simulated scans and "
+    "on other recordings if present.",
+    "Simulated experiments are run with several seeds. Where these differ, a number is the median, "
+    "with the least and the greatest in brackets; figures are those of the first seed.",
 )
 
 
@@ -71,20 +77,48 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
         "lineament": version("lineament"),
         "machine": machine(),
         "frames": setting.frames,
-        "seed": setting.seed,
+        "seeds": [one.seed for one in setting.by_seed()],
         "recordings": setting.data is not None,
+        "museum": setting.museum is not None,
     }
-    experiments = {name: found.to_dict() for name, found in findings.items()}
-    text = json.dumps({**about, "experiments": experiments}, indent=1, ensure_ascii=False)
+    judged = verdicts(findings)
+    written = {
+        **about,
+        "verdicts": {claim.place: verdict for claim, _, verdict in judged},
+        "experiments": {name: found.to_dict() for name, found in findings.items()},
+    }
+    text = json.dumps(written, indent=1, ensure_ascii=False)
     write_text(folder / "figures.json", text + "\n")
-    about["recordings"] = "none" if setting.data is None else "yes"
-    parts = [list_part((k, str(v)) for k, v in about.items()), *text_parts(_INTRODUCTION)]
-    parts.append(contents_part([(name, found.title) for name, found in findings.items()]))
+    shown = {**about, "seeds": ", ".join(str(one.seed) for one in setting.by_seed())}
+    facts = [(k, ("no", "yes")[v] if isinstance(v, bool) else str(v)) for k, v in shown.items()]
+    entries = {"verdicts": "The paper’s figures and tables"}
+    entries |= {name: found.title for name, found in findings.items()}
+    parts = [
+        *(list_part(facts), *text_parts(_INTRODUCTION), contents_part(entries.items())),
+        *(heading_part("verdicts", entries["verdicts"]), _verdicts_part(judged, findings)),
+    ]
     for name, found in findings.items():
         parts += [heading_part(name, found.title), *findings_parts(found)]
     page = folder / "index.html"
     write_parts(page, "lineament: the paper’s experiments", parts)
     return page
+
+
+def _verdicts_part(
+    judged: Sequence[tuple[Claim, str, str]], findings: Mapping[str, Findings]
+) -> str:
+    """Make the table of the paper's figures and tables: where they are here, and verdicts."""
+    rows = []
+    for claim, here, verdict in judged:
+        found = findings.get(claim.experiment)
+        figures = {figure.name for figure in found.figures} if found else {}
+        at = claim.figure if claim.figure in figures else claim.experiment
+        place = Cell(claim.place, href=f"#{at}" if found else "")
+        word = Cell(verdict or "–", "verdict")
+        rows.append([place, word, Cell(claim.paper), Cell(here or "–")])
+    words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
+    note = f"{words[0].upper()}{words[1:]}. A dash: the experiment was not run."
+    return table_part("Verdicts", ("", "verdict", "paper", "here"), rows, note)
 
 
 def findings_parts(findings: Findings) -> list[str]:
@@ -93,16 +127,18 @@ def findings_parts(findings: Findings) -> list[str]:
         table_part(
             table.title,
             table.columns,
-            [
-                [(cell_text(cell), isinstance(plain(cell), int | float)) for cell in row]
-                for row in table.rows
-            ],
+            [[_cell(cell) for cell in row] for row in table.rows],
             table.note,
         )
         for table in findings.tables
     ]
-    images = [image_part(figure.caption, figure.png) for figure in findings.figures]
+    images = [image_part(figure.caption, figure.png, figure.name) for figure in findings.figures]
     return [*text_parts(findings.text), *tables, *images]
+
+
+def _cell(cell: object) -> Cell:
+    is_number = isinstance(cell, Spread) or isinstance(plain(cell), int | float | None)
+    return Cell(cell_text(cell), "number" if is_number else "")
 
 
 def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:

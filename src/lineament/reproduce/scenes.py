@@ -1,22 +1,27 @@
 """Figure 11: what the methods find, side by side, in simulated scenes and in recordings."""
 
 from collections.abc import Mapping
+from typing import Any
 
-from ..evaluation.scores import evaluate
+import numpy as np
+
+from ..evaluation.scores import Scores, evaluate
+from ..evaluation.similarity import SimilarityScores, similarity_scores
 from ..features import Features
 from ..output import canvas
 from ..output.figures import scan_figure
 from ..scan import LaserScan
 from ..simulation import SENSORS
 from .compare import compare_scan
-from .contenders import drawn_methods
-from .findings import Figure, Findings, Progress, Setting, Table
+from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, drawn_methods
+from .findings import Figure, Findings, Progress, Setting, Table, median_of
 from .scans import INDOORS, recorded_scans, scene_numbers, simulated_frames
 
-#: What the numbers in the pictures are.
-RED_NUMBERS = "Red numbers: response of the corner, in the unit of the method."
-#: Scans of a recording, one of which is drawn.
-CHOICE = 5
+TRUE = "true features"
+#: What the first picture of a scan shows; the second one has all others.
+FIRST = (TRUE, PDBS_LINES, "iepf:paper", LIU_PAPER, LIU_BEST, "optimal")
+#: Scans of a recording, one of which is drawn; of the measurements, the share that is shown.
+CHOICE, NEAR = 5, 0.98
 
 _COLUMNS = {
     "segments found": ("segments_found", 1),
@@ -29,45 +34,56 @@ _COLUMNS = {
 
 
 def run(setting: Setting, progress: Progress) -> Findings:
-    """Draw scans of simulated scenes and of recordings, and count what is found in them."""
+    """Score and draw scans of simulated scenes and of recordings."""
     methods = drawn_methods(setting, progress)
     tables, figures = [], []
+    numbers: dict[str, Any] = {}
+    everything = dict.fromkeys(methods, Scores())
     for kind in INDOORS:
-        progress(f"{kind}: drawing all methods")
-        numbers = scene_numbers(1, setting.seed)
-        (frame,) = simulated_frames(SENSORS["paper"], [kind], numbers)
-        found = {name: extract(frame.scan) for name, extract in methods.items()}
-        rows = {}
-        for name, features in found.items():
-            scores = evaluate(features, frame.truth)
-            corners, segments = scores.corners.counts, scores.segments.counts
-            rows[name] = {
-                "segments_found": segments.found,
-                "segments_right": segments.correct,
-                "corners_found": corners.found,
-                "corners_right": corners.correct,
-                **scores.summary(),
-            }
+        progress(f"{kind}: all methods")
+        scenes = scene_numbers(setting.frames, setting.seed)
+        frames = list(simulated_frames(SENSORS["paper"], [kind], scenes))
+        scores = {
+            name: [evaluate(extract(frame.scan), frame.truth) for frame in frames]
+            for name, extract in methods.items()
+        }
+        totals = {name: Scores.total(of) for name, of in scores.items()}
+        everything = {name: everything[name] + total for name, total in totals.items()}
+        rows = numbers[kind] = {name: _numbers(total) for name, total in totals.items()}
+        some = next(iter(totals.values()))
         note = (
-            f"True segments: {segments.true}, true corners: {corners.true}, both sides of 6 beams "
-            "or more."
+            f"{len(frames)} scans. True segments: {some.segments.counts.true}, true corners: "
+            f"{some.corners.counts.true}, both sides of 6 beams or more."
         )
-        tables.append(Table.of_numbers(f"One scan of a simulated {kind}", rows, _COLUMNS, note))
-        caption = f"Simulated {kind}: the true features, and what each method finds. {RED_NUMBERS}"
-        shown = {"true features": frame.truth} | found
-        figures.append(picture(f"fig11-{kind}", caption, frame.scan, shown))
+        tables.append(Table.of_numbers(f"Scans of a simulated {kind}", rows, _COLUMNS, note))
+        of_frames = [Scores.total(of) for of in zip(*scores.values(), strict=True)]
+        order = median_of(enumerate(of_frames), lambda item: item[1].segments.counts.f1)[0]
+        frame = frames[order]
+        about = (
+            f"Simulated {kind}: of {len(frames)} scans the one with the median F1 of the segments "
+            "of all methods together"
+        )
+        found = {name: extract(frame.scan) for name, extract in methods.items()}
+        figures += pictures(f"fig11-{kind}", about, frame.scan, {TRUE: frame.truth} | found)
     for name, scans in recorded_scans(setting, CHOICE):
-        progress(f"{name}: drawing all methods")
-        # One far point would make a picture of small dots: the scan that reaches the least far.
-        nearest = min(scans, key=lambda scan: float(scan.ranges[scan.valid].max(initial=0.0)))
-        comparison = compare_scan(nearest, methods, title=f"{name}, one scan")
-        tables.append(comparison.table(times=False))
-        caption = (
-            f"{name}: what each method finds in one scan: of {CHOICE} from equal parts of the "
-            f"recording, the one that reaches the least far. {RED_NUMBERS}"
+        progress(f"{name}: all methods")
+        errors = [
+            SimilarityScores.total(similarity_scores(scan, e(scan)) for e in methods.values()).mean
+            for scan in scans
+        ]
+        scan = scans[median_of(range(len(scans)), errors.__getitem__)]
+        comparison = compare_scan(scan, methods, title=f"{name}, one scan")
+        table = comparison.table(times=False)
+        tables.append(table)
+        about = (
+            f"{name}: of {CHOICE} scans from equal parts of the recording the one with the median "
+            "mean similarity error of all methods together"
         )
         where = f"fig11-{name.lower().replace(' ', '-')}"
-        figures.append(picture(where, caption, nearest, comparison.features))
+        figures += pictures(where, about, scan, comparison.features)
+        numbers[name] = {
+            str(m): dict(zip(table.columns[1:], of, strict=True)) for m, *of in table.rows
+        }
     return Findings(
         "The methods side by side (Figure 11)",
         (
@@ -80,10 +96,27 @@ def run(setting: Setting, progress: Progress) -> Findings:
         ),
         tuple(tables),
         tuple(figures),
-        {table.title: table.to_dict()["rows"] for table in tables},
+        numbers | {"segment_f1": {n: s.segments.counts.f1 for n, s in everything.items()}},
     )
 
 
-def picture(name: str, caption: str, scan: LaserScan, found: Mapping[str, Features]) -> Figure:
-    """Draw the features of a scan, a panel for each method."""
-    return Figure(name, caption, canvas.figure_bytes(scan_figure(scan, found), dpi=100))
+def _numbers(scores: Scores) -> dict[str, float]:
+    counts = {"corners": scores.corners.counts, "segments": scores.segments.counts}
+    found = {f"{kind}_found": of.found for kind, of in counts.items()}
+    return found | {f"{kind}_right": of.correct for kind, of in counts.items()} | scores.summary()
+
+
+def pictures(name: str, about: str, scan: LaserScan, found: Mapping[str, Features]) -> list[Figure]:
+    """Draw the features of a scan, a panel for each method: those of `FIRST`, then the others."""
+    ranges = scan.ranges[scan.valid]
+    farthest = 1.1 * float(np.quantile(ranges, NEAR)) if len(ranges) else np.inf
+    beyond = int((ranges > farthest).sum())
+    left_out = f" {beyond} points beyond {farthest:.0f} m are left out." if beyond else ""
+    first = {method: found[method] for method in FIRST if method in found}
+    figures = []
+    for part, shown in (("", first), ("-others", {m: found[m] for m in found if m not in first})):
+        if shown:
+            figure = scan_figure(scan, shown, panel=canvas.PAGE_WIDTH / 3, farthest=farthest)
+            caption = f"{about}{', further methods' if part else ''}.{left_out}"
+            figures.append(Figure(name + part, caption, canvas.figure_bytes(figure)))
+    return figures

@@ -52,6 +52,8 @@ _WAY, _TURN = (0.02, 0.1), (0.01, 0.1)
 _FAR = 10
 ODOMETRY, FEATURES, ICP = "odometry, synthetic", "features", "ICP"
 CORRECTED = "the log’s corrected poses"
+#: Numbers by relations: all, those up to a minute apart, those over a minute apart.
+RELATION_KEYS = "relations", "near", "far_apart"
 
 _RELATIONS = {
     "relations": ("motions", 1),
@@ -104,12 +106,13 @@ def run(setting: Setting, progress: Progress) -> Findings:
               for kind, of_kind in of.items()}
         for log, every in found.items()
     }  # fmt: skip
-    near, far = ({log: of[key] for log, of in found.items()} for key in ("relations", "far_apart"))
+    every, near, far = ({log: of[key] for log, of in found.items()} for key in RELATION_KEYS)
     return Findings(
         title,
         _TEXT,
         (
-            *_table("Motion against verified relations", near, _RELATIONS, "motion from"),
+            *_table("Motion against verified relations", every, _RELATIONS, "motion from"),
+            *_table("Of these, those up to a minute apart", near, _RELATIONS, "motion from"),
             *_table("Of these, those over a minute apart", far, _RELATIONS, "motion from"),
             *_table("Motion against the log’s corrected poses", motions, _MOTION, "motion from"),
             *_table("Tracks", kinds, _TRACKS, "tracker: of"),
@@ -138,9 +141,8 @@ def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table
 _TEXT = (
     "Verified relations come first: relative poses of pairs of scans that people aligned by hand "
     "(Kümmerle et al. 2009), where both scans are in the log to the millisecond. Motions are put "
-    "together from the one scan to the other. The relations are between neighbours for the most; "
-    "those over a minute apart, where motions drift and nothing here closes a loop, are repeated "
-    "by themselves.",
+    "together from the one scan to the other. Most relations are between neighbours; over a minute "
+    "and more motions drift, as nothing here closes a loop: those stand by themselves.",
     "The log’s corrected poses are a reference second to them: they are off the relations by "
     "themselves, in the two offices by a few centimetres. Those of the arena come from motion "
     "capture, refined on its walls. Errors are from scan to scan, and over "
@@ -185,7 +187,7 @@ def measure(
     """Follow the features of a log, with an odometry and without, and run ICP on it.
 
     Returns errors of motions by what they are from, against the poses as "motion", against the
-    relations of a file as "relations" and "far_apart", and "tracks" by tracker and kind of feature.
+    relations of a file by `RELATION_KEYS`, and "tracks" by tracker and kind of feature.
     """
     poses = [scan.pose for scan in scans if scan.pose is not None]
     extract = Extractor(DEFAULT_METHOD)
@@ -203,11 +205,12 @@ def measure(
         tracks[features] = _track_numbers(frames, found, poses)
         progress(f"{name}: ICP{about}")
         motions[ICP + about] = _icp_motions(scans, None if about else steps)
-    numbers: dict[str, dict[str, Any]] = {"relations": {}, "far_apart": {}, "tracks": tracks}
+    numbers: dict[str, dict[str, Any]] = {key: {} for key in RELATION_KEYS} | {"tracks": tracks}
     if verified is not None:
         every = read_relations(verified, np.array([scan.stamp for scan in scans]))
         ways = {CORRECTED: poses} | {source: chained(of) for source, of in motions.items()}
-        for key, relations in (("relations", every), ("far_apart", every.far_apart())):
+        parts = every, every.far_apart(False), every.far_apart()
+        for key, relations in zip(RELATION_KEYS, parts, strict=True):
             numbers[key] = {by: relations.errors(way).summary() for by, way in ways.items()}
     numbers["motion"] = {
         source: motion_errors(motion, poses).summary()

@@ -1,0 +1,143 @@
+"""What several seeds give, as one: numbers that differ become their median and range."""
+
+import math
+import operator
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any, Self
+
+import numpy as np
+
+
+def by_seed(operation: Callable[..., float], *numbers: float) -> "Spread":
+    """Apply an operation seed by seed to spreads, and to numbers that are the same in all seeds.
+
+    Examples
+    --------
+    >>> by_seed(min, Spread([1.0, 3.0]), 2.0)
+    Spread([1.0, 2.0])
+    """
+    n = max(len(getattr(number, "values", ())) for number in numbers) or 1
+    each = (getattr(number, "values", (number,) * n) for number in numbers)
+    return Spread(map(operation, *each))
+
+
+def _operator(operation: Callable[..., float]) -> Callable[..., "Spread"]:
+    return lambda *numbers: by_seed(operation, *numbers)
+
+
+class Spread(float):
+    """A number by seed, NaN where a seed has none; as a float it is the median of the others.
+
+    Differences, products and quotients are taken seed by seed, comparisons by the median, and a
+    format is that of the median and of the least and the greatest value.
+
+    Examples
+    --------
+    >>> f1 = Spread([0.5, 0.75, 0.625])
+    >>> f"{100 * f1:.1f} %", f"{f1 - 0.125:.2f}"
+    ('62.5 (50.0–75.0) %', '0.50 (0.38–0.62)')
+    """
+
+    values: tuple[float, ...]
+
+    def __new__(cls, values: Iterable[float]) -> Self:
+        """Make it of the numbers of at least one seed."""
+        given = tuple(float(value) for value in values)
+        known = [value for value in given if not math.isnan(value)]
+        self = super().__new__(cls, median(known) if known else math.nan)
+        self.values = given
+        return self
+
+    __sub__ = _operator(operator.sub)
+    __rsub__ = _operator(lambda b, a: a - b)
+    __mul__ = __rmul__ = _operator(operator.mul)
+    __truediv__ = _operator(lambda part, whole: part / whole if whole else math.nan)
+
+    def __getnewargs__(self) -> Any:
+        """Return what copies are made of."""
+        return (self.values,)
+
+    def written(self, write: Callable[[float], str]) -> str:
+        """Write the median, and the range if that is another, each as a function does."""
+        known = [value for value in self.values if not math.isnan(value)]
+        if not known:
+            return write(math.nan)
+        some = f"{len(known)} of {len(self.values)} seeds" if len(known) < len(self.values) else ""
+        return _with_range(write(float(self)), write(min(known)), write(max(known)), some)
+
+    def __format__(self, form: str) -> str:
+        """Write each number in a format."""
+        return self.written(lambda value: format(value, form))
+
+    def __repr__(self) -> str:
+        """Write all numbers."""
+        return f"Spread({list(self.values)})"
+
+    def tolist(self) -> dict[str, object]:
+        """Return the median and the numbers of all seeds, as JSON has them."""
+        return {"median": float(self), "seeds": list(self.values)}
+
+
+def _with_range(middle: str, least: str, most: str, seeds: str = "") -> str:
+    to = " to " if least[:1] in ("-", "−", "+") else "–"
+    parts = [*([f"{least}{to}{most}"] if least != most else []), *([seeds] if seeds else [])]
+    return f"{middle} ({', '.join(parts)})" if parts else middle
+
+
+def merged(values: Sequence[Any]) -> Any:
+    """Merge the same number, text or container of several seeds; None is one that has none.
+
+    Examples
+    --------
+    >>> merged([{"f1": 0.5, "best": "radius 6"}, {"f1": 0.75, "best": "radius 8"}])
+    {'f1': Spread([0.5, 0.75]), 'best': 'radius 7 (6–8)'}
+    """
+    given = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
+    known = [value for value in given if value is not None]
+    if not known:
+        return None
+    first = known[0]
+    if isinstance(first, Mapping):
+        names = dict.fromkeys(name for value in known for name in value)
+        return {name: merged([value.get(name) for value in known]) for name in names}
+    if isinstance(first, list | tuple) and len({len(value) for value in known}) == 1:
+        return [merged(items) for items in zip(*known, strict=True)]
+    if all(isinstance(value, int | float | np.number) for value in known):
+        numbers = [math.nan if value is None else value for value in given]
+        return first if all(repr(value) == repr(first) for value in numbers) else Spread(numbers)
+    if all(isinstance(value, str) for value in known):
+        return merged_text(known)
+    return first if all(value == first for value in known) else given
+
+
+_NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_SENTENCES = re.compile(r"(?<=[.:;]) ")
+
+
+def merged_text(texts: Sequence[str]) -> str:
+    """Merge sentences that differ in their numbers; those that differ otherwise are all given.
+
+    Examples
+    --------
+    >>> merged_text(["3 of 9. It holds.", "4 of 9. It holds.", "8 of 9. It fails."])
+    '4 (3–8) of 9. It holds. (2 of 3 seeds); It fails. (1 of 3 seeds)'
+    """
+    if len(set(texts)) == 1:
+        return texts[0]
+    sentences = [_SENTENCES.split(text) for text in texts]
+    if len({len(each) for each in sentences}) == 1 < len(sentences[0]):
+        return " ".join(merged_text(same) for same in zip(*sentences, strict=True))
+    if len({_NUMBER.sub("", text) for text in texts}) > 1:
+        counts = Counter(texts).items()
+        return "; ".join(f"{text} ({count} of {len(texts)} seeds)" for text, count in counts)
+    tokens = iter([_merged_token(each) for each in zip(*map(_NUMBER.findall, texts), strict=True)])
+    return _NUMBER.sub(lambda _: next(tokens), texts[0])
+
+
+def _merged_token(tokens: Sequence[str]) -> str:
+    """Merge one number of a text; of an even number of them the median is the lower one."""
+    in_order = sorted(tokens, key=lambda token: float(token.replace("−", "-")))
+    return _with_range(in_order[(len(tokens) - 1) // 2], in_order[0], in_order[-1])
