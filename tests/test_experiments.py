@@ -300,7 +300,8 @@ class TestMuseum:
         monkeypatch.setattr(museum, "SCANS_A_FRAME", 20)
         findings = museum.run(Setting(2, museum=bag), silent)
         names = [figure.name for figure in findings.figures]
-        assert names == [f"museum-{name}" for name in ("fig11", "fig12", "fig13")]
+        parts = "fig11", "fig11-others", "fig12", "fig13"
+        assert names == [f"museum-{part}" for part in parts]
         methods, distance = (findings.numbers[key] for key in ("methods", "distance"))
         assert list(methods) == list(distance)
         assert methods["iepf"]["corners"] > 3
@@ -310,7 +311,7 @@ class TestMuseum:
         assert distance["pdbs, fitted"]["found"] == 0
         assert len(distance["iepf"]["places"]) == 5
         first = dict(zip(findings.tables[1].columns, findings.tables[1].rows[0], strict=True))
-        assert (first["paper: mean [m]"], first["here: mean [m]"]) == ("2.302", None)
+        assert (first["method"], first["paper: mean [m]"]) == ("liu, paper’s numbers", "2.302")
         json.dumps(findings.to_dict(), allow_nan=False)
 
     def test_scans_are_of_the_museums_topic_and_apart(self, bag):

@@ -158,6 +158,12 @@ class TestSeeds:
         assert (10 * one).values == (one * 10).values == (10.0, 50.0, 30.0)
         assert (other / one).values == (2.0, 0.8, 8 / 3)
         assert math.isnan((one / Spread([0.0, 1.0, 1.0])).values[0])
+        assert (1 / Spread([2.0, 4.0])).values == (0.5, 0.25)
+        assert (one + other).values == (other + one).values == (3.0, 9.0, 11.0)
+        assert (1 + one + 1).values == (3.0, 7.0, 5.0)
+        assert abs(-one).values == one.values
+        assert abs(one - other).values == (1.0, 1.0, 5.0)
+        assert copy.deepcopy(one).values == one.values
         assert repr(one) == "Spread([1.0, 5.0, 3.0])"
 
     @pytest.mark.parametrize(
@@ -344,10 +350,17 @@ class TestVerdicts:
                     "liu:paper, best of Figure 9": of(0, 0.7, 9.0),
                     "iepf:paper": of(0, 0.6, 4.0),
                     "iepf:paper, in clusters": of(0, 0.6, 4.0),
-                }
+                },
+                "sensitivity": {
+                    "bands": {
+                        "clusters": {"low": Spread([80, 70]), "high": Spread([90, 95])},
+                        "recall": {"low": 0, "high": 1},
+                    }
+                },
             }
         )
         assert judged["Table 3: partition"][1] == "does not"
+        assert judged["Table 3: partition"][0].endswith("leaves open: right 70 % to 95 %")
         assert judged["Table 3: corners"][1] == "in part"
         assert judged["Table 3: time"] == ("0.50 of PDBS, 0.75 of IEPF", "in part")
 

@@ -26,7 +26,8 @@ class Claim(NamedTuple):
     """A claim of the paper: its place there and here, what it is, and how to judge it.
 
     `judge` gets the numbers of the experiment, and returns what is found here, and margins: each
-    is a number or `Spread`, not negative where the claim holds, NaN where it is undecided.
+    is a number or `Spread`, not negative where the claim holds, NaN where it is undecided. `open`
+    names the band of `sensitivity` that the same number has, and what that is.
     """
 
     place: str
@@ -34,6 +35,7 @@ class Claim(NamedTuple):
     figure: str
     paper: str
     judge: Callable[[Any], tuple[str, Sequence[float]]]
+    open: tuple[str, str] | None = None
 
 
 def word(margins: Iterable[float]) -> str:
@@ -67,8 +69,19 @@ def verdicts(findings: Mapping[str, Findings]) -> list[tuple[Claim, str, str]]:
         if claim.experiment in findings:
             here, margins = claim.judge(findings[claim.experiment].numbers)
             verdict = word(margins)
+            if claim.open and "sensitivity" in findings:
+                about, (low, high) = claim.open[1], _band(findings["sensitivity"], claim.open[0])
+                here += f". By what the paper leaves open: {about} {low:.0f} % to {high:.0f} %"
         judged.append((claim, here, verdict))
     return judged
+
+
+def _band(sensitivity: Findings, name: str) -> tuple[float, float]:
+    """Return the least and the greatest share, over all seeds and values of what is open [%]."""
+    bands: Any = sensitivity.numbers["bands"]
+    ends = [bands[name][end] for end in ("low", "high")]
+    low, high = ([*getattr(end, "values", (end,))] for end in ends)
+    return min(low), max(high)
 
 
 def _definition(figure: str, about: str, margin: Callable[[Any], float]) -> Any:
@@ -244,6 +257,7 @@ CLAIMS = (
     Claim(
         *("Table 2", "two_corners", "", "Their distance: 2.302 m on average, variance lost"),
         _distance,
+        ("both", "both found in"),
     ),
     Claim(
         *("Table 3: partition", "success", "", "95.11 %, PDBS 83.55 %"),
@@ -251,6 +265,7 @@ CLAIMS = (
             *("Right clusters", "partition_success"),
             *(("liu:paper, no corners",), ("pdbs, fixed 0.3 m",)),
         ),
+        ("clusters", "right"),
     ),
     Claim(
         *("Table 3: corners", "success", "", "92.62 %, IEPF 72.51 %"),
@@ -258,6 +273,7 @@ CLAIMS = (
             *("Found", "corner_recall_0.10", (LITERAL, LITERAL_BEST)),
             ("iepf:paper", "iepf:paper, in clusters"),
         ),
+        ("recall", "found"),
     ),
     Claim(
         *("Table 3: time", "success", "", "“About half”: 0.61–0.70 of PDBS, 0.72 of IEPF"),

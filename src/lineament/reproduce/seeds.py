@@ -10,28 +10,34 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..evaluation.counts import ratio
 
-def by_seed(operation: Callable[..., float], *numbers: float) -> "Spread":
+
+def by_seed(operation: Callable[..., float], *numbers: float) -> float:
     """Apply an operation seed by seed to spreads, and to numbers that are the same in all seeds.
+
+    The result is a spread if one of them is.
 
     Examples
     --------
     >>> by_seed(min, Spread([1.0, 3.0]), 2.0)
     Spread([1.0, 2.0])
     """
-    n = max(len(getattr(number, "values", ())) for number in numbers) or 1
+    n = max(len(getattr(number, "values", ())) for number in numbers)
+    if n == 0:
+        return operation(*numbers)
     each = (getattr(number, "values", (number,) * n) for number in numbers)
     return Spread(map(operation, *each))
 
 
-def _operator(operation: Callable[..., float]) -> Callable[..., "Spread"]:
+def _operator(operation: Callable[..., float]) -> Callable[..., float]:
     return lambda *numbers: by_seed(operation, *numbers)
 
 
 class Spread(float):
     """A number by seed, NaN where a seed has none; as a float it is the median of the others.
 
-    Differences, products and quotients are taken seed by seed, comparisons by the median, and a
+    Sums, products and their inverses are taken seed by seed, comparisons by the median, and a
     format is that of the median and of the least and the greatest value.
 
     Examples
@@ -51,10 +57,13 @@ class Spread(float):
         self.values = given
         return self
 
+    __add__ = __radd__ = _operator(operator.add)
     __sub__ = _operator(operator.sub)
     __rsub__ = _operator(lambda b, a: a - b)
     __mul__ = __rmul__ = _operator(operator.mul)
-    __truediv__ = _operator(lambda part, whole: part / whole if whole else math.nan)
+    __truediv__ = _operator(ratio)
+    __rtruediv__ = _operator(lambda whole, part: ratio(part, whole))
+    __neg__, __abs__ = _operator(operator.neg), _operator(abs)
 
     def __getnewargs__(self) -> Any:
         """Return what copies are made of."""
