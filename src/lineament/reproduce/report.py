@@ -21,7 +21,7 @@ from ..output.page import (
     write_parts,
 )
 from . import experiment_names, run_experiments
-from .claims import WORDS, Claim, verdicts
+from .claims import WORDS, Claim, bands, verdicts
 from .findings import Findings, Progress, Setting, Table, cell_text
 from .seeds import Spread
 
@@ -104,21 +104,28 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     return page
 
 
+_VERDICTS = "", "verdict", "paper", "here", "by what the paper leaves open"
+
+
 def _verdicts_part(
     judged: Sequence[tuple[Claim, str, str]], findings: Mapping[str, Findings]
 ) -> str:
     """Make the table of the paper's figures and tables: where they are here, and verdicts."""
-    rows = []
+    rows, of_open = [], bands(findings)
     for claim, here, verdict in judged:
         found = findings.get(claim.experiment)
         figures = {figure.name for figure in found.figures} if found else {}
         at = claim.figure if claim.figure in figures else claim.experiment
         place = Cell(claim.place, href=f"#{at}" if found else "")
         word = Cell(verdict or "–", "verdict")
-        rows.append([place, word, Cell(claim.paper), Cell(here or "–")])
+        band = Cell(of_open.get(claim.place, "–"))
+        rows.append([place, word, Cell(claim.paper), Cell(here or "–"), band])
     words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
-    note = f"{words[0].upper()}{words[1:]}. A dash: the experiment was not run."
-    return table_part("Verdicts", ("", "verdict", "paper", "here"), rows, note)
+    note = (
+        f"{words[0].upper()}{words[1:]}. The last column is the range of the same number over all "
+        "values of the parameters that the paper does not state. A dash: not run."
+    )
+    return table_part("Verdicts", _VERDICTS, rows, note)
 
 
 def findings_parts(findings: Findings) -> list[str]:
