@@ -106,6 +106,16 @@ def view(
 
 
 @click.command()
+@click.argument("name", default="")
+def methods(name: str) -> None:
+    """List the methods; or the parameters of NAME, with defaults, units and bounds."""
+    from ..methods import describe
+
+    with wrong_usage():
+        click.echo(describe(name))
+
+
+@click.command()
 @methods_option("Name of the method; may be given again.  [default: optimal]")
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
@@ -135,5 +145,8 @@ def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
-_ALL = (extract, info, plot, view, live, demo, warmup, compare, reproduce, bench, simulate)
+_ALL = (
+    *(extract, info, plot, view, live, demo),
+    *(methods, warmup, compare, reproduce, bench, simulate),
+)
 COMMANDS = {command.name: command for command in _ALL if command.name}

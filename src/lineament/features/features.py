@@ -5,24 +5,64 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan import RangeNoise
+from .._lazy import Pictured
+from ..errors import needed_by
+from ..scan import LaserScan, NoiseLike, RangeNoise
 from .records import TABLES
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
     import pyarrow as pa
+    from matplotlib.axes import Axes
 
 #: What is counted: edges apart from the corners.
 COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
 
 
+class Tabled:
+    """Features that become a table, with one row a feature."""
+
+    __slots__ = ()
+
+    def to_arrow(self, scan: int = 0) -> pa.Table:
+        """Make a table with one row a feature; its schema is described in ``docs/formats.md``.
+
+        Scans are numbered from `scan`.
+
+        Examples
+        --------
+        >>> import lineament as ln
+        >>> table = ln.extract([2.0] * 5, angle_min=-0.02, angle_increment=0.01).to_arrow(scan=7)
+        >>> table["kind"].to_pylist(), table["scan"][0].as_py()
+        (['segment', 'breakpoint', 'breakpoint', 'cluster'], 7)
+        """
+        raise NotImplementedError
+
+    def to_pandas(self, scan: int = 0) -> pd.DataFrame:
+        """Make `to_arrow` a data frame of pandas; a LineamentError if pandas is missing."""
+        with needed_by("to_pandas"):
+            import pandas  # noqa: F401
+        return self.to_arrow(scan).to_pandas()
+
+    def to_polars(self, scan: int = 0) -> pl.DataFrame:
+        """Make `to_arrow` a data frame of polars; a LineamentError if polars is missing."""
+        with needed_by("to_polars"):
+            import polars as pl
+        return pl.from_arrow(self.to_arrow(scan))
+
+
 @dataclass(slots=True, eq=False, repr=False)
-class Features:
+class Features(Tabled, Pictured):
     """All features of one scan. The arrays are read-only.
+
+    ``len(features)`` counts the records of its four tables, ``features["corners"]`` is a table by
+    name, iterating gives the names; in a notebook they are a picture.
 
     Attributes
     ----------
@@ -37,6 +77,8 @@ class Features:
         The scan's own frame.
     noise : RangeNoise or None
         The range noise that was used, given or estimated; None where the scan has no valid beam.
+    scan : LaserScan or None
+        The scan itself, for pictures; None in a batch, in another frame, and from a file.
 
     Examples
     --------
@@ -53,6 +95,19 @@ class Features:
     stamp: float = 0.0
     frame_id: str = ""
     noise: RangeNoise | None = None
+    scan: LaserScan | None = None
+
+    def __len__(self) -> int:
+        return sum(len(getattr(self, name)) for name in TABLES)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(TABLES)
+
+    def __getitem__(self, name: str) -> NDArray[np.void]:
+        if name not in TABLES:
+            raise KeyError(f"{name!r}, expected one of: {', '.join(TABLES)}")
+        table: NDArray[np.void] = getattr(self, name)
+        return table
 
     def __repr__(self) -> str:
         n_clusters = int(self.clusters.max(initial=-1)) + 1
@@ -115,20 +170,22 @@ class Features:
         breakpoints["position"] = moved(breakpoints["position"])
         for table in tables.values():
             table.flags.writeable = False
-        return replace(self, **tables, frame_id=self.frame_id if frame_id is None else frame_id)
+        name = self.frame_id if frame_id is None else frame_id
+        return replace(self, **tables, frame_id=name, scan=None)
 
-    def to_arrow(self) -> pa.Table:
-        """Make a table with one row a feature; its schema is described in ``docs/formats.md``.
+    def plot(self, ax: Axes | None = None, *, scan: LaserScan | None = None) -> Axes:
+        """Draw the features over their scan, see `lineament.plot`; returns the axes.
 
-        Examples
-        --------
-        >>> import lineament as ln
-        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).to_arrow()["kind"].to_pylist()
-        ['segment', 'breakpoint', 'breakpoint', 'cluster']
+        `scan` is needed where the features do not have it themselves: those of a batch.
         """
+        import lineament
+
+        return lineament.plot(self, scan, ax=ax)
+
+    def to_arrow(self, scan: int = 0) -> pa.Table:  # noqa: D102 (as in the base)
         from .tables import features_table
 
-        return features_table([self])
+        return features_table([self], scan)
 
     def to_dict(self) -> dict[str, Any]:
         """Make plain dicts, lists, numbers and strings of everything, as JSON takes them.
@@ -149,10 +206,11 @@ class Features:
 
 
 @dataclass(slots=True, eq=False, repr=False)
-class FeatureBatch:
+class FeatureBatch(Tabled):
     """Features of many scans: the arrays of `Features`, one after the other.
 
-    ``batch[i]`` is a view of the i-th scan's features; iterating gives them in order.
+    ``batch[i]`` is a view of the i-th scan's features, ``batch[i:j]`` of several as a batch;
+    iterating gives them in order.
 
     Attributes
     ----------
@@ -194,7 +252,15 @@ class FeatureBatch:
     def __len__(self) -> int:
         return len(self.clusters)
 
-    def __getitem__(self, index: int) -> Features:
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> Features: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Self: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> Features | Self:
+        if isinstance(index, slice):
+            return self._part(range(len(self))[index])
         i = range(len(self))[index]
         tables = {
             name: getattr(self, name)[self.offsets[name][i] : self.offsets[name][i + 1]]
@@ -208,20 +274,32 @@ class FeatureBatch:
             noise=noise_of(self.noises[i]),
         )
 
+    def _part(self, scans: range) -> Self:
+        if scans.step != 1:
+            raise ValueError(f"step is {scans.step}, expected 1")
+        begin, end = scans.start, max(scans.start, scans.stop)
+        offsets = self.offsets[begin : end + 1].copy()
+        tables = {}
+        for name in TABLES:
+            tables[name] = getattr(self, name)[offsets[name][0] : offsets[name][-1]]
+            offsets[name] -= offsets[name][0]
+        rows = {name: getattr(self, name)[begin:end] for name in ("clusters", "stamps", "noises")}
+        return replace(self, **tables, **rows, offsets=offsets)
+
     def __iter__(self) -> Iterator[Features]:
         return (self[i] for i in range(len(self)))
 
-    def to_arrow(self) -> pa.Table:
-        """Make a table with one row a feature; its schema is described in ``docs/formats.md``."""
+    def to_arrow(self, scan: int = 0) -> pa.Table:  # noqa: D102 (as in the base)
         from .tables import batch_table
 
-        return batch_table(self)
+        return batch_table(self, scan)
 
 
-def noise_row(noise: RangeNoise | None) -> NDArray[np.float64]:
+def noise_row(noise: NoiseLike | None) -> NDArray[np.float64]:
     """(sigma, proportional, bearing, quantum) as the kernels take them, NaN where not given."""
     if noise is None:
         return np.full(4, np.nan)
+    noise = RangeNoise.of(noise)
     return np.array([noise.sigma, noise.proportional, noise.bearing, noise.quantum])
 
 

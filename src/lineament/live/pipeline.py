@@ -12,7 +12,7 @@ from ..motion import Tracker, Tracks
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
-from ..scan import LaserScan, Pose, RangeNoise
+from ..scan import LaserScan, Pose
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 from .received import Time
@@ -141,8 +141,8 @@ class _Publisher:
     """What is kept of a publisher from scan to scan."""
 
     def __init__(self, config: LiveConfig) -> None:
-        noise = None if config.noise is None else RangeNoise(sigma=config.noise)
-        self.extractor = Extractor(get_method(config.method, **config.parameters), noise=noise)
+        method = get_method(config.method, **config.parameters)
+        self.extractor = Extractor(method, noise=config.noise)
         self.tracker = Tracker() if config.track or config.deskew == "scans" else None
         self.last: LaserScan | None = None
 

@@ -1,72 +1,29 @@
 """One sweep of a 2-D laser scanner: its beams, and which of them are valid (equations 1-3)."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self, TypeVar
+from typing import Any, Self, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._lazy import Pictured
 from .fields import (
     Array,
     Pose,
     checked_pose,
     finite,
     irregular_bearings,
-    number,
     range_limits,
     regular_bearings,
     stamp_seconds,
     vector,
 )
 
-Distance = TypeVar("Distance", float, Array)
 
-
-@dataclass(frozen=True, slots=True)
-class RangeNoise:
-    """Noise of one range, as standard deviations.
-
-    The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
-    each beam is off by ``bearing``. A part that is negative or not finite is a ValueError.
-
-    Parameters
-    ----------
-    sigma, proportional : float
-        Constant part [m], and the part that grows with the range [m/m].
-    bearing : float
-        Noise of the bearing [rad].
-    quantum : float
-        Step of the lattice on which ranges are reported [m].
-
-    Examples
-    --------
-    >>> RangeNoise(sigma=0.03, proportional=0.01).range_variance(4.0)
-    0.0025
-    """
-
-    sigma: float = 0.0
-    proportional: float = 0.0
-    bearing: float = 0.0
-    quantum: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("sigma", "proportional", "bearing", "quantum"):
-            value = getattr(self, name)
-            if type(value) is float and 0 <= value < math.inf:
-                continue
-            value = number(f"RangeNoise.{name}", value)
-            if not 0 <= value < math.inf:
-                raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
-            object.__setattr__(self, name, value)
-
-    def range_variance(self, distance: Distance) -> Distance:
-        """Variance [m²] of a range of `distance` [m], or of each of an array of them."""
-        return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
-
-
-class LaserScan:
+class LaserScan(Pictured):
     """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
@@ -166,6 +123,36 @@ class LaserScan:
     def __len__(self) -> int:
         return len(self.ranges)
 
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> tuple[float, float]: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Self: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> tuple[float, float] | Self:
+        """Return bearing and range of a beam [rad, m]; or a scan of the beams of a slice."""
+        if not isinstance(index, slice):
+            i = range(len(self))[index]
+            return float(self.angles[i]), float(self.ranges[i])
+        kept = range(len(self))[index]
+        if kept.step < 0:
+            raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
+        first, step = self.angle_min + kept.start * self.angle_increment, kept.step
+        return self.__class__(
+            self.ranges[index],
+            first if self.is_regular else None,
+            step * self.angle_increment if self.is_regular else None,
+            angles=None if self.is_regular else self.angles[index],
+            range_min=self.range_min,
+            range_max=self.range_max,
+            stamp=self.stamp + kept.start * self.time_increment,
+            scan_time=self.scan_time,
+            time_increment=step * self.time_increment,
+            frame_id=self.frame_id,
+            intensities=None if self.intensities is None else self.intensities[index],
+            pose=self.pose,
+        )
+
     def __repr__(self) -> str:
         return (
             f"LaserScan({len(self)} beams, {int(self.valid.sum())} valid, "
@@ -216,6 +203,47 @@ class LaserScan:
         other = self.__class__.__new__(self.__class__)
         other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
         return other
+
+    @classmethod
+    def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
+        """Make the scan that a sensor at the origin would have of some points, in any order.
+
+        Beams are sorted by bearing, from the widest gap on. Points that are not finite or at the
+        origin have no bearing and are left out; of points with one bearing the nearest stays.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 2)
+            x and y in the frame of the sensor [m].
+        **fields
+            ``stamp``, ``frame_id``, ``pose`` and limits, as in `LaserScan`.
+
+        Raises
+        ------
+        ValueError
+            If the points have another shape.
+
+        Examples
+        --------
+        >>> LaserScan.from_points([(0.0, 2.0), (1.0, 0.0)]).ranges.tolist()
+        [1.0, 2.0]
+        """
+        xy = np.asarray(points, dtype=np.float64)
+        if xy.ndim != 2 or xy.shape[1] != 2:
+            raise ValueError(f"points has shape {xy.shape}, expected (n, 2): x and y of each")
+        xy = xy[np.isfinite(xy).all(axis=1)]
+        ranges, angles = np.hypot(*xy.T), np.arctan2(xy[:, 1], xy[:, 0])
+        order = np.lexsort((ranges, angles))
+        order = order[ranges[order] > 0]
+        ranges, angles = ranges[order], angles[order]
+        first = np.diff(angles, prepend=-np.inf) > 0
+        ranges, angles = ranges[first], angles[first]
+        gaps = np.diff(angles, append=angles[:1] + 2 * math.pi)
+        if len(gaps) and gaps.max() > 2.5 * np.median(gaps):  # else a full circle, cut at the back
+            begin = (int(gaps.argmax()) + 1) % len(gaps)
+            ranges = np.roll(ranges, -begin)
+            angles = np.unwrap(np.roll(angles, -begin))
+        return cls(ranges, angles=angles, **fields)
 
     @classmethod
     def from_message(cls, message: Any, *, pose: Pose | None = None) -> Self:
