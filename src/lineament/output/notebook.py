@@ -126,8 +126,9 @@ def picture(shown: Features | LaserScan | Log) -> str:
     Nothing is extracted for it: of a log its first scan is drawn, and a scan alone has no features.
     """
     if isinstance(shown, Log):
-        facts: dict[str, str] = {"format": shown.format, "topics": ", ".join(shown.topics)}
+        facts = {"format": shown.format}
         try:
+            facts["topics"] = ", ".join(shown.topics)
             facts["scans"] = f"{len(shown)}, the first is drawn" if len(shown) else "none"
             drawn = svg(shown[0]) if len(shown) else ""
         except LineamentError as error:

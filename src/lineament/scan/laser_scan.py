@@ -13,6 +13,7 @@ from .._lazy import Pictured
 from .fields import (
     Array,
     Pose,
+    beams_to,
     checked_pose,
     finite,
     irregular_bearings,
@@ -208,8 +209,9 @@ class LaserScan(Pictured):
     def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
         """Make the scan that a sensor at the origin would have of some points, in any order.
 
-        Beams are sorted by bearing, from the widest gap on. Points that are not finite or at the
-        origin have no bearing and are left out; of points with one bearing the nearest stays.
+        Beams are sorted by bearing, from the widest gap on; where more than one and a half median
+        steps lie between two, there are beams without a return. Points that are not finite or at
+        the origin are left out; of points with one bearing the nearest stays.
 
         Parameters
         ----------
@@ -228,21 +230,7 @@ class LaserScan(Pictured):
         >>> LaserScan.from_points([(0.0, 2.0), (1.0, 0.0)]).ranges.tolist()
         [1.0, 2.0]
         """
-        xy = np.asarray(points, dtype=np.float64)
-        if xy.ndim != 2 or xy.shape[1] != 2:
-            raise ValueError(f"points has shape {xy.shape}, expected (n, 2): x and y of each")
-        xy = xy[np.isfinite(xy).all(axis=1)]
-        ranges, angles = np.hypot(*xy.T), np.arctan2(xy[:, 1], xy[:, 0])
-        order = np.lexsort((ranges, angles))
-        order = order[ranges[order] > 0]
-        ranges, angles = ranges[order], angles[order]
-        first = np.diff(angles, prepend=-np.inf) > 0
-        ranges, angles = ranges[first], angles[first]
-        gaps = np.diff(angles, append=angles[:1] + 2 * math.pi)
-        if len(gaps) and gaps.max() > 2.5 * np.median(gaps):  # else a full circle, cut at the back
-            begin = (int(gaps.argmax()) + 1) % len(gaps)
-            ranges = np.roll(ranges, -begin)
-            angles = np.unwrap(np.roll(angles, -begin))
+        ranges, angles = beams_to(points)
         return cls(ranges, angles=angles, **fields)
 
     @classmethod
