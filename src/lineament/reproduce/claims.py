@@ -114,7 +114,7 @@ def _counts(n: Any) -> tuple[str, Sequence[float]]:
     true, liu = example["true features"], example[LIU_PAPER]
     return (
         f"A simulated scene with {true['clusters']} and {true['corners']}: "
-        f"{liu['clusters']} and {liu['corners']}",
+        f"{liu['clusters']:.0f} and {liu['corners']:.0f}",
         [-abs(liu[name] - true[name]) for name in ("clusters", "corners")],
     )
 
