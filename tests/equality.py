@@ -6,6 +6,7 @@ import math
 
 import naive
 import numpy as np
+from liu_2023 import bilateral_filter
 
 from lineament import Extractor
 from lineament.features import TABLES
@@ -15,13 +16,14 @@ def assert_same_run(scan, extractor: Extractor) -> dict:
     """Run both on one scan; the twin works on the kernel's filtered ranges, once held equal."""
     trace = extractor.trace(scan)
     method = extractor.method
-    own = naive.bilateral(scan, method.sigma_d, method.sigma_r, method.half_width)
+    ranges = np.where(naive.valid(scan), scan.ranges, np.nan)
+    own = bilateral_filter(ranges, scan.is_full_circle, naive.paper_of(method))
     assert_same_filtered(trace.filtered, own, method.sigma_r, method.half_width)
     noise = extractor.noise
     given = None
     if noise is not None:
         given = (noise.sigma, noise.proportional, noise.bearing, noise.quantum)
-    twin = naive.liu(scan, method, given, trace.filtered)
+    twin = naive.liu(scan, method, trace.filtered, given)
     assert_same_trace(trace, twin)
     assert_same_features(trace.features, twin)
     return twin
@@ -34,16 +36,11 @@ def assert_same_filtered(filtered, twin, sigma_r=0.3, half_width=8, **_):
 
 
 def assert_same_trace(trace, twin):
-    found, scan = twin["found"], trace.scan
-    by_beam = (
-        (trace.spacing, found.spacing),
-        (trace.distance_threshold, found.distance_threshold),
-        (trace.density_threshold, found.density_threshold),
-    )
-    for kernel, slow in by_beam:
-        expected = np.full(len(scan), np.nan)
-        expected[list(slow)] = list(slow.values())
-        np.testing.assert_allclose(kernel, expected, rtol=1e-6, atol=1e-12)
+    found = twin["found"]
+    for name in ("spacing", "distance_threshold", "density_threshold"):
+        np.testing.assert_allclose(
+            getattr(trace, name), getattr(found, name), rtol=1e-6, atol=1e-12
+        )
     assert trace.clusters.tolist() == twin["clusters"].tolist()
     assert trace.candidates["beam"].tolist() == [beam for beam, _, _ in twin["candidates"]]
     for name, k in (("chord_distance", 1), ("response", 2)):

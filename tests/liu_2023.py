@@ -17,14 +17,14 @@ class Paper:
 
     sigma_d: float = 4.0
     sigma_r: float = 0.3
-    half_width: int = 8  # open
+    half_width: int = 2  # open
     spacing_scale: float = 6.0  # open: λ
     noise_floor: float = 0.0  # added to T_d [m]; not in the paper
     density_k: float = 3.0  # open: k
     min_points: int = 3
     support_radius: int = 6
     threshold: float = 0.66
-    response: str = "tangent"  # open
+    response: str = "product_scaled"  # open
     recursion: str = "both"  # open: "after" is step 7 to the letter
     ends: str = "truncated"  # open
     fit: str = "y_of_x"  # "slope_intercept" is equation 23 to the letter
@@ -35,7 +35,8 @@ class Paper:
 
 def polar(ranges, bearings):
     """Points of ranges, shape (n, 2) (2, 3)."""
-    return np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
+    with np.errstate(invalid="ignore"):  # of infinite ranges
+        return np.column_stack([ranges * np.cos(bearings), ranges * np.sin(bearings)])
 
 
 def bilateral_filter(ranges, full, paper):
@@ -69,26 +70,32 @@ class Clusters(NamedTuple):
     """Beams of each cluster in order, and by beam the spacing d, and T_d, T_K where needed.
 
     A cluster over the seam of a full circle begins before the seam. One that goes all the way
-    round begins and ends with the same beam.
+    round is closed: it begins and ends with the same beam.
     """
 
-    beams: list
+    groups: list
     spacing: np.ndarray
-    linear: np.ndarray
-    density: np.ndarray
+    distance_threshold: np.ndarray
+    density_threshold: np.ndarray
+
+    @property
+    def closed(self):
+        """Whether one cluster goes all the way round."""
+        return any(group[0] == group[-1] for group in self.groups if len(group) > 1)
 
     def labels(self):
         """Index of the cluster of each beam, -1 for none."""
         labels = np.full(len(self.spacing), -1)
-        for index, beams in enumerate(self.beams):
-            labels[beams] = index
+        for index, group in enumerate(self.groups):
+            labels[group] = index
         return labels
 
 
 def adaptive_clusters(ranges, bearings, step, full, paper):
     """Divide the beams that have a range into clusters."""
     points = polar(ranges, bearings)
-    spacing, linear, density = np.full((3, len(ranges)), np.nan)
+    found = Clusters([], *np.full((3, len(ranges)), np.nan))
+    spacing, linear, density = found[1:]
     beams = np.flatnonzero(np.isfinite(ranges))
 
     def joins(cluster, beam):
@@ -104,22 +111,22 @@ def adaptive_clusters(ranges, bearings, step, full, paper):
         density[beam] = np.mean(inner) + paper.density_k * np.std(inner)  # 11-13
         return spacing[beam] <= density[beam]
 
-    clusters = [[beam] for beam in beams[:1]]
+    groups = [[beam] for beam in beams[:1]]
     for beam in beams[1:]:  # Step 3.
-        if joins(clusters[-1], beam):
-            clusters[-1].append(beam)
+        if joins(groups[-1], beam):
+            groups[-1].append(beam)
         else:
-            clusters.append([beam])
+            groups.append([beam])
     closed = False
-    if full and len(beams) and joins(clusters[-1], beams[0]) and len(beams) > 2:  # Step 4.
-        closed = len(clusters) == 1
+    if full and len(beams) and joins(groups[-1], beams[0]) and len(beams) > 2:  # Step 4.
+        closed = len(groups) == 1
         if not closed:
-            clusters[0] = clusters.pop() + clusters[0]
-    clusters = [np.array(cluster) for cluster in clusters if len(cluster) >= paper.min_points]
-    if closed and clusters:
+            groups[0] = groups.pop() + groups[0]
+    found.groups.extend(np.array(group) for group in groups if len(group) >= paper.min_points)
+    if closed and found.groups:
         turned = np.roll(beams, -np.argmax(ranges[beams]))
-        clusters = [np.append(turned, turned[0])]
-    return Clusters(clusters, spacing, linear, density)
+        found.groups[0] = np.append(turned, turned[0])
+    return found
 
 
 # ----- Stage 3: equation 14, steps 5 to 7, primary corners.
@@ -184,7 +191,7 @@ def support_of(index, count, closed, paper):
 
 def tangent(arc, offsets):
     """Direction (b1, b2) at s = 0 of the parabolas x = a1 s² + b1 s, y = a2 s² + b2 s (16-19)."""
-    s = arc / np.ptp(arc)  # The unit does not change the direction.
+    s = arc / (np.ptp(arc) or 1.0)  # The unit does not change the direction.
     return np.linalg.lstsq(np.column_stack([s**2, s]), offsets, rcond=1e-12)[0][1]
 
 
@@ -192,11 +199,13 @@ def corner_response(points, index, closed, paper):
     """Response of the corner operator at a point of a cluster (22); 0 where it has none."""
     support, target = support_of(index, len(points), closed, paper)
     points = points[support]
-    if len(points) < 3 or not np.ptp(points, axis=0).any():
+    if len(points) < 3:
         return 0.0
     arc = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     arc -= arc[target]  # 15
     direction = tangent(arc, points - points[target])
+    if not direction.any():
+        return 0.0
     to_tangent = distances(points, points[target], direction)  # 20, 21
     chord = points[-1] - points[0]
     to_chord = distances(points, points[0], chord)
@@ -210,7 +219,7 @@ def corner_response(points, index, closed, paper):
         case _ if not chord.any():
             return 0.0
         case "product_scaled":
-            return to_tangent @ to_chord / (chord @ chord)
+            return to_tangent.sum() * to_chord.sum() / (chord @ chord)
         case "chord_scaled":
             return to_tangent.sum() / np.hypot(*chord)
     raise ValueError(paper.response)
@@ -219,12 +228,15 @@ def corner_response(points, index, closed, paper):
 # ----- Stage 4: equations 23 and 24, step 8, lines.
 
 
-def pieces_of(beams, corners):
-    """Pieces of a cluster between its corners, which belong to both; a ring without has none."""
-    inner = sorted(index for index in corners if 0 < index < len(beams) - 1)
-    if beams[0] == beams[-1] and not inner:
+def pieces_of(count, corners, closed):
+    """First and last point of the pieces of a cluster, from corner to corner.
+
+    A closed cluster without corners but that at which it is opened has none.
+    """
+    inner = sorted(index for index in corners if 0 < index < count - 1)
+    if closed and not inner:
         return []
-    return [beams[a : b + 1] for a, b in pairwise([0, *inner, len(beams) - 1])]
+    return list(pairwise([0, *inner, count - 1]))
 
 
 def line_of(points, paper):
@@ -256,11 +268,12 @@ def liu_2023(filtered, bearings, step, full, paper):
     clusters = adaptive_clusters(filtered, bearings, step, full, paper)
     points = polar(filtered, bearings)
     found = Found(clusters, [], [], [])
-    for beams in clusters.beams:
-        examined = primary_corners(points[beams], beams[0] == beams[-1], paper)
+    for beams in clusters.groups:
+        examined = primary_corners(points[beams], clusters.closed, paper)
         corners = [index for index, _, response in examined if response > paper.threshold]
         found.candidates.extend((beams[index], *values) for index, *values in examined)
         found.corners.extend(beams[sorted(corners)])
-        for piece in pieces_of(beams, corners):
+        for first, last in pieces_of(len(beams), corners, clusters.closed):
+            piece = beams[first : last + 1]
             found.lines.append((piece, *line_of(points[piece], paper)))
     return found

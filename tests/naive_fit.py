@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from liu_2023 import Paper, line_of
 
 
 def range_variance(rho, noise):
@@ -24,22 +25,14 @@ def principal_line(points, weights):
     return centroid, math.atan2(vectors[1, 1], vectors[0, 1])
 
 
-def steep_or_flat_line(points, fit):
-    """y = kx + b; of `y_of_x` x = ky + b where points are steeper than 45° (equations 23, 24)."""
-    centroid = points.mean(axis=0)
-    x, y = (points - centroid).T
-    if fit == "slope_intercept" or x @ x >= y @ y:
-        return centroid, math.atan2(x @ y, x @ x)
-    return centroid, math.atan2(y @ y, x @ y)
-
-
 def estimate(points, bearings, rho, noise, fit, passes=2):
     """Centroid, direction from first to last, weights."""
     weights = np.ones(len(points))
     if not np.ptp(points, axis=0).any():
         return points[0], 0.0, weights
     if fit in ("y_of_x", "slope_intercept"):
-        centroid, angle = steep_or_flat_line(points, fit)
+        centroid, (run, rise) = line_of(points, Paper(fit=fit))
+        angle = math.atan2(rise, run)
     else:
         centroid, angle = principal_line(points, weights)
     for _ in range(passes if fit == "weighted" else 0):

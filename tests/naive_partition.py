@@ -4,7 +4,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from naive import Clusters, chord_distances, pieces_of, polar, sigma, valid
+from liu_2023 import Clusters, distances, pieces_of, polar
+from naive import sigma, valid
 from naive_fit import breakpoints, estimate, principal_line, range_variance
 
 from lineament import LaserScan
@@ -68,14 +69,14 @@ def threshold(rule, before, rho, step, noise, method):
 def parted(scan, method: PDBS, noise) -> Clusters:
     """Clusters of neighbours by a rule, Lee's by its ratio."""
     rule = method.rule
-    out, ok, rho, n = Clusters(), valid(scan), scan.ranges, len(scan)
+    ok, rho, n = valid(scan), scan.ranges, len(scan)
+    out = Clusters([], *np.full((3, n), np.nan))
     points = polar(rho, scan.angles)
     beams = [i for i in range(n) if ok[i]]
 
     def joins(before, b):
         out.spacing[b] = d = float(np.linalg.norm(points[b] - points[before]))
         if (b - before - 1) % n > method.max_missing:
-            out.distance_threshold[b] = math.nan
             return False
         step = (scan.angles[b] - scan.angles[before]) % (2 * math.pi)
         if rule == "lee":
@@ -96,13 +97,11 @@ def parted(scan, method: PDBS, noise) -> Clusters:
             groups.append([b])
     if scan.is_full_circle and beams and joins(beams[-1], beams[0]) and len(beams) >= 3:
         if len(groups) == 1:
-            out.closed = True
+            turn = int(np.argmax(rho[beams]))
+            groups = [beams[turn:] + beams[: turn + 1]]
         else:
             groups = [groups[-1] + groups[0], *groups[1:-1]]
-    out.groups = [members for members in groups if len(members) >= method.min_points]
-    if out.closed and out.groups:
-        turn = int(np.argmax(rho[beams]))
-        out.groups = [beams[turn:] + beams[: turn + 1]]
+    out.groups.extend(group for group in groups if len(set(group)) >= method.min_points)
     return out
 
 
@@ -123,7 +122,7 @@ def split(scan, found, noise, *, tolerance, min_piece, by_line):
 
         def search(a, b, own=own, rho=rho, beams=beams, allowed=allowed, cuts=cuts):
             margin = min_piece - 1
-            inner = chord_distances(own[a : b + 1])[margin : b - a - margin + 1]
+            inner = distances(own, own[a], own[b] - own[a])[a + margin : b - margin + 1]
             if b - a < 2 * margin or len(inner) == 0:
                 return
             c = a + margin + int(np.argmax(inner))
@@ -142,14 +141,14 @@ def split(scan, found, noise, *, tolerance, min_piece, by_line):
 
         search(0, len(beams) - 1)
         if found.closed and cuts:
-            over = np.array([own[max(cuts)], own[0], own[min(cuts)]])
-            distance = chord_distances(over)[1]
+            before, after = own[max(cuts)], own[min(cuts)]
+            (distance,) = distances(own[:1], before, after - before)
             candidates.append((beams[0], distance, distance / allowed[0]))
             if distance > allowed[0]:
                 cuts[0] = distance / allowed[0]
         base, own_pieces = len(pieces), pieces_of(len(beams), cuts, found.closed)
-        for k, (first, last, is_corner) in enumerate(own_pieces):
-            before = base + (k - 1) % len(own_pieces) if is_corner else -1
+        for k, (first, last) in enumerate(own_pieces):
+            before = base + (k - 1) % len(own_pieces) if first in cuts else -1
             pieces.append((beams[first], beams[last], before))
     return candidates, pieces
 
@@ -214,13 +213,11 @@ def is_predicted(scan, points, gained, b, noise, method):
 def assert_same_partition(scan, extractor):
     trace = extractor.trace(scan)
     found = parted(scan, extractor.method, noise_of(scan, extractor))
-    assert trace.clusters.tolist() == found.labels(len(scan)).tolist()
-    for kernel, slow in (
+    assert trace.clusters.tolist() == found.labels().tolist()
+    for kernel, expected in (
         (trace.spacing, found.spacing),
         (trace.distance_threshold, found.distance_threshold),
     ):
-        expected = np.full(len(scan), np.nan)
-        expected[list(slow)] = list(slow.values())
         # Near its pole the rule of Santos has thresholds beyond all distances, and no digits.
         kernel, expected = np.minimum(kernel, 1e6), np.minimum(expected, 1e6)
         np.testing.assert_allclose(kernel, expected, rtol=1e-6, atol=1e-12)

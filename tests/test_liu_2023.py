@@ -14,7 +14,12 @@ from lineament.simulation import SCENES, SENSORS, scene
 FILTER = 5e-5
 #: The kernels take σ_K from running sums: where it is nearly 0, half its digits are left [m].
 ROOT = 1e-7
-DEGENERATE = degenerate_scans()
+OTHERS = degenerate_scans()
+OTHERS |= {
+    f"ring of {n}": LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
+    for n in range(3, 20)
+}
+OTHERS |= {f"random {seed}": random_scan(seed) for seed in range(12)}
 LOGS = (
     "carmen/intel-corrected.log.gz",
     "carmen/csail-corrected.log.gz",
@@ -27,14 +32,15 @@ RESPONSES = ("tangent", "product", "relative", "product_scaled", "chord_scaled")
 THRESHOLDS = (0.0, 0.02, 0.05, 0.1, 0.2)
 VARIANTS = {
     "the paper's numbers": {},
-    "more corners": {"threshold": 0.1},
+    "more corners": {"threshold": 0.05},
+    "tangent": {"response": "tangent", "half_width": 8},
+    "tangent, more corners": {"response": "tangent", "half_width": 8, "threshold": 0.1},
     "product": {"response": "product", "threshold": 0.05},
     "relative": {"response": "relative", "threshold": 0.15, "support_radius": 10},
     "scaled by the chord": {"response": "chord_scaled", "threshold": 0.2},
-    "product, scaled": {"response": "product_scaled", "threshold": 0.05},
     "to the letter": {"recursion": "after", "fit": "slope_intercept", "threshold": 0.1},
     "whole supports": {"ends": "excluded", "threshold": 0.1},
-    "narrow": {"half_width": 2, "sigma_d": 1.5, "sigma_r": 0.1, "threshold": 0.2},
+    "narrow": {"half_width": 3, "sigma_d": 1.5, "sigma_r": 0.1, "threshold": 0.2},
     "unfiltered": {"half_width": 0, "support_radius": 1, "threshold": 0.02},
     "clusters": {"spacing_scale": 2.0, "density_k": 1.0, "min_points": 5, "threshold": 0.1},
     "pairs": {"spacing_scale": 9.0, "density_k": 0.0, "min_points": 2, "threshold": 0.05},
@@ -56,8 +62,12 @@ def by_the_paper(scan, filtered, paper):
     return liu_2023(filtered, scan.angles, scan.angle_increment, scan.is_full_circle, paper)
 
 
-def assert_reproduced(scan, **changes):
-    """Compare each stage on the ranges that the kernels filtered, and the corners end to end."""
+def assert_reproduced(scan, may_tie=False, **changes):
+    """Compare each stage on the ranges that the kernels filtered, and the corners end to end.
+
+    Where two points are equally far from a chord, the last digits of the filter decide. Returns
+    the number of lines, and whether there was such a tie.
+    """
     paper = Paper(**changes)
     trace = Extractor("liu:paper", **changes).trace(scan)
     features = trace.features
@@ -69,8 +79,8 @@ def assert_reproduced(scan, **changes):
     clusters = found.clusters
     np.testing.assert_array_equal(trace.clusters, clusters.labels())
     equal(trace.spacing, clusters.spacing)
-    equal(trace.distance_threshold, clusters.linear)
-    equal(trace.density_threshold, clusters.density, ROOT)
+    equal(trace.distance_threshold, clusters.distance_threshold)
+    equal(trace.density_threshold, clusters.density_threshold, ROOT)
 
     beams, to_chord, responses = np.reshape(found.candidates, (-1, 3)).T
     np.testing.assert_array_equal(trace.candidates["beam"], beams)
@@ -95,42 +105,38 @@ def assert_reproduced(scan, **changes):
 
     alone = by_the_paper(scan, filtered, paper)
     np.testing.assert_array_equal(alone.clusters.labels(), trace.clusters)
-    assert alone.corners == found.corners
-    return found
+    tie = alone.corners != found.corners
+    if tie and may_tie:
+        pairs = zip(alone.candidates, found.candidates, strict=False)
+        own, other = next(pair for pair in pairs if pair[0][0] != pair[1][0])
+        equal(own[1], other[1])
+    else:
+        assert alone.corners == found.corners
+    return len(found.lines), tie
 
 
 @pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
 @pytest.mark.parametrize("sensor", ["paper", "utm30lx", "lms361", "rplidar", "ld19"])
 def test_simulated_scans_are_reproduced(sensor, changes):
-    found = [assert_reproduced(scan, **changes) for scan in simulated(sensor)]
-    assert sum(len(one.lines) for one in found) > len(found)
+    lines = [assert_reproduced(scan, **changes)[0] for scan in simulated(sensor)]
+    assert sum(lines) > len(lines)
 
 
 @pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
 @pytest.mark.parametrize("log", LOGS)
 def test_recorded_scans_are_reproduced(data_dir, log, changes):
-    scans = islice(open_log(data_dir / log), 0, 100, 20)
-    found = [assert_reproduced(scan, **changes) for scan in scans]
-    assert sum(len(one.lines) for one in found) > len(found)
+    scans = list(islice(open_log(data_dir / log), 0, 100, 20))
+    whole_millimetres = log == "rosbag2/ld19"
+    found = [assert_reproduced(scan, whole_millimetres, **changes) for scan in scans]
+    lines, ties = np.sum(found, axis=0)
+    assert lines > len(scans)
+    assert ties <= 2
 
 
-@pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
-def test_degenerate_scans_are_reproduced(scan):
+@pytest.mark.parametrize("scan", OTHERS.values(), ids=OTHERS)
+def test_other_scans_are_reproduced(scan):
     for changes in VARIANTS.values():
         assert_reproduced(scan, **changes)
-
-
-@pytest.mark.parametrize("n", range(3, 20))
-def test_rings_of_few_beams_are_reproduced(n):
-    scan = LaserScan(2 + 0.2 * np.sin(np.arange(n)), -np.pi, 2 * np.pi / n)
-    for changes in VARIANTS.values():
-        assert_reproduced(scan, **changes)
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_random_scans_are_reproduced(seed):
-    for changes in VARIANTS.values():
-        assert_reproduced(random_scan(seed), **changes)
 
 
 @pytest.mark.parametrize("recursion", ["both", "after"])

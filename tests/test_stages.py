@@ -2,11 +2,11 @@
 
 import math
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from liu_2023 import Paper, corner_response, polar
 from naive_fit import fit_line, jacobian_covariance
 from worlds import (
     BOX,
@@ -133,7 +133,8 @@ def points_of(seed):
 def test_response_of_random_clusters(seed, radius, response):
     points = points_of(seed)
     found = stages.corner_response(points, support_radius=radius, response=response)
-    expected = [naive.response(points, i, radius, response) for i in range(len(points))]
+    paper = Paper(support_radius=radius, response=response)
+    expected = [corner_response(points, i, False, paper) for i in range(len(points))]
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
     if response == "relative":
         assert ((found >= 0) & (found <= 1 + 1e-12)).all()
@@ -146,7 +147,8 @@ def test_response_of_random_clusters(seed, radius, response):
 @pytest.mark.parametrize("response", RESPONSES)
 def test_response_of_degenerate_clusters(points, response):
     found = stages.corner_response(points, response=response)
-    expected = [naive.response(np.array(points), i, 6, response) for i in range(len(points))]
+    paper, own = Paper(response=response), np.array(points)
+    expected = [corner_response(own, i, False, paper) for i in range(len(own))]
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert len(stages.primary_corners(points, response=response)) <= len(points)
 
@@ -167,7 +169,7 @@ def seen_wall(seed, sigma):
 @given(seeds)
 def test_fits_equal_their_twins(fit, seed):
     angles, rho, noise = seen_wall(seed, 0.01)
-    points = naive.polar(rho, angles)
+    points = polar(rho, angles)
     found = stages.fit_line(points, noise=RangeNoise(*noise), fit=fit)
     expected = fit_line(points, angles, rho, noise, fit)
     for name in ("start", "end", "centroid", "n_points"):
@@ -182,7 +184,7 @@ def test_fits_equal_their_twins(fit, seed):
 @pytest.mark.parametrize("seed", range(6))
 def test_covariance_is_that_of_moved_measurements(fit, seed):
     angles, rho, noise = seen_wall(seed, 1e-5)
-    line = stages.fit_line(naive.polar(rho, angles), noise=RangeNoise(*noise), fit=fit)
+    line = stages.fit_line(polar(rho, angles), noise=RangeNoise(*noise), fit=fit)
     expected = jacobian_covariance(angles, rho, noise, fit)
     scale = np.sqrt(np.outer(*[np.diag(expected)] * 2))
     np.testing.assert_allclose(line["covariance"] / scale, expected / scale, atol=2e-3)
@@ -192,7 +194,7 @@ def test_covariance_is_that_of_moved_measurements(fit, seed):
 @pytest.mark.parametrize("normal", [0, 45, 90, 135, 180, 270])
 def test_walls_of_any_direction_fit_exactly(fit, normal):
     angles = math.radians(normal) + fan(30)
-    line = stages.fit_line(naive.polar(wall(angles, 2.0, normal), angles), fit=fit)
+    line = stages.fit_line(polar(wall(angles, 2.0, normal), angles), fit=fit)
     across = np.array([math.cos(math.radians(normal)), math.sin(math.radians(normal))])
     for name in ("start", "end", "centroid"):
         assert line[name] @ across == pytest.approx(2.0, abs=1e-12)
@@ -289,7 +291,7 @@ def test_trace_is_made_of_the_stages(scan, noise):
     accepted = trace.candidates[trace.candidates["accepted"]]
     assert (trace.candidates["accepted"] == (trace.candidates["response"] > 0.15)).all()
     assert sorted(accepted["beam"]) == trace.cuts.tolist()
-    points = naive.polar(filtered, scan.angles)
+    points = polar(filtered, scan.angles)
     for label in range(0 if scan.is_full_circle else labels.max(initial=-1) + 1):
         beams = np.flatnonzero(labels == label)
         own = stages.primary_corners(points[beams], **CORNERS, min_points=4)

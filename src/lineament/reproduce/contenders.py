@@ -70,19 +70,25 @@ def feature_methods(setting: Setting, progress: Progress) -> dict[str, Extractor
     return methods
 
 
-def drawn_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
-    """Make the methods of pictures: `pdbs` with a line for each cluster, the paper's IEPF.
-
-    The paper's Figure 11 fits one line to each region of PDBS.
-    """
+def fitted_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
+    """Make all methods; `pdbs` with a line for each cluster, as in the paper's Figure 11."""
     methods: dict[str, Extract] = {}
-    left_out = (LITERAL, LITERAL_BEST, LIU_SHARED, BLIND)
     for name, extractor in every_method(setting, progress).items():
         if name == PARTITION_ONLY:
             methods[PDBS_LINES] = partial(_with_lines, extractor)
-        elif name == "iepf:paper" or not (name in left_out or name.endswith(":paper")):
+        else:
             methods[name] = extractor
     return methods
+
+
+def drawn_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
+    """Make the methods of pictures: of the rivals as published the paper's IEPF alone."""
+    left_out = (LITERAL, LITERAL_BEST, LIU_SHARED, BLIND)
+    return {
+        name: extract
+        for name, extract in fitted_methods(setting, progress).items()
+        if name == "iepf:paper" or not (name in left_out or name.endswith(":paper"))
+    }
 
 
 def _with_lines(extract: Extractor, scan: LaserScan) -> Features:

@@ -12,7 +12,13 @@ from ..methods.workspace import Block
 
 @method
 class BlindCut(PieceMethod):
-    """Clusters cut into pieces of equal numbers of points, whatever they show; then settled."""
+    """Clusters cut into pieces of equal numbers of points, whatever they show; then settled.
+
+    Examples
+    --------
+    >>> BlindCut(every=5).every
+    5
+    """
 
     name = "blind"
 
@@ -36,6 +42,11 @@ class OperatorCut(PieceMethod):
     """Clusters cut where the corner operator of `liu` responds; then settled.
 
     Not filtered, as in the preset `liu:tuned`; the threshold is chosen like its parameters.
+
+    Examples
+    --------
+    >>> OperatorCut().threshold
+    0.1
     """
 
     name = "operator"

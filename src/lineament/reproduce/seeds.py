@@ -102,7 +102,7 @@ def merged(values: Sequence[Any]) -> Any:
     Examples
     --------
     >>> merged([{"f1": 0.5, "best": "radius 6"}, {"f1": 0.75, "best": "radius 8"}])
-    {'f1': Spread([0.5, 0.75]), 'best': 'radius 7 (6–8)'}
+    {'f1': Spread([0.5, 0.75]), 'best': 'radius 6 (6–8)'}
     """
     given = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
     known = [value for value in given if value is not None]

@@ -10,7 +10,7 @@ from ..output import canvas, drawing
 from ..scan import LaserScan
 from ..simulation import SENSORS
 from .compare import SIMILARITY, SIMILARITY_NOTE
-from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, Extract, drawn_methods
+from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, Extract, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, cells
 from .scans import INDOORS, recorded_scans, scene_numbers, simulated_frames
 
@@ -31,7 +31,7 @@ SMALL = 0.01
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Measure similarity errors on simulated scans and on recordings."""
-    methods = drawn_methods(setting, progress)
+    methods = fitted_methods(setting, progress)
     numbers = scene_numbers(len(INDOORS) * setting.frames, setting.seed)
     frames = list(simulated_frames(SENSORS["paper"], INDOORS, numbers))
     simulated = "simulated rooms, corridors and halls"
