@@ -189,10 +189,11 @@ class Results:
         return sum(values) / len(values)
 
     @staticmethod
-    def middle(found: Mapping[str, Any], method: str, kind: str) -> float:
+    def middle(found: Mapping[str, Any], method: str, kind: str) -> float | None:
         """Return the median NEES of features of 30 to 99 measurements over the recordings."""
         bins = [of[method][kind]["30-99"] for of in found.values()]
-        return median(of["nees_median"] for of in bins if of["pairs"] >= 10)
+        values = [of["nees_median"] for of in bins if of["pairs"] >= 10]
+        return median(values) if values else None
 
     def arena(self) -> str:
         """Corners of a real arena, at rest and moving."""
@@ -203,6 +204,26 @@ class Results:
             for m in next(iter(arenas.values()))
         ]
         return markdown(("method", *(f"{a}: {s}" for a in arenas for s in shown)), rows)
+
+    def relations(self) -> str:
+        """Motion against relations that people verified: up to a minute apart, and beyond."""
+        rows = []
+        for log, of in self.numbers("tracking").items():
+            for source in of["near"]:
+                near, far = of["near"][source], of["far_apart"].get(source)
+                pairs = [(near[f"way_{k}"], near[f"turn_{k}"]) for k in ("mean", "std")]
+                way, turn = zip(*pairs, strict=True)
+                rows.append(
+                    (
+                        *(log, source, near["motions"]),
+                        f"{1e3 * way[0]:.0f} ± {1e3 * way[1]:.0f}",
+                        f"{1e3 * near['way_median']:.0f}",
+                        f"{math.degrees(turn[0]):.2f} ± {math.degrees(turn[1]):.2f}",
+                        f"{1e3 * far['way_median']:.0f} ({far['motions']})" if far else None,
+                    )
+                )
+        columns = ("log", "motion from", "n", "way [mm]", "median", "turn [°]")
+        return markdown((*columns, "over 60 s: way, median [mm] (n)"), rows)
 
     def tracking(self) -> str:
         """Motion from features and by ICP, and tracks."""
@@ -304,7 +325,7 @@ class Results:
 
 
 TABLES = (
-    *("speed", "process", "maps", "tracking", "real", "arena"),
+    *("speed", "process", "maps", "relations", "tracking", "real", "arena"),
     *("simulation", "summary", "sensors", "optimal", "similarity", "claims"),
 )
 #: Rows of the table by sensor.
@@ -313,7 +334,7 @@ BY_SENSOR = (
     *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
 )
 #: Tables of recordings.
-RECORDED = ("maps", "tracking", "real", "arena")
+RECORDED = ("maps", "relations", "tracking", "real", "arena")
 
 
 # The document ------------------------------------------------------------------------------------
