@@ -131,14 +131,14 @@ class Results:
 
     def summary(self) -> str:
         """The table of README: some methods with the paper's sensor."""
-        return self.simulation(BY_SENSOR)
+        return self.simulation(SOME)
 
     def sensors(self) -> str:
         """F1 of corners of some methods with each sensor."""
         found = self.numbers("all_methods")
         rows = [
             (method, *(two_digits(of[method].get("corner_f1_0.10")) for of in found.values()))
-            for method in BY_SENSOR
+            for method in SOME
         ]
         return markdown(("method", *found), rows)
 
@@ -171,8 +171,10 @@ class Results:
                 self.total(free, method, "phantom_in_100m"),
                 100 * self.total(free, method, "covered"),
                 *(self.middle(standing, method, kind) for kind in ("segments", "corners")),
-                sum(of[method]["count"] for of in repeats.values()),
-                sum(of[method]["count_without_edges"] for of in repeats.values()),
+                *(
+                    sum(of[method][key] for of in repeats.values()) or None
+                    for key in ("count", "count_without_edges")
+                ),
             )
             for method in next(iter(free.values()))
         ]
@@ -201,7 +203,7 @@ class Results:
         shown = {"recall": ("recall", 1), "error [mm]": ("median_error", 1e3)}
         rows = [
             (m, *(f * of[m][key] for of in arenas.values() for key, f in shown.values()))
-            for m in next(iter(arenas.values()))
+            for m in SOME
         ]
         return markdown(("method", *(f"{a}: {s}" for a in arenas for s in shown)), rows)
 
@@ -209,7 +211,7 @@ class Results:
         """Motion against relations that people verified: up to a minute apart, and beyond."""
         rows = []
         for log, of in self.numbers("tracking").items():
-            for source in of["near"]:
+            for source in ("the log’s corrected poses", "features", "ICP", "features, no odometry"):
                 near, far = of["near"][source], of["far_apart"].get(source)
                 pairs = [(near[f"way_{k}"], near[f"turn_{k}"]) for k in ("mean", "std")]
                 way, turn = zip(*pairs, strict=True)
@@ -278,7 +280,8 @@ class Results:
         found = next(iter(self.numbers("similarity").values()))
         rows = [
             (method, f"{100 * of['similarity_explained']:.0f}", f"{1e3 * of['similarity_rms']:.0f}")
-            for method, of in found.items()
+            for method in ("the true lines", "pdbs, fitted", *SOME)
+            for of in [found[method]]
         ]
         return markdown(("method", "explained [%]", "RMS error of these [mm]"), rows)
 
@@ -328,8 +331,8 @@ TABLES = (
     *("speed", "process", "maps", "relations", "tracking", "real", "arena"),
     *("simulation", "summary", "sensors", "optimal", "similarity", "claims"),
 )
-#: Rows of the table by sensor.
-BY_SENSOR = (
+#: Methods of the shorter tables; lineament reproduce has them all.
+SOME = (
     *("optimal", "liu:paper, paper’s numbers", "liu:tuned", "iepf:paper", "split_and_merge:paper"),
     *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
 )
