@@ -308,21 +308,16 @@ class Results:
         return markdown(("method", *columns), rows.values())
 
     def process(self) -> str:
-        """What a process costs: starts, threads, and the sizes of the code."""
+        """What a process costs: starts and threads."""
         sys.path.insert(0, str(Path(__file__).parent))
         import speed
 
-        lines = {
-            name: sum(len(p.read_text("utf-8").splitlines()) for p in (ROOT / name).rglob("*.py"))
-            for name in ("src/lineament", "src/lineament/kernels", "tests")
-        }
         gains = (f"{speed.speed_of_method(m, 'utm30lx')[3]:.2f}" for m in ("optimal", "liu"))
         rows = [
             ("two threads ÷ one, 1081 beams: optimal, liu", ", ".join(gains)),
             ("pure arithmetic, the same", f"{speed.gain_of_the_machine():.2f}"),
             *((name.replace("`", ""), value) for name, value in speed.start_up()),
             *speed.throughput(),
-            *((f"lines of Python in {name}", count) for name, count in lines.items()),
         ]
         return markdown(("what", "measured"), rows)
 
