@@ -440,3 +440,21 @@ def test_units_are_those_of_the_parameters(capsys):
     assert "Width of the filter in range [m]; a number > 0." in ln.methods.Liu.__doc__
     assert run(["methods", "lui"]) == 2
     assert "method 'lui' is unknown, expected one of: optimal" in capsys.readouterr().err
+
+
+# Reprs
+
+
+def test_reprs_fit_a_line(scan):
+    tracker, features = ln.Tracker(3), ln.extract(scan)
+    assert repr(tracker) == "Tracker(3, gate=0.99, roughness=0.01: 0 tracks)"
+    tracks = tracker(features)
+    found = len(features.segments) + len(features.corners)
+    assert repr(tracker).endswith(f": {found} tracks)")
+    assert f"{len(features.corners)} corners, 0 arcs, {found} born, 0 ended, None" in repr(tracks)
+    motion = tracker(features).motion
+    assert repr(motion).startswith("Motion(0.0000 ± 0.0")
+    liu = ln.trace(scan, method="liu")
+    assert repr(liu) == f"Trace(liu: {len(liu.candidates)} candidates, {liu.features})"
+    shown = (tracker, tracks, motion, liu, scan, features, ln.Extractor(), ln.RangeNoise())
+    assert all(len(repr(one)) < 200 and "object at" not in repr(one) for one in shown)
