@@ -138,21 +138,23 @@ class LaserScan(Pictured):
         kept = range(len(self))[index]
         if kept.step < 0:
             raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
-        first, step = self.angle_min + kept.start * self.angle_increment, kept.step
-        return self.__class__(
-            self.ranges[index],
-            first if self.is_regular else None,
-            step * self.angle_increment if self.is_regular else None,
-            angles=None if self.is_regular else self.angles[index],
-            range_min=self.range_min,
-            range_max=self.range_max,
-            stamp=self.stamp + kept.start * self.time_increment,
-            scan_time=self.scan_time,
-            time_increment=step * self.time_increment,
-            frame_id=self.frame_id,
-            intensities=None if self.intensities is None else self.intensities[index],
-            pose=self.pose,
-        )
+        own = dict(vars(self))
+        for name in ("angles", "valid", "points"):
+            own.pop(name, None)  # what is made when it is first asked for
+        own["ranges"] = self.ranges[index]
+        if self.intensities is not None:
+            own["intensities"] = self.intensities[index]
+        if self.is_regular:
+            own["angle_min"] += kept.start * self.angle_increment
+            own["angle_increment"] *= kept.step
+        else:
+            own["angles"] = self.angles[index]
+            own["angle_min"], own["angle_increment"] = irregular_bearings(own["angles"])
+        own["stamp"] += kept.start * self.time_increment
+        own["time_increment"] *= kept.step
+        other = self.__class__.__new__(self.__class__)
+        other.__dict__.update(own)
+        return other
 
     def __repr__(self) -> str:
         return (
