@@ -168,8 +168,16 @@ def test_of_points_with_one_bearing_the_nearest_stays():
     assert again.ranges[again.valid] == pytest.approx([math.sqrt(2)] * 2)
     assert len(ln.LaserScan.from_points([])) == 0
     assert ln.LaserScan.from_points([(0, 2)]).angles == pytest.approx([math.pi / 2])
-    many = ln.LaserScan.from_points([(1, 0), (1, 1e-9), (1, 2e-9), (1, 1)])
-    assert len(many) < 3000  # a tiny step does not make a beam for each
+    many = ln.LaserScan.from_points([*((1, 1e-6 * k) for k in range(9)), (1, 1)])
+    assert 2000 < len(many) < 20_000  # a tiny step does not make a beam for each
+
+
+@pytest.mark.parametrize(("steps", "missing"), [(1.4, 0), (1.6, 1), (2.4, 1), (5.0, 4)])
+def test_beams_between_points_are_as_many_as_fit(steps, missing):
+    angles = np.array([0.0, 0.1, 0.2, 0.3, 0.3 + 0.1 * steps])
+    again = ln.LaserScan.from_points(np.column_stack((np.cos(angles), np.sin(angles))))
+    assert len(again) == 5 + missing
+    assert np.isnan(again.ranges).sum() == missing
 
 
 def test_a_doorway_between_points_parts_the_wall():
@@ -208,8 +216,9 @@ def test_beams_of_a_scan(scan):
         scan.ranges, **FRAME, stamp=2.0, time_increment=0.5, intensities=scan.ranges, pose=(1, 2, 3)
     )
     for whole in (timed, ln.LaserScan(scan.ranges, angles=RING, intensities=scan.ranges)):
+        assert len(whole.points) == len(whole)  # is made once, and not that of the part
         part = whole[10:50:2]
-        assert len(part) == 20
+        assert len(part) == len(part.points) == len(part.valid) == 20
         np.testing.assert_allclose(part.angles, whole.angles[10:50:2], atol=1e-14)
         np.testing.assert_array_equal(part.ranges, whole.ranges[10:50:2])
         np.testing.assert_array_equal(part.intensities, whole.ranges[10:50:2])
@@ -310,6 +319,11 @@ def test_features_in_a_notebook(scan):
     assert rows[0][3].startswith(f"{longest['length']:.3f} m")
     assert rows[0][4] == f"{1000 * math.sqrt(longest['covariance'][0, 0]):.1f}"
     assert "4 corners" in html
+    assert "polygon" not in found  # an ellipse would be hidden by its diamond
+    corners = features.corners.copy()
+    corners["covariance"][0] = np.eye(2)
+    unsure = replace(features, corners=corners)
+    assert len(parsed(unsure._repr_html_())["polygon"]) == 1
     assert "more" not in html
 
 
@@ -382,7 +396,7 @@ def test_a_log_that_cannot_be_read_shows_why(tmp_path):
     log = ln.open_log(path)
     path.unlink()
     html = log._repr_html_()
-    assert "a&amp;b.log" in html
+    assert re.search(r"<b>\S+a&amp;b.log</b>", html)
     assert "there is no such file" in html
 
 
