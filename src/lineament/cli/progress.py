@@ -57,14 +57,16 @@ def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     class Pace(ProgressColumn):
         def render(self, task: Task) -> Text:
             rate = task.completed / max((task.elapsed or 0) - compiled_seconds() + compiled, 1e-9)
-            left = (total - task.completed) / rate if rate > 0 else 0.0
-            return Text(f"{_rate_text(rate)}, {max(left, 0.0):.0f} s left")
+            if not rate:
+                return Text()
+            left = max(total - task.completed, 0) / rate
+            return Text(f"{_rate_text(rate)}, {left:.0f} s left")
 
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Pace())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(about, total=total)
         with _in_front(lambda text: progress.update(task, description=text or about)):
-            yield from progress.track(items, total, task)
+            yield from progress.track(items, total, task_id=task)
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
