@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -113,7 +114,7 @@ class _Compiler:
         self._begin()
 
     def _begin(self) -> None:
-        self._expected: list[Any] = []
+        self._expected: list[tuple[tuple[Any, ...], tuple[type, ...]]] = []
         self._started: list[Any] = []
         self._done: set[Any] = set()
         self._is_shown = False
@@ -137,11 +138,11 @@ class _Compiler:
 
             event.register("numba:compile", Listener())
 
-    def open(self, kernels: Iterable[Any]) -> None:
-        """Take what is compiled until `close` for one piece of work that needs these kernels."""
+    def open(self, functions: tuple[Any, ...], classes: tuple[type, ...]) -> None:
+        """Take what is compiled until `close` for one piece of work, see `compiling`."""
         with self._lock:
             self._open += 1
-            self._expected += kernels
+            self._expected.append((functions, classes))
 
     def close(self) -> None:
         with self._lock:
@@ -178,9 +179,9 @@ class _Compiler:
         if self.show is None or (seconds < _PATIENCE and not self._is_shown):
             return
         # What has an overload and was not compiled here came from the cache.
-        waiting = [kernel for kernel in self._expected if not kernel.overloads]
+        expected = (kernel for called in self._expected for kernel in _kernels_of(*called))
         work: dict[Any, float] = {}
-        for kernel in [*self._started, *waiting]:
+        for kernel in [*self._started, *(kernel for kernel in expected if not kernel.overloads)]:
             needed = _needed(kernel)
             work.update((other, cost) for other, cost in needed.items() if other not in work)
             work[kernel.py_func] = needed[kernel.py_func] + _LAST_SHARE * sum(needed.values())
@@ -214,7 +215,7 @@ def compiling(functions: Iterable[Any] = (), classes: Iterable[type] = ()) -> It
         Where the attributes that their code names are looked for.
     """
     _compiler.hear()
-    _compiler.open(_kernels_of(functions, tuple(classes)))
+    _compiler.open(tuple(functions), tuple(classes))
     try:
         yield
     finally:
@@ -253,6 +254,7 @@ def _named_by(function: Any, classes: tuple[type, ...] = ()) -> Iterator[Any]:
             yield getattr(cls, name, None)
 
 
+@cache
 def _needed(kernel: Any) -> dict[Any, float]:
     """Return the functions that numba compiles for a kernel, itself too, with their work."""
     needed: dict[Any, float] = {}
@@ -265,7 +267,8 @@ def _needed(kernel: Any) -> dict[Any, float]:
     return needed
 
 
-def _kernels_of(functions: Iterable[Any], classes: tuple[type, ...]) -> list[Any]:
+@cache
+def _kernels_of(functions: tuple[Any, ...], classes: tuple[type, ...]) -> list[Any]:
     """Return the kernels that functions of Python call, and those that these call in turn."""
     kernels, seen, todo = [], set(), list(functions)
     while todo:
