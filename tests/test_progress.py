@@ -14,7 +14,13 @@ from rich.status import Status
 import lineament as ln
 from lineament import cli, progress
 from lineament.cli import progress as cli_progress
-from lineament.progress import Compiling, compiled_seconds, compiling, compiling_shown
+from lineament.progress import (
+    Compiling,
+    compiled_seconds,
+    compiling,
+    compiling_now,
+    compiling_shown,
+)
 from lineament.tasks import extract as extraction
 
 
@@ -136,8 +142,13 @@ def test_what_takes_no_time_or_is_hidden_is_not_shown(states, clock, monkeypatch
     clock.now = 0.49
     progress._compiler.end(leaf)
     with compiling_shown(None):
-        compile_all(clock, branch)
+        progress._compiler.start(branch)
+        clock.now += 1
+        compile_all(clock, leaf)
+        assert compiling_now() == "compiling kernels, once: 1 of 2, 0 s left"
+        progress._compiler.end(branch)
     assert states == []
+    assert compiling_now() == ""
     compile_all(clock, branch)
     assert states[-1].is_last
 

@@ -12,8 +12,6 @@ from functools import cache
 from types import FunctionType, ModuleType
 from typing import Any
 
-__all__ = ["Compiling", "Track", "compiled_seconds", "compiling", "compiling_shown", "untracked"]
-
 #: ``track(items, about, total)`` gives the items, and shows how far they are.
 Track = Callable[[Any, str, int], Iterable[Any]]
 
@@ -107,6 +105,7 @@ class _Compiler:
     def __init__(self) -> None:
         self.show: Show | None = show_to_person
         self.seconds = 0.0
+        self.now: Compiling | None = None
         self._lock = threading.RLock()
         self._is_heard = False
         self._open = self._depth = 0
@@ -176,7 +175,7 @@ class _Compiler:
 
     def _report(self, is_last: bool = False) -> None:
         seconds = time.perf_counter() - self._began
-        if self.show is None or (seconds < _PATIENCE and not self._is_shown):
+        if seconds < _PATIENCE and not self._is_shown:
             return
         # What has an overload and was not compiled here came from the cache.
         expected = (kernel for called in self._expected for kernel in _kernels_of(*called))
@@ -190,9 +189,12 @@ class _Compiler:
         speed = (worked + 2.0 * _SPEED) / (seconds + 2.0)
         left = (sum(work.values()) - worked) / speed
         is_first, self._is_shown = not self._is_shown, True
-        # Nobody to show it to is no reason to end the work.
-        with suppress(OSError, ValueError):
-            self.show(Compiling(len(done), len(work), seconds, left, is_first, is_last))
+        state = Compiling(len(done), len(work), seconds, left, is_first, is_last)
+        self.now = None if is_last else state
+        if self.show is not None:
+            # Nobody to show it to is no reason to end the work.
+            with suppress(OSError, ValueError):
+                self.show(state)
 
 
 _compiler = _Compiler()
@@ -201,6 +203,11 @@ _compiler = _Compiler()
 def compiled_seconds() -> float:
     """Return the time that went into compiling kernels, in this process [s]."""
     return _compiler.seconds
+
+
+def compiling_now() -> str:
+    """Return how far the compilation of kernels is, in this process; "" if there is none."""
+    return str(_compiler.now or "")
 
 
 @contextmanager
