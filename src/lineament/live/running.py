@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
 
-import numpy as np
-
 from ..errors import needed_by
+from ..extractor import WALL
+from ..motion import Tracker
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
-from ..scan import LaserScan
+from ..progress import compiling
 from .config import LiveConfig
 from .counters import Report
 from .node import Node
@@ -18,10 +18,6 @@ from .pipeline import Pipeline
 from .received import Source
 from .replay import ReplaySource
 from .sinks import FoxgloveSink, RosSink, Sink
-
-#: What kernels are loaded with, so that the first scan need not wait for them.
-_BEARINGS = np.linspace(-1.0, 1.0, 101)
-_WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)
 
 
 def run_live(
@@ -60,8 +56,10 @@ def run_live(
             # Other nodes are discovered while the kernels are loaded.
             source, sinks = _ends(config, stack, write)
             pipeline = Pipeline(config)
-            frame = pipeline("", _WALL)
-            feature_points(frame.features, frame.tracks)
+            # The motion of tracks is estimated from the second scan on.
+            with compiling([Tracker.__call__] if config.track else [], [Tracker]):
+                for frame in (pipeline("", WALL), pipeline("", WALL)):
+                    feature_points(frame.features, frame.tracks)
         write(f"{config.name} finds features on {config.scan_topic} by {config.method}")
         return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
 

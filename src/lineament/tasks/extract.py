@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..extractor import Extractor
+from ..extractor import Extractor, load_kernels
 from ..features import COUNTED
 from ..logs import open_log
 from ..output import open_writer
@@ -20,8 +20,8 @@ class Extraction:
     """Result of the extraction of one log.
 
     Topics of the scans; number of scans and of features of each kind; share of invalid beams; wall
-    time [s] from opening the log to the finished file; number of faulty lines or records that were
-    skipped, the first of which are in `faults`.
+    time [s] from opening the log to the finished file, without that of loading kernels; number of
+    faulty lines or records that were skipped, the first of which are in `faults`.
     """
 
     log: str
@@ -91,6 +91,7 @@ def extract_log(
     >>> extract_log(folder / "log.npz", folder / "features.parquet", Extractor("liu")).scans
     5
     """
+    load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
     topics = log.topics if log.topic is None else [log.topic]

@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, cast
 
 from ..._version import __version__
-from ...extractor import Extractor
+from ...extractor import Extractor, load_kernels
 from ...features import COUNTED
 from ...files import made_folder
 from ...logs import find_logs, open_log
@@ -119,9 +119,11 @@ def extract_logs(
     >>> extract_logs(home, home / "out", Extractor("liu"), resume=True).whole
     2
     """
-    started = time.perf_counter()
     settings = _settings(reading)
     open_writer(f"part-0{ending}")  # refuses an unknown ending before anything is computed
+    if executor is None or isinstance(executor, Threads):  # once here, not in each process
+        load_kernels([extractor])
+    started = time.perf_counter()
     found = [full_path(log) for log in find_logs(logs)]
     manifest = Manifest(made_folder(folder))
     names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
