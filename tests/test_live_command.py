@@ -151,6 +151,36 @@ def test_a_log_is_played_until_its_end(peer, domain, log):
     assert_same(clouds[-1], ln.extract(last))
 
 
+def test_the_motion_of_a_log_is_published(peer, domain, log):
+    peer.listen("/scan/odometry", "Odometry", 1000)
+    scans = {round(1e9 * scan.stamp): scan for scan in ln.open_log(log)}
+    with Running(domain=domain, log=log, rate=20.0, track=True) as node:
+        node.end()
+        eventually(lambda: peer._readers["/scan/odometry"].read(1))
+    last = peer.take("/scan/odometry")[-1]
+    header, twist, inside = last["header"], last["twist"]["twist"], np.ix_((0, 1, 5), (0, 1, 5))
+    assert (header["frame_id"], last["child_frame_id"]) == ("odom", "laser")
+    assert header["stamp"]["sec"] * 10**9 + header["stamp"]["nanosec"] == max(scans)
+    assert twist["linear"]["x"] == pytest.approx(1.0, abs=0.1)
+    place = last["pose"]["pose"]["position"]
+    assert (place["x"], place["y"]) == pytest.approx((4.0, 0.0), abs=0.05)
+    for part in ("pose", "twist"):
+        covariance = np.reshape(last[part]["covariance"], (6, 6))[inside]
+        assert (np.linalg.eigvalsh(covariance) > 0).all()
+        assert (np.diag(covariance) < 0.5**2).all()
+
+
+def test_a_log_is_shown_in_foxglove_without_dds(log, monkeypatch):
+    """Of the extra ``foxglove`` alone, as the README names it."""
+    pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    lines: list[str] = []
+    report = run_live(LiveConfig(log=log, rate=0, foxglove=0), write=lines.append)
+    assert report.total.scans == 41
+    assert lines[0].startswith("without ROS 2, for Foxglove alone: needs cyclonedds, which is not")
+    assert lines[1].startswith("Foxglove: open a connection to ws://127.0.0.1:")
+
+
 def test_a_log_is_shown_in_foxglove(log):
     pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
     from foxglove_client import FoxgloveClient

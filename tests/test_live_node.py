@@ -318,11 +318,15 @@ def test_no_message_ends_a_node(options):
         (ln.LaserScan(WALL, angles=BEARINGS**3), ["/scan/points"]),
     ],
 )
-def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics):
-    publisher = Taken()
-    sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log=log))
-    frame = Pipeline(LiveConfig())("a", scan)
+@pytest.mark.parametrize("options", [{}, {"track": True}, {"deskew": "scans"}])
+def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics, options):
+    publisher, config = Taken(), LiveConfig(log=log, **options)
+    sink = RosSink(publisher, RosMessages("cdr"), config)
+    frame = Pipeline(config)("a", scan)
     below = [f"/scan/{name}" for name in ("features", "corners", "markers")]
+    if options:
+        below.append("/scan/odometry")
+    assert ("/scan/odometry" in publisher._topics) == bool(options)
     made = below + topics if log else below
     for heard in (None, [], *([topic] for topic in made)):
         publisher.heard = heard

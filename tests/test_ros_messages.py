@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
-from lineament.motion import Tracks
+from lineament.motion import Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
@@ -126,6 +126,34 @@ def test_transform(make):
     assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(0.5)
 
 
+def covariance_of(values):
+    """Read the plane of a covariance of six numbers, of which nothing else may be there."""
+    six = np.reshape(values, (6, 6)).copy()
+    plane = six[np.ix_((0, 1, 5), (0, 1, 5))].copy()
+    six[np.ix_((0, 1, 5), (0, 1, 5))] = 0
+    assert not six.any()
+    return plane
+
+
+def in_plane(pose):
+    position, turned = pose.position, pose.orientation
+    assert position.z == turned.x == turned.y == 0
+    return position.x, position.y, 2 * math.atan2(turned.z, turned.w)
+
+
+def test_odometry(make):
+    of_pose, of_twist = np.arange(9.0).reshape(3, 3), np.eye(3) + 0.5
+    travel = Travel((1.5, -2.0, -3.0), of_pose, (0.5, -0.25, 0.125), of_twist)
+    back = read(make, make.odometry("/scan/odometry", MOMENT, travel))
+    assert (back.header.frame_id, back.child_frame_id) == ("odom", "laser_link")
+    assert in_plane(back.pose.pose) == pytest.approx((1.5, -2.0, -3.0))
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), of_pose)
+    np.testing.assert_array_equal(covariance_of(back.twist.covariance), of_twist)
+    linear, angular = back.twist.twist.linear, back.twist.twist.angular
+    assert (linear.x, linear.y, linear.z) == (0.5, -0.25, 0.0)
+    assert (angular.x, angular.y, angular.z) == (0.0, 0.0, 0.125)
+
+
 def test_markers(make):
     layers = layers_of(markers_of(FOUND, SCAN))
     markers = read(make, make.features("/scan/features", MOMENT, layers)).markers
@@ -226,6 +254,9 @@ def test_frames_of_all_lengths_leave_numbers_aligned(make, length):
     n = len(found.segments) + len(found.corners) + len(found.arcs)
     assert read(make, make.cloud("/f", moment, found)).width == n
     assert len(read(make, make.transform("/f", moment, (0.0, 0.0, 0.0))).transforms) == 1
+    travel = Travel((1.0, 2.0, 0.0), np.eye(3), (0.0, 0.0, 0.0), np.eye(3))
+    back = read(make, make.odometry("/f", moment, travel))
+    np.testing.assert_array_equal(covariance_of(back.twist.covariance), np.eye(3))
     message = make.diagnostics("/f", moment, "n" * length, "", 0, "", {"a": "b"})
     (status,) = read(make, message).status
     assert status.name == "n" * length

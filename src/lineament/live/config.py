@@ -79,7 +79,8 @@ class LiveConfig:
     laser_pose : (x, y, theta)
         Pose of the scanner in the frame of the odometry's twist [m, m, rad].
     track : bool
-        Whether features are recognised from scan to scan.
+        Whether features are recognised from scan to scan. Then, and where `deskew` is ``scans``,
+        the motion by them is known too: ``TOPIC/odometry``.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -159,6 +160,11 @@ class LiveConfig:
     def scan_topic(self) -> str:
         """Full name of the topic of the scans."""
         return resolved(self.topic, self.namespace)
+
+    @property
+    def is_tracking(self) -> bool:
+        """Whether the motion of the sensor is found by its scans."""
+        return self.track or self.deskew == "scans"
 
     @property
     def odometry_topic(self) -> str | None:

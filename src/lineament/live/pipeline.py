@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..extractor import Extractor
 from ..features import Features
 from ..methods import get_method
-from ..motion import Tracker, Tracks
+from ..motion import Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
@@ -56,6 +56,8 @@ class Frame(NamedTuple):
         None unless tracking is on.
     time : (int, int)
         Stamp of its message, exactly: seconds and nanoseconds.
+    travel : Travel or None
+        Where the sensor has come to; None unless features are tracked, to number them or to deskew.
     """
 
     scan: LaserScan
@@ -63,6 +65,7 @@ class Frame(NamedTuple):
     features: Features
     tracks: Tracks | None
     time: Time
+    travel: Travel | None = None
 
 
 class Pipeline:
@@ -99,10 +102,13 @@ class Pipeline:
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
         features = kept.extractor(straight)
-        tracks = None if kept.tracker is None else kept.tracker(features)
+        tracks, travel = None, None
+        if kept.tracker is not None:
+            tracks = kept.tracker(features)
+            travel = kept.odometer(tracks, scan.stamp)
         if not self._config.track:
             tracks = None
-        return Frame(scan, straight, features, tracks, time or time_of(scan.stamp))
+        return Frame(scan, straight, features, tracks, time or time_of(scan.stamp), travel)
 
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
@@ -143,7 +149,8 @@ class _Publisher:
     def __init__(self, config: LiveConfig) -> None:
         noise = None if config.noise is None else RangeNoise(sigma=config.noise)
         self.extractor = Extractor(get_method(config.method, **config.parameters), noise=noise)
-        self.tracker = Tracker() if config.track or config.deskew == "scans" else None
+        self.tracker = Tracker() if config.is_tracking else None
+        self.odometer = Odometer()
         self.last: LaserScan | None = None
 
 

@@ -15,13 +15,16 @@ from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_b
 from .association import Matches, associate
 from .deskew import beam_times, deskew
 from .estimate import Motion, estimate_motion
+from .odometry import Odometer, Travel
 from .tracker import Tracker, Tracks
 
 __all__ = [
     "Matches",
     "Motion",
+    "Odometer",
     "Tracker",
     "Tracks",
+    "Travel",
     "Twist",
     "associate",
     "beam_times",
