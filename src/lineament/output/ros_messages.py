@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..rosmsg.definitions import definition
+from ..rosmsg.poses import IN_PLANE
 from ..rosmsg.scans import CLOUD, POINT_TYPES
 from ..rosmsg.wire import WireWriter
 from ..scan import Array, LaserScan, Pose
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 # Numbers of visualization_msgs/Marker: its types and its actions.
 LINE_LIST, SPHERE_LIST = 5, 7
 ADD, DELETE = 0, 2
-#: Rows of x, y and the turn about z in a covariance of six numbers; the others are 0.
-_IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
 #: Position and orientation of a marker: those of its frame.
 _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 #: Centroid of a segment that is not known.
@@ -199,9 +198,9 @@ def _pose(pose: Pose) -> tuple[float, ...]:
 
 
 def _six(covariance: Array) -> Array:
-    """Covariance of x, y, z and the turns about them, by that of (x, y, theta)."""
+    """Covariance of x, y, z and the turns about them, by that of (x, y, theta); else 0."""
     six = np.zeros((6, 6))
-    six[_IN_PLANE] = covariance
+    six[IN_PLANE] = covariance
     return six
 
 

@@ -12,6 +12,7 @@ from .fields import (
     Array,
     Pose,
     checked_pose,
+    covariance_of_pose,
     finite,
     irregular_bearings,
     number,
@@ -123,6 +124,8 @@ class LaserScan:
     frame_id: str
     intensities: Array | None
     pose: Pose | None
+    #: Covariance (3, 3) of the pose [m, m, rad], where it is known; see `with_pose`.
+    pose_covariance: Array | None
 
     def __init__(
         self,
@@ -159,6 +162,7 @@ class LaserScan:
         own["frame_id"] = str(frame_id)
         own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
         own["pose"] = None if pose is None else checked_pose(pose)
+        own["pose_covariance"] = None
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
@@ -205,8 +209,10 @@ class LaserScan:
         span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
         return span >= 2 * math.pi - 2.5 * step
 
-    def with_pose(self, pose: Pose | None) -> Self:
+    def with_pose(self, pose: Pose | None, covariance: ArrayLike | None = None) -> Self:
         """Return the same scan with another pose [m, m, rad]; they share their arrays.
+
+        `covariance` is that of the pose, shape (3, 3), where it is known.
 
         Examples
         --------
@@ -214,7 +220,11 @@ class LaserScan:
         (3.0, 4.0, 0.0)
         """
         other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
+        other.__dict__.update(
+            self.__dict__,
+            pose=None if pose is None else checked_pose(pose),
+            pose_covariance=None if covariance is None else covariance_of_pose(covariance),
+        )
         return other
 
     @classmethod
