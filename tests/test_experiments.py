@@ -276,6 +276,12 @@ def test_operator_by_definition_is_that_of_the_code():
         np.testing.assert_allclose(np.vstack((s, s**2)) @ (off - fit), 0, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_scene_of_figure_10_has_as_many_clusters_and_corners(seed):
+    true = layers.like_figure_10(seed).truth
+    assert (true.clusters.max() + 1, len(true.corners)) == layers.PAPER_COUNTS
+
+
 class TestMuseum:
     """A bag of the layout of the museum's: echoes of a drive past the two corners of Table 2."""
 
@@ -323,7 +329,7 @@ class TestMuseum:
 
     def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
         def view(way, **corners):
-            places = {"a": (0, True), "b": (2, False), "c": (2.5, False), "f": (9, False)}
+            places = {"a": (0, True), "b": (2, False), "c": (3.5, False), "f": (9, False)}
             shown = {ord(n): (np.array((places[n][0], 0.0)), places[n][1]) for n in corners}
             return museum.View(None, None, way, shown)
 
