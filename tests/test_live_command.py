@@ -1,6 +1,7 @@
 """`lineament live` as a whole: what others hear of it, its options, and how it ends."""
 
 import gc
+import math
 import re
 import signal
 import sys
@@ -170,6 +171,25 @@ def test_the_motion_of_a_log_is_published(peer, domain, log):
         assert (np.diag(covariance) < 0.5**2).all()
 
 
+def test_the_pose_of_a_corner_is_published(peer, domain, log):
+    """A corner of the room, 5 m ahead and 2 m to the left when the drive begins."""
+    peer.listen("/scan/dock", "PoseWithCovarianceStamped", 1000)
+    scans = list(ln.open_log(log))
+    with Running(domain=domain, log=log, rate=20.0, dock=(5.3, 1.8)) as node:
+        node.end()
+        eventually(lambda: peer._readers["/scan/dock"].read(1))
+    last = peer.take("/scan/dock")[-1]
+    assert last["header"]["frame_id"] == "laser"
+    assert last["header"]["stamp"]["sec"] == int(scans[-1].stamp)
+    place, turned = last["pose"]["pose"]["position"], last["pose"]["pose"]["orientation"]
+    covariance = np.reshape(last["pose"]["covariance"], (6, 6))[np.ix_((0, 1, 5), (0, 1, 5))]
+    yaw = 2 * math.atan2(turned["z"], turned["w"])
+    # The drive has gone 4 m straight on.
+    off = np.subtract((place["x"], place["y"], yaw), (1.0, 2.0, -0.75 * math.pi))
+    assert off @ np.linalg.solve(covariance, off) < 30
+    assert np.abs(off).max() < 0.03
+
+
 def test_a_log_is_shown_in_foxglove_without_dds(log, monkeypatch):
     """Of the extra ``foxglove`` alone, as the README names it."""
     pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
@@ -247,6 +267,7 @@ min_points = 6
     configs: list[LiveConfig] = []
     monkeypatch.setattr("lineament.live.running.run_live", kept)
     flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
+    flags += " --dock 2 -1.5"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0
     assert capfd.readouterr() == ("3 scans, 2 dropped, 1 lost, 0 malformed messages\n", "begun\n")
     assert run(["live", "--ros", "1", "__name:=front", "-q"]) == 0
@@ -264,6 +285,7 @@ min_points = 6
             foxglove=8765,
             rate=2.0,
             noise=0.1,
+            dock=(2.0, -1.5),
         ),
         LiveConfig(ros=1),
     ]

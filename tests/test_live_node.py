@@ -318,7 +318,9 @@ def test_no_message_ends_a_node(options):
         (ln.LaserScan(WALL, angles=BEARINGS**3), ["/scan/points"]),
     ],
 )
-@pytest.mark.parametrize("options", [{}, {"track": True}, {"deskew": "scans"}])
+@pytest.mark.parametrize(
+    "options", [{}, {"track": True}, {"deskew": "scans"}, {"dock": (9, 9)}, {"dock_track": 1}]
+)
 def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics, options):
     publisher, config = Taken(), LiveConfig(log=log, **options)
     sink = RosSink(publisher, RosMessages("cdr"), config)
@@ -327,6 +329,8 @@ def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, 
     if options:
         below.append("/scan/odometry")
     assert ("/scan/odometry" in publisher._topics) == bool(options)
+    # The scan has no corner.
+    assert ("/scan/dock" in publisher._topics) == any("dock" in name for name in options)
     made = below + topics if log else below
     for heard in (None, [], *([topic] for topic in made)):
         publisher.heard = heard

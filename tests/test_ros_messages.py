@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
-from lineament.motion import Tracks, Travel
+from lineament.motion import CornerPose, Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
@@ -154,6 +154,14 @@ def test_odometry(make):
     assert (angular.x, angular.y, angular.z) == (0.0, 0.0, 0.125)
 
 
+def test_corner_pose(make):
+    found = CornerPose((1.5, -2.0, -3.0), np.arange(9.0).reshape(3, 3))
+    back = read(make, make.corner_pose("/scan/dock", MOMENT, found))
+    assert back.header.frame_id == "laser_link"
+    assert in_plane(back.pose.pose) == pytest.approx(found.pose)
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), found.covariance)
+
+
 def test_markers(make):
     layers = layers_of(markers_of(FOUND, SCAN))
     markers = read(make, make.features("/scan/features", MOMENT, layers)).markers
@@ -257,6 +265,8 @@ def test_frames_of_all_lengths_leave_numbers_aligned(make, length):
     travel = Travel((1.0, 2.0, 0.0), np.eye(3), (0.0, 0.0, 0.0), np.eye(3))
     back = read(make, make.odometry("/f", moment, travel))
     np.testing.assert_array_equal(covariance_of(back.twist.covariance), np.eye(3))
+    back = read(make, make.corner_pose("/f", moment, CornerPose(travel.pose, np.eye(3))))
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), np.eye(3))
     message = make.diagnostics("/f", moment, "n" * length, "", 0, "", {"a": "b"})
     (status,) = read(make, message).status
     assert status.name == "n" * length

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..extractor import Extractor
 from ..features import Features
 from ..methods import get_method
-from ..motion import Odometer, Tracker, Tracks, Travel
+from ..motion import CornerPose, Dock, Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
@@ -57,7 +57,9 @@ class Frame(NamedTuple):
     time : (int, int)
         Stamp of its message, exactly: seconds and nanoseconds.
     travel : Travel or None
-        Where the sensor has come to; None unless features are tracked, to number them or to deskew.
+        Where the sensor has come to; None unless features are tracked, for whatever purpose.
+    dock : CornerPose or None
+        The corner that is docked to; None unless one was asked for, and where it is not seen.
     """
 
     scan: LaserScan
@@ -66,6 +68,7 @@ class Frame(NamedTuple):
     tracks: Tracks | None
     time: Time
     travel: Travel | None = None
+    dock: CornerPose | None = None
 
 
 class Pipeline:
@@ -102,13 +105,16 @@ class Pipeline:
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
         features = kept.extractor(straight)
-        tracks, travel = None, None
+        tracks, travel, dock = None, None, None
         if kept.tracker is not None:
             tracks = kept.tracker(features)
             travel = kept.odometer(tracks, scan.stamp)
+            if kept.dock is not None:
+                dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:
             tracks = None
-        return Frame(scan, straight, features, tracks, time or time_of(scan.stamp), travel)
+        time = time or time_of(scan.stamp)
+        return Frame(scan, straight, features, tracks, time, travel, dock)
 
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
@@ -151,6 +157,7 @@ class _Publisher:
         self.extractor = Extractor(get_method(config.method, **config.parameters), noise=noise)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
+        self.dock = Dock(config.dock, track=config.dock_track) if config.is_docking else None
         self.last: LaserScan | None = None
 
 

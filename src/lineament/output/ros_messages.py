@@ -21,7 +21,7 @@ from .markers import is_drawn
 from .scene import ODOMETRY_FRAME, Layer, Message, Moment, SceneMessages, cloud_of, single
 
 if TYPE_CHECKING:
-    from ..motion import Tracks, Travel
+    from ..motion import CornerPose, Tracks, Travel
 
 # Numbers of visualization_msgs/Marker: its types and its actions.
 LINE_LIST, SPHERE_LIST = 5, 7
@@ -72,6 +72,13 @@ class RosMessages(SceneMessages):
         writer.numbers("6d", vx, vy, 0.0, 0.0, 0.0, turn_rate)
         writer.array(_six(travel.twist_covariance))
         return self._message(topic, "nav_msgs/Odometry", writer)
+
+    def corner_pose(self, topic: str, moment: Moment, found: "CornerPose") -> Message:
+        """``geometry_msgs/PoseWithCovarianceStamped``, in the frame of the scan."""
+        writer = self._begin(moment)
+        writer.numbers("7d", *_pose(found.pose))
+        writer.array(_six(found.covariance))
+        return self._message(topic, "geometry_msgs/PoseWithCovarianceStamped", writer)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
         """``sensor_msgs/LaserScan``."""
