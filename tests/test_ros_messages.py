@@ -14,12 +14,15 @@ from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
+from lineament.live import Counts, LiveConfig, Pipeline, Report, RosSink
+from lineament.live.sinks import Publisher
 from lineament.motion import CornerPose, Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment, layers_of
+from lineament.simulation import SENSORS, drive, room
 
 MOMENT = Moment(1_700_000_012, 123_456_789, "laser_link", "map")
 SCAN = LaserScan(
@@ -283,6 +286,39 @@ def test_messages_of_ros1_in_a_file(tmp_path):
     found = [(s.name, s.encoding, c.message_encoding) for s, c, _ in reader.iter_messages()]
     names = "tf2_msgs/TFMessage", "sensor_msgs/LaserScan", "visualization_msgs/MarkerArray"
     assert found == [(name, "ros1msg", "ros1") for name in names]
+
+
+class Kept(Publisher):
+    """Keeps what is published, as others would receive it."""
+
+    def __init__(self):
+        super().__init__()
+        self.opened, self.sent = {}, {}
+
+    def _open(self, topic, kind):
+        self.opened[topic] = kind
+
+    def _send(self, _, message):
+        self.sent[message.topic] = message
+
+    def _count(self, _):
+        return 1
+
+
+def test_all_that_is_published_is_read_by_rosbags(make):
+    """Of a log with poses, with odometry, a dock, diagnostics: each topic, by its type."""
+    publisher, config = Kept(), LiveConfig(log="a.npz", dock=(5.0, 2.0))
+    sink, pipeline = RosSink(publisher, make, config), Pipeline(config)
+    walk = [(-2, 0), (-1.9, 0)]
+    for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=20):
+        sink.publish(pipeline("a", scan, MOMENT[:2]))
+    irregular = LaserScan(scan.ranges, angles=scan.angles)
+    sink.publish(pipeline("a", irregular, MOMENT[:2]))
+    sink.diagnose(Report(1.0, Counts(), Counts(3, 2, 1), (0, 0), 0, {}, 0), MOMENT[:2])
+    assert set(publisher.sent) == set(publisher.opened)
+    for topic, message in publisher.sent.items():
+        assert message.kind == publisher.opened[topic]
+        read(make, message)
 
 
 def test_an_unknown_encoding():
