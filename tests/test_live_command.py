@@ -24,6 +24,7 @@ from live_driving import (
 import lineament as ln
 from lineament.cli import run
 from lineament.live import Counts, LiveConfig, Report, run_live
+from lineament.live.running import _is_for_foxglove_alone
 from lineament.logs import save_npz
 from lineament.output.feature_points import feature_points
 from lineament.simulation import SENSORS, drive, room
@@ -199,6 +200,9 @@ def test_a_log_is_shown_in_foxglove_without_dds(log, monkeypatch):
     assert report.total.scans == 41
     assert lines[0].startswith("without ROS 2, for Foxglove alone: needs cyclonedds, which is not")
     assert lines[1].startswith("Foxglove: open a connection to ws://127.0.0.1:")
+    # What else needs ROS goes on to fail without it.
+    for options in ({"log": log}, {"foxglove": 0}):
+        assert not _is_for_foxglove_alone(LiveConfig(**options), pytest.fail)
 
 
 def test_a_log_is_shown_in_foxglove(log):

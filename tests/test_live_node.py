@@ -407,6 +407,21 @@ def test_poses_give_the_motion_between_scans():
         assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
 
 
+def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
+    poses = []
+    monkeypatch.setattr(
+        "lineament.live.pipeline.Dock", lambda *_, **__: lambda *at: poses.append(at)
+    )
+    pipeline = Pipeline(LiveConfig(dock=(5.0, 2.0)))
+    walk = [(-2.0, 0.0), (-1.0, 0.0)]
+    for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=5):
+        frame = pipeline("one", scan)
+        features, tracks, pose = poses.pop()
+        assert (features, pose) == (frame.features, frame.travel.pose)
+        assert len(tracks.corners) == len(features.corners)
+    assert pose[0] == pytest.approx(1.0, abs=0.02)
+
+
 @pytest.mark.parametrize(("deskew", "most"), [("scans", 0.02), ("poses", 1e-6), ("/odom", 1e-9)])
 def test_moving_scans_are_deskewed(deskew, most):
     walk = [(-2.0, 0.0), (-1.0, 0.0)]

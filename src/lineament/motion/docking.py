@@ -140,7 +140,7 @@ class Dock:
         x, y, _ = compose(inverse(pose), (self._point[0], self._point[1], 0.0))
         corners = features.corners
         away = np.hypot(*(corners["position"] - (x, y)).T)
-        away[(tracks.corners < 0) | (corners["segments"] < 0).any(axis=1)] = math.inf
+        away[(corners["segments"] < 0).any(axis=1)] = math.inf  # edges too, which have no track
         if away.min(initial=math.inf) > _REACH:
             return None
         return int(tracks.corners[away.argmin()])
