@@ -152,7 +152,7 @@ def _scenes(n: Any) -> tuple[str, Sequence[float]]:
 
 def _similarity(n: Any) -> tuple[str, Sequence[float]]:
     simulated = next(iter(n.values()))
-    names = (LIU_PAPER, "iepf", PDBS_LINES)
+    names = (LIU_PAPER, "iepf:paper", PDBS_LINES)
     most = [simulated[name]["similarity_maximum"] for name in names]
     about = ", ".join(f"{name} {value:.2f} m" for name, value in zip(names, most, strict=True))
     return f"Largest: {about}", [0.01 - most[0]]

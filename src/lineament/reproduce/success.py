@@ -83,7 +83,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     )
     return Findings(
         "Success of partition and of corners, and time (Table 3)",
-        (*_TEXT, _verdict({name: many for name, (_, many) in totals.items()})),
+        _TEXT,
         (
             Table.of_records(
                 "Table 3, partition: correct clusters of the true ones",
@@ -119,23 +119,6 @@ _TEXT = (
     "and 0.72 of theirs. They are of MATLAB, those here of compiled kernels: compare ratios.",
     LIU_NOTE,
 )
-
-
-def _verdict(totals: dict[str, Scores]) -> str:
-    """State which of the paper's claims hold here, over the many frames."""
-    liu, fixed = (
-        totals[name].partition.success for name in ("liu:paper, no corners", "pdbs, fixed 0.3 m")
-    )
-    best, iepf = (totals[name].corners.counts for name in (LITERAL, "iepf:paper, in clusters"))
-    clusters, corners = (
-        "holds" if claim else "does not hold" for claim in (liu > fixed, best.recall > iepf.recall)
-    )
-    return (
-        f"That liu makes better clusters than PDBS {clusters} here: {liu:.2f} against {fixed:.2f}. "
-        f"That it finds more corners than IEPF in clusters {corners} with the paper’s numbers: "
-        f"recall {best.recall:.2f} against {iepf.recall:.2f}, F1 {best.f1:.2f} against "
-        f"{iepf.f1:.2f}."
-    )
 
 
 def _row(name: str, few: int, counts: list[Counts], of: str) -> dict[str, object]:
