@@ -27,9 +27,11 @@ from lineament.reproduce.scans import (
     INDOORS,
     batch_of,
     frame_times,
+    interleaved_times,
     recorded_scans,
     scene_numbers,
     simulated_frames,
+    time_ratio,
 )
 from lineament.simulation import SENSORS, Sensor
 
@@ -151,8 +153,9 @@ def recorded(extractor: Extractor, setting: Setting, scans: int) -> Iterator[Aim
 def speed(extractor: Extractor, setting: Setting, count: int) -> Iterator[Aim]:
     for name in ("paper", "utm30lx"):
         scans = simulated_scans(SENSORS[name], count)
-        kernels = frame_times(extractor, scans)
-        ratio = float(np.median(kernels / frame_times(Extractor("liu"), scans)))
+        times = interleaved_times({"": extractor, "liu": Extractor("liu")}, scans)
+        kernels = np.median(times[""], axis=0)
+        ratio = time_ratio(times[""], times["liu"])[0]
         calls = [median(seconds(partial(extractor, s)) for _ in range(CALLS)) for s in scans]
         worst = max(frame_times(extractor, [scan])[0] for scan in garbage(scans[0]))
         yield name, f"kernels, {len(scans[0])} beams [µs]", NONE, 1e6 * float(np.median(kernels))

@@ -131,14 +131,14 @@ class Results:
 
     def summary(self) -> str:
         """The table of README: some methods with the paper's sensor."""
-        return self.simulation(BY_SENSOR)
+        return self.simulation(SOME)
 
     def sensors(self) -> str:
         """F1 of corners of some methods with each sensor."""
         found = self.numbers("all_methods")
         rows = [
             (method, *(two_digits(of[method].get("corner_f1_0.10")) for of in found.values()))
-            for method in BY_SENSOR
+            for method in SOME
         ]
         return markdown(("method", *found), rows)
 
@@ -171,8 +171,10 @@ class Results:
                 self.total(free, method, "phantom_in_100m"),
                 100 * self.total(free, method, "covered"),
                 *(self.middle(standing, method, kind) for kind in ("segments", "corners")),
-                sum(of[method]["count"] for of in repeats.values()),
-                sum(of[method]["count_without_edges"] for of in repeats.values()),
+                *(
+                    sum(of[method][key] for of in repeats.values()) or None
+                    for key in ("count", "count_without_edges")
+                ),
             )
             for method in next(iter(free.values()))
         ]
@@ -189,10 +191,11 @@ class Results:
         return sum(values) / len(values)
 
     @staticmethod
-    def middle(found: Mapping[str, Any], method: str, kind: str) -> float:
+    def middle(found: Mapping[str, Any], method: str, kind: str) -> float | None:
         """Return the median NEES of features of 30 to 99 measurements over the recordings."""
         bins = [of[method][kind]["30-99"] for of in found.values()]
-        return median(of["nees_median"] for of in bins if of["pairs"] >= 10)
+        values = [of["nees_median"] for of in bins if of["pairs"] >= 10]
+        return median(values) if values else None
 
     def arena(self) -> str:
         """Corners of a real arena, at rest and moving."""
@@ -200,9 +203,29 @@ class Results:
         shown = {"recall": ("recall", 1), "error [mm]": ("median_error", 1e3)}
         rows = [
             (m, *(f * of[m][key] for of in arenas.values() for key, f in shown.values()))
-            for m in next(iter(arenas.values()))
+            for m in SOME
         ]
         return markdown(("method", *(f"{a}: {s}" for a in arenas for s in shown)), rows)
+
+    def relations(self) -> str:
+        """Motion against relations that people verified: up to a minute apart, and beyond."""
+        rows = []
+        for log, of in self.numbers("tracking").items():
+            for source in ("the log’s corrected poses", "features", "ICP", "features, no odometry"):
+                near, far = of["near"][source], of["far_apart"].get(source)
+                pairs = [(near[f"way_{k}"], near[f"turn_{k}"]) for k in ("mean", "std")]
+                way, turn = zip(*pairs, strict=True)
+                rows.append(
+                    (
+                        *(log, source, near["motions"]),
+                        f"{1e3 * way[0]:.0f} ± {1e3 * way[1]:.0f}",
+                        f"{1e3 * near['way_median']:.0f}",
+                        f"{math.degrees(turn[0]):.2f} ± {math.degrees(turn[1]):.2f}",
+                        f"{1e3 * far['way_median']:.0f} ({far['motions']})" if far else None,
+                    )
+                )
+        columns = ("log", "motion from", "n", "way [mm]", "median", "turn [°]")
+        return markdown((*columns, "over 60 s: way, median [mm] (n)"), rows)
 
     def tracking(self) -> str:
         """Motion from features and by ICP, and tracks."""
@@ -257,7 +280,8 @@ class Results:
         found = next(iter(self.numbers("similarity").values()))
         rows = [
             (method, f"{100 * of['similarity_explained']:.0f}", f"{1e3 * of['similarity_rms']:.0f}")
-            for method, of in found.items()
+            for method in ("the true lines", "pdbs, fitted", *SOME)
+            for of in [found[method]]
         ]
         return markdown(("method", "explained [%]", "RMS error of these [mm]"), rows)
 
@@ -284,36 +308,31 @@ class Results:
         return markdown(("method", *columns), rows.values())
 
     def process(self) -> str:
-        """What a process costs: starts, threads, and the sizes of the code."""
+        """What a process costs: starts and threads."""
         sys.path.insert(0, str(Path(__file__).parent))
         import speed
 
-        lines = {
-            name: sum(len(p.read_text("utf-8").splitlines()) for p in (ROOT / name).rglob("*.py"))
-            for name in ("src/lineament", "src/lineament/kernels", "tests")
-        }
         gains = (f"{speed.speed_of_method(m, 'utm30lx')[3]:.2f}" for m in ("optimal", "liu"))
         rows = [
             ("two threads ÷ one, 1081 beams: optimal, liu", ", ".join(gains)),
             ("pure arithmetic, the same", f"{speed.gain_of_the_machine():.2f}"),
             *((name.replace("`", ""), value) for name, value in speed.start_up()),
             *speed.throughput(),
-            *((f"lines of Python in {name}", count) for name, count in lines.items()),
         ]
         return markdown(("what", "measured"), rows)
 
 
 TABLES = (
-    *("speed", "process", "maps", "tracking", "real", "arena"),
+    *("speed", "process", "maps", "relations", "tracking", "real", "arena"),
     *("simulation", "summary", "sensors", "optimal", "similarity", "claims"),
 )
-#: Rows of the table by sensor.
-BY_SENSOR = (
+#: Methods of the shorter tables; lineament reproduce has them all.
+SOME = (
     *("optimal", "liu:paper, paper’s numbers", "liu:tuned", "iepf:paper", "split_and_merge:paper"),
     *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
 )
 #: Tables of recordings.
-RECORDED = ("maps", "tracking", "real", "arena")
+RECORDED = ("maps", "relations", "tracking", "real", "arena")
 
 
 # The document ------------------------------------------------------------------------------------

@@ -133,7 +133,7 @@ def test_scan_and_its_features(drawn):
     counts = "2 segments · 1 corner · 1 edge · 1 arc · 2 breakpoints · 2 clusters"
     assert texts_of(axes) == {counts, "0.88"}  # the quality; the edge has no number
     labels = {"no return", "noise", "sensor", "arc", "segment", "breakpoint", "corner", "edge"}
-    labels.add("3 σ of a corner, cut at 0.5 m")
+    labels.add("3 σ of a corner, at most 0.5 m")
     assert {t.get_text() for t in figure.legends[0].get_texts()} == labels
     assert axes.get_aspect() == 1
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")

@@ -158,10 +158,8 @@ def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
         shape = {"marker": "D", "ms": size, "mfc": "none", "mec": color, "mew": size / 4}
         _draw_points(axes, drawn["position"], name, **shape, zorder=5)
     corners = corners[~is_edge]
-    ellipses = ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA)
-    is_cut = bool((ellipses[:, 2] > LARGEST_ELLIPSE).any())
-    label = "3 σ of a corner" + is_cut * f", cut at {LARGEST_ELLIPSE} m"
-    for x, y, a, b, turn in ellipses:
+    label = f"3 σ of a corner, at most {LARGEST_ELLIPSE} m"
+    for x, y, a, b, turn in ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA):
         if a > 0.012 * extent:  # else hidden by the marker
             a, b = min(a, LARGEST_ELLIPSE), min(b, LARGEST_ELLIPSE)
             shape = {"facecolor": theme.corner + "22", "edgecolor": theme.corner, "linewidth": 0.8}

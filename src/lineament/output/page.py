@@ -35,7 +35,7 @@ figure { margin: 0 0 2.25rem; }
 figcaption { margin-top: .6rem; max-width: 46rem; }
 h2 { margin: 3rem 0 .75rem; font-size: 1.4rem; line-height: 1.25; }
 nav { columns: 20rem; margin: 0 0 2rem; }
-nav a { display: block; padding: .1rem 0; }
+nav a { display: block; padding: .1rem 0; break-inside: avoid; }
 .table { margin: 1.25rem 0 2rem; }
 .table > div { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }

@@ -4,9 +4,9 @@ import numpy as np
 
 from ..evaluation.scores import Scores, evaluate
 from ..simulation import SCENES, SENSORS
-from .contenders import LIU_NOTE, PARTITION_ONLY, RIVALS_NOTE, every_method
+from .contenders import LIU_NOTE, LIU_PAPER, PARTITION_ONLY, RIVALS_NOTE, every_method
 from .findings import Figure, Findings, Numbers, Progress, Setting, Table, dot_chart, each
-from .scans import batch_of, frame_times, scene_numbers, simulated_frames
+from .scans import batch_of, interleaved_times, scene_numbers, simulated_frames, time_ratio
 
 _COLUMNS = {
     "corner F1": ("corner_f1_0.10", 1),
@@ -26,6 +26,7 @@ _COLUMNS = {
     "arc F1": ("arc_f1", 1),
     "partition": ("partition_success", 1),
     "time [µs]": ("time", 1e6),
+    "÷ liu": ("time_ratio", 1),
 }
 _PANELS = {
     "corner F1": ("corner_f1_0.10", 1),
@@ -44,14 +45,15 @@ def run(setting: Setting, progress: Progress) -> Findings:
         progress(f"{name}: simulating")
         frames = list(simulated_frames(sensor, SCENES, scenes))
         scans = [frame.scan for frame in frames]
-        numbers[name] = {}
+        numbers[name], times = {}, interleaved_times(methods, scans[: len(SCENES)])
         for method, extractor in each(methods, progress, name):
             scores = map(evaluate, batch_of(extractor, scans), (frame.truth for frame in frames))
             of = Scores.total(scores).summary()
             kinds = ("corner", "segment") if method == PARTITION_ONLY else ("corner",)
             if method == PARTITION_ONLY or "corner_precision_0.10" not in of:
                 of = {k: v for k, v in of.items() if not k.startswith((*kinds, "arc"))}
-            of["time"] = float(np.median(frame_times(extractor, scans[: len(SCENES)])))
+            of["time"] = float(np.median(times[method]))
+            of["time_ratio"] = time_ratio(times[method], times[LIU_PAPER])[0]
             numbers[name][method] = of
     progress("drawing")
     shown = {

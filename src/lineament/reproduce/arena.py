@@ -134,15 +134,16 @@ def arena_figure(
     name: str, arena: Arena, scores: Mapping[str, tuple[Mapping[str, float], Array]]
 ) -> Figure:
     """Draw the corners that the methods found in all scans, on the map of the arena."""
+    scores = {method: found for method, found in scores.items() if len(found[1])}
     columns = 4
-    rows = -(-len(scores) // columns)
-    figure = canvas.new_figure(3.4 * columns, 4.3 * rows)
+    rows = max(-(-len(scores) // columns), 1)
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.0 * rows)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in panels[len(scores) :]:
         axes.remove()
     ends = arena.walls.segments.reshape(-1, 2)
     for axes, (method, (numbers, positions)) in zip(panels, scores.items(), strict=False):
-        about = f"recall {numbers['recall']:.2f}, at no corner {100 * numbers['false']:.0f} %"
+        about = f"found {100 * numbers['recall']:.0f} %, false {100 * numbers['false']:.0f} %"
         canvas.style_plane(axes, method, about, ends)
         axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK, linewidth=1.0)
         axes.plot(*arena.corners.T, "o", markersize=9, mfc="none", mec=canvas.FAINT)
@@ -150,6 +151,7 @@ def arena_figure(
     return Figure(
         name.replace(", ", "-"),
         f"{name}: corners that each method found in all scans (red), the fitted walls and the real "
-        "corners (circles).",
+        "corners (circles); the share of the real ones found, and of those found at no real one. "
+        "Methods that found none are left out.",
         canvas.figure_bytes(figure),
     )

@@ -114,7 +114,7 @@ def _counts(n: Any) -> tuple[str, Sequence[float]]:
     true, liu = example["true features"], example[LIU_PAPER]
     return (
         f"A simulated scene with {true['clusters']} and {true['corners']}: "
-        f"{liu['clusters']} and {liu['corners']}",
+        f"{liu['clusters']:.0f} and {liu['corners']:.0f}",
         [-abs(liu[name] - true[name]) for name in ("clusters", "corners")],
     )
 
@@ -152,7 +152,7 @@ def _scenes(n: Any) -> tuple[str, Sequence[float]]:
 
 def _similarity(n: Any) -> tuple[str, Sequence[float]]:
     simulated = next(iter(n.values()))
-    names = (LIU_PAPER, "iepf", PDBS_LINES)
+    names = (LIU_PAPER, "iepf:paper", PDBS_LINES)
     most = [simulated[name]["similarity_maximum"] for name in names]
     about = ", ".join(f"{name} {value:.2f} m" for name, value in zip(names, most, strict=True))
     return f"Largest: {about}", [0.01 - most[0]]

@@ -16,8 +16,7 @@ from ..features import Features
 from ..logs import open_log
 from ..methods import DEFAULT_METHOD
 from ..motion import Tracker
-from ..output import canvas
-from ..output.figures import scan_figure
+from ..output import canvas, drawing
 from ..scan import Array, LaserScan
 from ..scan.poses import compose
 from .contenders import LIU_PAPER, PDBS_LINES, Extract, drawn_methods
@@ -236,10 +235,12 @@ def _metres(length: float) -> str | None:
 
 
 def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
-    """Draw the similarity error of each beam below what is found."""
-    shown = {name: found[name] for name in (LIU_PAPER, "iepf", PDBS_LINES) if name in found}
-    errors = {name: similarity_errors(scan, features) for name, features in shown.items()}
-    figure = scan_figure(scan, shown, errors, panel=canvas.PAGE_WIDTH / 3)
+    """Draw the similarity error of each beam, by method."""
+    shown = [name for name in (LIU_PAPER, "iepf:paper", PDBS_LINES) if name in found]
+    figure = canvas.new_figure(canvas.PAGE_WIDTH, 2.0 * len(shown))
+    for axes, name in zip(figure.subplots(len(shown), 1, squeeze=False)[:, 0], shown, strict=True):
+        drawing.draw_errors(axes, scan, similarity_errors(scan, found[name]))
+        axes.set_title(name, loc="right", fontsize=10, fontweight="bold", color=canvas.INK)
     caption = "The museum, the same scan: similarity error of each beam."
     return Figure("museum-fig12", caption, canvas.figure_bytes(figure))
 

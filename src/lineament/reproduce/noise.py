@@ -136,8 +136,8 @@ def _text(
         f"{labelled[smallest]} of those off by {smallest}, and {labelled['planes']} of the good "
         "points on planes. The filter moves edges and corners by more than the noise.",
         f"With the paper’s numbers, {raw[0]} of the corners found are right without the filter, "
-        f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found. The filter "
-        f"rounds corners, so their response drops. The best numbers of Figure 9 are: {best}.",
+        f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found. The best "
+        f"numbers of Figure 9 are: {best}.",
     )
 
 

@@ -3,11 +3,11 @@
 import json
 import os
 import platform
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from ..evaluation.counts import plain
 from ..evaluation.ple import BenchmarkResult
 from ..files import made_folder, write_text
 from ..output.page import (
@@ -143,9 +143,14 @@ def findings_parts(findings: Findings) -> list[str]:
     return [*text_parts(findings.text), *tables, *images]
 
 
+#: A cell that is a number and nothing else; a dash is one that is missing.
+_NUMBER = re.compile(r"[+−-]?\d[\d.e-]*|–")
+
+
 def _cell(cell: object) -> Cell:
-    is_number = isinstance(cell, Spread) or isinstance(plain(cell), int | float | None)
-    return Cell(cell_text(cell), "number" if is_number else "")
+    text = cell_text(cell)
+    is_number = isinstance(cell, Spread) or _NUMBER.fullmatch(text)
+    return Cell(text, "number" if is_number else "")
 
 
 def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:

@@ -211,7 +211,7 @@ def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
     canvas.add_legend(figure)
     return Figure(
         "fig13",
-        "The convex corner A and the concave corner B from five places: the room, and what `liu` "
+        "The convex corner A and the concave corner B from five places: the room, and what liu "
         "with the best parameters of Figure 9 finds in the scan from each whose distance has the "
         "median error, not found being the largest.",
         canvas.figure_bytes(figure),
