@@ -240,7 +240,9 @@ def test_every_scan_fills_its_panel_and_no_text_covers_another(name, tmp_path):
     scan, shown = EXTREMES[name], {"optimal": "optimal", "liu:scale_free": "liu:scale_free"}
     found = {label: ln.extract(scan, method=method) for label, method in shown.items()}
     title = figures.scan_title("logs/a.bag", 7, scan)
+    long = f"{'a_long_name' * 12}.bag · scan 40"
     for figure in (
+        figures.scans_figure([(long, scan, found["optimal"])] * 4, title=long),
         figures.scan_figure(scan, found, title=title),
         figures.scan_figure(scan, found, dark=True),
         stages.trace_figure(ln.trace(scan), title=title),
@@ -249,6 +251,7 @@ def test_every_scan_fills_its_panel_and_no_text_covers_another(name, tmp_path):
         canvas.save(figure, tmp_path / "a.png")
         boxes = [text.get_window_extent() for text in texts_drawn(figure)]
         assert len(boxes) > 20
+        assert all(box.x0 >= 0 and box.x1 <= figure.bbox.width for box in boxes)
         for i, box in enumerate(boxes):
             for other in boxes[:i]:
                 assert not box.padded(-1.5).overlaps(other.padded(-1.5))

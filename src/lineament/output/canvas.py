@@ -152,6 +152,11 @@ def settle(figure: Figure) -> None:
     figure.set_layout_engine("none")
 
 
+def fitting(text: str, size: float, width: float) -> float:
+    """Return the size [points], at most this one, at which a text is not wider than that [inch]."""
+    return min(size, 110 * width / max(len(text), 1))
+
+
 def _fill(figure: Figure) -> None:
     """Let the plans of a figure show more than they must where that fills their places."""
     for axes in figure.axes:
@@ -163,12 +168,14 @@ def _fill(figure: Figure) -> None:
 
 def style(axes: Axes, title: str, subtitle: str = "", xlabel: str = "", ylabel: str = "") -> None:
     """Give a panel its title, the names of its axes, a light grid, and quiet edges."""
-    theme = theme_of(axes)
+    theme, figure = theme_of(axes), axes.get_figure(root=True)
+    assert figure is not None
+    width = figure.get_figwidth() * axes.get_position().width / 0.85  # about, once it has its place
     axes.set_facecolor(theme.paper)
     axes.set_title(
         title,
         loc="left",
-        fontsize=12,
+        fontsize=fitting(title, 12, width),
         fontweight="bold",
         color=theme.ink,
         pad=20 if subtitle else 6,
@@ -180,7 +187,7 @@ def style(axes: Axes, title: str, subtitle: str = "", xlabel: str = "", ylabel: 
             xytext=(0, 7),
             xycoords="axes fraction",
             textcoords="offset points",
-            fontsize=8.5,
+            fontsize=fitting(subtitle, 8.5, 1.15 * width),
             color=theme.text,
         )
     axes.set_xlabel(xlabel, fontsize=9, color=theme.text)

@@ -147,7 +147,9 @@ def titled(width: float, height: float, title: str, dark: bool) -> Figure:
         return canvas.new_figure(width, height, dark=dark)
     figure = canvas.new_figure(width, height + 0.4, dark=dark)
     color = canvas.theme_of(figure).ink
-    figure.suptitle(title, x=0.01, ha="left", fontsize=13, color=color).set_parse_math(False)
+    size = canvas.fitting(title, 13, width)
+    text = figure.suptitle(title, x=0.01, ha="left", fontsize=size, color=color)
+    text.set_parse_math(False)
     return figure
 
 
