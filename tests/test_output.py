@@ -426,3 +426,17 @@ def test_page_is_one_file_with_its_images(tmp_path):
     assert tags.count("dl") == tags.count("script") == 1
     assert "http" not in text
     assert "prefers-color-scheme: dark" in text
+
+
+def test_page_has_a_picture_for_either_light():
+    light, dark = (
+        canvas.figure_bytes(canvas.new_figure(5, 2, dark=is_dark)) for is_dark in (False, True)
+    )
+    parsed = _Page(page.image_part("a", light, dark=dark))
+    start = "data:image/png;base64,"
+    (source,) = (attributes for tag, attributes in parsed.tags if tag == "source")
+    assert source["media"] == "(prefers-color-scheme: dark) and screen"
+    assert base64.b64decode(source["srcset"].removeprefix(start)) == dark
+    (image,) = (attributes for tag, attributes in parsed.tags if tag == "img")
+    assert base64.b64decode(image["src"].removeprefix(start)) == light
+    assert "source" not in [tag for tag, _ in _Page(page.image_part("a", light)).tags]
