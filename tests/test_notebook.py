@@ -410,6 +410,10 @@ def test_plot_of_features_scans_and_logs(scan, log):
     low, high = ax.get_ylim()
     assert low < -1.7
     assert high > 1.3
+    flat = ln.plot(ln.LaserScan([1.0, 9.0], angles=[0.0, 0.01]))  # its panel is flat
+    flat.figure.draw_without_rendering()
+    legend, label = flat.get_legend(), flat.xaxis.label
+    assert legend.get_window_extent().y1 < label.get_window_extent().y0
     title = ln.plot(log, scan=4, method="iepf", min_piece=5).get_title(loc="left")
     assert title == "drive.npz · scan 4 · iepf"
     assert ln.plot(log.path).get_title(loc="left") == "drive.npz · scan 0 · optimal"
