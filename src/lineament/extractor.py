@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,9 +15,14 @@ from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
 from .methods.trace import Trace
 from .methods.workspace import Block, block_capacity, run_batch
+from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 
-__all__ = ["Extractor", "extract", "trace"]
+__all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
+
+_BEARINGS = np.linspace(-1.0, 1.0, 101)
+#: What kernels are loaded with, so that the first scan need not wait for them.
+WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
 
 
 class Extractor:
@@ -65,6 +72,8 @@ class Extractor:
         self._noise_row = noise_row(self.noise)
         self._block: Block | None = None
         self._workers: list[Block] = []
+        #: That of the method, once its kernels are compiled.
+        self._run: Callable[[Block], None] | None = None
 
     def __repr__(self) -> str:
         return f"Extractor({self.method!r}, noise={self.noise!r})"
@@ -77,7 +86,7 @@ class Extractor:
         if block is None or not block.fits(scan):
             block = self._block = self._new_block(scan, 1)
         block.load(scan.ranges)
-        self.method.run(block)
+        (self._run or self._first_run)(block)
         segments, corners, arcs, breakpoints = block.written()
         return Features(
             segments,
@@ -143,7 +152,9 @@ class Extractor:
             range_max=range_max,
             frame_id=frame_id,
         )
-        found = run_batch(rows, self._blocks_of(frame, max(1, min(workers, m))), self.method.run)
+        found = run_batch(
+            rows, self._blocks_of(frame, max(1, min(workers, m))), self._run or self._first_run
+        )
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
@@ -159,6 +170,16 @@ class Extractor:
     def trace(self, scan: LaserScan) -> Trace:
         """Extract the features of one scan and keep every intermediate of the run."""
         return self.method.trace(scan, self(scan), self._noise_row)
+
+    def compiling(self) -> AbstractContextManager[None]:
+        """Take the kernels that are compiled within for one piece of work, which is shown."""
+        method = type(self.method)
+        return compiling([method.run], [method, Block])
+
+    def _first_run(self, block: Block) -> None:
+        with self.compiling():
+            self.method.run(block)
+        self._run = self.method.run
 
     def _blocks_of(self, frame: LaserScan, workers: int) -> list[Block]:
         """Give each worker a block; those of the last batch, where they fit."""
@@ -262,6 +283,15 @@ def _no_scan(given: Any) -> TypeError:
             "LaserScan.from_points(xy) takes points"
         )
     return TypeError(f"scan is of type {kind}, expected a LaserScan: {hint}")
+
+
+def load_kernels(extractors: Iterable[Extractor]) -> None:
+    """Compile the kernels of some extractors as one piece of work, or load them from the cache."""
+    with ExitStack() as stack:
+        for extractor in (extractors := list(extractors)):
+            stack.enter_context(extractor.compiling())
+        for extractor in extractors:
+            extractor(WALL)
 
 
 def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from .experiments import bench, compare, reproduce, simulate
 from .extract import extract
 from .live import live
 from .options import (
+    HUSH,
     LOG,
     LOG_PATH,
     METHODS,
@@ -48,6 +49,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @NOISE
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
 @reading
+@HUSH
 def plot(
     log: Path | str,
     index: int,
@@ -85,6 +87,7 @@ def plot(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
+@HUSH
 def view(
     log: Path | str,
     methods: tuple[str, ...],

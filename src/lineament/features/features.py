@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._lazy import Pictured
 from ..errors import needed_by
 from ..scan import LaserScan, NoiseLike, RangeNoise
+from ..scan.fields import covariance_of_pose
 from .records import TABLES
 
 if TYPE_CHECKING:
@@ -128,16 +129,26 @@ class Features(Tabled, Pictured):
         return dict(zip(COUNTED, found, strict=True))
 
     def transform(
-        self, x: float, y: float, theta: float, *, frame_id: str | None = None
+        self,
+        x: float,
+        y: float,
+        theta: float,
+        covariance: ArrayLike | None = None,
+        *,
+        frame_id: str | None = None,
     ) -> Features:
         """Move the features by a pose: p ↦ R(θ) p + (x, y), and their covariances with them.
 
-        The covariance of a segment is in its own frame and stays as it is.
+        The covariance of a segment is in its own frame and stays as it is, but for that of the
+        pose, which is propagated to first order: a turn moves what is far away the most.
 
         Parameters
         ----------
         x, y, theta : float
             Translation [m], and rotation counter-clockwise [rad].
+        covariance : array_like, shape (3, 3), optional
+            Of the pose [m, m, rad], independent of the features. Its part in the errors is the same
+            for all features of the scan.
         frame_id : str, optional
             Name of the new frame; by default the old one stays.
 
@@ -168,6 +179,8 @@ class Features(Tabled, Pictured):
         arcs["center"] = moved(arcs["center"])
         arcs["covariance"] = with_radius @ arcs["covariance"] @ with_radius.T
         breakpoints["position"] = moved(breakpoints["position"])
+        if covariance is not None:
+            _add_pose_covariance(segments, corners, arcs, shift, covariance_of_pose(covariance))
         for table in tables.values():
             table.flags.writeable = False
         name = self.frame_id if frame_id is None else frame_id
@@ -217,6 +230,36 @@ def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
     """Name the four parts of a noise; None if they are NaN (no valid beam to estimate from)."""
     parts = row.tolist()
     return None if math.isnan(parts[0]) else RangeNoise(*parts)
+
+
+def _add_pose_covariance(
+    segments: NDArray[np.void],
+    corners: NDArray[np.void],
+    arcs: NDArray[np.void],
+    shift: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> None:
+    """Add J P Jᵀ to the covariances of features that were moved by a pose with the covariance P.
+
+    A point q from the pose moves with (x, y) and, as the pose turns, at right angles to q.
+    """
+
+    def jacobian(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        turning = (places - shift)[:, ::-1] * (-1.0, 1.0)
+        straight = np.broadcast_to(np.eye(2), (len(places), 2, 2))
+        return np.concatenate((straight, turning[..., None]), axis=2)
+
+    def added(of_pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(of_pose @ covariance @ of_pose.transpose(0, 2, 1))
+
+    corners["covariance"] += added(jacobian(corners["position"]))
+    arcs["covariance"][:, :2, :2] += added(jacobian(arcs["center"]))
+    # The offset of a segment is along its normal; its angle is the pose's.
+    of_segment = np.zeros((len(segments), 2, 3))
+    normals = np.column_stack((-np.sin(segments["angle"]), np.cos(segments["angle"])))
+    of_segment[:, 0] = (normals[:, None] @ jacobian(segments["centroid"]))[:, 0]
+    of_segment[:, 1, 2] = 1.0
+    segments["covariance"] += added(of_segment)
 
 
 def sizes(tables: Tabled) -> str:

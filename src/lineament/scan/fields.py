@@ -154,6 +154,23 @@ def checked_pose(pose: Any) -> Pose:
     return x, y, theta
 
 
+def covariance_of_pose(covariance: ArrayLike) -> Array:
+    """Covariance (3, 3) of x, y, theta: symmetric, and of no direction below 0; read-only."""
+    matrix = np.array(covariance, dtype=np.float64)
+    is_matrix = matrix.shape == (3, 3) and bool(np.isfinite(matrix).all())
+    if is_matrix:
+        least = -1e-9 * np.abs(matrix).max()
+        is_matrix = np.abs(matrix - matrix.T).max() <= -least
+        is_matrix = is_matrix and np.linalg.eigvalsh(matrix)[0] >= least
+    if not is_matrix:
+        raise ValueError(
+            f"covariance of the pose is {matrix.tolist()}, expected (3, 3), symmetric, "
+            "positive semidefinite"
+        )
+    matrix.flags.writeable = False
+    return matrix
+
+
 def stamp_seconds(stamp: Any) -> float:
     """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
     if hasattr(stamp, "sec"):

@@ -15,6 +15,7 @@ from .fields import (
     Pose,
     beams_to,
     checked_pose,
+    covariance_of_pose,
     finite,
     irregular_bearings,
     range_limits,
@@ -81,6 +82,8 @@ class LaserScan(Pictured):
     frame_id: str
     intensities: Array | None
     pose: Pose | None
+    #: Covariance (3, 3) of the pose [m, m, rad], where it is known; see `with_pose`.
+    pose_covariance: Array | None
 
     def __init__(
         self,
@@ -117,6 +120,7 @@ class LaserScan(Pictured):
         own["frame_id"] = str(frame_id)
         own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
         own["pose"] = None if pose is None else checked_pose(pose)
+        own["pose_covariance"] = None
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
@@ -195,8 +199,10 @@ class LaserScan(Pictured):
         span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
         return span >= 2 * math.pi - 2.5 * step
 
-    def with_pose(self, pose: Pose | None) -> Self:
+    def with_pose(self, pose: Pose | None, covariance: ArrayLike | None = None) -> Self:
         """Return the same scan with another pose [m, m, rad]; they share their arrays.
+
+        `covariance` is that of the pose, shape (3, 3), where it is known.
 
         Examples
         --------
@@ -204,7 +210,11 @@ class LaserScan(Pictured):
         (3.0, 4.0, 0.0)
         """
         other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
+        other.__dict__.update(
+            self.__dict__,
+            pose=None if pose is None else checked_pose(pose),
+            pose_covariance=None if covariance is None else covariance_of_pose(covariance),
+        )
         return other
 
     @classmethod

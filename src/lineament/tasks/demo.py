@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import LineamentError
-from ..extractor import Extractor
+from ..extractor import Extractor, load_kernels
 from ..files import made_folder
 from ..logs import open_log
 from ..progress import Track, untracked
@@ -32,6 +32,7 @@ def run_demo(
         If the log cannot be read or the folder cannot be written.
     """
     target = made_folder(folder)
+    load_kernels(map(Extractor, DEMO_METHODS))
     if log is None:
         from ..simulation import SENSORS, simulate_log
 
