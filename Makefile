@@ -4,7 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all lint house types tests coverage wheel bench mutants results lines browser ros1 clean
+.PHONY: demo test test-all lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
@@ -68,6 +68,10 @@ mutants: .venv/ready
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py
+
+# Draws recorded scans (LINEAMENT_DATA) and the stages of each, to be looked at.
+pictures: .venv/ready
+	$(BIN)/python benchmarks/contact_sheet.py -o build/pictures
 
 # Measures the tables of docs/results.md and of the README again, in a quarter of an hour.
 results: .venv/ready

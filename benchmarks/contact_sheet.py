@@ -1,19 +1,16 @@
-"""Many recorded scans on one sheet, with what a method finds in each: to be looked at.
+"""Many recorded scans on one sheet, and the stages of each: to be looked at.
 
-Run: python benchmarks/contact_sheet.py [-m METHOD] -o SHEET.png, with LINEAMENT_DATA.
+Run: python benchmarks/contact_sheet.py [-m METHOD] -o FOLDER, with LINEAMENT_DATA.
 """
 
 import argparse
-import math
 import os
-from itertools import islice
 from pathlib import Path
 
-import numpy as np
-from matplotlib.axes import Axes
-
-from lineament import Extractor, Features, LaserScan, open_log
-from lineament.output import canvas, drawing
+from lineament import Extractor, open_log
+from lineament.output.canvas import figure_bytes
+from lineament.output.figures import scan_title, scans_figure
+from lineament.output.stages import trace_figure
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: Scans that are drawn, by the number that `lineament plot --scan` takes: first those at which
@@ -42,17 +39,6 @@ SHEET = (
     ("text/tinyslam_exp1.dat.gz", 380),
     ("text/lidar01.csv", 0),
 )
-#: Panels side by side, and the side of each [inch].
-_COLUMNS, _SIDE = 4, 4.6
-#: A panel shows this share of the measurements along each axis, and a margin of so much about them.
-_SHOWN, _MARGIN = 0.95, 0.06
-#: Marker, size and colour of each kind of corner.
-_MARKERS = {
-    "corner": ("D", 4.5, canvas.CORNER_COLOR),
-    "slit": ("s", 5.0, "#ee9933"),
-    "edge": ("^", 5.0, "#228833"),
-}
-_LINE_COLOR, _POINT_COLOR = "#0a5fb4", "#8b949e"
 
 
 def main() -> None:
@@ -60,48 +46,20 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("-m", "--method", default="optimal")
     given = parser.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
     extract, scans = Extractor(given.method), []
     for file, number in SHEET:
-        if (DATA / file).exists():
-            scan = next(islice(open_log(DATA / file, keep_going=True), number, None))
-            scans.append((f"{file.rpartition('/')[2]} · {number}", scan))
-    rows = -(-len(scans) // _COLUMNS)
-    figure = canvas.new_figure(_SIDE * _COLUMNS, _SIDE * rows)
-    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
-    for axes in panels[len(scans) :]:
-        axes.remove()
-    for axes, (title, scan) in zip(panels, scans, strict=False):
-        draw(axes, title, scan, extract(scan))
-    given.output.write_bytes(canvas.figure_bytes(figure, dpi=100))
-
-
-def draw(axes: Axes, title: str, scan: LaserScan, features: Features) -> None:
-    canvas.style(axes, "")
-    axes.set_title(title, fontsize=9, color=canvas.INK).set_parse_math(False)
-    points = scan.points[scan.valid]
-    axes.plot(*points.T, ".", markersize=2.5, color=_POINT_COLOR, zorder=2)
-    drawing.draw_arcs(axes, features.arcs, scan)
-    for segment in features.segments:
-        ends = np.array([segment["start"], segment["end"]])
-        axes.plot(*ends.T, "-", color=_LINE_COLOR, linewidth=1.3, zorder=4)
-        across = math.degrees(segment["angle"])
-        axes.plot(*ends.T, marker=(2, 0, across), ls="", color=_LINE_COLOR, ms=6, zorder=4)
-    for kind, (marker, size, color) in _MARKERS.items():
-        positions = features.corners["position"][features.corners["kind"] == kind]
-        axes.plot(*positions.T, marker, markersize=size, mfc="none", mec=color, mew=1.2, zorder=5)
-    axes.plot(0, 0, "+", color=canvas.INK, markersize=7, zorder=3)
-    frame(axes, points)
-
-
-def frame(axes: Axes, points: np.ndarray) -> None:
-    """Show most of the points and the scanner, in a square."""
-    rest = 0.5 * (1.0 - _SHOWN)
-    ends = np.quantile(points, (rest, 1.0 - rest), axis=0) if len(points) else np.zeros((2, 2))
-    low, high = np.minimum(ends[0], 0.0), np.maximum(ends[1], 0.0)
-    middle, half = 0.5 * (low + high), (0.5 + _MARGIN) * max(float((high - low).max()), 0.1)
-    axes.set_xlim(middle[0] - half, middle[0] + half)
-    axes.set_ylim(middle[1] - half, middle[1] + half)
-    axes.set_aspect("equal")
+        if not (DATA / file).exists():
+            continue
+        scan = open_log(DATA / file, keep_going=True).scan(number)
+        title = scan_title(file, number, scan)
+        scans.append((title, scan, extract(scan)))
+        figure = trace_figure(extract.trace(scan), title=f"{title} · {given.method}")
+        (given.output / f"trace_{len(scans):02}.png").write_bytes(figure_bytes(figure, dpi=75))
+    for name, dark in (("light", False), ("dark", True)):
+        sheet = scans_figure(scans, title=f"What {given.method} finds", dark=dark)
+        (given.output / f"scans_{name}.png").write_bytes(figure_bytes(sheet, dpi=75))
+    print(f"{len(scans)} scans, {len(scans) + 2} pictures in {given.output}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import sys
 from types import SimpleNamespace
 
 import click
+import matplotlib.image
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -20,6 +21,7 @@ from lineament.cli import run
 from lineament.cli.options import reading
 from lineament.logs import save_npz
 from lineament.logs.base import ECHOES, ReadOptions
+from lineament.output import canvas
 from lineament.reproduce import EXPERIMENTS, Setting
 
 
@@ -201,34 +203,38 @@ def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsy
 
 
 def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
-    one, two, trace = (tmp_path / f"{name}.png" for name in ("one", "two", "trace"))
+    one, two, trace, dark = (tmp_path / f"{name}.png" for name in ("one", "two", "trace", "dark"))
     base = ["plot", str(npz), "--scan", "3"]
     assert run([*base, "-o", str(one)]) == 0
     assert run([*base, "-o", str(two), "-m", "liu", "-m", "liu:paper"]) == 0
     assert run([*base, "-o", str(trace), "--trace"]) == 0
-    assert len({path.read_bytes() for path in (one, two, trace)}) == 3
+    assert run([*base, "-o", str(dark), "--dark"]) == 0
+    assert len({path.read_bytes() for path in (one, two, trace, dark)}) == 4
+    assert matplotlib.image.imread(one)[..., :3].mean() > 0.8
+    assert matplotlib.image.imread(dark)[..., :3].mean() < 0.2
+    svg = tmp_path / "dark.svg"
+    assert run([*base, "-o", str(svg), "--dark", "--trace"]) == 0
+    assert canvas.DARK.paper in svg.read_text(encoding="utf-8")
+    assert "#ffffff" not in svg.read_text(encoding="utf-8")
 
 
 def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
     folder = tmp_path / "deep" / "demo"
     assert run(["demo", str(npz), "-o", str(folder)]) == 0
-    assert {p.name for p in folder.iterdir()} == {
-        "features.parquet",
-        "index.html",
-        "map.png",
-        "scan.png",
-        "trace.png",
-    }
+    pictures = {f"{name}.png" for name in ("scan", "trace", "methods", "map")}  # no corner
+    assert {p.name for p in folder.iterdir()} == {"features.parquet", "index.html", *pictures}
     assert run(["extract", str(npz), "-q", "-o", str(tmp_path / "f.parquet")]) == 0
     tables = [pq.read_table(path) for path in (folder / "features.parquet", tmp_path / "f.parquet")]
     assert tables[0].equals(tables[1])
     page = (folder / "index.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 2 * 4  # on white and on black
+    assert page.index("<figure") < page.index("<dl>")
     assert str(folder / "index.html") in capsys.readouterr().out
-    # Without poses there is no map.
+    # Without poses there is no map, but scans.
     log = corner_log(tmp_path / "still.npz", 2)
     assert run(["demo", str(log), "-q", "-o", str(tmp_path / "demo")]) == 0
-    assert not (tmp_path / "demo" / "map.png").exists()
+    pictures = {path.stem for path in (tmp_path / "demo").glob("*.png")}
+    assert pictures == {"scan", "corner", "trace", "methods", "scans"}
 
 
 @pytest.mark.slow

@@ -5,9 +5,11 @@ import sys
 from dataclasses import replace
 
 import matplotlib.image
+import matplotlib.text
 import numpy as np
 import pytest
 from handmade import features as features_of
+from handmade import segment
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Ellipse
@@ -16,7 +18,7 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
 from lineament.methods.trace import CANDIDATE, Trace
-from lineament.output import canvas, drawing, figures
+from lineament.output import canvas, drawing, figures, stages
 
 
 @pytest.fixture
@@ -44,7 +46,8 @@ def room() -> tuple[ln.LaserScan, Features]:
     segments, corners = np.zeros(2, SEGMENT), np.zeros(2, CORNER)
     segments["start"], segments["end"] = [scan.points[0], [2, 2]], [[2, 2], scan.points[-1]]
     corners["position"], corners["kind"] = [[2, 2], scan.points[0]], ["corner", "edge"]
-    corners["response"], corners["beam"] = [12.5, 0], [40, 0]
+    corners["response"], corners["beam"] = [9.84e4, 0], [40, 0]
+    corners["quality"] = [0.875, 0.5]
     corners["covariance"] = np.diag([1e-2, 4e-2])
     arcs, breakpoints = np.zeros(1, ARC), np.zeros(2, BREAKPOINT)
     arcs["center"], arcs["radius"], arcs["last_beam"] = [1, 1], 0.3, 8
@@ -128,7 +131,7 @@ def test_scan_and_its_features(drawn):
     figure = drawn(figures.plot_scan, scan, {"a": features})
     (axes,) = figure.axes
     counts = "2 segments · 1 corner · 1 edge · 1 arc · 2 breakpoints · 2 clusters"
-    assert texts_of(axes) == {counts, "12.5"}  # the edge has no number
+    assert texts_of(axes) == {counts, "0.88"}  # the quality; the edge has no number
     labels = {"no return", "noise", "sensor", "arc", "segment", "breakpoint", "corner", "edge"}
     labels.add("3 σ of a corner, at most 0.5 m")
     assert {t.get_text() for t in figure.legends[0].get_texts()} == labels
@@ -149,6 +152,7 @@ def test_scan_and_its_features(drawn):
     np.testing.assert_allclose(points.get_offsets(), scan.points[known])
     colors = [to_hex(color) for color in points.get_facecolors()]
     assert colors == canvas.PALETTE[features.clusters[known]].tolist()
+    assert figure._suptitle is None
     walls = [line.get_xydata() for line in axes.lines if line.get_marker() == (2, 0, 90.0)]
     np.testing.assert_allclose(walls, [[features.segments["start"][0], [2, 2]]])
     # Three deviations, the longer along y, cut.
@@ -163,23 +167,220 @@ def test_scan_and_its_features(drawn):
     assert sum(colors[1]) > sum(colors[0]) + 0.5
 
 
-def test_beams_without_return_are_ticks_outside_what_was_seen(drawn):
+def test_nothing_came_back_from_shaded_sectors(drawn):
     ranges = np.full(90, 2.0)
     ranges[40:48] = 8.0
-    ranges[[10, 36, 50, 80]] = np.nan  # Two of them are at most 8 degrees from what is far.
+    ranges[[10, 50, 51]] = np.nan  # two of them are at most 8 degrees from what is far
     scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=math.radians(1))
     axes = drawn(figures.plot_scan, scan, {"a": features_of(90)}).axes[0]
-    ticks = np.array(by_label(axes)["no return"].get_segments())
-    expected = [[2.4, 2.64], [8.4, 8.64], [8.4, 8.64], [2.4, 2.64]]
-    np.testing.assert_allclose(np.linalg.norm(ticks, axis=2), expected)
-    angles = np.arctan2(ticks[..., 1], ticks[..., 0])
-    np.testing.assert_allclose(np.degrees(angles), [[10, 10], [36, 36], [50, 50], [80, 80]])
+    wedges = [path.vertices for path in by_label(axes)["no return"].get_paths()]
+    for wedge, bearings, reach in (
+        (wedges[0], [9.5, 10, 10.5], 2),
+        (wedges[1], [49.5, 50, 51, 51.5], 8),
+    ):
+        x, y = wedge[1 : 1 + len(bearings)].T
+        np.testing.assert_allclose(wedge[0], 0)
+        np.testing.assert_allclose(np.hypot(x, y), reach)
+        np.testing.assert_allclose(np.degrees(np.arctan2(y, x)), bearings)
+    assert len(wedges) == 2
     counts = "0 segments · 0 corners · 0 arcs · 0 breakpoints · 1 cluster"  # not: 0 edges
     assert texts_of(axes) == {counts}
-    (low, high) = np.transpose([axes.get_xlim(), axes.get_ylim()])
-    for points in (ticks[:, 1], scan.points[scan.valid], [(0, 0)]):
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    for points in (scan.points[scan.valid], [(0, 0)]):
         assert (points > low).all()
         assert (points < high).all()
+
+
+def arena(width, height, x=0.0, y=0.0, n=720, noise=0.003) -> ln.LaserScan:
+    """Scan a room of some size [m] from a place in it."""
+    angles = np.linspace(-math.pi, math.pi, n, endpoint=False)
+    toward = np.column_stack((np.cos(angles), np.sin(angles)))
+    sides = np.sign(toward) * np.array([width, height]) / 2 - (x, y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ranges = np.nanmin(np.where(toward == 0, np.inf, sides / toward), axis=1)
+    ranges += noise * np.random.default_rng(1).normal(size=n)
+    return ln.LaserScan(ranges, angles[0], angles[1] - angles[0], range_max=300.0, stamp=12.5)
+
+
+def lone(n_valid) -> ln.LaserScan:
+    ranges = np.full(360, np.nan)
+    ranges[40 : 40 + n_valid] = 2.0
+    return ln.LaserScan(ranges, -math.pi, math.radians(1))
+
+
+#: A segment that rises as it runs.
+SLOPE = segment((-0.1, -0.1), (0.1, 0.1), 1, 100)
+EXTREMES = {
+    "cupboard": arena(0.6, 1.0),
+    "room": arena(7.0, 5.0, x=1.0),
+    "corridor along x": arena(200.0, 2.4, x=-60.0),
+    "corridor along y": arena(2.4, 200.0, y=40.0),
+    "one beam": lone(1),
+    "no beam": lone(0),
+}
+
+
+def texts_drawn(figure):
+    """Return the texts of a figure that are drawn: those of ticks beyond the axes are not."""
+    texts, draw = [], matplotlib.text.Text.draw
+
+    def record(text, renderer):
+        if text.get_visible() and text.get_text().strip():
+            texts.append(text)
+        draw(text, renderer)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(matplotlib.text.Text, "draw", record)
+        figure.draw_without_rendering()
+    return texts
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+def test_every_scan_fills_its_panel_and_no_text_covers_another(name, tmp_path):
+    scan, shown = EXTREMES[name], {"optimal": "optimal", "liu:scale_free": "liu:scale_free"}
+    found = {label: ln.extract(scan, method=method) for label, method in shown.items()}
+    title = figures.scan_title("logs/a.bag", 7, scan)
+    long = f"{'a_long_name' * 12}.bag · scan 40"
+    for figure in (
+        figures.scans_figure([(long, scan, found["optimal"])] * 4, title=long),
+        figures.scan_figure(scan, found, title=title),
+        figures.scan_figure(scan, found, dark=True),
+        stages.trace_figure(ln.trace(scan), title=title),
+        stages.trace_figure(ln.trace(scan, method="liu"), title=title),
+    ):
+        canvas.save(figure, tmp_path / "a.png")
+        boxes = [text.get_window_extent() for text in texts_drawn(figure)]
+        assert len(boxes) > 20
+        assert all(box.x0 >= 0 and box.x1 <= figure.bbox.width for box in boxes)
+        for i, box in enumerate(boxes):
+            for other in boxes[:i]:
+                assert not box.padded(-1.5).overlaps(other.padded(-1.5))
+        plans = [axes for axes in figure.axes if axes.get_xlabel().startswith("x [m]")]
+        for axes in plans:
+            width, height = axes.get_window_extent().size / figure.dpi
+            assert height > 1.7
+            assert width > 4
+            points = scan.points[scan.valid]
+            if len(points) < 2:
+                continue
+            extent = np.ptp(points, axis=0)
+            share = extent / np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1)
+            assert share.max() > 0.75
+            assert share.min() > 0.2
+
+
+def test_a_corridor_is_drawn_larger_across_and_says_so():
+    for name, label, other, aspect in (
+        ("corridor along x", "y [m], drawn 20 ×", "x [m]", 20),
+        ("corridor along y", "x [m], drawn 50 ×", "y [m]", 1 / 50),
+        ("room", "x [m]", "y [m]", 1),
+    ):
+        scan = EXTREMES[name]
+        low, high = scan.points.min(axis=0), scan.points.max(axis=0)
+        found = features_of(len(scan), segments=[SLOPE, segment(low, high, 1, 100)])
+        (axes,) = figures.scan_figure(scan, {"a": found}).axes
+        assert {axes.get_xlabel(), axes.get_ylabel()} == {label, other}
+        assert axes.get_aspect() == pytest.approx(aspect)
+        # The marks across the ends of a segment stand across it on the paper.
+        mark = next(line.get_marker() for line in axes.lines if line.get_marker()[0] == 2)
+        assert mark[2] == pytest.approx(math.degrees(math.atan(aspect)))
+
+
+def test_a_few_beams_far_out_do_not_shrink_the_plan():
+    scan = EXTREMES["room"]
+    for far, label in (((), "x [m]"), ((100, 101), "x [m] · 2 beams farther out not shown")):
+        ranges = scan.ranges.copy()
+        ranges[list(far)] = 90.0
+        one = ln.LaserScan(ranges, angles=scan.angles)
+        (axes,) = figures.scan_figure(one, {"a": features_of(720)}).axes
+        assert axes.get_xlabel() == label
+        assert np.ptp(axes.get_xlim()) < 10
+    # What was found there is shown, and so are many beams.
+    wall = features_of(720, segments=[segment((0, 0), one.points[100], 1, 100)])
+    (axes,) = figures.scan_figure(one, {"a": wall}).axes
+    assert np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).max() > 70
+    ranges[100:160] = 90.0
+    many = ln.LaserScan(ranges, angles=scan.angles)
+    (axes,) = figures.scan_figure(many, {"a": features_of(720)}).axes
+    assert np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).max() > 70
+
+
+@pytest.mark.parametrize(
+    ("stamp", "time"),
+    [(0.0, ""), (12.345, " · 12.35 s"), (1_500_000_000.0, " · 2017-07-14 02:40:00 UTC")],
+)
+def test_titles_have_log_scan_and_time(stamp, time, drawn):
+    scan = ln.LaserScan([1.0], 0.0, 0.1, stamp=stamp)
+    title = figures.scan_title("some/where/a.bag", 40, scan)
+    assert title == f"a.bag · scan 40{time}"
+    figure = drawn(figures.plot_scan, scan, {"a": features_of(1)}, title=title)
+    assert figure.get_suptitle() == title
+
+
+def test_dark_figures_have_light_marks(drawn):
+    scan, features = room()
+    for dark, theme in ((False, canvas.LIGHT), (True, canvas.DARK)):
+        for figure in (
+            drawn(figures.plot_scan, scan, {"a": features}, title="A", dark=dark),
+            drawn(stages.plot_trace, trace_of(scan, features), title="A", dark=dark),
+            drawn(figures.plot_map, [((0.0, 0.0, 0.0), features)], title="A", dark=dark),
+        ):
+            assert to_hex(figure.get_facecolor()) == theme.paper
+            for axes in figure.axes:
+                assert to_hex(axes.get_facecolor()) == theme.paper
+            for text in figure.findobj(matplotlib.text.Text):
+                if text.get_text():
+                    assert contrast(text.get_color(), theme.paper) > 3, text
+
+
+def test_clusters_of_a_picture_have_the_colours_of_its_theme():
+    scan, features = room()
+    (axes,) = figures.scan_figure(scan, {"a": features}, dark=True).axes
+    (points,) = [c for c in axes.collections if len(c.get_offsets()) > 1]
+    assert {to_hex(color) for color in points.get_facecolors()} == set(canvas.DARK.palette[:2])
+
+
+#: What people without one kind of cone see: Machado et al. 2009, in linear RGB, severity 1.
+CONES = {
+    "all": np.eye(3),
+    "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+               [-0.003882, -0.048116, 1.051998]],
+    "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+               [-0.011820, 0.042940, 0.968881]],
+    "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+               [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+
+
+def linear(color) -> np.ndarray:
+    rgb = np.array(to_rgb(color))
+    return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+
+
+def contrast(a, b) -> float:
+    """Contrast of two colours, 1 to 21 (WCAG 2)."""
+    light = sorted(linear(color) @ (0.2126, 0.7152, 0.0722) + 0.05 for color in (a, b))
+    return float(light[1] / light[0])
+
+
+def lab(color, cones) -> np.ndarray:
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    seen = np.clip(np.asarray(cones) @ linear(color), 0, 1)
+    x, y, z = np.cbrt(np.maximum(np.array(to_xyz) @ seen / (0.9505, 1, 1.089), 0.009))
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("cones", CONES)
+@pytest.mark.parametrize("theme", [canvas.LIGHT, canvas.DARK])
+def test_colours_stay_apart_for_every_eye(theme, cones):
+    neighbours = [*zip(theme.palette, np.roll(theme.palette, 1), strict=True)]
+    marks = [(theme.corner, theme.ink), (theme.corner, theme.way), (theme.arc, theme.ink),
+             (theme.corner, theme.edge), (theme.way, theme.ink)]  # fmt: skip
+    for a, b in [*neighbours, *marks]:
+        assert np.linalg.norm(lab(a, CONES[cones]) - lab(b, CONES[cones])) > 25, (a, b)
+    for color in [*theme.palette, theme.corner, theme.arc, theme.way, theme.ink]:
+        far = np.linalg.norm(lab(color, CONES[cones]) - lab(theme.paper, CONES[cones]))
+        assert far > 25, color
 
 
 @pytest.mark.parametrize(
@@ -195,7 +396,7 @@ def test_ellipses_are_drawn_where_they_can_be_seen_and_are_cut(size, widths):
 def test_narrow_panels_say_less_and_leave_out_what_is_far():
     scan, features = room()
     ranges = scan.ranges.copy()
-    ranges[60] = 25.0
+    ranges[50:61] = 25.0
     scan = ln.LaserScan(ranges, angles=scan.angles, range_max=30.0)
     wide, narrow = (
         figures.scan_figure(scan, {"a": features}, **given).axes[0]
@@ -211,7 +412,7 @@ def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
     features.corners = np.repeat(features.corners[:1], 8)
     features.corners["position"] += np.linspace(0, 0.1, 8)[:, None]
     axes = drawn(figures.plot_scan, scan, {"a": features}).axes[0]
-    boxes = [t.get_window_extent() for t in axes.texts if t.get_text() == "12.5"]
+    boxes = [t.get_window_extent() for t in axes.texts if t.get_text() == "0.88"]
     assert len(boxes) == 8
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     panel = axes.get_window_extent()
@@ -221,7 +422,7 @@ def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
 def labels(positions, obstacles):
     """Texts beside the positions in a panel whose unit is a point of the paper."""
     axes = canvas.new_figure(4, 4).add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))
-    values = np.full(len(positions), 12.25)
+    values = np.full(len(positions), 0.125)
     drawing.label_points(axes, np.array(positions, float), values, np.reshape(obstacles, (-1, 2)))
     return axes.texts
 
@@ -247,7 +448,7 @@ def test_numbers_stay_away_from_other_corners():
 )
 def test_number_stands_where_it_hides_least(place, hidden, offset):
     (text,) = labels([place, (np.nan, 0)], [*hidden, (np.nan, 0)])
-    assert text.get_text() == "12.2"
+    assert text.get_text() == "0.12"
     if isinstance(offset, str):
         is_near = (np.abs(text.get_position()) < (15.3, 10.6)).all()
         assert is_near == (offset == "near")
@@ -255,21 +456,25 @@ def test_number_stands_where_it_hides_least(place, hidden, offset):
         assert text.get_position() == pytest.approx(offset, abs=1e-9)
 
 
-@pytest.mark.parametrize(("width", "height"), [(1, 40), (40, 1), (4, 3)])
-def test_figures_have_the_shape_of_the_scan_within_reason(width, height):
-    x, y = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]).T * [[width / 2], [height / 2]]
-    scan = ln.LaserScan(np.hypot(x, y), angles=np.arctan2(y, x))
-    figure = figures.scan_figure(scan, {"a": features_of(4)})
-    inches = figure.get_figheight() - 1.2  # without titles
-    assert inches == pytest.approx(5.6 * {40: 1.4, 1: 0.4, 3: 0.86 * 3.32 / 4.32}[height])
+@pytest.mark.parametrize(
+    ("width", "height", "inches"), [(1, 8, 1.4), (8, 1, 0.4), (4, 3, 0.9 * 3.24 / 4.32)]
+)
+def test_figures_have_the_shape_of_the_scan_within_reason(width, height, inches):
+    scan = arena(width, height, noise=0.0)
+    figure = figures.scan_figure(scan, dict.fromkeys("ab", features_of(len(scan))))
+    assert figure.get_figheight() - 1.6 == pytest.approx(5.6 * inches, rel=1e-2)  # without titles
 
 
-@pytest.mark.parametrize("more", [0, 1])
-def test_many_corners_have_no_numbers(more):
+def test_numbers_without_room_are_left_out():
     scan, features = room()
-    features.corners = np.repeat(features.corners[:1], drawing.MAX_LABELS + more)
+    features.corners = np.repeat(features.corners[:1], 300)
+    features.corners["quality"] = np.linspace(0, 0.99, 300)
+    features.corners["quality"][7] = np.nan  # of a method that has none
     (axes,) = figures.scan_figure(scan, {"a": features}).axes
-    assert len(axes.texts) == 1 + (0 if more else drawing.MAX_LABELS)
+    numbers = [float(text.get_text()) for text in axes.texts[1:]]
+    assert 10 < len(numbers) < 150
+    assert max(numbers) == 0.99  # the best first
+    assert min(numbers) > 0.5
 
 
 def test_stages_of_a_trace(drawn):
@@ -280,40 +485,66 @@ def test_stages_of_a_trace(drawn):
     filtered = np.where(scan.valid, 0.5 * scan.ranges, np.nan)
     trace = trace_of(scan, features, filtered=filtered, candidates=candidates, threshold=10.0)
     trace.spacing[5] = 0.0  # a log axis has no place for it
-    figure = drawn(figures.plot_trace, trace)
-    filter_, spacing, clusters, corners = figure.axes
+    figure = drawn(stages.plot_trace, trace)
+    filter_, spacing, decisions, clusters, found = figure.axes
     assert texts_of(filter_) == {f"{scan.valid.sum()} valid beams of 81"}
     lines = by_label(filter_)
     np.testing.assert_array_equal(lines["filtered"].get_ydata(), trace.filtered)
     np.testing.assert_array_equal(
-        lines["raw"].get_ydata(), np.where(scan.valid, scan.ranges, np.nan)
+        lines["measured"].get_ydata(), np.where(scan.valid, scan.ranges, np.nan)
     )
     np.testing.assert_allclose(lines["no return"].get_xdata(), np.arange(15, 20))
     # A new cluster begins at beam 41, noise at 60, and what follows is no noise.
-    breaks = [line.get_xdata()[0] for line in spacing.lines if line.get_color() == "#dbb0b4"]
+    breaks = [
+        line.get_xdata()[0] for line in spacing.lines if line.get_color() == canvas.EDGE_COLOR
+    ]
     assert breaks == [41, 60, 61]
     assert texts_of(spacing) == {"3 breaks"}
     assert spacing.get_yscale() == "log"
     expected = np.where(trace.spacing > 0, trace.spacing, np.nan)
     np.testing.assert_array_equal(by_label(spacing)["spacing"].get_ydata(), expected)
     assert texts_of(clusters) == {"2 clusters · 1 noise point"}
-    about = "3 candidates · 1 accepted · threshold 10 · 2 segments"
-    assert texts_of(corners) == {about, "12.5", "3.25", "1.12"}
-    shown = by_label(corners)
-    np.testing.assert_allclose(shown["accepted"].get_xydata(), [[1, 1]])  # on filtered ranges
-    np.testing.assert_allclose(shown["rejected"].get_xydata(), scan.points[[20, 30]] / 2)
+    assert texts_of(decisions) == {"3 candidates · 1 accepted"}
+    shown = by_label(decisions)
+    np.testing.assert_allclose(shown["accepted candidate"].get_xydata(), [[40, 12.5]])
+    np.testing.assert_allclose(shown["rejected candidate"].get_xydata(), [[20, 3.25], [30, 1.125]])
+    np.testing.assert_allclose(shown["threshold 10"].get_ydata(), 10)
+    counts = "2 segments · 1 corner · 1 edge · 1 arc · 2 breakpoints · 2 clusters"
+    assert texts_of(found) == {counts, "0.88"}
+    shown = by_label(found)
+    np.testing.assert_allclose(shown["accepted candidate"].get_xydata(), [[1, 1]])  # as filtered
+    np.testing.assert_allclose(shown["rejected candidate"].get_xydata(), scan.points[[20, 30]] / 2)
+    np.testing.assert_allclose(shown["corner"].get_xydata(), [[2, 2]])  # where it was measured
     for axes in figure.axes:
         box = axes.get_legend().get_window_extent()
         assert box.y1 <= axes.get_window_extent().y0  # below its panel
-        assert box.height < 0.1 * axes.get_window_extent().height  # in one row
-    assert clusters.get_xlim() == corners.get_xlim()
+    np.testing.assert_allclose(clusters.get_xlim(), found.get_xlim(), atol=0.05)
 
 
-def test_trace_without_candidates_shows_corners_and_edges(drawn):
-    trace = trace_of(*room(), candidates=np.zeros(0, CANDIDATE))
-    panel = drawn(figures.plot_trace, trace).axes[3]
-    assert {"corner", "edge"} <= set(by_label(panel))
-    assert any("1 corner · 1 edge" in text for text in texts_of(panel))
+def test_trace_shows_the_stages_that_a_method_has():
+    """No filter, density or candidates for one that has none of them; evidence where it has."""
+    scan = EXTREMES["room"]
+    trace = ln.trace(scan)
+    figure = stages.trace_figure(trace)
+    names = [axes.get_title(loc="left") for axes in figure.axes]
+    assert names == ["Ranges", "Spacing", "Evidence", "Clusters", "Features"]
+    ranges, spacing, evidence, _, found = map(by_label, figure.axes)
+    assert "filtered" not in ranges
+    assert {"spacing", "distance threshold"} <= set(spacing)
+    assert "density threshold" not in spacing
+    beams, rises = evidence["corner"].get_xydata().T
+    np.testing.assert_array_equal(beams, trace.features.corners["beam"])
+    np.testing.assert_array_equal(rises, trace.evidence["corners"])
+    beams = evidence["segment"].get_xdata()
+    for segment_, beam in zip(trace.features.segments, beams, strict=True):
+        first, last = segment_["first_beam"], segment_["last_beam"]
+        assert first <= beam <= last if first <= last else beam >= first or beam <= last
+    assert f"threshold {trace.threshold:g}" in evidence
+    assert "corner" in found
+    assert not any("candidate" in label for label in found)
+    figure = stages.trace_figure(replace(trace, evidence={}))
+    names = [axes.get_title(loc="left") for axes in figure.axes]
+    assert names == ["Ranges", "Spacing", "Clusters", "Features"]
 
 
 def test_map_moves_features_by_their_poses(drawn):
@@ -352,7 +583,7 @@ def test_hostile_scans_are_drawn(tmp_path, case, monkeypatch):
     path = tmp_path / "a.png"
     for plot in (
         lambda: figures.plot_scan(scan, {"liu": features}, path),
-        lambda: figures.plot_trace(trace_of(scan, features), path),
+        lambda: stages.plot_trace(trace_of(scan, features), path),
         lambda: figures.plot_map([((0.0, 0.0, 0.0), features)], path),
         lambda: figures.plot_map([], path),
     ):
@@ -369,7 +600,7 @@ def test_wrong_arguments(tmp_path):
     for plot, arguments, message in (
         (figures.plot_scan, (scan, {}, path), "at least one method"),
         (figures.plot_scan, (scan, {"liu": few}, path), beams),
-        (figures.plot_trace, (trace_of(scan, few), path), beams),
+        (stages.plot_trace, (trace_of(scan, few), path), beams),
     ):
         with pytest.raises(ValueError, match=message):
             plot(*arguments)

@@ -197,13 +197,18 @@ def test_the_page_and_nothing_else_is_served(server):
 
 
 def test_colours_are_those_of_the_figures(server):
-    from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR, PALETTE
+    from lineament.output.canvas import DARK, LIGHT
 
-    script = server.page["/drawing.js"].decode()
-    listed = script[script.index("PALETTE = [") : script.index("];")]
-    assert [part.strip(' \n",') for part in listed.split('"')[1::2]] == PALETTE.tolist()
-    light = server.page["/style.css"].decode().partition("@media")[0]
-    assert f"--corner: {CORNER_COLOR}; --edge: {EDGE_COLOR};" in light
+    light, _, dark = server.page["/style.css"].decode().partition("@media")
+    for style, theme in ((light, LIGHT), (dark, DARK)):
+        for name, color in (
+            ("corner", theme.corner),
+            ("edge", theme.edge),
+            ("break", theme.breakpoint),
+            ("arc", theme.arc),
+            ("clusters", " ".join(theme.palette)),
+        ):
+            assert f"--{name}: {color};" in style
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @SET
 @NOISE
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
+@click.option("--dark", is_flag=True, help="Draw on black.")
 @reading
 @HUSH
 def plot(
@@ -58,22 +59,28 @@ def plot(
     settings: tuple[str, ...],
     noise: float | None,
     trace: bool,
+    dark: bool,
     reading: dict[str, Any],
 ) -> None:
     """Draw a scan of LOG and what is found in it."""
     from ..logs import open_log
     from ..methods import DEFAULT_METHOD
     from ..output.canvas import PICTURE_ENDINGS
-    from ..output.figures import plot_scan, plot_trace
+    from ..output.figures import plot_scan, scan_title
+    from ..output.stages import plot_trace
 
     check_ending(output, PICTURE_ENDINGS)
     names = methods or (DEFAULT_METHOD,)
     extractors = {name: make_extractor(name, settings, noise) for name in names}
-    scan = open_log(log, **reading).scan(index)
+    opened = open_log(log, **reading)
+    scan = opened.scan(index)
+    title = scan_title(opened.name, index, scan)
     if trace:
-        plot_trace(extractors[names[0]].trace(scan), output)
+        title = f"{title} · {names[0]}"
+        plot_trace(extractors[names[0]].trace(scan), output, title=title, dark=dark)
     else:
-        plot_scan(scan, {name: extractor(scan) for name, extractor in extractors.items()}, output)
+        found = {name: extractor(scan) for name, extractor in extractors.items()}
+        plot_scan(scan, found, output, title=title, dark=dark)
 
 
 @click.command()
@@ -109,6 +116,16 @@ def view(
 
 
 @click.command()
+@click.argument("name", default="")
+def methods(name: str) -> None:
+    """List the methods; or the parameters of NAME, with defaults, units and bounds."""
+    from ..methods import describe
+
+    with wrong_usage():
+        click.echo(describe(name))
+
+
+@click.command()
 @methods_option("Name of the method; may be given again.  [default: optimal]")
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
@@ -138,5 +155,8 @@ def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
-_ALL = (extract, info, plot, view, live, demo, warmup, compare, reproduce, bench, simulate)
+_ALL = (
+    *(extract, info, plot, view, live, demo),
+    *(methods, warmup, compare, reproduce, bench, simulate),
+)
 COMMANDS = {command.name: command for command in _ALL if command.name}

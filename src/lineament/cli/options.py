@@ -115,13 +115,12 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
     """Return the extractor that the options ask for."""
     from ..extractor import Extractor
     from ..methods import DEFAULT_METHOD, get_method
-    from ..scan import RangeNoise
 
     name = DEFAULT_METHOD if method is None else method
     with wrong_usage():
         return Extractor(
             get_method(name, **settings_of(settings)),
-            noise=None if noise is None else RangeNoise(sigma=noise),
+            noise=noise,
         )
 
 

@@ -4,8 +4,9 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 
-from ..errors import needed_by
+from ..errors import needed_by, needs
 from ..extractor import WALL
 from ..motion import Tracker
 from ..output.feature_points import feature_points
@@ -102,7 +103,7 @@ def _ends(
         node = stack.enter_context(closing(ros1.Ros1Node(config.name)))
         source = source or ros1.Ros1Source(node, config)
         sinks.append(RosSink(ros1.Ros1Publisher(node, config.depth), RosMessages("ros1"), config))
-    elif config.ros == 2:
+    elif config.ros == 2 and not _is_for_foxglove_alone(config, write):
         with needed_by("live"):
             dds = import_module(".dds", __package__)
         participant = dds.Participant(config.domain, localhost=config.localhost)
@@ -119,3 +120,12 @@ def _ends(
         sinks.append(FoxgloveSink(server, foxglove.FoxgloveMessages(), config))
     assert source is not None  # `LiveConfig` requires a log where there is no ROS.
     return source, sinks
+
+
+def _is_for_foxglove_alone(config: LiveConfig, write: Callable[[str], None]) -> bool:
+    """Whether a log is played for Foxglove where DDS is not installed: that needs none."""
+    alone = config.log is not None and config.foxglove is not None
+    if not alone or find_spec("cyclonedds") is not None:
+        return False
+    write(f"without ROS 2, for Foxglove alone: {needs('cyclonedds')}")
+    return True

@@ -29,6 +29,7 @@ a { color: inherit; text-underline-offset: .15em; }
 figure { margin: 0 0 2.25rem; }
 .card { overflow-x: auto; max-width: max-content; padding: .5rem; border-radius: 8px;
   background: #fff; border: 1px solid var(--line); }
+.card.either { background: var(--page); }
 .card img { display: block; width: var(--width); max-width: 100%; height: auto;
   min-width: min(.6 * var(--width), 40rem); }
 figcaption { margin-top: .6rem; max-width: 46rem; }
@@ -186,17 +187,26 @@ def table_part(
     return "\n".join(lines)
 
 
-def image_part(caption: str, png: bytes, name: str = "") -> str:
+def image_part(caption: str, png: bytes, name: str = "", dark: bytes = b"") -> str:
     """Make a figure of the bytes of a PNG file; the caption is the image's text, too.
 
-    It is as wide as it was drawn, or as the page if that is less; links lead to its `name`.
+    It is as wide as it was drawn, or as the page if that is less; links lead to its `name`. One for
+    dark pages, of the same size, may be given with it.
     """
     data, text = base64.b64encode(png).decode("ascii"), escape(caption)
+    source = ""
+    if dark:
+        black = base64.b64encode(dark).decode("ascii")
+        source = (
+            '<source media="(prefers-color-scheme: dark) and screen" '
+            f'srcset="data:image/png;base64,{black}">'
+        )
     width, height = (round(_SCALE * side) for side in struct.unpack(">2I", png[16:24]))
     place = f' id="{escape(name)}"' if name else ""
     return (
         f"<figure{place}>\n"
-        f'<div class="card" tabindex="0"><img width="{width}" height="{height}" '
-        f'style="--width: {width}px" src="data:image/png;base64,{data}" alt="{text}"></div>\n'
+        f'<div class="card{" either" if dark else ""}" tabindex="0"><picture>{source}'
+        f'<img width="{width}" height="{height}" style="--width: {width}px" '
+        f'src="data:image/png;base64,{data}" alt="{text}"></picture></div>\n'
         f"<figcaption>{text}</figcaption>\n</figure>"
     )

@@ -1,18 +1,31 @@
 """A demonstration: a simulated drive, or a log, into a table and a page."""
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..errors import LineamentError
 from ..extractor import Extractor, load_kernels
+from ..features import Features
 from ..files import made_folder
 from ..logs import open_log
+from ..output import canvas
 from ..progress import Track, untracked
+from ..scan import LaserScan, Pose
 from .extract import extract_log
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Methods in the pictures; the first makes the table.
 DEMO_METHODS = ("optimal", "liu:scale_free", "liu:paper")
+#: How many scans one picture shows.
+_MOMENTS = 6
 
 
 def run_demo(
@@ -42,7 +55,7 @@ def run_demo(
     summary = extract_log(log, target / "features.parquet", extractor, track=track)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
-    figures = list(track(_draw(target, log, extractor, summary.scans // 2), "drawing", 3))
+    pictures = list(track(_draw(target, log, extractor, summary.scans), "drawing", 5))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
         ("log", str(log)),
@@ -53,36 +66,93 @@ def run_demo(
         ("beams invalid", f"{100 * summary.invalid:.1f} %"),
         ("speed", f"{summary.scans / summary.seconds:.0f} scans/s, from file to table"),
     ]
-    from ..output.page import image_part, list_part, text_parts, write_parts
+    from ..output.page import image_part, list_part, write_parts
 
     page = target / "index.html"
-    images = [image_part(caption, image.read_bytes()) for caption, image in figures]
-    parts = [list_part(facts), *images, *text_parts([_NOTE])]
-    write_parts(page, "lineament: lines and corners of a drive", parts)
+    images = [image_part(caption, path.read_bytes(), dark=dark) for caption, path, dark in pictures]
+    title = f"lineament: lines and corners of {Path(log).name}"
+    write_parts(page, title, [*images[:1], list_part(facts), *images[1:]])
     return [*facts, ("page", str(page))]
 
 
-_NOTE = (
-    "The last panel has the parameters of the paper: with the response in metres, the threshold "
-    "0.66 finds only the corners of distant walls, and one line is fitted to a cluster without "
-    "corners."
-)
-
-
 def _draw(
-    target: Path, log: str | os.PathLike[str], extractor: Extractor, index: int
-) -> Iterator[tuple[str, Path]]:
-    """Draw a scan, its stages and, if the log has poses, a map; yield captions and files."""
-    from ..output.figures import plot_map, plot_scan, plot_trace
+    target: Path, log: str | os.PathLike[str], extractor: Extractor, total: int
+) -> Iterator[tuple[str, Path, bytes]]:
+    """Draw one scan, a corner of it, how they were found, other methods, and the drive.
 
-    scan, path = open_log(log).scan(index), target / "scan.png"
-    plot_scan(scan, {name: Extractor(name)(scan) for name in DEMO_METHODS}, path)
-    yield f"Scan {index}: clusters, segments and corners.", path
-    path = target / "trace.png"
-    plot_trace(extractor.trace(scan), path)
-    yield f"The stages of {DEMO_METHODS[0]} on that scan.", path
-    posed = [(s.pose, extractor(s)) for s in open_log(log) if s.pose is not None]
+    Yields captions, files, and the same pictures on black.
+    """
+    from ..output import figures
+    from ..output.stages import trace_figure
+
+    posed, moments, (index, scan, features) = _drive(log, extractor, total)
+    method, drive = extractor.method.name, Path(log).name
+    title = figures.scan_title(log, index, scan)
+
+    def drawn(name: str, caption: str, draw: Callable[..., Figure], *given: Any, title: str) -> Any:
+        path = target / f"{name}.png"
+        canvas.save(draw(*given, title=title), path)
+        dark = canvas.figure_bytes(draw(*given, title=title, dark=True), canvas.DPI)
+        return caption, path, dark
+
+    yield drawn(
+        "scan",
+        "What the scanner saw, and what was found in it: points have the colour of their cluster, "
+        "lines are segments, diamonds are corners; nothing came back from shaded sectors.",
+        *(figures.scan_figure, scan, {method: features}),
+        title=title,
+    )
+    corners = features.corners
+    quality = np.where(corners["kind"] == "edge", 0.0, corners["quality"])
+    if quality.any():
+        k = int(quality.argmax())
+        caption = "How sure it is: the corner of the highest quality, close up."
+        if features.noise is not None:
+            caption += f" Ranges scatter by {1e3 * features.noise.sigma:.1f} mm."
+        given = figures.corner_figure, scan, features, k
+        yield drawn("corner", caption, *given, title=f"{title} · {method}")
+    yield drawn(
+        "trace",
+        "How it was found: beams farther apart than the threshold begin a new cluster, and each "
+        "corner explains the measurements better, by more than a threshold, than a line would.",
+        *(trace_figure, extractor.trace(scan)),
+        title=f"{title} · {method}",
+    )
+    yield drawn(
+        "methods",
+        "Other methods on that scan. The last panel has the parameters of the paper: with the "
+        "response in metres, the threshold 0.66 finds only the corners of distant walls, and one "
+        "line is fitted to a cluster without corners.",
+        *(figures.scan_figure, scan, {name: Extractor(name)(scan) for name in DEMO_METHODS}),
+        title=title,
+    )
     if posed:
-        path = target / "map.png"
-        plot_map(posed, path, title="What was found on the whole drive")
-        yield "All scans, at the poses of the log.", path
+        caption = "The whole drive: all scans, at the poses of the log."
+        yield drawn("map", caption, figures.map_figure, posed, title=drive)
+    else:
+        caption = "Scans from the first to the last; the log has no poses for a map."
+        yield drawn("scans", caption, figures.scans_figure, moments, title=drive)
+
+
+def _drive(
+    log: str | os.PathLike[str], extractor: Extractor, total: int
+) -> tuple[
+    list[tuple[Pose, Features]], list[tuple[str, LaserScan, Features]], tuple[int, LaserScan, Any]
+]:
+    """Return what was found at each pose, some scans, and the scan of the best corners.
+
+    Corners count by their quality, edges do not.
+    """
+    posed, moments, most = [], [], -1.0
+    kept = set(np.linspace(0, total - 1, _MOMENTS).round().astype(int).tolist())
+    for index, scan in enumerate(open_log(log)):
+        features = extractor(scan)
+        corners = features.corners
+        quality = float(np.nansum(corners["quality"][corners["kind"] != "edge"]))
+        if quality > most:
+            most, best = quality, (index, scan, features)
+        if index in kept:
+            moments.append((f"scan {index}", scan, features))
+        if scan.pose is not None:
+            posed.append((scan.pose, features))
+    return posed, moments, best

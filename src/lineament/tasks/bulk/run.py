@@ -68,6 +68,7 @@ def extract_logs(
     executor: Executor | None = None,
     ending: str = ".parquet",
     resume: bool = False,
+    world: bool = False,
     show: Callable[[str], None] = lambda text: None,  # noqa: ARG005
     **reading: Any,
 ) -> Bulk:
@@ -94,6 +95,8 @@ def extract_logs(
     resume : bool
         Skip logs that are complete: done by this version with this configuration, the file of the
         size in the manifest, and the log unchanged.
+    world : bool
+        Whether the tables have the features in the world, as for `extract_log`.
     show : callable
         ``show(text)`` is called twice a second with the progress.
     **reading
@@ -127,7 +130,7 @@ def extract_logs(
     found = [full_path(log) for log in find_logs(logs)]
     manifest = Manifest(made_folder(folder))
     names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
-    configuration = _configuration(extractor, settings)
+    configuration = _configuration(extractor, settings) | ({"world": True} if world else {})
     rows = [
         Row(
             log=log,
@@ -140,7 +143,8 @@ def extract_logs(
     ]
     todo = _unfinished(rows, manifest) if resume else rows
     home = os.path.abspath(folder)  # noqa: PTH100
-    tasks = [Task(row, home, extractor.method, extractor.noise, settings) for row in todo]
+    method, noise = extractor.method, extractor.noise
+    tasks = [Task(row, home, method, noise, settings, world) for row in todo]
     manifest.rows |= {row.log: row for row in todo}
     with Threads() if executor is None else nullcontext(executor) as workers:
         _run(tasks, workers, manifest, show)

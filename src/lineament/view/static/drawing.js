@@ -2,18 +2,13 @@
 
 import { roundLength } from "./plane.js";
 
-// Colours of clusters, those of the figures: easy to tell apart, also with colour blindness.
-export const PALETTE = [
-  "#4477aa", "#ee9933", "#228833", "#cc6699", "#33a9c9",
-  "#aa7744", "#8866bb", "#a3a22a", "#dd6655", "#44aa88",
-];
-
 const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "accent", "corner", "edge", "break", "arc"];
 
 /** The colours of the page, light or dark. */
 export function readTheme() {
   const style = getComputedStyle(document.documentElement);
-  return Object.fromEntries(NAMES.map((n) => [n, style.getPropertyValue(`--${n}`).trim()]));
+  const read = (name) => style.getPropertyValue(`--${name}`).trim();
+  return { ...Object.fromEntries(NAMES.map((n) => [n, read(n)])), clusters: read("clusters").split(/\s+/) };
 }
 
 /** Bearings and points of a scan as it comes from the server; null where a beam is invalid. */
@@ -78,7 +73,7 @@ export class Drawing {
       if (!point) return;
       const cluster = scan.clusters[i];
       if (cluster < 0) return this.#cross(point, half + 0.8);
-      this.ctx.fillStyle = shown.clusters ? PALETTE[cluster % PALETTE.length] : this.theme.soft;
+      this.ctx.fillStyle = shown.clusters ? this.theme.clusters[cluster % this.theme.clusters.length] : this.theme.soft;
       this.#round(point, half);
       this.ctx.fill();
     });
