@@ -2,7 +2,7 @@
 # make test: what is checked before each commit.                    make bench: the README's figures.
 # make test-all: what takes longer, besides.                        make lines: what there is to read.
 PYTHON ?= python3
-BIN := .venv/bin
+BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
 .PHONY: demo test test-all lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
@@ -16,7 +16,7 @@ test-all: coverage
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
@@ -58,9 +58,9 @@ wheel: .venv/ready
 	$(BIN)/python -m build --no-isolation --quiet
 	$(PYTHON) -m venv build/empty
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
-	build/empty/bin/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
-	build/empty/bin/python benchmarks/installed.py
-	cd build/empty && bin/lineament demo --quiet -o demo && ls demo
+	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
+	build/empty/$(notdir $(BIN))/python benchmarks/installed.py
+	cd build/empty && $(notdir $(BIN))/lineament demo --quiet -o demo && ls demo
 
 # Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
 mutants: .venv/ready

@@ -16,6 +16,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", ["launch/lineament.launch.py"]),
+        (f"share/{NAME}/rviz", ["rviz/lineament.rviz"]),
     ],
     install_requires=["setuptools", "lineament"],
     zip_safe=True,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import random
@@ -85,6 +84,7 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Domain of DDS that no other test uses; ports of those above 100 are lent by the system."""
     pytest.importorskip("cyclonedds", reason="no cyclonedds for this Python")
+    fcntl = pytest.importorskip("fcntl", reason="no locks of files on this system")
     for name in ("CYCLONEDDS_URI", "ROS_DOMAIN_ID"):
         monkeypatch.delenv(name, raising=False)
     for number in random.SystemRandom().sample(range(1, 101), 100):

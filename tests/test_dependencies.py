@@ -57,8 +57,11 @@ import sys
 from importlib.metadata import distribution
 from lineament.cli import run
 from lineament.errors import EXTRAS
-for package in (*EXTRAS, "rosbags"):
-    sys.modules[package] = None
+class Missing:  # None in sys.modules is a module to the extensions of pyarrow
+    def find_spec(name, path=None, target=None):
+        if name.partition(".")[0] in (*EXTRAS, "rosbags"):
+            raise ModuleNotFoundError(name=name)
+sys.meta_path.insert(0, Missing)
 log = "log.npz"
 assert run(["simulate", "room", "-o", log, "--scans", "3", "-q"]) == 0
 for ending in ("parquet", "csv", "jsonl", "svg", "ros2.mcap"):

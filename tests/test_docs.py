@@ -49,4 +49,4 @@ def test_every_public_name_resolves_and_is_documented():
     for name in ln.__all__:
         value = getattr(ln, name)
         assert isinstance(value, str) or value.__doc__
-    assert set(ln.__all__) <= set(dir(ln))
+    assert dir(ln) == sorted(ln.__all__)

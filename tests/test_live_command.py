@@ -1,6 +1,7 @@
 """`lineament live` as a whole: what others hear of it, its options, and how it ends."""
 
 import gc
+import math
 import re
 import signal
 import sys
@@ -23,6 +24,7 @@ from live_driving import (
 import lineament as ln
 from lineament.cli import run
 from lineament.live import Counts, LiveConfig, Report, run_live
+from lineament.live.running import _is_for_foxglove_alone
 from lineament.logs import save_npz
 from lineament.output.feature_points import feature_points
 from lineament.simulation import SENSORS, drive, room
@@ -151,6 +153,58 @@ def test_a_log_is_played_until_its_end(peer, domain, log):
     assert_same(clouds[-1], ln.extract(last))
 
 
+def test_the_motion_of_a_log_is_published(peer, domain, log):
+    peer.listen("/scan/odometry", "Odometry", 1000)
+    scans = {round(1e9 * scan.stamp): scan for scan in ln.open_log(log)}
+    with Running(domain=domain, log=log, rate=20.0, track=True) as node:
+        node.end()
+        eventually(lambda: peer._readers["/scan/odometry"].read(1))
+    last = peer.take("/scan/odometry")[-1]
+    header, twist, inside = last["header"], last["twist"]["twist"], np.ix_((0, 1, 5), (0, 1, 5))
+    assert (header["frame_id"], last["child_frame_id"]) == ("odom", "laser")
+    assert header["stamp"]["sec"] * 10**9 + header["stamp"]["nanosec"] == max(scans)
+    assert twist["linear"]["x"] == pytest.approx(1.0, abs=0.1)
+    place = last["pose"]["pose"]["position"]
+    assert (place["x"], place["y"]) == pytest.approx((4.0, 0.0), abs=0.05)
+    for part in ("pose", "twist"):
+        covariance = np.reshape(last[part]["covariance"], (6, 6))[inside]
+        assert (np.linalg.eigvalsh(covariance) > 0).all()
+        assert (np.diag(covariance) < 0.5**2).all()
+
+
+def test_the_pose_of_a_corner_is_published(peer, domain, log):
+    """A corner of the room, 5 m ahead and 2 m to the left when the drive begins."""
+    peer.listen("/scan/dock", "PoseWithCovarianceStamped", 1000)
+    scans = list(ln.open_log(log))
+    with Running(domain=domain, log=log, rate=20.0, dock=(5.3, 1.8)) as node:
+        node.end()
+        eventually(lambda: peer._readers["/scan/dock"].read(1))
+    last = peer.take("/scan/dock")[-1]
+    assert last["header"]["frame_id"] == "laser"
+    assert last["header"]["stamp"]["sec"] == int(scans[-1].stamp)
+    place, turned = last["pose"]["pose"]["position"], last["pose"]["pose"]["orientation"]
+    covariance = np.reshape(last["pose"]["covariance"], (6, 6))[np.ix_((0, 1, 5), (0, 1, 5))]
+    yaw = 2 * math.atan2(turned["z"], turned["w"])
+    # The drive has gone 4 m straight on.
+    off = np.subtract((place["x"], place["y"], yaw), (1.0, 2.0, -0.75 * math.pi))
+    assert off @ np.linalg.solve(covariance, off) < 30
+    assert np.abs(off).max() < 0.03
+
+
+def test_a_log_is_shown_in_foxglove_without_dds(log, monkeypatch):
+    """Of the extra ``foxglove`` alone, as the README names it."""
+    pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    lines: list[str] = []
+    report = run_live(LiveConfig(log=log, rate=0, foxglove=0), write=lines.append)
+    assert report.total.scans == 41
+    assert lines[0].startswith("without ROS 2, for Foxglove alone: needs cyclonedds, which is not")
+    assert lines[1].startswith("Foxglove: open a connection to ws://127.0.0.1:")
+    # What else needs ROS goes on to fail without it.
+    for options in ({"log": log}, {"foxglove": 0}):
+        assert not _is_for_foxglove_alone(LiveConfig(**options), pytest.fail)
+
+
 def test_a_log_is_shown_in_foxglove(log):
     pytest.importorskip("foxglove", reason="no foxglove-sdk for this Python")
     from foxglove_client import FoxgloveClient
@@ -217,6 +271,7 @@ min_points = 6
     configs: list[LiveConfig] = []
     monkeypatch.setattr("lineament.live.running.run_live", kept)
     flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
+    flags += " --dock 2 -1.5"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0
     assert capfd.readouterr() == ("3 scans, 2 dropped, 1 lost, 0 malformed messages\n", "begun\n")
     assert run(["live", "--ros", "1", "__name:=front", "-q"]) == 0
@@ -234,6 +289,7 @@ min_points = 6
             foxglove=8765,
             rate=2.0,
             noise=0.1,
+            dock=(2.0, -1.5),
         ),
         LiveConfig(ros=1),
     ]

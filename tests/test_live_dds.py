@@ -30,7 +30,7 @@ from dds_peer import KINDS, Peer
 from lineament.errors import LineamentError
 from lineament.live import LiveConfig
 from lineament.live.dds import DdsPublisher, DdsSource
-from lineament.live.participant import Participant, type_hash
+from lineament.live.participant import _HASHES, Participant, type_hash
 from lineament.output.scene import Message
 
 SCAN = "sensor_msgs/msg/LaserScan"
@@ -55,6 +55,7 @@ def source_of(participant: Participant, depth: int = 64, **options: object) -> D
 def test_hashes_are_those_of_ros():
     from rosbags.typesys import Stores, get_typestore
 
+    assert set(KINDS) == set(_HASHES)
     for name in (Stores.ROS2_HUMBLE, Stores.ROS2_JAZZY, Stores.LATEST):
         for kind, package in KINDS.items():
             full = f"{package}/msg/{kind}"

@@ -318,11 +318,19 @@ def test_no_message_ends_a_node(options):
         (ln.LaserScan(WALL, angles=BEARINGS**3), ["/scan/points"]),
     ],
 )
-def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics):
-    publisher = Taken()
-    sink = RosSink(publisher, RosMessages("cdr"), LiveConfig(log=log))
-    frame = Pipeline(LiveConfig())("a", scan)
+@pytest.mark.parametrize(
+    "options", [{}, {"track": True}, {"deskew": "scans"}, {"dock": (9, 9)}, {"dock_track": 1}]
+)
+def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, topics, options):
+    publisher, config = Taken(), LiveConfig(log=log, **options)
+    sink = RosSink(publisher, RosMessages("cdr"), config)
+    frame = Pipeline(config)("a", scan)
     below = [f"/scan/{name}" for name in ("features", "corners", "markers")]
+    if options:
+        below.append("/scan/odometry")
+    assert ("/scan/odometry" in publisher._topics) == bool(options)
+    # The scan has no corner.
+    assert ("/scan/dock" in publisher._topics) == any("dock" in name for name in options)
     made = below + topics if log else below
     for heard in (None, [], *([topic] for topic in made)):
         publisher.heard = heard
@@ -397,6 +405,21 @@ def test_poses_give_the_motion_between_scans():
     ]
     for stamp, pose, moves in poses:
         assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
+
+
+def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
+    poses = []
+    monkeypatch.setattr(
+        "lineament.live.pipeline.Dock", lambda *_, **__: lambda *at: poses.append(at)
+    )
+    pipeline = Pipeline(LiveConfig(dock=(5.0, 2.0)))
+    walk = [(-2.0, 0.0), (-1.0, 0.0)]
+    for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=5):
+        frame = pipeline("one", scan)
+        features, tracks, pose = poses.pop()
+        assert (features, pose) == (frame.features, frame.travel.pose)
+        assert len(tracks.corners) == len(features.corners)
+    assert pose[0] == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("deskew", "most"), [("scans", 0.02), ("poses", 1e-6), ("/odom", 1e-9)])

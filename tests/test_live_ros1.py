@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 from live_driving import (
     DEADLINE,
@@ -209,7 +210,10 @@ def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):
 
 def test_messages_are_read_by_a_genuine_listener(node, scanner, topic):
     # What each message holds is tested in test_ros_messages.
-    publisher, config = Ros1Publisher(node), LiveConfig(topic=topic, log="played.npz")
+    publisher, config = (
+        Ros1Publisher(node),
+        LiveConfig(topic=topic, log="played.npz", dock=(2.0, 1.0)),
+    )
     sink = RosSink(publisher, RosMessages("ros1"), config)
     kinds = {
         topic: SCAN,
@@ -217,17 +221,31 @@ def test_messages_are_read_by_a_genuine_listener(node, scanner, topic):
         f"{topic}/markers": "visualization_msgs/MarkerArray",
         f"{topic}/corners": "geometry_msgs/PoseArray",
         f"{topic}/features": "sensor_msgs/PointCloud2",
+        f"{topic}/odometry": "nav_msgs/Odometry",
+        f"{topic}/dock": "geometry_msgs/PoseWithCovarianceStamped",
     }
     for name, kind in kinds.items():
         assert publisher.listeners(name) == 0
         scanner.listen(name, kind)
     eventually(lambda: all(publisher.listeners(name) == 1 for name in kinds))
     fields = {"range_max": 8.0, "stamp": 5.5, "frame_id": "laser", "pose": (1.0, 2.0, math.pi)}
-    frame = Pipeline(config)("a", ln.LaserScan([2.0, 2.0 / math.cos(0.25)], 0.0, 0.25, **fields))
+    bearings = np.linspace(-0.5, 1.2, 400)
+    ranges = np.minimum(2 / np.cos(bearings), 1 / np.maximum(np.sin(bearings), 1e-9))
+    step = bearings[1] - bearings[0]
+    frame = Pipeline(config)("a", ln.LaserScan(ranges, -0.5, step, **fields))
     sink.publish(frame)
-    found, transforms, markers, corners, cloud = (heard(scanner, name) for name in kinds)
+    found, transforms, markers, corners, cloud, odometry, dock = (
+        heard(scanner, name) for name in kinds
+    )
+    place = dock["pose"]["pose"]["position"]
+    assert (place["x"], place["y"]) == pytest.approx((2.0, 1.0), abs=1e-3)
+    assert dock["pose"]["covariance"][35] > 0
+    assert (odometry["header"]["frame_id"], odometry["child_frame_id"]) == ("odom", "laser")
+    assert (
+        odometry["twist"]["covariance"] == np.diag([2500.0, 2500, 0, 0, 0, 2500]).ravel().tolist()
+    )
     (transform,) = transforms["transforms"]
-    for one in (found, corners, cloud, transform, markers["markers"][0]):
+    for one in (found, corners, cloud, dock, transform, markers["markers"][0]):
         assert one["header"]["stamp"] == {"sec": 5, "nanosec": 500_000_000}
         assert one["header"]["frame_id"] == ("map" if one is transform else "laser")
     assert points_of(cloud).tobytes() == feature_points(frame.features).tobytes()

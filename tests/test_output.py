@@ -26,7 +26,7 @@ from lineament import LaserScan, LineamentError, RangeNoise
 from lineament.features.tables import SCHEMA, features_table
 from lineament.files import written_beside
 from lineament.output import ENDINGS, canvas, open_writer, page
-from lineament.output.tables import TOPIC
+from lineament.output.tables import POSE, TOPIC
 from lineament.output.writer import Writer
 
 try:
@@ -43,6 +43,11 @@ TOPICS = ("/front", '/re"ar,\n')
 @pytest.fixture(params=ENDINGS)
 def target(request, tmp_path):
     return tmp_path / f"features{request.param}"
+
+
+#: Columns of the tables that are written, and their poses, those of SCAN.
+WRITTEN = pa.schema([*SCHEMA, *POSE])
+AT = {"pose_x": 1.0, "pose_y": 2.0, "pose_theta": 0.5}
 
 
 def write(path, scans, topics=()):
@@ -85,7 +90,7 @@ def test_log_without_scans_or_features(target):
         write(target, [random_features(0, n_beams=0, counts=(0, 0, 0, 0))] * n)
         if target.suffix == ".parquet":
             table = pq.read_table(target)
-            assert table.schema.equals(SCHEMA)
+            assert table.schema.equals(WRITTEN)
             assert table.num_rows == 0
             assert pq.read_metadata(target).metadata[b"lineament.scans"] == b"%d" % n
         elif target.suffix == ".jsonl":
@@ -232,9 +237,9 @@ def test_parquet_reads_back_the_same(tmp_path):
     scans = [random_features(i, frame_id="laser" if i else "odd") for i in range(2010)]
     write(path, scans)
     table = pq.read_table(path)
-    assert table.schema.equals(SCHEMA)
+    assert table.schema.equals(WRITTEN)
     assert table.schema.field("cov_00").metadata == SCHEMA.field("cov_00").metadata
-    assert table.combine_chunks().equals(features_table(scans))
+    assert table.select(SCHEMA.names).combine_chunks().equals(features_table(scans))
     # Memory does not grow: a thousand scans a group.
     file = pq.ParquetFile(path)
     groups = [set(np.unique(file.read_row_group(k)["scan"]) // 1000) for k in range(3)]
@@ -246,15 +251,33 @@ def test_parquet_reads_back_the_same(tmp_path):
     assert file.metadata.row_group(0).column(4).compression == "ZSTD"
 
 
+@pytest.mark.parametrize("ending", [".parquet", ".csv", ".jsonl"])
+def test_poses_are_those_of_the_scans_where_they_are_known(tmp_path, ending):
+    path, poses = tmp_path / f"a{ending}", [None, (1.0, -2.0, 0.5), None, (3.0, 4.0, -0.5)]
+    with open_writer(path) as writer:
+        for i, pose in enumerate(poses):
+            writer.write(random_features(i), SCAN.with_pose(pose))
+        writer.write(random_features(4))
+    if ending == ".jsonl":
+        found = [json.loads(line).get("pose") for line in path.read_text().splitlines()]
+        assert found == [None if pose is None else [*pose] for pose in (*poses, None)]
+        return
+    table = pq.read_table(path) if ending == ".parquet" else pa.csv.read_csv(path)
+    for row in table.to_pylist():
+        pose = (*poses, None)[row["scan"]]
+        assert tuple(row[name] for name in AT) == (pose or (None, None, None))
+    assert table.num_rows == sum(random_features(i).to_arrow().num_rows for i in range(5))
+
+
 def test_parquet_has_a_column_of_topics_where_there_are_several(tmp_path):
     scans = [random_features(i) for i in range(1005)]
     write(tmp_path / "one.parquet", scans[:3], TOPICS[:1])
     assert set(pq.read_table(tmp_path / "one.parquet")["topic"].to_pylist()) == {TOPICS[0]}
     write(tmp_path / "two.parquet", scans, TOPICS)
     table = pq.read_table(tmp_path / "two.parquet")
-    assert table.schema.names == [*SCHEMA.names, "topic"]
+    assert table.schema.names == [*WRITTEN.names, "topic"]
     assert table.schema.metadata == SCHEMA.metadata
-    assert table.drop_columns("topic").combine_chunks().equals(features_table(scans))
+    assert table.select(SCHEMA.names).combine_chunks().equals(features_table(scans))
     assert table["topic"].to_pylist() == [TOPICS[k % 2] for k in table["scan"].to_pylist()]
 
 
@@ -263,12 +286,12 @@ def test_csv_reads_back_the_same(tmp_path, topics):
     scans = [random_features(i) for i in range(1010)]
     scans[7].segments["rms"] = [np.nan, np.inf, -np.inf]
     write(tmp_path / "a.csv", scans, topics)
-    schema = SCHEMA.append(TOPIC) if topics else SCHEMA
+    schema = WRITTEN.append(TOPIC) if topics else WRITTEN
     types = pa.csv.ConvertOptions(column_types=schema, strings_can_be_null=True, null_values=[""])
     lines = pa.csv.ParseOptions(newlines_in_values=True)
     found = pa.csv.read_csv(tmp_path / "a.csv", parse_options=lines, convert_options=types)
     assert found.schema.names == schema.names
-    expected = features_table(scans).to_pylist()
+    expected = [row | AT for row in features_table(scans).to_pylist()]
     if topics:
         expected = [row | {"topic": topics[row["scan"] % 2]} for row in expected]
     assert list(map(str, found.to_pylist())) == list(map(str, expected))  # NaN is "nan"
@@ -284,9 +307,9 @@ def test_jsonl_reads_back_the_same(tmp_path, topics):
     assert data.endswith(b"\n")
     assert b"\r" not in data
     for i, (line, found) in enumerate(zip(data.splitlines(), scans, strict=True)):
-        topic = {"topic": topics[i % 2]} if topics else {}
-        assert list(json.loads(line).items())[: 1 + len(topic)] == [("scan", i), *topic.items()]
-        assert json.loads(line) == {"scan": i, **topic, **found.to_dict()}
+        known = ({"topic": topics[i % 2]} if topics else {}) | {"pose": [1.0, 2.0, 0.5]}
+        assert list(json.loads(line).items())[: 1 + len(known)] == [("scan", i), *known.items()]
+        assert json.loads(line) == {"scan": i, **known, **found.to_dict()}
 
 
 def test_jsonl_is_strict(tmp_path):
@@ -303,7 +326,7 @@ def test_docs_name_every_field_of_a_line():
     text = DOCS.read_text(encoding="utf-8").split("## JSON lines")[1].split("\n## ")[0]
     rows = {line.split("|")[1].strip(" `"): line for line in text.splitlines() if "| `" in line}
     record = random_features(1, noise=RangeNoise(0.01)).to_dict()
-    assert set(rows) == {"scan", "topic", *record}
+    assert set(rows) == {"scan", "topic", "pose", *record}
     for name in ("noise", "segments", "corners", "arcs", "breakpoints"):
         fields = record[name] if name == "noise" else record[name][0]
         for field in fields:

@@ -14,12 +14,15 @@ from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
-from lineament.motion import Tracks
+from lineament.live import Counts, LiveConfig, Pipeline, Report, RosSink
+from lineament.live.sinks import Publisher
+from lineament.motion import CornerPose, Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
 from lineament.output.mcap import McapWriter
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment, layers_of
+from lineament.simulation import SENSORS, drive, room
 
 MOMENT = Moment(1_700_000_012, 123_456_789, "laser_link", "map")
 SCAN = LaserScan(
@@ -126,6 +129,42 @@ def test_transform(make):
     assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(0.5)
 
 
+def covariance_of(values):
+    """Read the plane of a covariance of six numbers, of which nothing else may be there."""
+    six = np.reshape(values, (6, 6)).copy()
+    plane = six[np.ix_((0, 1, 5), (0, 1, 5))].copy()
+    six[np.ix_((0, 1, 5), (0, 1, 5))] = 0
+    assert not six.any()
+    return plane
+
+
+def in_plane(pose):
+    position, turned = pose.position, pose.orientation
+    assert position.z == turned.x == turned.y == 0
+    return position.x, position.y, 2 * math.atan2(turned.z, turned.w)
+
+
+def test_odometry(make):
+    of_pose, of_twist = np.arange(9.0).reshape(3, 3), np.eye(3) + 0.5
+    travel = Travel((1.5, -2.0, -3.0), of_pose, (0.5, -0.25, 0.125), of_twist)
+    back = read(make, make.odometry("/scan/odometry", MOMENT, travel))
+    assert (back.header.frame_id, back.child_frame_id) == ("odom", "laser_link")
+    assert in_plane(back.pose.pose) == pytest.approx((1.5, -2.0, -3.0))
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), of_pose)
+    np.testing.assert_array_equal(covariance_of(back.twist.covariance), of_twist)
+    linear, angular = back.twist.twist.linear, back.twist.twist.angular
+    assert (linear.x, linear.y, linear.z) == (0.5, -0.25, 0.0)
+    assert (angular.x, angular.y, angular.z) == (0.0, 0.0, 0.125)
+
+
+def test_corner_pose(make):
+    found = CornerPose((1.5, -2.0, -3.0), np.arange(9.0).reshape(3, 3))
+    back = read(make, make.corner_pose("/scan/dock", MOMENT, found))
+    assert back.header.frame_id == "laser_link"
+    assert in_plane(back.pose.pose) == pytest.approx(found.pose)
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), found.covariance)
+
+
 def test_markers(make):
     layers = layers_of(markers_of(FOUND, SCAN))
     markers = read(make, make.features("/scan/features", MOMENT, layers)).markers
@@ -226,6 +265,11 @@ def test_frames_of_all_lengths_leave_numbers_aligned(make, length):
     n = len(found.segments) + len(found.corners) + len(found.arcs)
     assert read(make, make.cloud("/f", moment, found)).width == n
     assert len(read(make, make.transform("/f", moment, (0.0, 0.0, 0.0))).transforms) == 1
+    travel = Travel((1.0, 2.0, 0.0), np.eye(3), (0.0, 0.0, 0.0), np.eye(3))
+    back = read(make, make.odometry("/f", moment, travel))
+    np.testing.assert_array_equal(covariance_of(back.twist.covariance), np.eye(3))
+    back = read(make, make.corner_pose("/f", moment, CornerPose(travel.pose, np.eye(3))))
+    np.testing.assert_array_equal(covariance_of(back.pose.covariance), np.eye(3))
     message = make.diagnostics("/f", moment, "n" * length, "", 0, "", {"a": "b"})
     (status,) = read(make, message).status
     assert status.name == "n" * length
@@ -242,6 +286,39 @@ def test_messages_of_ros1_in_a_file(tmp_path):
     found = [(s.name, s.encoding, c.message_encoding) for s, c, _ in reader.iter_messages()]
     names = "tf2_msgs/TFMessage", "sensor_msgs/LaserScan", "visualization_msgs/MarkerArray"
     assert found == [(name, "ros1msg", "ros1") for name in names]
+
+
+class Kept(Publisher):
+    """Keeps what is published, as others would receive it."""
+
+    def __init__(self):
+        super().__init__()
+        self.opened, self.sent = {}, {}
+
+    def _open(self, topic, kind):
+        self.opened[topic] = kind
+
+    def _send(self, _, message):
+        self.sent[message.topic] = message
+
+    def _count(self, _):
+        return 1
+
+
+def test_all_that_is_published_is_read_by_rosbags(make):
+    """Of a log with poses, with odometry, a dock, diagnostics: each topic, by its type."""
+    publisher, config = Kept(), LiveConfig(log="a.npz", dock=(5.0, 2.0))
+    sink, pipeline = RosSink(publisher, make, config), Pipeline(config)
+    walk = [(-2, 0), (-1.9, 0)]
+    for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=20):
+        sink.publish(pipeline("a", scan, MOMENT[:2]))
+    irregular = LaserScan(scan.ranges, angles=scan.angles)
+    sink.publish(pipeline("a", irregular, MOMENT[:2]))
+    sink.diagnose(Report(1.0, Counts(), Counts(3, 2, 1), (0, 0), 0, {}, 0), MOMENT[:2])
+    assert set(publisher.sent) == set(publisher.opened)
+    for topic, message in publisher.sent.items():
+        assert message.kind == publisher.opened[topic]
+        read(make, message)
 
 
 def test_an_unknown_encoding():

@@ -4,6 +4,8 @@ It shows that the node can be imported, configured, run and ended; what rclpy do
 """
 
 import importlib
+import re
+import runpy
 import signal
 import struct
 import sys
@@ -14,12 +16,14 @@ from unittest.mock import MagicMock
 from xml.etree import ElementTree
 
 import pytest
+from ruamel.yaml import YAML
 
 import lineament as ln
 from lineament import LineamentError
-from lineament.live import LiveConfig
+from lineament.live import LiveConfig, RosSink
+from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
-from lineament.output.scene import Moment
+from lineament.output.scene import Moment, layers_of
 
 ROS = Path(__file__).parents[1] / "ros"
 SCAN = ln.LaserScan([2.0, 2.0, 2.0], -0.01, 0.01, stamp=5.5, frame_id="laser")
@@ -108,9 +112,76 @@ def test_manifest_has_the_version_and_what_is_imported():
     assert manifest.findtext("version") == ln.__version__
     assert f'version="{ln.__version__}"' in (ROS / "setup.py").read_text(encoding="utf-8")
     needed = {depend.text for depend in manifest.iter("exec_depend")}
-    kinds = ("sensor", "geometry", "visualization", "diagnostic")
+    kinds = ("sensor", "geometry", "visualization", "diagnostic", "nav")
     assert {f"{kind}_msgs" for kind in kinds} <= needed
     assert (ROS / "resource" / "lineament_ros").is_file()
+
+
+#: Types that displays of RViz show.
+DISPLAYS = {
+    "LaserScan": "sensor_msgs/msg/LaserScan",
+    "MarkerArray": "visualization_msgs/msg/MarkerArray",
+    "PoseArray": "geometry_msgs/msg/PoseArray",
+    "PoseWithCovariance": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "Odometry": "nav_msgs/msg/Odometry",
+}
+
+
+def test_rviz_shows_what_is_published():
+    opened: dict[str, str] = {}
+    publisher = MagicMock(advertise=opened.__setitem__)
+    RosSink(publisher, RosMessages("cdr"), LiveConfig(log="a.npz", dock=(1, 2)))
+    text = (ROS / "rviz" / "lineament.rviz").read_text(encoding="utf-8")
+    manager = YAML(typ="safe").load(text)["Visualization Manager"]
+    shown = {
+        display["Topic"]["Value"]: DISPLAYS[display["Class"].removeprefix("rviz_default_plugins/")]
+        for display in manager["Displays"]
+        if "Topic" in display
+    }
+    assert len(shown) == 5
+    assert shown.items() <= opened.items()
+    layers = [layer.name for layer in layers_of(markers_of(ln.extract(SCAN)))]
+    (features,) = (d for d in manager["Displays"] if d["Name"] == "Features")
+    assert sorted(features["Namespaces"]) == sorted(layers)
+
+
+def test_launch_file_starts_the_node_and_rviz_on_its_topics(monkeypatch, package):
+    def kept(name: str):
+        return lambda *values, **options: SimpleNamespace(kind=name, values=values, **options)
+
+    names = {
+        "launch": "LaunchDescription",
+        "launch.actions": "DeclareLaunchArgument",
+        "launch.conditions": "IfCondition",
+        "launch.substitutions": "LaunchConfiguration PathJoinSubstitution",
+        "launch_ros": "",
+        "launch_ros.actions": "Node",
+        "launch_ros.parameter_descriptions": "ParameterValue",
+        "launch_ros.substitutions": "FindPackageShare",
+    }
+    for module, classes in names.items():
+        made = SimpleNamespace(**{name: kept(name) for name in classes.split()})
+        monkeypatch.setitem(sys.modules, module, made)
+    launch = runpy.run_path(str(ROS / "launch" / "lineament.launch.py"))
+    (entities,) = launch["generate_launch_description"]().values
+    *arguments, node, rviz = entities
+    declared = {argument.values[0]: argument.default_value for argument in arguments}
+    (parameters,) = node.parameters
+    assert set(parameters) <= set(package.node.KNOWN)
+    assert set(declared) == {*parameters, "rviz", "frame"}
+    for name, value in parameters.items():
+        default = getattr(LiveConfig(), name)
+        assert value.value_type is type(default)
+        assert declared[name] == str(default).lower()
+    text = (ROS / "rviz" / "lineament.rviz").read_text(encoding="utf-8")
+    topics = re.findall("Value: (/.*)", text)
+    assert sorted(topic for topic, _ in rviz.remappings) == sorted(topics)
+    for topic, (beginning, below) in rviz.remappings:
+        assert (beginning.values, f"/scan{below}") == (("topic",), topic)
+    setup = (ROS / "setup.py").read_text(encoding="utf-8")
+    for folder in ("launch", "rviz"):
+        for file in (ROS / folder).iterdir():
+            assert f'(f"share/{{NAME}}/{folder}", ["{folder}/{file.name}"])' in setup
 
 
 def test_parameters_that_were_not_given_are_declared(package):
@@ -128,11 +199,12 @@ def test_parameters_are_those_of_live(package):
         "noise": 0.02,
         "deskew": False,  # what YAML makes of off
         "laser_pose": [0.1, 0.0, 0.5],
+        "dock": [5.3, 1.8],
         "parameters.evidence": 12,
     }
     config = package.node.config_of(node)
     assert (config.topic, config.noise, config.deskew) == ("/front/scan", 0.02, "off")
-    assert config.laser_pose == (0.1, 0.0, 0.5)
+    assert (config.laser_pose, config.dock) == ((0.1, 0.0, 0.5), (5.3, 1.8))
     assert config.parameters == {"evidence": 12}
     node.parameters["methd"] = "liu"
     with pytest.raises(LineamentError, match="parameter methd is not known, expected one of topic"):

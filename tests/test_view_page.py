@@ -2,6 +2,7 @@
 
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,7 +14,7 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from lineament import Extractor, LaserScan
+from lineament import Extractor, LaserScan, progress
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer
@@ -177,6 +178,27 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
         " seen.add((d[i] << 16) | (d[i + 1] << 8) | d[i + 2]); return seen.size"
     )
     assert colours > 20
+
+
+def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
+    """A scan of a method that is being compiled."""
+    session = Session(log, {"pdbs": Extractor("pdbs")})
+    state = progress.Compiling(14, 40, 9.0, 18.0, is_first=False, is_last=False)
+    monkeypatch.setattr(progress._compiler, "now", state)
+    with session, ViewServer(session) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        with session._busy["pdbs"]:
+            page.driver.get(server.address)
+            text = "document.querySelector('.panel span')?.textContent"
+            page.wait(f"{text} === 'compiling kernels, once: 14 of 40, 18 s left'")
+            monkeypatch.setattr(progress._compiler, "now", None)
+            page.wait(f"{text} === 'working …'")
+        shown(page, 0)
+        time.sleep(1.5)  # what is asked every 0.7 s came for the last time
+        assert "segments" in caption(page)
+        server.shutdown()
+        thread.join()
 
 
 def test_scrubbing_keys_and_playing_change_the_scan(page):

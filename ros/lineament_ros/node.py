@@ -34,6 +34,8 @@ KNOWN = (
     "deskew",
     "laser_pose",
     "track",
+    "dock",
+    "dock_track",
 )
 #: Below this are the parameters of the method: parameters.evidence.
 OF_METHOD = "parameters"

@@ -17,6 +17,7 @@ from ._lazy import lazily
 from ._version import __version__
 
 if TYPE_CHECKING:
+    from . import bounds, logs, methods, simulation
     from .errors import LineamentError, LogError
     from .extractor import Extractor, extract, trace
     from .features import FeatureBatch, Features
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from .methods.trace import Trace
     from .motion.deskew import deskew
     from .motion.tracker import Tracker
+    from .output.notebook import picture as picture
+    from .output.notebook import plot as plot
     from .scan import LaserScan, RangeNoise
 
 _HOME = {
@@ -36,16 +39,21 @@ _HOME = {
     "RangeNoise": "scan",
     "Trace": "methods.trace",
     "Tracker": "motion.tracker",
+    "bounds": "",
     "deskew": "motion.deskew",
     "extract": "extractor",
+    "logs": "",
+    "methods": "",
     "open_log": "logs",
+    "plot": "output.notebook",
+    "simulation": "",
     "trace": "extractor",
 }
 
 __all__ = [*_HOME, "__version__"]
 
 
-__getattr__ = lazily(__name__, _HOME)
+__getattr__ = lazily(__name__, {**_HOME, "picture": "output.notebook"})
 
 
 def __dir__() -> list[str]:

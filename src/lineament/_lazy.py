@@ -13,12 +13,24 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     package : str
         Name of the package.
     homes : mapping
-        The module of each name, relative to the package.
+        The module of each name, relative to the package; "" for a module itself.
     """
 
     def get(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if not homes[name]:
+            return import_module(f".{name}", package)
         return getattr(import_module(f".{homes[name]}", package), name)
 
     return get
+
+
+class Pictured:
+    """Is a picture in notebooks. Pictures are drawn on a higher floor: the package knows where."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        html: str = import_module(__package__).picture(self)
+        return html

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .scan import Array, RangeNoise
+from .scan import Array, NoiseLike, RangeNoise
 
 #: No scanner is better than this [m]; keeps bounds positive where ranges are noiseless. As in
 #: `lineament.kernels.noise`, which cannot be imported without numba.
@@ -75,7 +75,7 @@ class LineBound:
         return np.asarray(lever @ self.covariance @ lever.T)
 
 
-def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: RangeNoise) -> LineBound:
+def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: NoiseLike) -> LineBound:
     """Bound of a line that is met by beams.
 
     Parameters
@@ -84,7 +84,8 @@ def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: Range
         Bearings of the beams that meet it [rad], two different ones at least.
     point, angle : array_like, shape (2,), and float
         A point of the line [m] and its direction [rad].
-    noise : RangeNoise
+    noise : RangeNoise or float
+        Noise of the ranges, or its sigma [m].
 
     Raises
     ------
@@ -93,7 +94,7 @@ def line_bound(bearings: ArrayLike, point: ArrayLike, angle: float, noise: Range
 
     Examples
     --------
-    >>> bound = line_bound([-0.1, 0.0, 0.1], (3.0, 5.0), math.pi / 2, RangeNoise(sigma=0.01))
+    >>> bound = line_bound([-0.1, 0.0, 0.1], (3.0, 5.0), math.pi / 2, 0.01)
     >>> np.abs(bound.centroid).round(9).tolist()
     [3.0, 0.0]
     """
@@ -142,7 +143,7 @@ def corner_bound(before: LineBound, after: LineBound) -> Array:
     return np.asarray((covariance + covariance.T) / 2)
 
 
-def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: RangeNoise) -> Array:
+def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: NoiseLike) -> Array:
     """Bound of a circle that is met by beams: on its near side, or from within on its far side.
 
     With m the unit vector from the centre to the measurement, its offset changes by (m_x, m_y, 1)
@@ -154,7 +155,8 @@ def arc_bound(bearings: ArrayLike, center: ArrayLike, radius: float, noise: Rang
         Bearings of the beams that meet it [rad], three different ones at least.
     center, radius : array_like, shape (2,), and float
         [m].
-    noise : RangeNoise
+    noise : RangeNoise or float
+        Noise of the ranges, or its sigma [m].
 
     Returns
     -------
@@ -213,9 +215,10 @@ def wall_end_bound(end: ArrayLike, angle: float, increment: float) -> float:
     return (square / distance * increment) ** 2 / 12  # cos ψ = distance/ρ
 
 
-def _offset_variance(ranges: Array, cosine: Array, noise: RangeNoise) -> Array:
+def _offset_variance(ranges: Array, cosine: Array, noise: NoiseLike) -> Array:
     """B = σ_r(ρ)² cos² ψ + ρ² σ_φ² sin² ψ [m²]."""
     square = np.maximum(cosine**2, _LEAST_COSINE**2)
+    noise = RangeNoise.of(noise)
     along_beam = np.maximum(noise.range_variance(ranges), _LEAST_SIGMA**2)
     across_beam = (ranges * noise.bearing) ** 2
     return np.asarray(along_beam * square + across_beam * (1 - square))

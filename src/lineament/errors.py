@@ -12,6 +12,8 @@ EXTRAS = {
     "ezdxf": "cad",
     "foxglove": "foxglove",
     "fsspec": "remote",
+    "pandas": "pandas",
+    "polars": "polars",
     "rerun": "rerun",
     "scipy": "evaluation",
     "shapely": "evaluation",

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +15,14 @@ from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
 from .methods.trace import Trace
 from .methods.workspace import Block, block_capacity, run_batch
-from .scan import LaserScan, RangeNoise
+from .progress import compiling
+from .scan import LaserScan, NoiseLike, RangeNoise
 
-__all__ = ["Extractor", "extract", "trace"]
+__all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
+
+_BEARINGS = np.linspace(-1.0, 1.0, 101)
+#: What kernels are loaded with, so that the first scan need not wait for them.
+WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
 
 
 class Extractor:
@@ -26,9 +34,9 @@ class Extractor:
     Parameters
     ----------
     method : str or Method
-        Name of a method (``"liu"``, ``"liu:paper"``), or one made before.
-    noise : RangeNoise, optional
-        Noise of the sensor; estimated from each scan if it is not given.
+        Name of a method (``"liu"``, ``"liu:paper"``), or one of `lineament.methods`.
+    noise : RangeNoise or float, optional
+        Noise of the sensor, or its sigma [m]; estimated from each scan if it is not given.
     **parameters
         Parameters of the method that differ from its defaults.
 
@@ -39,7 +47,7 @@ class Extractor:
 
     Examples
     --------
-    >>> extractor = Extractor("liu", support_radius=5, noise=RangeNoise(sigma=0.01))
+    >>> extractor = Extractor("liu", support_radius=5, noise=0.01)
     >>> bearings = np.linspace(-0.5, 0.5, 101)
     >>> wall = extractor(LaserScan(2.0 / np.cos(bearings), angles=bearings))
     >>> wall.segments["start"].round(3).tolist(), wall.segments["end"].round(3).tolist()
@@ -50,26 +58,35 @@ class Extractor:
         self,
         method: str | Method = DEFAULT_METHOD,
         *,
-        noise: RangeNoise | None = None,
+        noise: NoiseLike | None = None,
         **parameters: Any,
     ) -> None:
-        if isinstance(method, str):
+        if isinstance(method, type):
+            method = method(**parameters)
+        elif not hasattr(method, "run"):
             method = get_method(method, **parameters)
         elif parameters:
             raise ValueError("parameters are given together with a method that was made before")
-        self.method = method
-        self.noise = noise
-        self._noise_row = noise_row(noise)
+        self.method = cast(Method, method)
+        self.noise = None if noise is None else RangeNoise.of(noise)
+        self._noise_row = noise_row(self.noise)
         self._block: Block | None = None
         self._workers: list[Block] = []
+        #: That of the method, once its kernels are compiled.
+        self._run: Callable[[Block], None] | None = None
+
+    def __repr__(self) -> str:
+        return f"Extractor({self.method!r}, noise={self.noise!r})"
 
     def __call__(self, scan: LaserScan) -> Features:
-        """Extract the features of one scan."""
+        """Extract the features of one scan; a TypeError if it is something else."""
+        if not isinstance(scan, LaserScan):
+            raise _no_scan(scan)
         block = self._block
         if block is None or not block.fits(scan):
             block = self._block = self._new_block(scan, 1)
         block.load(scan.ranges)
-        self.method.run(block)
+        (self._run or self._first_run)(block)
         segments, corners, arcs, breakpoints = block.written()
         return Features(
             segments,
@@ -80,6 +97,7 @@ class Extractor:
             scan.stamp,
             scan.frame_id,
             self.noise or noise_of(block.noises[0]),
+            scan,
         )
 
     def batch(
@@ -134,7 +152,9 @@ class Extractor:
             range_max=range_max,
             frame_id=frame_id,
         )
-        found = run_batch(rows, self._blocks_of(frame, max(1, min(workers, m))), self.method.run)
+        found = run_batch(
+            rows, self._blocks_of(frame, max(1, min(workers, m))), self._run or self._first_run
+        )
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
@@ -151,6 +171,16 @@ class Extractor:
         """Extract the features of one scan and keep every intermediate of the run."""
         return self.method.trace(scan, self(scan), self._noise_row)
 
+    def compiling(self) -> AbstractContextManager[None]:
+        """Take the kernels that are compiled within for one piece of work, which is shown."""
+        method = type(self.method)
+        return compiling([method.run], [method, Block])
+
+    def _first_run(self, block: Block) -> None:
+        with self.compiling():
+            self.method.run(block)
+        self._run = self.method.run
+
     def _blocks_of(self, frame: LaserScan, workers: int) -> list[Block]:
         """Give each worker a block; those of the last batch, where they fit."""
         # New memory costs more to touch than to fill, above all from several threads at once.
@@ -165,28 +195,52 @@ class Extractor:
 
 
 def extract(
-    scan: LaserScan,
+    scan: LaserScan | ArrayLike,
     *,
-    method: str = DEFAULT_METHOD,
-    noise: RangeNoise | None = None,
+    method: str | Method = DEFAULT_METHOD,
+    noise: NoiseLike | None = None,
+    angle_min: float | None = None,
+    angle_increment: float | None = None,
+    range_min: float = 0.0,
+    range_max: float = math.inf,
     **parameters: Any,
 ) -> Features:
-    """Extract the features of one scan; for many, keep an `Extractor`, which has its parameters.
+    """Extract the features of one scan; for many, keep an `Extractor`.
+
+    Parameters
+    ----------
+    scan : LaserScan, or array_like, shape (n,)
+        The scan, or its ranges [m].
+    method, noise, **parameters
+        As in `Extractor`.
+    angle_min, angle_increment, range_min, range_max
+        As in `LaserScan`; for ranges, not for a scan, which has them.
+
+    Raises
+    ------
+    TypeError
+        If it is something else than a scan or ranges. The message says what to pass.
+    ValueError
+        If a field of the scan, the method or a parameter makes no sense.
 
     Examples
     --------
-    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> extract(scan, method="liu", min_points=4)
+    >>> extract([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01, method="liu", min_points=4)
     Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
-    return Extractor(method, noise=noise, **parameters)(scan)
+    made = _scan_of(scan, angle_min, angle_increment, range_min, range_max)
+    return Extractor(method, noise=noise, **parameters)(made)
 
 
 def trace(
-    scan: LaserScan,
+    scan: LaserScan | ArrayLike,
     *,
-    method: str = DEFAULT_METHOD,
-    noise: RangeNoise | None = None,
+    method: str | Method = DEFAULT_METHOD,
+    noise: NoiseLike | None = None,
+    angle_min: float | None = None,
+    angle_increment: float | None = None,
+    range_min: float = 0.0,
+    range_max: float = math.inf,
     **parameters: Any,
 ) -> Trace:
     """Extract the features of one scan and keep every intermediate.
@@ -195,14 +249,56 @@ def trace(
 
     Examples
     --------
-    >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> trace(scan).spacing.round(2).tolist()
+    >>> trace([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01).spacing.round(2).tolist()
     [nan, 0.02, 0.02]
     """
-    return Extractor(method, noise=noise, **parameters).trace(scan)
+    made = _scan_of(scan, angle_min, angle_increment, range_min, range_max)
+    return Extractor(method, noise=noise, **parameters).trace(made)
+
+
+def _scan_of(given: Any, first: float | None, step: float | None, *limits: float) -> LaserScan:
+    """Make a scan of ranges and their bearings; a scan stays as it is."""
+    bare = first is None and step is None
+    if isinstance(given, LaserScan):
+        if not bare or limits != (0.0, math.inf):
+            raise TypeError("a LaserScan has its own bearings and limits: pass it alone")
+        return given
+    if bare or isinstance(given, str | Path):
+        raise _no_scan(given)
+    return LaserScan(given, first, step, range_min=limits[0], range_max=limits[1])
+
+
+def _no_scan(given: Any) -> TypeError:
+    """Return the error that says what to pass in place of something that is no scan."""
+    kind = type(given).__name__
+    if isinstance(given, str | Path):
+        hint = "open_log(path).scan(0) reads one from a log"
+    elif callable(getattr(given, "scan", None)):
+        hint = "log[i] is one of a log"
+    elif hasattr(given, "ranges"):
+        hint = "LaserScan.from_message(message) makes one of a message"
+    else:
+        hint = (
+            "extract(ranges, angle_min=..., angle_increment=...) takes ranges, "
+            "LaserScan.from_points(xy) takes points"
+        )
+    return TypeError(f"scan is of type {kind}, expected a LaserScan: {hint}")
+
+
+def load_kernels(extractors: Iterable[Extractor]) -> None:
+    """Compile the kernels of some extractors as one piece of work, or load them from the cache."""
+    with ExitStack() as stack:
+        for extractor in (extractors := list(extractors)):
+            stack.enter_context(extractor.compiling())
+        for extractor in extractors:
+            extractor(WALL)
 
 
 def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
+    if isinstance(ranges, LaserScan):
+        raise TypeError(
+            "ranges is a LaserScan, expected a matrix; call the extractor with the scan"
+        )
     try:
         rows = np.asarray(ranges, dtype=np.float64)
     except (TypeError, ValueError):

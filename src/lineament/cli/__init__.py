@@ -5,7 +5,9 @@ import sys
 import click
 
 from ..errors import LineamentError
+from ..progress import compiling_shown
 from .commands import COMMANDS
+from .progress import show_compiling
 
 __all__ = ["cli", "main"]
 
@@ -27,7 +29,8 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     try:
-        cli.main(arguments, prog_name="lineament", standalone_mode=False)
+        with compiling_shown(show_compiling):
+            cli.main(arguments, prog_name="lineament", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message(), err=True)
         return 2

@@ -9,6 +9,7 @@ from .experiments import bench, compare, reproduce, simulate
 from .extract import extract
 from .live import live
 from .options import (
+    HUSH,
     LOG,
     LOG_PATH,
     METHODS,
@@ -49,6 +50,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
 @click.option("--dark", is_flag=True, help="Draw on black.")
 @reading
+@HUSH
 def plot(
     log: Path | str,
     index: int,
@@ -92,6 +94,7 @@ def plot(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
+@HUSH
 def view(
     log: Path | str,
     methods: tuple[str, ...],
@@ -110,6 +113,16 @@ def view(
     extractors = {name: make_extractor(name, settings, noise) for name in names}
     session = Session(log, extractors, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
+
+
+@click.command()
+@click.argument("name", default="")
+def methods(name: str) -> None:
+    """List the methods; or the parameters of NAME, with defaults, units and bounds."""
+    from ..methods import describe
+
+    with wrong_usage():
+        click.echo(describe(name))
 
 
 @click.command()
@@ -142,5 +155,8 @@ def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
-_ALL = (extract, info, plot, view, live, demo, warmup, compare, reproduce, bench, simulate)
+_ALL = (
+    *(extract, info, plot, view, live, demo),
+    *(methods, warmup, compare, reproduce, bench, simulate),
+)
 COMMANDS = {command.name: command for command in _ALL if command.name}

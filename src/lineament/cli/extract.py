@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from ..extractor import Extractor
 
+#: Formats that hold features alone; the others show scans at their poses.
+_TABLES = (".parquet", ".csv", ".jsonl")
 _COUNT = click.IntRange(min=1)
 
 
@@ -44,6 +46,7 @@ _COUNT = click.IntRange(min=1)
 )
 @click.option("--threads", type=_COUNT, help="Work in so many threads of one process.")
 @click.option("--dask", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
+@click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
 @click.option("--append", is_flag=True, hidden=True)
 @QUIET
 def extract(
@@ -53,6 +56,7 @@ def extract(
     settings: tuple[str, ...],
     noise: float | None,
     reading: dict[str, Any],
+    world: bool,
     append: bool,
     quiet: bool,
     **bulk: Any,
@@ -75,6 +79,11 @@ def extract(
             if value:
                 name = {"ending": "format"}.get(name, name)
                 raise click.UsageError(f"--{name}: expected a folder as output, FOLDER/")
+    ending = f".{(bulk['ending'] or 'parquet').removeprefix('.')}"
+    ending = ending if is_folder else Path(output).suffix.lower()
+    if world and ending not in _TABLES:
+        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
+    reading = reading | {"world": world}
     extractor = make_extractor(method, settings, noise)
     if is_folder:
         _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)

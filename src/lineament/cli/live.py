@@ -45,6 +45,8 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 )
 @click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
+@click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
+@click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
 @click.option("--from", "log", metavar="LOG", help="Play a log in place of a topic.")
 @click.option("--log-topic", metavar="TOPIC", help="Topic of the scans in the log.")
 @click.option("--poses", metavar="TOPIC", help="Topic of the poses in the log.")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from ..progress import compiling_shown
+
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
@@ -40,7 +42,18 @@ _ECHO = click.option(
 )
 _RING = click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud to read.")
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
-QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+
+
+def _hush(context: click.Context, parameter: click.Parameter, quiet: bool) -> bool:  # noqa: ARG001
+    if quiet:
+        context.with_resource(compiling_shown(None))
+    return quiet
+
+
+_QUIET: dict[str, Any] = {"is_flag": True, "callback": _hush, "help": "Print errors only."}
+QUIET = click.option("-q", "--quiet", **_QUIET)
+#: For commands that print nothing else than what is compiled.
+HUSH = click.option("-q", "--quiet", expose_value=False, **_QUIET)
 
 
 def reading(command: Callable[..., None]) -> Callable[..., None]:
@@ -102,13 +115,12 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
     """Return the extractor that the options ask for."""
     from ..extractor import Extractor
     from ..methods import DEFAULT_METHOD, get_method
-    from ..scan import RangeNoise
 
     name = DEFAULT_METHOD if method is None else method
     with wrong_usage():
         return Extractor(
             get_method(name, **settings_of(settings)),
-            noise=None if noise is None else RangeNoise(sigma=noise),
+            noise=noise,
         )
 
 

@@ -1,4 +1,7 @@
-"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet."""
+"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet.
+
+Kernels that are compiled meanwhile are shown in its place, and are not counted into its speed.
+"""
 
 import sys
 import time
@@ -6,12 +9,35 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from ..progress import Track, untracked
+from ..progress import Compiling, Track, compiled_seconds, show_line, untracked
 
 T = TypeVar("T")
 
 #: Seconds between two plain lines, and before the first.
 _PATIENCE = 2.0
+
+#: What changes the text of the bars and spinners that are on the terminal, the last in front; None
+#: is its own text.
+_fronts: list[Callable[[str | None], None]] = []
+
+
+def show_compiling(state: Compiling) -> None:
+    """Show the compilation of kernels: in place on a terminal, elsewhere its beginning and end."""
+    if _fronts:
+        _fronts[-1](None if state.is_last else str(state))
+    elif sys.stderr.isatty():
+        show_line(state)
+    elif state.is_first or state.is_last:
+        print(state, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _in_front(set_text: Callable[[str | None], None]) -> Iterator[None]:
+    _fronts.append(set_text)
+    try:
+        yield
+    finally:
+        _fronts.remove(set_text)
 
 
 def tracker(quiet: bool) -> Track:
@@ -24,25 +50,33 @@ def tracker(quiet: bool) -> Track:
 def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task
-    from rich.progress import TimeRemainingColumn as TimeLeft
     from rich.text import Text
 
-    class Rate(ProgressColumn):
-        def render(self, task: Task) -> Text:
-            return Text(_rate_text(task.speed or 0.0))
+    compiled = compiled_seconds()
 
-    columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Rate(), TimeLeft())
+    class Pace(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            rate = task.completed / max((task.elapsed or 0) - compiled_seconds() + compiled, 1e-9)
+            if not rate:
+                return Text()
+            left = max(total - task.completed, 0) / rate
+            return Text(f"{_rate_text(rate)}, {left:.0f} s left")
+
+    columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Pace())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield from progress.track(items, total, description=about)
+        task = progress.add_task(about, total=total)
+        with _in_front(lambda text: progress.update(task, description=text or about)):
+            yield from progress.track(items, total, task_id=task)
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     started = last = time.monotonic()
+    compiled = compiled_seconds()
     for done, item in enumerate(items, 1):
         yield item
         now = time.monotonic()
         if now - last >= _PATIENCE:
-            last, rate = now, done / (now - started)
+            last, rate = now, done / (now - started - compiled_seconds() + compiled)
             left = max(total - done, 0) / rate
             line = f"{about}: {done}/{total}, {_rate_text(rate)}, {left:.0f} s left"
             print(line, file=sys.stderr, flush=True)
@@ -60,8 +94,16 @@ def status(quiet: bool) -> Iterator[Callable[[str], None]]:
     elif sys.stderr.isatty():
         from rich.console import Console
 
-        with Console(stderr=True).status("") as status:
-            yield status.update
+        own = ""
+        with Console(stderr=True).status(own) as status:
+
+            def show(about: str) -> None:
+                nonlocal own
+                own = about
+                status.update(about)
+
+            with _in_front(lambda text: status.update(own if text is None else text)):
+                yield show
     else:
         yield _now_and_then(time.monotonic())
 

@@ -1,6 +1,7 @@
 """What is found in a scan, and its fields: their types, units and columns are declared once."""
 
-from .features import COUNTED, FeatureBatch, Features, noise_of, noise_row
+from .batch import FeatureBatch
+from .features import COUNTED, Features, noise_of, noise_row
 from .records import ARC, BREAKPOINT, CORNER, SEGMENT, TABLES, make_records
 
 __all__ = [

@@ -8,21 +8,62 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..scan import RangeNoise
+from .._lazy import Pictured
+from ..errors import needed_by
+from ..scan import LaserScan, NoiseLike, RangeNoise
+from ..scan.fields import covariance_of_pose
 from .records import TABLES
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
     import pyarrow as pa
+    from matplotlib.axes import Axes
 
 #: What is counted: edges apart from the corners.
 COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
 
 
+class Tabled:
+    """Features that become a table, with one row a feature."""
+
+    __slots__ = ()
+
+    def to_arrow(self, scan: int = 0) -> pa.Table:
+        """Make a table with one row a feature; its schema is described in ``docs/formats.md``.
+
+        Scans are numbered from `scan`.
+
+        Examples
+        --------
+        >>> import lineament as ln
+        >>> table = ln.extract([2.0] * 5, angle_min=-0.02, angle_increment=0.01).to_arrow(scan=7)
+        >>> table["kind"].to_pylist(), table["scan"][0].as_py()
+        (['segment', 'breakpoint', 'breakpoint', 'cluster'], 7)
+        """
+        raise NotImplementedError
+
+    def to_pandas(self, scan: int = 0) -> pd.DataFrame:
+        """Make `to_arrow` a data frame of pandas; a LineamentError if pandas is missing."""
+        with needed_by("to_pandas"):
+            import pandas  # noqa: F401
+        return self.to_arrow(scan).to_pandas()
+
+    def to_polars(self, scan: int = 0) -> pl.DataFrame:
+        """Make `to_arrow` a data frame of polars; a LineamentError if polars is missing."""
+        with needed_by("to_polars"):
+            import polars as pl
+        return pl.from_arrow(self.to_arrow(scan))
+
+
 @dataclass(slots=True, eq=False, repr=False)
-class Features:
+class Features(Tabled, Pictured):
     """All features of one scan. The arrays are read-only.
+
+    ``len(features)`` counts the records of its four tables, ``features["corners"]`` is a table by
+    name, iterating gives the names; in a notebook they are a picture.
 
     Attributes
     ----------
@@ -37,6 +78,8 @@ class Features:
         The scan's own frame.
     noise : RangeNoise or None
         The range noise that was used, given or estimated; None where the scan has no valid beam.
+    scan : LaserScan or None
+        The scan itself, for pictures; None in a batch, in another frame, and from a file.
 
     Examples
     --------
@@ -53,10 +96,23 @@ class Features:
     stamp: float = 0.0
     frame_id: str = ""
     noise: RangeNoise | None = None
+    scan: LaserScan | None = None
+
+    def __len__(self) -> int:
+        return sum(len(getattr(self, name)) for name in TABLES)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(TABLES)
+
+    def __getitem__(self, name: str) -> NDArray[np.void]:
+        if name not in TABLES:
+            raise KeyError(f"{name!r}, expected one of: {', '.join(TABLES)}")
+        table: NDArray[np.void] = getattr(self, name)
+        return table
 
     def __repr__(self) -> str:
         n_clusters = int(self.clusters.max(initial=-1)) + 1
-        return f"Features({_sizes(self)}, {n_clusters} clusters, stamp={self.stamp:.3f})"
+        return f"Features({sizes(self)}, {n_clusters} clusters, stamp={self.stamp:.3f})"
 
     def counts(self) -> dict[str, int]:
         """Return how many features there are, by the names of `COUNTED`.
@@ -73,16 +129,26 @@ class Features:
         return dict(zip(COUNTED, found, strict=True))
 
     def transform(
-        self, x: float, y: float, theta: float, *, frame_id: str | None = None
+        self,
+        x: float,
+        y: float,
+        theta: float,
+        covariance: ArrayLike | None = None,
+        *,
+        frame_id: str | None = None,
     ) -> Features:
         """Move the features by a pose: p ↦ R(θ) p + (x, y), and their covariances with them.
 
-        The covariance of a segment is in its own frame and stays as it is.
+        The covariance of a segment is in its own frame and stays as it is, but for that of the
+        pose, which is propagated to first order: a turn moves what is far away the most.
 
         Parameters
         ----------
         x, y, theta : float
             Translation [m], and rotation counter-clockwise [rad].
+        covariance : array_like, shape (3, 3), optional
+            Of the pose [m, m, rad], independent of the features. Its part in the errors is the same
+            for all features of the scan.
         frame_id : str, optional
             Name of the new frame; by default the old one stays.
 
@@ -113,22 +179,26 @@ class Features:
         arcs["center"] = moved(arcs["center"])
         arcs["covariance"] = with_radius @ arcs["covariance"] @ with_radius.T
         breakpoints["position"] = moved(breakpoints["position"])
+        if covariance is not None:
+            _add_pose_covariance(segments, corners, arcs, shift, covariance_of_pose(covariance))
         for table in tables.values():
             table.flags.writeable = False
-        return replace(self, **tables, frame_id=self.frame_id if frame_id is None else frame_id)
+        name = self.frame_id if frame_id is None else frame_id
+        return replace(self, **tables, frame_id=name, scan=None)
 
-    def to_arrow(self) -> pa.Table:
-        """Make a table with one row a feature; its schema is described in ``docs/formats.md``.
+    def plot(self, ax: Axes | None = None, *, scan: LaserScan | None = None) -> Axes:
+        """Draw the features over their scan, see `lineament.plot`; returns the axes.
 
-        Examples
-        --------
-        >>> import lineament as ln
-        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).to_arrow()["kind"].to_pylist()
-        ['segment', 'breakpoint', 'breakpoint', 'cluster']
+        `scan` is needed where the features do not have it themselves: those of a batch.
         """
+        import lineament
+
+        return lineament.plot(self, scan, ax=ax)
+
+    def to_arrow(self, scan: int = 0) -> pa.Table:  # noqa: D102 (as in the base)
         from .tables import features_table
 
-        return features_table([self])
+        return features_table([self], scan)
 
     def to_dict(self) -> dict[str, Any]:
         """Make plain dicts, lists, numbers and strings of everything, as JSON takes them.
@@ -148,80 +218,11 @@ class Features:
         }
 
 
-@dataclass(slots=True, eq=False, repr=False)
-class FeatureBatch:
-    """Features of many scans: the arrays of `Features`, one after the other.
-
-    ``batch[i]`` is a view of the i-th scan's features; iterating gives them in order.
-
-    Attributes
-    ----------
-    segments, corners, arcs, breakpoints : structured arrays
-        As in `Features`; indices into a scan's segments count within that scan.
-    clusters : int32 array, shape (m, n)
-        Cluster of each beam of each scan.
-    offsets : structured array, shape (m + 1,)
-        ``offsets["segments"][i]`` is where the segments of scan i begin, and likewise for
-        "corners", "arcs" and "breakpoints".
-    stamps : float64 array, shape (m,)
-        Stamp of each scan [s].
-    noises : float64 array, shape (m, 4)
-        (sigma, proportional, bearing, quantum) used for each scan; NaN where no beam is valid.
-    frame_id : str
-        Frame of all scans.
-
-    Examples
-    --------
-    >>> import lineament as ln
-    >>> batch = ln.Extractor("liu").batch(np.full((3, 9), 2.0), angle_min=0.0, angle_increment=0.01)
-    >>> len(batch), batch.offsets["segments"].tolist(), len(batch[1].segments)
-    (3, [0, 1, 2, 3], 1)
-    """
-
-    segments: NDArray[np.void]
-    corners: NDArray[np.void]
-    arcs: NDArray[np.void]
-    clusters: NDArray[np.int32]
-    breakpoints: NDArray[np.void]
-    offsets: NDArray[np.void]
-    stamps: NDArray[np.float64]
-    noises: NDArray[np.float64]
-    frame_id: str = ""
-
-    def __repr__(self) -> str:
-        return f"FeatureBatch({len(self)} scans: {_sizes(self)})"
-
-    def __len__(self) -> int:
-        return len(self.clusters)
-
-    def __getitem__(self, index: int) -> Features:
-        i = range(len(self))[index]
-        tables = {
-            name: getattr(self, name)[self.offsets[name][i] : self.offsets[name][i + 1]]
-            for name in TABLES
-        }
-        return Features(
-            **tables,
-            clusters=self.clusters[i],
-            stamp=float(self.stamps[i]),
-            frame_id=self.frame_id,
-            noise=noise_of(self.noises[i]),
-        )
-
-    def __iter__(self) -> Iterator[Features]:
-        return (self[i] for i in range(len(self)))
-
-    def to_arrow(self) -> pa.Table:
-        """Make a table with one row a feature; its schema is described in ``docs/formats.md``."""
-        from .tables import batch_table
-
-        return batch_table(self)
-
-
-def noise_row(noise: RangeNoise | None) -> NDArray[np.float64]:
+def noise_row(noise: NoiseLike | None) -> NDArray[np.float64]:
     """(sigma, proportional, bearing, quantum) as the kernels take them, NaN where not given."""
     if noise is None:
         return np.full(4, np.nan)
+    noise = RangeNoise.of(noise)
     return np.array([noise.sigma, noise.proportional, noise.bearing, noise.quantum])
 
 
@@ -231,7 +232,38 @@ def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
     return None if math.isnan(parts[0]) else RangeNoise(*parts)
 
 
-def _sizes(tables: Features | FeatureBatch) -> str:
+def _add_pose_covariance(
+    segments: NDArray[np.void],
+    corners: NDArray[np.void],
+    arcs: NDArray[np.void],
+    shift: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+) -> None:
+    """Add J P Jᵀ to the covariances of features that were moved by a pose with the covariance P.
+
+    A point q from the pose moves with (x, y) and, as the pose turns, at right angles to q.
+    """
+
+    def jacobian(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        turning = (places - shift)[:, ::-1] * (-1.0, 1.0)
+        straight = np.broadcast_to(np.eye(2), (len(places), 2, 2))
+        return np.concatenate((straight, turning[..., None]), axis=2)
+
+    def added(of_pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(of_pose @ covariance @ of_pose.transpose(0, 2, 1))
+
+    corners["covariance"] += added(jacobian(corners["position"]))
+    arcs["covariance"][:, :2, :2] += added(jacobian(arcs["center"]))
+    # The offset of a segment is along its normal; its angle is the pose's.
+    of_segment = np.zeros((len(segments), 2, 3))
+    normals = np.column_stack((-np.sin(segments["angle"]), np.cos(segments["angle"])))
+    of_segment[:, 0] = (normals[:, None] @ jacobian(segments["centroid"]))[:, 0]
+    of_segment[:, 1, 2] = 1.0
+    segments["covariance"] += added(of_segment)
+
+
+def sizes(tables: Tabled) -> str:
+    """Write how many records there are in each table."""
     return ", ".join(f"{len(getattr(tables, name))} {name}" for name in TABLES)
 
 

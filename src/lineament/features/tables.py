@@ -15,7 +15,8 @@ from .._version import __version__
 from .records import COLUMNS, FIELDS, KINDS, SHARED_COLUMNS, TABLES, Field, kind_codes, numbers
 
 if TYPE_CHECKING:
-    from .features import FeatureBatch, Features
+    from .batch import FeatureBatch
+    from .features import Features
 
 #: Values of the column `kind`, in the order in which the rows of a scan come.
 _ROWS = (*(table[:-1] for table in TABLES), "cluster")

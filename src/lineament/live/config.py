@@ -26,6 +26,7 @@ _BOUNDS: dict[str, tuple[float, float]] = {
     "noise": (0, 1000),
     "domain": (0, 232),
     "foxglove": (0, 65535),
+    "dock_track": (0, 2**31 - 1),
 }
 _NAMES = ("topic", "namespace", "name", "deskew")
 #: What each annotation accepts, and how it is called in a message.
@@ -35,8 +36,11 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "int": (int, "a whole number"),
     "float": ((int, float), "a number"),
     "Pose": ((tuple, list), "three numbers"),
+    "Point": ((tuple, list), "two numbers"),
     "Mapping[str, Any]": (Mapping, "a table"),
 }
+#: x, y [m].
+Point = tuple[float, float]
 #: Values of `LiveConfig.deskew` that are not topics.
 _NOT_TOPICS = ("off", "scans", "poses")
 
@@ -79,7 +83,13 @@ class LiveConfig:
     laser_pose : (x, y, theta)
         Pose of the scanner in the frame of the odometry's twist [m, m, rad].
     track : bool
-        Whether features are recognised from scan to scan.
+        Whether features are recognised from scan to scan. Then, and where `deskew` is ``scans``,
+        the motion by them is known too: ``TOPIC/odometry``.
+    dock : (x, y), optional
+        The corner nearest to this point, in the frame of the first scan [m], within 1 m, is
+        followed, and its pose goes to ``TOPIC/dock``.
+    dock_track : int, optional
+        The same of the corner of this track.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -126,6 +136,8 @@ class LiveConfig:
     deskew: str = "off"
     laser_pose: Pose = (0.0, 0.0, 0.0)
     track: bool = False
+    dock: Point | None = None
+    dock_track: int | None = None
     log: str | None = None
     log_topic: str | None = None
     poses: str | None = None
@@ -141,11 +153,17 @@ class LiveConfig:
             _check(known.name, str(known.type), getattr(self, known.name))
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
-        if len(self.laser_pose) != 3 or not all(
-            isinstance(value, int | float) and abs(value) <= sys.float_info.max
-            for value in self.laser_pose
+        for name, values, n, many in (
+            ("laser_pose", self.laser_pose, 3, "three"),
+            ("dock", (0, 0) if self.dock is None else self.dock, 2, "two"),
         ):
-            raise ValueError(f"laser_pose is {self.laser_pose}, expected three finite numbers")
+            if len(values) != n or not all(
+                isinstance(value, int | float) and abs(value) <= sys.float_info.max
+                for value in values
+            ):
+                raise ValueError(f"{name} is {values}, expected {many} finite numbers")
+        if self.dock is not None and self.dock_track is not None:
+            raise ValueError("dock and dock_track are given, expected one of them")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
         if self.log is not None and self.odometry_topic is not None:
@@ -159,6 +177,16 @@ class LiveConfig:
     def scan_topic(self) -> str:
         """Full name of the topic of the scans."""
         return resolved(self.topic, self.namespace)
+
+    @property
+    def is_tracking(self) -> bool:
+        """Whether the motion of the sensor is found by its scans."""
+        return self.track or self.deskew == "scans" or self.is_docking
+
+    @property
+    def is_docking(self) -> bool:
+        """Whether the pose of a corner is published."""
+        return self.dock is not None or self.dock_track is not None
 
     @property
     def odometry_topic(self) -> str | None:

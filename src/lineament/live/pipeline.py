@@ -8,11 +8,11 @@ from typing import NamedTuple
 from ..extractor import Extractor
 from ..features import Features
 from ..methods import get_method
-from ..motion import Tracker, Tracks
+from ..motion import CornerPose, Dock, Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
-from ..scan import LaserScan, Pose, RangeNoise
+from ..scan import LaserScan, Pose
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 from .received import Time
@@ -56,6 +56,10 @@ class Frame(NamedTuple):
         None unless tracking is on.
     time : (int, int)
         Stamp of its message, exactly: seconds and nanoseconds.
+    travel : Travel or None
+        Where the sensor has come to; None unless features are tracked, for whatever purpose.
+    dock : CornerPose or None
+        The corner that is docked to; None unless one was asked for, and where it is not seen.
     """
 
     scan: LaserScan
@@ -63,6 +67,8 @@ class Frame(NamedTuple):
     features: Features
     tracks: Tracks | None
     time: Time
+    travel: Travel | None = None
+    dock: CornerPose | None = None
 
 
 class Pipeline:
@@ -99,10 +105,16 @@ class Pipeline:
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
         features = kept.extractor(straight)
-        tracks = None if kept.tracker is None else kept.tracker(features)
+        tracks, travel, dock = None, None, None
+        if kept.tracker is not None:
+            tracks = kept.tracker(features)
+            travel = kept.odometer(tracks, scan.stamp)
+            if kept.dock is not None:
+                dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:
             tracks = None
-        return Frame(scan, straight, features, tracks, time or time_of(scan.stamp))
+        time = time or time_of(scan.stamp)
+        return Frame(scan, straight, features, tracks, time, travel, dock)
 
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
@@ -141,9 +153,11 @@ class _Publisher:
     """What is kept of a publisher from scan to scan."""
 
     def __init__(self, config: LiveConfig) -> None:
-        noise = None if config.noise is None else RangeNoise(sigma=config.noise)
-        self.extractor = Extractor(get_method(config.method, **config.parameters), noise=noise)
-        self.tracker = Tracker() if config.track or config.deskew == "scans" else None
+        method = get_method(config.method, **config.parameters)
+        self.extractor = Extractor(method, noise=config.noise)
+        self.tracker = Tracker() if config.is_tracking else None
+        self.odometer = Odometer()
+        self.dock = Dock(config.dock, track=config.dock_track) if config.is_docking else None
         self.last: LaserScan | None = None
 
 

@@ -4,13 +4,14 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 
-import numpy as np
-
-from ..errors import needed_by
+from ..errors import needed_by, needs
+from ..extractor import WALL
+from ..motion import Tracker
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
-from ..scan import LaserScan
+from ..progress import compiling
 from .config import LiveConfig
 from .counters import Report
 from .node import Node
@@ -18,10 +19,6 @@ from .pipeline import Pipeline
 from .received import Source
 from .replay import ReplaySource
 from .sinks import FoxgloveSink, RosSink, Sink
-
-#: What kernels are loaded with, so that the first scan need not wait for them.
-_BEARINGS = np.linspace(-1.0, 1.0, 101)
-_WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)
 
 
 def run_live(
@@ -60,8 +57,10 @@ def run_live(
             # Other nodes are discovered while the kernels are loaded.
             source, sinks = _ends(config, stack, write)
             pipeline = Pipeline(config)
-            frame = pipeline("", _WALL)
-            feature_points(frame.features, frame.tracks)
+            # The motion of tracks is estimated from the second scan on.
+            with compiling([Tracker.__call__] if config.track else [], [Tracker]):
+                for frame in (pipeline("", WALL), pipeline("", WALL)):
+                    feature_points(frame.features, frame.tracks)
         write(f"{config.name} finds features on {config.scan_topic} by {config.method}")
         return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
 
@@ -104,7 +103,7 @@ def _ends(
         node = stack.enter_context(closing(ros1.Ros1Node(config.name)))
         source = source or ros1.Ros1Source(node, config)
         sinks.append(RosSink(ros1.Ros1Publisher(node, config.depth), RosMessages("ros1"), config))
-    elif config.ros == 2:
+    elif config.ros == 2 and not _is_for_foxglove_alone(config, write):
         with needed_by("live"):
             dds = import_module(".dds", __package__)
         participant = dds.Participant(config.domain, localhost=config.localhost)
@@ -121,3 +120,12 @@ def _ends(
         sinks.append(FoxgloveSink(server, foxglove.FoxgloveMessages(), config))
     assert source is not None  # `LiveConfig` requires a log where there is no ROS.
     return source, sinks
+
+
+def _is_for_foxglove_alone(config: LiveConfig, write: Callable[[str], None]) -> bool:
+    """Whether a log is played for Foxglove where DDS is not installed: that needs none."""
+    alone = config.log is not None and config.foxglove is not None
+    if not alone or find_spec("cyclonedds") is not None:
+        return False
+    write(f"without ROS 2, for Foxglove alone: {needs('cyclonedds')}")
+    return True

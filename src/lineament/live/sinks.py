@@ -78,7 +78,9 @@ class RosSink:
         Makes the messages.
     config : LiveConfig
         Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
-        ``TOPIC/markers``. The scans of a log are published too, with their poses on ``/tf``.
+        ``TOPIC/markers``; where they are tracked, the motion of the sensor goes to
+        ``TOPIC/odometry``, and the pose of a corner that is asked for to ``TOPIC/dock``. The scans
+        of a log are published too, with their poses on ``/tf``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
@@ -91,6 +93,10 @@ class RosSink:
             f"{topic}/markers": "visualization_msgs/MarkerArray",
             DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
         }
+        if config.is_tracking:
+            topics[f"{topic}/odometry"] = "nav_msgs/Odometry"
+        if config.is_docking:
+            topics[f"{topic}/dock"] = "geometry_msgs/PoseWithCovarianceStamped"
         if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
@@ -114,6 +120,10 @@ class RosSink:
                 to, moment, layers_of(markers_of(features, frame.straight))
             ),
         }
+        if (travel := frame.travel) is not None:
+            messages[f"{topic}/odometry"] = lambda to: make.odometry(to, moment, travel)
+        if (dock := frame.dock) is not None:
+            messages[f"{topic}/dock"] = lambda to: make.corner_pose(to, moment, dock)
         if self._publishes_scan:
             if (pose := scan.pose) is not None:
                 messages["/tf"] = lambda to: make.transform(to, moment, pose)

@@ -1,5 +1,6 @@
 """What every log offers, and what a reader says about its format."""
 
+import operator
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
@@ -7,8 +8,9 @@ from dataclasses import dataclass
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
 
+from .._lazy import Pictured
 from ..errors import LogError
 from ..scan import LaserScan
 
@@ -64,8 +66,10 @@ class Head:
     is_gzip: bool = False
 
 
-class Log(ABC):
+class Log(Pictured, ABC):
     """An iterable of :class:`~lineament.LaserScan`; each iteration reads from the start.
+
+    ``log[i]`` is a scan, ``log[i:j]`` a list of them; in a notebook a log is a picture.
 
     Parameters
     ----------
@@ -118,7 +122,7 @@ class Log(ABC):
         self.faults: list[str] = []
         self._open()
 
-    def _open(self) -> None:  # noqa: B027 (nothing to do is a way to open)
+    def _open(self) -> None:
         """Read as much of the file as shows that it is a log, and has the topic."""
 
     @classmethod
@@ -150,6 +154,26 @@ class Log(ABC):
 
     def __iter__(self) -> Iterator[LaserScan]:
         return map(itemgetter(1), self.items())
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> LaserScan: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[LaserScan]: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> LaserScan | list[LaserScan]:
+        # Both read from the start: a log is a stream.
+        if isinstance(index, slice):
+            wanted = range(len(self))[index]
+            if wanted.step < 0:
+                raise ValueError(f"step is {wanted.step}, expected > 0: a log is read forwards")
+            return list(islice(self, wanted.start, wanted.stop, wanted.step))
+        i = operator.index(index)
+        i += len(self) * (i < 0)
+        scan = next(islice(self, i, None), None) if i >= 0 else None
+        if scan is None:
+            raise IndexError(f"{self.name}: has no scan {index}, expected 0 to {len(self) - 1}")
+        return scan
 
     def scan(self, index: int) -> LaserScan:
         """Read one scan by its index, from 0; those before it are read too.

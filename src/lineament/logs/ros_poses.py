@@ -5,9 +5,11 @@ from bisect import bisect_right
 from collections import deque
 from itertools import pairwise
 
+import numpy as np
+
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, stamped_poses
 from ..rosmsg.wire import Buffer
-from ..scan import LaserScan, Pose
+from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose
 from .ros_bag import Connection
 
@@ -21,8 +23,9 @@ FARTHEST = 1e100
 class PoseFinder:
     """Gives scans the poses of a topic, at their stamps.
 
-    Between two poses it interpolates: linearly in position, along the shorter turn in heading. A
-    scan after the last pose has that one, a scan before the first has none. Scans wait for a pose
+    Between two poses it interpolates: linearly in position, along the shorter turn in heading, and
+    their covariances, where both have one. A scan after the last pose has that one, a scan before
+    the first has none. Of a chain of transforms no covariance is known. Scans wait for a pose
     behind theirs, up to `MAX_WAITING` of them: what a recorder writes later is not looked for.
 
     What is `wanted` is a topic, ``/odom``, or one of transforms with two frames or more:
@@ -49,7 +52,8 @@ class PoseFinder:
         for found in stamped_poses(data, connection.encoding, connection.type):
             edge = (_frame(found.frame), _frame(found.child_frame)) if is_chain else ("", "")
             if edge in self._tracks:
-                self._tracks[edge].add(-math.inf if is_static else found.stamp, found.pose)
+                stamp = -math.inf if is_static else found.stamp
+                self._tracks[edge].add(stamp, found.pose, found.covariance)
         return self._release(MAX_WAITING)
 
     def wait(self, topic: str, scan: LaserScan) -> list[tuple[str, LaserScan]]:
@@ -69,17 +73,18 @@ class PoseFinder:
             if len(self._waiting) <= most and not is_covered:
                 break
             self._waiting.popleft()
-            ready.append((topic, scan.with_pose(self._pose(scan.stamp))))
+            ready.append((topic, scan.with_pose(*self._pose(scan.stamp))))
         return ready
 
-    def _pose(self, stamp: float) -> Pose | None:
-        pose = (0.0, 0.0, 0.0)
+    def _pose(self, stamp: float) -> tuple[Pose | None, Array | None]:
+        pose, covariance = (0.0, 0.0, 0.0), None
         for track in self._tracks.values():
             link = track.at(stamp)
             if link is None:
-                return None
-            pose = compose(pose, link)
-        return pose
+                return None, None
+            # Only messages that are no links have a covariance.
+            pose, covariance = compose(pose, link[0]), link[1]
+        return pose, covariance
 
 
 class _Track:
@@ -87,16 +92,16 @@ class _Track:
 
     def __init__(self) -> None:
         self._stamps: list[float] = []
-        self._poses: list[Pose] = []
+        self._poses: list[tuple[Pose, Array | None]] = []
         self._is_static = False
 
-    def add(self, stamp: float, pose: Pose) -> None:
+    def add(self, stamp: float, pose: Pose, covariance: Array | None) -> None:
         if not all(abs(value) < FARTHEST for value in pose):
             raise ValueError(f"pose is {pose}, expected numbers below {FARTHEST:g}")
         self._is_static = self._is_static or stamp == -math.inf
         i = bisect_right(self._stamps, stamp)
         self._stamps.insert(i, stamp)
-        self._poses.insert(i, pose)
+        self._poses.insert(i, (pose, covariance))
         if len(self._stamps) >= 2 * MAX_POSES:
             del self._stamps[:MAX_POSES], self._poses[:MAX_POSES]
 
@@ -104,19 +109,25 @@ class _Track:
         """Whether waiting for more would not change the pose at `stamp`."""
         return self._is_static or (bool(self._stamps) and self._stamps[-1] >= stamp)
 
-    def at(self, stamp: float) -> Pose | None:
+    def at(self, stamp: float) -> tuple[Pose, Array | None] | None:
         i = bisect_right(self._stamps, stamp)
         if i == 0:
             return None
-        x, y, theta = self._poses[i - 1]
+        (x, y, theta), covariance = self._poses[i - 1]
         if i == len(self._stamps) or self._is_static:
-            return x, y, theta
+            return (x, y, theta), covariance
         before, after = self._stamps[i - 1], self._stamps[i]
         share = (stamp - before) / (after - before)
-        next_x, next_y, next_theta = self._poses[i]
+        (next_x, next_y, next_theta), following = self._poses[i]
+        if covariance is not None:
+            covariance = None if following is None else _between(covariance, following, share)
         turn = math.remainder(next_theta - theta, 2 * math.pi)
         heading = math.remainder(theta + share * turn, 2 * math.pi)
-        return x + share * (next_x - x), y + share * (next_y - y), heading
+        return (x + share * (next_x - x), y + share * (next_y - y), heading), covariance
+
+
+def _between(covariance: Array, following: Array, share: float) -> Array:
+    return np.asarray(covariance + share * (following - covariance))
 
 
 def _frame(name: str) -> str:

@@ -42,10 +42,13 @@ class Hough(NearMethod):
         256, "cells of the accumulator in d; it takes 4 · angles · distances bytes", low=4
     )
     resolution: float = parameter(
-        0.02, "width of a cell in d [m], or two deviations of the noise if these are more", above=0
+        0.02,
+        "width of a cell in d, or two deviations of the noise if these are more",
+        above=0,
+        unit="m",
     )
     min_points: int = parameter(4, "least points near its line of a piece", low=3)
-    min_length: float = parameter(0.0, "least length of a piece [m]", low=0)
+    min_length: float = parameter(0.0, "least length of a piece", low=0, unit="m")
     max_misses: int = parameter(
         2, "points in a row that may lie off the line without ending a piece", low=0
     )

@@ -42,12 +42,12 @@ class IEPF(PieceMethod):
     }
     least_response = 1.0
 
-    threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
+    threshold: float = parameter(0.0, "constant part of the tolerance", low=0, unit="m")
     proportion: float = parameter(
-        0.002, "part of the tolerance that grows with range (Przybyła) [m/m]", low=0
+        0.002, "part of the tolerance that grows with range (Przybyła)", low=0, unit="m/m"
     )
     noise_factor: float = parameter(
-        4.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
+        4.0, "part of the tolerance that grows with noise", low=0, unit="σ"
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
     corner: str = parameter(

@@ -38,7 +38,7 @@ class LineTracking(PieceMethod):
     }
 
     threshold: float = parameter(
-        0.0, "distance from its line that a point without noise may have [m]", low=0
+        0.0, "distance from its line that a point without noise may have", low=0, unit="m"
     )
     noise_factor: float = parameter(
         3.0, "standard deviations of the prediction that are added", above=0

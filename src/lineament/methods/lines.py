@@ -31,7 +31,9 @@ class LineMethod(MethodBase):
         "or not at all",
         choices=("borges_aldon", "fixed", "none"),
     )
-    distance: float = parameter(0.3, "distance at which `fixed` parts two neighbours [m]", above=0)
+    distance: float = parameter(
+        0.3, "distance at which `fixed` parts two neighbours", above=0, unit="m"
+    )
     settling: bool = parameter(
         True,
         "whether neighbours are merged, points about their border go to the nearer line, and "
@@ -42,9 +44,10 @@ class LineMethod(MethodBase):
     )
     grazing_angle: float = parameter(
         math.radians(6.0),
-        "λ of the breakpoint detector (Borges and Aldon, see `PDBS`) [rad]",
+        "λ of the breakpoint detector (Borges and Aldon, see `PDBS`)",
         above=0,
         below=math.pi / 2,
+        unit="rad",
     )
     max_missing: int = parameter(5, "missing beams in a row over which a cluster goes on", low=0)
     max_vertices: int = parameter(
@@ -98,7 +101,7 @@ class PieceMethod(LineMethod):
     """A method that cuts or grows along clusters, and merges what one line fits."""
 
     unevenness: float = parameter(
-        0.01, "misfit of walls, by which lines may differ and still be merged [m]", low=0
+        0.01, "misfit of walls, by which lines may differ and still be merged", low=0, unit="m"
     )
     corner_trim: int = parameter(
         1, "measurements next to a corner that the last fits leave out", low=0
@@ -123,7 +126,7 @@ class NearMethod(LineMethod):
     }
 
     epsilon: float = parameter(
-        0.01, "misfit: how far a point may lie from the line without noise [m]", low=0
+        0.01, "misfit: how far a point may lie from the line without noise", low=0, unit="m"
     )
     sigmas: float = parameter(
         2.5, "standard deviations of its range noise that a point may lie off besides", low=0

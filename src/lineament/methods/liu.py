@@ -42,8 +42,8 @@ class Liu(MethodBase):
     name = "liu"
     presets = ("paper", "tuned", "scale_free")
 
-    sigma_d: float = parameter(4.0, "width of the filter along the scan [beams]", above=0)
-    sigma_r: float = parameter(0.3, "width of the filter in range [m]", above=0)
+    sigma_d: float = parameter(4.0, "width of the filter along the scan", above=0, unit="beams")
+    sigma_r: float = parameter(0.3, "width of the filter in range", above=0, unit="m")
     half_width: int = parameter(
         2, "beams on either side that the filter takes in; not stated, chosen by Figure 9", low=0
     )

@@ -50,12 +50,14 @@ class Bounds:
             raise ValueError(f"{name} is {value!r}, expected {self}")
 
 
-def parameter(default: bool | int | float | str, meaning: str, **bounds: Any) -> Any:
+def parameter(
+    default: bool | int | float | str, meaning: str, *, unit: str = "", **bounds: Any
+) -> Any:
     """Declare a parameter of a method; its type is that of its default.
 
     `bounds` are those of `Bounds`.
     """
-    declared = {"meaning": meaning, "bounds": Bounds(type(default), **bounds)}
+    declared = {"meaning": meaning, "unit": unit, "bounds": Bounds(type(default), **bounds)}
     return field(default=default, metadata=declared)
 
 
@@ -63,6 +65,16 @@ def bounds_of(cls: Any, name: str) -> Bounds:
     """Return the bounds of a parameter of a method."""
     (found,) = [one.metadata["bounds"] for one in fields(cls) if one.name == name]
     return found  # type: ignore[no-any-return]
+
+
+def sentence(meaning: str) -> str:
+    """Begin the meaning of a parameter with a capital letter, unless it begins with a symbol."""
+    return meaning if meaning[1] in " ,_" else meaning[0].upper() + meaning[1:]
+
+
+def indented(text: str) -> list[str]:
+    """Break a text into indented lines."""
+    return wrap(text, 96, initial_indent="    ", subsequent_indent="    ")
 
 
 _EXAMPLE = """Examples
@@ -85,10 +97,10 @@ def method(cls: type[T]) -> type[T]:
     cls = dataclass(frozen=True, slots=True, kw_only=True)(cls)
     lines = ["Parameters", "----------"]
     for one in fields(cls):  # type: ignore[arg-type]
-        bounds, meaning = one.metadata["bounds"], one.metadata["meaning"]
+        bounds = one.metadata["bounds"]
         lines += [f"{one.name} : {bounds.kind.__name__}, default {one.default!r}"]
-        text = meaning if meaning[1] in " ," else meaning[0].upper() + meaning[1:]
-        lines += wrap(f"{text}; {bounds}.", 96, initial_indent="    ", subsequent_indent="    ")
+        unit = f" [{one.metadata['unit']}]" if one.metadata["unit"] else ""
+        lines += indented(f"{sentence(one.metadata['meaning'])}{unit}; {bounds}.")
     lines += ["", "Raises", "------", "ValueError", "    If a parameter is out of bounds."]
     text = cleandoc(cls.__doc__ or "")
     name = getattr(cls, "name", "")

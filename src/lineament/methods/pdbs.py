@@ -52,18 +52,23 @@ class PDBS(MethodBase):
     presets = ("paper",)
 
     rule: str = parameter("borges_aldon", "the rule", choices=RULES)
-    distance: float = parameter(0.3, "D_0 [m]", above=0)
-    c0: float = parameter(0.2, "C_0, for the noise of the ranges [m]", low=0)
+    distance: float = parameter(0.3, "D_0", above=0, unit="m")
+    c0: float = parameter(0.2, "C_0, for the noise of the ranges", low=0, unit="m")
     beta: float = parameter(
-        math.radians(80.0), "β, steepest incidence of a surface [rad]", above=0, below=math.pi / 2
+        math.radians(80.0),
+        "β, steepest incidence of a surface",
+        above=0,
+        below=math.pi / 2,
+        unit="rad",
     )
     ratio: float = parameter(0.05, "r, largest difference of two ranges over their sum", above=0)
     grazing_angle: float = parameter(
         math.radians(6.0),
         "λ, least angle between a beam and a surface; the paper's 10° (preset `paper`) tear many "
-        "walls that go away from the sensor [rad]",
+        "walls that go away from the sensor",
         above=0,
         below=math.pi / 2,
+        unit="rad",
     )
     noise_factor: float = parameter(
         3.0, "standard deviations of the range that Borges and Aldon add", low=0

@@ -38,7 +38,7 @@ class Ransac(NearMethod):
         30, "points over which a pair is drawn: one of those left, and one of those after it", low=1
     )
     min_points: int = parameter(4, "least points near its line of a piece", low=3)
-    min_length: float = parameter(0.0, "least length of a piece [m]", low=0)
+    min_length: float = parameter(0.0, "least length of a piece", low=0, unit="m")
     max_misses: int = parameter(
         2, "points in a row that may lie off the line without ending a piece", low=0
     )

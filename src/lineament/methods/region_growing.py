@@ -40,9 +40,9 @@ class RegionGrowing(NearMethod):
 
     s_num: int = parameter(6, "points of a seed", low=3)
     p_min: int = parameter(6, "least points of a region", low=3)
-    l_min: float = parameter(0.0, "least length of a region [m]", low=0)
+    l_min: float = parameter(0.0, "least length of a region", low=0, unit="m")
     delta: float = parameter(
-        0.1, "the same along the beam: from where the beam meets the line [m]", low=0
+        0.1, "the same along the beam: from where the beam meets the line", low=0, unit="m"
     )
     sigmas: float = parameter(
         3.0, "standard deviations of its range noise that a point may lie off besides", low=0

@@ -41,9 +41,9 @@ class SplitAndMerge(PieceMethod):
     }
     least_response = 1.0
 
-    threshold: float = parameter(0.0, "constant part of the tolerance [m]", low=0)
+    threshold: float = parameter(0.0, "constant part of the tolerance", low=0, unit="m")
     noise_factor: float = parameter(
-        2.0, "part of the tolerance that grows with noise [standard deviations of a range]", low=0
+        2.0, "part of the tolerance that grows with noise", low=0, unit="σ"
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
 

@@ -15,7 +15,7 @@ from ..kernels.clustering import cluster
 from ..kernels.corner_operator import RESPONSES, response_along
 from ..kernels.cutting import cut
 from ..kernels.line_fit import FITS
-from ..scan import LaserScan, RangeNoise
+from ..scan import LaserScan, NoiseLike, RangeNoise
 from .liu import Liu
 from .parameters import Bounds, bounds_of
 from .trace import candidate_records
@@ -92,7 +92,7 @@ def adaptive_clusters(
     noise_floor: float = 3.0,
     density_k: float = 3.0,
     min_points: int = 3,
-    noise: RangeNoise | None = None,
+    noise: NoiseLike | None = None,
 ) -> NDArray[np.int32]:
     """Part the valid beams of a scan into clusters, on distance and density.
 
@@ -107,8 +107,8 @@ def adaptive_clusters(
         Ranges to use in place of the scan's own, such as filtered ones [m].
     spacing_scale, noise_floor, density_k, min_points
         As in `Liu`.
-    noise : RangeNoise, optional
-        σ of the noise floor; estimated from the scan if it is not given.
+    noise : RangeNoise or float, optional
+        σ [m] of the noise floor; estimated from the scan if it is not given.
 
     Returns
     -------
@@ -134,8 +134,8 @@ def adaptive_clusters(
     block.work.beams[at.FILTERED, :n] = used
     cluster(
         block.floats, block.ints, block.bearings, block.step, block.circular,
-        noise_row(noise or estimate_noise(scan)), float(spacing_scale), float(noise_floor),
-        float(density_k), int(min_points),
+        noise_row(estimate_noise(scan) if noise is None else noise), float(spacing_scale),
+        float(noise_floor), float(density_k), int(min_points),
     )  # fmt: skip
     labels = np.full(n, -1, np.int32)
     beam, label = block.work.marks[[at.BEAM, at.LABEL], : block.counts[at.POINTS]]
@@ -226,15 +226,16 @@ def primary_corners(
     return candidate_records(block, float(threshold))
 
 
-def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "total") -> np.void:
+def fit_line(points: ArrayLike, *, noise: NoiseLike | None = None, fit: str = "total") -> np.void:
     """Fit a line to points seen from the origin, by least squares (equations 23, 24).
 
     Parameters
     ----------
     points : array_like, shape (m, 2)
         Points in beam order, in the frame of the sensor [m]; m ≥ 2.
-    noise : RangeNoise, optional
-        Noise of the ranges, for the covariance and the weights; 1 m (unit variance) if not given.
+    noise : RangeNoise or float, optional
+        Noise of the ranges, or its sigma [m], for the covariance and the weights; 1 m (unit
+        variance) if not given.
     fit
         As in `Liu`; y = kx + b is x = ky + b where it is steeper than 45°.
 
@@ -255,7 +256,7 @@ def fit_line(points: ArrayLike, *, noise: RangeNoise | None = None, fit: str = "
         raise ValueError(f"points has {len(xy)} points, expected at least 2")
     if not xy.any(axis=1).all():
         raise ValueError("points has a point at the origin, expected points that a beam can meet")
-    block = _one_cluster(xy, noise_row(noise or RangeNoise(sigma=1.0)))
+    block = _one_cluster(xy, noise_row(1.0 if noise is None else noise))
     block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
     block.counts[at.PIECES] = 1
     block.measure(fit=FITS[fit], sharp=False)

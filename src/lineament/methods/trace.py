@@ -27,7 +27,7 @@ CANDIDATE = np.dtype(
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Trace:
     """Every intermediate of one run, by beam of the scan. NaN marks beams that a stage left out.
 
@@ -75,6 +75,9 @@ class Trace:
     cuts: NDArray[np.int32]
     evidence: dict[str, Array] = field(default_factory=dict)
     scale: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"Trace({self.method}: {len(self.candidates)} candidates, {self.features})"
 
 
 def intermediates(block: Block, threshold: float) -> dict[str, Any]:

@@ -15,7 +15,10 @@ from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure
 from ..kernels.noise import estimate_noise
 from ..kernels.rivals.pdbs import BORGES_ALDON, part_by_distance
+from ..progress import hear_compiler
 from ..scan import LaserScan
+
+hear_compiler()  # Nobody should wait for it in silence.
 
 Array = NDArray[np.float64]
 

@@ -14,18 +14,25 @@ sensor, `Tracker.twist`, is what :func:`lineament.deskew` needs for the next sca
 from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_between
 from .association import Matches, associate
 from .deskew import beam_times, deskew
+from .docking import CornerPose, Dock, corner_pose
 from .estimate import Motion, estimate_motion
+from .odometry import Odometer, Travel
 from .tracker import Tracker, Tracks
 
 __all__ = [
+    "CornerPose",
+    "Dock",
     "Matches",
     "Motion",
+    "Odometer",
     "Tracker",
     "Tracks",
+    "Travel",
     "Twist",
     "associate",
     "beam_times",
     "compose",
+    "corner_pose",
     "deskew",
     "estimate_motion",
     "inverse",

@@ -101,8 +101,7 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
         stamp=scan.stamp,
         frame_id=scan.frame_id,
         intensities=None if scan.intensities is None else scan.intensities[order],
-        pose=scan.pose,
-    )
+    ).with_pose(scan.pose, scan.pose_covariance)
 
 
 def _seen_from_the_stamp(scan: LaserScan, poses: Array) -> tuple[Array, Array]:

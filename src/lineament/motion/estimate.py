@@ -18,7 +18,7 @@ _UNKNOWN = np.diag((10.0, 10.0, math.pi)) ** 2
 _RIGHT = 0.99
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Motion:
     """Pose of the later sensor in the frame of the earlier one.
 
@@ -41,6 +41,13 @@ class Motion:
     theta: float
     covariance: Array
     unobserved: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+    def __repr__(self) -> str:
+        x, y, theta = np.sqrt(np.diag(self.covariance))
+        return (
+            f"Motion({self.x:.4f} ± {x:.4f} m, {self.y:.4f} ± {y:.4f} m, "
+            f"{self.theta:.5f} ± {theta:.5f} rad)"
+        )
 
     @property
     def pose(self) -> Pose:

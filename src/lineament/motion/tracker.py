@@ -27,7 +27,7 @@ FASTEST = 50.0
 _ROUNDS = 3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Tracks:
     """Who is who in a frame.
 
@@ -50,6 +50,10 @@ class Tracks:
     born: Numbers
     ended: Numbers
     motion: Motion | None
+
+    def __repr__(self) -> str:
+        sizes = [f"{len(getattr(self, name))} {name}" for name in (*KINDS, "born", "ended")]
+        return f"Tracks({', '.join(sizes)}, {self.motion})"
 
 
 class Tracker:
@@ -101,6 +105,10 @@ class Tracker:
         self._odometry: Pose | None = None
         self._twists: deque[Twist] = deque(maxlen=2)
         self._next = 0
+
+    def __repr__(self) -> str:
+        given = f"{self.max_missed}, gate={self.gate}, roughness={self.roughness}"
+        return f"Tracker({given}: {sum(map(len, self._tracks.values()))} tracks)"
 
     @property
     def twist(self) -> Twist | None:

@@ -35,7 +35,7 @@ class McapWriter(Writer):
         self._channels: dict[str, int] = {}
 
     def _write(self, found: list[Found], first_scan: int) -> None:
-        for i, (features, scan, topic) in enumerate(found, first_scan):
+        for i, (features, scan, topic, _) in enumerate(found, first_scan):
             assert scan is not None  # `write` has checked it
             try:
                 moment = Moment.of(scan)

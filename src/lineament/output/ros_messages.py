@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..rosmsg.definitions import definition
+from ..rosmsg.poses import IN_PLANE
 from ..rosmsg.scans import CLOUD, POINT_TYPES
 from ..rosmsg.wire import WireWriter
 from ..scan import Array, LaserScan, Pose
 from .feature_points import feature_points
 from .markers import is_drawn
-from .scene import Layer, Message, Moment, SceneMessages, cloud_of, single
+from .scene import ODOMETRY_FRAME, Layer, Message, Moment, SceneMessages, cloud_of, single
 
 if TYPE_CHECKING:
-    from ..motion import Tracks
+    from ..motion import CornerPose, Tracks, Travel
 
 # Numbers of visualization_msgs/Marker: its types and its actions.
 LINE_LIST, SPHERE_LIST = 5, 7
@@ -54,13 +55,30 @@ class RosMessages(SceneMessages):
 
     def transform(self, topic: str, moment: Moment, pose: Pose) -> Message:
         """``tf2_msgs/TFMessage``: where the frame of the scan is in the world."""
-        x, y, theta = pose
         writer = WireWriter(self.encoding)
         writer.count(1)
         writer.header(moment.seconds, moment.nanoseconds, moment.world)
         writer.text(moment.frame)
-        writer.numbers("7d", x, y, 0.0, 0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2))
+        writer.numbers("7d", *_pose(pose))
         return self._message(topic, "tf2_msgs/TFMessage", writer)
+
+    def odometry(self, topic: str, moment: Moment, travel: "Travel") -> Message:
+        """``nav_msgs/Odometry``: pose in ``odom``, the frame of the first scan, and twist."""
+        writer = self._begin(moment._replace(frame=ODOMETRY_FRAME))
+        writer.text(moment.frame)
+        writer.numbers("7d", *_pose(travel.pose))
+        writer.array(_six(travel.covariance))
+        vx, vy, turn_rate = travel.twist
+        writer.numbers("6d", vx, vy, 0.0, 0.0, 0.0, turn_rate)
+        writer.array(_six(travel.twist_covariance))
+        return self._message(topic, "nav_msgs/Odometry", writer)
+
+    def corner_pose(self, topic: str, moment: Moment, found: "CornerPose") -> Message:
+        """``geometry_msgs/PoseWithCovarianceStamped``, in the frame of the scan."""
+        writer = self._begin(moment)
+        writer.numbers("7d", *_pose(found.pose))
+        writer.array(_six(found.covariance))
+        return self._message(topic, "geometry_msgs/PoseWithCovarianceStamped", writer)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
         """``sensor_msgs/LaserScan``."""
@@ -178,6 +196,19 @@ class RosMessages(SceneMessages):
         writer.raw(points.tobytes())
         writer.numbers("B", is_dense)
         return self._message(topic, CLOUD, writer)
+
+
+def _pose(pose: Pose) -> tuple[float, ...]:
+    """Position and quaternion of a pose in the plane."""
+    x, y, theta = pose
+    return x, y, 0.0, 0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2)
+
+
+def _six(covariance: Array) -> Array:
+    """Covariance of x, y, z and the turns about them, by that of (x, y, theta); else 0."""
+    six = np.zeros((6, 6))
+    six[IN_PLANE] = covariance
+    return six
 
 
 @cache

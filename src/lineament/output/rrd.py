@@ -74,7 +74,7 @@ class RerunWriter(Writer):
             raise OSError(errno.ENOSPC, problem)
 
     def _log(self, found: Found, index: int) -> None:
-        features, scan, topic = found
+        features, scan, topic, _ = found
         assert scan is not None  # `needs_scan`
         recording, place = self._recording, f"world/{(topic or 'scan').strip('/')}"
         recording.set_time(SCAN, sequence=index)

@@ -15,6 +15,8 @@ NANO = 1_000_000_000
 LAST_STAMP = 2**31 - 1
 #: Frames of logs that name none; poses are in the first.
 WORLD_FRAME, LASER_FRAME = "map", "laser"
+#: Frame of odometry by scans: that of the first scan.
+ODOMETRY_FRAME = "odom"
 
 _NOTHING = np.zeros((0, 2))
 

@@ -3,6 +3,7 @@
 import json
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +22,13 @@ TOPIC = pa.field(
 )
 
 
+#: Pose of the scanner in the world, the same in all rows of a scan; null where it is not known.
+POSE = [
+    pa.field(f"pose_{name}", pa.float64(), metadata={"unit": unit, "description": "of the scan"})
+    for name, unit in (("x", "m"), ("y", "m"), ("theta", "rad"))
+]
+
+
 class _RowWriter(Writer):
     """A writer of rows; its `_table` makes those of some scans."""
 
@@ -28,13 +36,18 @@ class _RowWriter(Writer):
 
     @property
     def _schema(self) -> pa.Schema:
-        return SCHEMA.append(TOPIC) if self.topics else SCHEMA
+        fields = [*SCHEMA, *POSE, *([TOPIC] if self.topics else ())]
+        return pa.schema(fields, SCHEMA.metadata)
 
     def _table(self, found: list[Found], first_scan: int) -> pa.Table:
         table = features_table([one.features for one in found], first_scan)
+        scan = table["scan"].to_numpy() - first_scan
+        poses = np.array([one.pose or (np.nan,) * 3 for one in found]).reshape(-1, 3)[scan]
+        for field, column in zip(POSE, poses.T, strict=True):
+            table = table.append_column(field, pa.array(column, mask=np.isnan(column)))
         if self.topics:
             of_scan = np.array([self.topics.index(one.topic) for one in found], dtype=np.int32)
-            codes = of_scan[table["scan"].to_numpy() - first_scan]
+            codes = of_scan[scan]
             topics = pa.DictionaryArray.from_arrays(codes, pa.array(self.topics, pa.string()))
             table = table.append_column(TOPIC, topics)
         return table.replace_schema_metadata(SCHEMA.metadata)
@@ -82,13 +95,14 @@ class ParquetWriter(_RowWriter):
 
 
 class JsonLinesWriter(Writer):
-    """Writes ``{"scan": i, **features.to_dict()}`` in strict JSON, with ``topic`` where known."""
+    """Writes ``{"scan": i, **features.to_dict()}`` in strict JSON, ``topic``, ``pose`` if known."""
 
     def _open(self, temporary: Path, files: ExitStack) -> None:
         # The same bytes on every system: no "\r\n".
         self._file = files.enter_context(temporary.open("w", encoding="utf-8", newline="\n"))
 
     def _write(self, found: list[Found], first_scan: int) -> None:
-        for i, (features, _, topic) in enumerate(found, first_scan):
-            record = {"scan": i} | ({"topic": topic} if topic else {}) | features.to_dict()
-            self._file.write(strict_json(record) + "\n")
+        for i, (features, _, topic, pose) in enumerate(found, first_scan):
+            known: dict[str, Any] = {"topic": topic} if topic else {}
+            known |= {} if pose is None else {"pose": pose}
+            self._file.write(strict_json({"scan": i} | known | features.to_dict()) + "\n")

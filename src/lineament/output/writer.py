@@ -9,18 +9,20 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from ..features import Features
 from ..files import naming_errors, written_beside
-from ..scan import LaserScan
+from ..scan import LaserScan, Pose
 
 
 class Found(NamedTuple):
-    """What was found in one scan, the scan, and the topic of its log.
+    """What was found in one scan, the scan, the topic of its log, and the pose of the scan.
 
-    The scan is None where the writer was not given it, the topic "" where it is not known.
+    The scan is None where the writer does not need it, the topic "" and the pose None where they
+    are not known.
     """
 
     features: Features
     scan: LaserScan | None
     topic: str
+    pose: Pose | None = None
 
 
 class Writer(ABC):
@@ -80,7 +82,8 @@ class Writer(ABC):
         """Take the features of the next scan.
 
         They must not change until the block ends. The scan is what they were found in: formats that
-        draw it need it. The topic is that of the scan, where its log has several.
+        draw it need it, tables have its pose. The topic is that of the scan, where its log has
+        several.
 
         Raises
         ------
@@ -96,7 +99,8 @@ class Writer(ABC):
         if self.topics and topic not in self.topics:
             raise ValueError(f"topic is {topic!r}, expected one of {', '.join(self.topics)}")
         # Tables keep no ranges until they are written.
-        self._waiting.append(Found(features, scan if self.needs_scan else None, topic))
+        pose = None if scan is None else scan.pose
+        self._waiting.append(Found(features, scan if self.needs_scan else None, topic, pose))
         if len(self._waiting) >= self.chunk:
             with naming_errors(self.path):
                 self._flush()

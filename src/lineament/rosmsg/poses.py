@@ -4,7 +4,10 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..scan import Pose
+import numpy as np
+
+from ..scan import Array, Pose
+from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist
 from .wire import Buffer, WireReader
 
@@ -17,17 +20,25 @@ POSE_TYPES = {
 }
 #: Types of messages that hold many, each of a frame in another one.
 TRANSFORMS = ("tf2_msgs/TFMessage", "tf/tfMessage")
+#: Those whose pose has a covariance.
+_WITH_COVARIANCE = ("geometry_msgs/PoseWithCovarianceStamped", "nav_msgs/Odometry")
+#: Rows of x, y and the turn about z in a covariance of six numbers.
+IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
 #: Bytes of a covariance of six numbers.
 _COVARIANCE_SIZE = 36 * 8
 
 
 class StampedPose(NamedTuple):
-    """The pose of a frame, or of what the message is about (""), in another at a time [s]."""
+    """The pose of a frame, or of what the message is about (""), in another at a time [s].
+
+    Its covariance, (3, 3) of x, y, theta, is None where the message does not give a valid one.
+    """
 
     stamp: float
     frame: str
     child_frame: str
     pose: Pose
+    covariance: Array | None = None
 
 
 class Odometry(NamedTuple):
@@ -48,13 +59,16 @@ def stamped_poses(data: Buffer, encoding: str, kind: str) -> Iterator[StampedPos
     """Decode the poses in a message of a type that has some; ValueError if it is malformed."""
     reader = WireReader(data, encoding)
     for _ in range(reader.count() if kind in TRANSFORMS else 1):
-        yield _stamped_pose(reader, POSE_TYPES.get(kind, True))
+        found = _stamped_pose(reader, POSE_TYPES.get(kind, True))
+        if kind in _WITH_COVARIANCE:
+            found = found._replace(covariance=_covariance(reader.numbers("36d")))
+        yield found
 
 
 def odometry(data: Buffer, encoding: str) -> Odometry:
     """Decode a ``nav_msgs/Odometry``; ValueError if it is malformed or not finite."""
     reader = WireReader(data, encoding)
-    stamp, frame, child_frame, pose = _stamped_pose(reader, True)
+    stamp, frame, child_frame, pose, _ = _stamped_pose(reader, True)
     reader.raw(_COVARIANCE_SIZE)
     vx, vy, _, _, _, wz = reader.numbers("6d")
     reader.raw(_COVARIANCE_SIZE)
@@ -62,6 +76,17 @@ def odometry(data: Buffer, encoding: str) -> Odometry:
     if not all(map(math.isfinite, (*pose, vx, vy, wz))):
         raise ValueError(f"has pose {pose} and twist {(vx, vy, wz)}, expected finite numbers")
     return Odometry(stamp, (vx, vy, wz), pose, frame, child_frame)
+
+
+def _covariance(values: tuple[float, ...]) -> Array | None:
+    """Covariance in the plane of one of six numbers; None if it is all 0, which means unknown."""
+    matrix = np.reshape(values, (6, 6))[IN_PLANE]
+    if not matrix.any():
+        return None
+    try:
+        return covariance_of_pose((matrix + matrix.T) / 2)
+    except ValueError:
+        return None
 
 
 def _stamped_pose(reader: WireReader, has_child: bool) -> StampedPose:

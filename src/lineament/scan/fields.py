@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 _FLOAT64 = np.dtype(np.float64)
 #: x, y [m], and heading [rad].
 Pose = tuple[float, float, float]
+#: Beams to points: a gap of more steps is where the scan begins, and a turn has so many at most.
+_WIDE, _MOST_BEAMS = 10.0, 20_000
 
 
 def number(name: str, value: object) -> float:
@@ -97,6 +99,40 @@ def _check_turn(name: str, first: float, last: float, step: float) -> None:
         )
 
 
+def beams_to(points: ArrayLike) -> tuple[Array, Array]:
+    """Ranges and increasing bearings of beams to points (n, 2), and of beams to nothing between."""
+    try:
+        xy = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"points is {points!r:.60}, expected numbers of shape (n, 2)") from None
+    xy = xy.reshape(-1, 2) if xy.size == 0 else xy
+    if xy.ndim != 2 or xy.shape[1] != 2:
+        raise ValueError(f"points has shape {xy.shape}, expected (n, 2): x and y of each")
+    xy = xy[np.isfinite(xy).all(axis=1)]
+    ranges, angles = np.hypot(*xy.T), np.arctan2(xy[:, 1], xy[:, 0])
+    order = np.lexsort((ranges, angles))
+    order = order[ranges[order] > 0]
+    ranges, angles = ranges[order], angles[order]
+    is_nearest = np.diff(angles, prepend=-np.inf) > 0
+    ranges, angles = ranges[is_nearest], angles[is_nearest]
+    if len(ranges) < 2:
+        return ranges, angles
+    gaps = np.diff(angles, append=angles[0] + 2 * math.pi)
+    step = max(float(np.median(gaps)), 2 * math.pi / _MOST_BEAMS)
+    if gaps.max() > _WIDE * step:  # else a full circle, which stays cut at the back
+        begin = int(gaps.argmax()) + 1
+        ranges, angles = np.roll(ranges, -begin), np.unwrap(np.roll(angles, -begin))
+        gaps = np.roll(gaps, -begin)
+    gaps[-1] = 0.0  # nothing is behind the last
+    beams = np.maximum(np.floor(gaps / step + 0.5).astype(np.int64), 1)
+    last = np.repeat(np.arange(len(beams)), beams)
+    ahead = np.arange(len(last)) - np.repeat(np.cumsum(beams) - beams, beams)
+    return (
+        np.where(ahead == 0, ranges[last], np.nan),
+        angles[last] + ahead * (gaps / beams)[last],
+    )
+
+
 def range_limits(low: object, high: object) -> tuple[float, float]:
     """Limits of valid ranges [m], in order."""
     range_min, range_max = number("range_min", low), number("range_max", high)
@@ -116,6 +152,23 @@ def checked_pose(pose: Any) -> Pose:
     except ValueError:
         raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
     return x, y, theta
+
+
+def covariance_of_pose(covariance: ArrayLike) -> Array:
+    """Covariance (3, 3) of x, y, theta: symmetric, and of no direction below 0; read-only."""
+    matrix = np.array(covariance, dtype=np.float64)
+    is_matrix = matrix.shape == (3, 3) and bool(np.isfinite(matrix).all())
+    if is_matrix:
+        least = -1e-9 * np.abs(matrix).max()
+        is_matrix = np.abs(matrix - matrix.T).max() <= -least
+        is_matrix = is_matrix and np.linalg.eigvalsh(matrix)[0] >= least
+    if not is_matrix:
+        raise ValueError(
+            f"covariance of the pose is {matrix.tolist()}, expected (3, 3), symmetric, "
+            "positive semidefinite"
+        )
+    matrix.flags.writeable = False
+    return matrix
 
 
 def stamp_seconds(stamp: Any) -> float:

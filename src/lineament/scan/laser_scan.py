@@ -1,72 +1,31 @@
 """One sweep of a 2-D laser scanner: its beams, and which of them are valid (equations 1-3)."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self, TypeVar
+from typing import Any, Self, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._lazy import Pictured
 from .fields import (
     Array,
     Pose,
+    beams_to,
     checked_pose,
+    covariance_of_pose,
     finite,
     irregular_bearings,
-    number,
     range_limits,
     regular_bearings,
     stamp_seconds,
     vector,
 )
 
-Distance = TypeVar("Distance", float, Array)
 
-
-@dataclass(frozen=True, slots=True)
-class RangeNoise:
-    """Noise of one range, as standard deviations.
-
-    The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
-    each beam is off by ``bearing``. A part that is negative or not finite is a ValueError.
-
-    Parameters
-    ----------
-    sigma, proportional : float
-        Constant part [m], and the part that grows with the range [m/m].
-    bearing : float
-        Noise of the bearing [rad].
-    quantum : float
-        Step of the lattice on which ranges are reported [m].
-
-    Examples
-    --------
-    >>> RangeNoise(sigma=0.03, proportional=0.01).range_variance(4.0)
-    0.0025
-    """
-
-    sigma: float = 0.0
-    proportional: float = 0.0
-    bearing: float = 0.0
-    quantum: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("sigma", "proportional", "bearing", "quantum"):
-            value = getattr(self, name)
-            if type(value) is float and 0 <= value < math.inf:
-                continue
-            value = number(f"RangeNoise.{name}", value)
-            if not 0 <= value < math.inf:
-                raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
-            object.__setattr__(self, name, value)
-
-    def range_variance(self, distance: Distance) -> Distance:
-        """Variance [m²] of a range of `distance` [m], or of each of an array of them."""
-        return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
-
-
-class LaserScan:
+class LaserScan(Pictured):
     """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
@@ -123,6 +82,8 @@ class LaserScan:
     frame_id: str
     intensities: Array | None
     pose: Pose | None
+    #: Covariance (3, 3) of the pose [m, m, rad], where it is known; see `with_pose`.
+    pose_covariance: Array | None
 
     def __init__(
         self,
@@ -159,12 +120,45 @@ class LaserScan:
         own["frame_id"] = str(frame_id)
         own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
         own["pose"] = None if pose is None else checked_pose(pose)
+        own["pose_covariance"] = None
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
 
     def __len__(self) -> int:
         return len(self.ranges)
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> tuple[float, float]: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Self: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> tuple[float, float] | Self:
+        """Return bearing and range of a beam [rad, m]; or a scan of the beams of a slice."""
+        if not isinstance(index, slice):
+            i = range(len(self))[index]
+            return float(self.angles[i]), float(self.ranges[i])
+        kept = range(len(self))[index]
+        if kept.step < 0:
+            raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
+        own = dict(vars(self))
+        for name in ("angles", "valid", "points"):
+            own.pop(name, None)  # what is made when it is first asked for
+        own["ranges"] = self.ranges[index]
+        if self.intensities is not None:
+            own["intensities"] = self.intensities[index]
+        if self.is_regular:
+            own["angle_min"] += kept.start * self.angle_increment
+            own["angle_increment"] *= kept.step
+        else:
+            own["angles"] = self.angles[index]
+            own["angle_min"], own["angle_increment"] = irregular_bearings(own["angles"])
+        own["stamp"] += kept.start * self.time_increment
+        own["time_increment"] *= kept.step
+        other = self.__class__.__new__(self.__class__)
+        other.__dict__.update(own)
+        return other
 
     def __repr__(self) -> str:
         return (
@@ -205,8 +199,10 @@ class LaserScan:
         span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
         return span >= 2 * math.pi - 2.5 * step
 
-    def with_pose(self, pose: Pose | None) -> Self:
+    def with_pose(self, pose: Pose | None, covariance: ArrayLike | None = None) -> Self:
         """Return the same scan with another pose [m, m, rad]; they share their arrays.
+
+        `covariance` is that of the pose, shape (3, 3), where it is known.
 
         Examples
         --------
@@ -214,8 +210,40 @@ class LaserScan:
         (3.0, 4.0, 0.0)
         """
         other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(self.__dict__, pose=None if pose is None else checked_pose(pose))
+        other.__dict__.update(
+            self.__dict__,
+            pose=None if pose is None else checked_pose(pose),
+            pose_covariance=None if covariance is None else covariance_of_pose(covariance),
+        )
         return other
+
+    @classmethod
+    def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
+        """Make the scan that a sensor at the origin would have of some points, in any order.
+
+        Beams are sorted by bearing, from the widest gap on; where more than one and a half median
+        steps lie between two, there are beams without a return. Points that are not finite or at
+        the origin are left out; of points with one bearing the nearest stays.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 2)
+            x and y in the frame of the sensor [m].
+        **fields
+            ``stamp``, ``frame_id``, ``pose`` and limits, as in `LaserScan`.
+
+        Raises
+        ------
+        ValueError
+            If the points have another shape.
+
+        Examples
+        --------
+        >>> LaserScan.from_points([(0.0, 2.0), (1.0, 0.0)]).ranges.tolist()
+        [1.0, 2.0]
+        """
+        ranges, angles = beams_to(points)
+        return cls(ranges, angles=angles, **fields)
 
     @classmethod
     def from_message(cls, message: Any, *, pose: Pose | None = None) -> Self:

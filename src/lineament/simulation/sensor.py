@@ -31,8 +31,8 @@ class Sensor:
         Bearing of the first beam and step between beams [rad], counter-clockwise.
     range_min, range_max : float
         Limits of ranges that are reported [m]: ``range_min <= r < range_max``.
-    noise : RangeNoise
-        Noise of a measurement; all four parts are applied.
+    noise : RangeNoise or float
+        Noise of a measurement, or its sigma [m]; all four parts are applied.
     dropout : float
         Probability that a beam returns nothing.
     outlier : float
@@ -68,6 +68,7 @@ class Sensor:
     rate: float = 10.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", RangeNoise.of(self.noise))
         last = self.angle_min + (self.n_beams - 1) * self.angle_increment
         requirements = (
             ("n_beams", self.n_beams >= 1, "at least 1"),

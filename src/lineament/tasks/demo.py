@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import LineamentError
-from ..extractor import Extractor
+from ..extractor import Extractor, load_kernels
 from ..features import Features
 from ..files import made_folder
 from ..logs import open_log
@@ -45,6 +45,7 @@ def run_demo(
         If the log cannot be read or the folder cannot be written.
     """
     target = made_folder(folder)
+    load_kernels(map(Extractor, DEMO_METHODS))
     if log is None:
         from ..simulation import SENSORS, simulate_log
 

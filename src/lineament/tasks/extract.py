@@ -2,17 +2,20 @@
 
 import os
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..extractor import Extractor
-from ..features import COUNTED
+from ..errors import LogError
+from ..extractor import Extractor, load_kernels
+from ..features import COUNTED, TABLES, Features, make_records
 from ..logs import open_log
 from ..output import open_writer
+from ..output.scene import WORLD_FRAME
 from ..progress import Track, untracked
+from ..scan import LaserScan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,8 +23,9 @@ class Extraction:
     """Result of the extraction of one log.
 
     Topics of the scans; number of scans and of features of each kind; share of invalid beams; wall
-    time [s] from opening the log to the finished file; number of faulty lines or records that were
-    skipped, the first of which are in `faults`.
+    time [s] from opening the log to the finished file, without that of loading kernels; number of
+    faulty lines or records that were skipped, the first of which are in `faults`; number of scans
+    whose features are left out, since they are to be in the world and the scan has no pose.
     """
 
     log: str
@@ -32,6 +36,7 @@ class Extraction:
     invalid: float = 0.0
     seconds: float = 0.0
     skipped: int = 0
+    unplaced: int = 0
     faults: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
@@ -43,6 +48,7 @@ class Extraction:
             f"{self.skipped} faults skipped",
             f"  {found}",
             f"  {self.seconds:.2f} s, {rate:.0f} scans/s",
+            *([f"  {self.unplaced} scans without a pose left out"] if self.unplaced else []),
             *(f"  skipped: {fault}" for fault in self.faults),
         ]
         return "\n".join(lines)
@@ -54,6 +60,7 @@ def extract_log(
     extractor: Extractor,
     *,
     topic_column: bool | None = None,
+    world: bool = False,
     track: Track = untracked,
     **reading: Any,
 ) -> Extraction:
@@ -71,6 +78,10 @@ def extract_log(
         The method.
     topic_column : bool, optional
         Whether tables have the topic of each row; by default where the log has several.
+    world : bool
+        Whether a table has the features in the frame of the poses, ``map``, with covariances that
+        are turned and, where it is known, have the covariance of the pose in them. A scan without a
+        pose has no features then.
     track : callable
         ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
@@ -79,7 +90,10 @@ def extract_log(
     Raises
     ------
     LineamentError
-        If the log cannot be read or the output cannot be written; no partial file stays.
+        If the log cannot be read or the output cannot be written; no partial file stays. And if
+        they are to be in the world, but no scan has a pose.
+    ValueError
+        If they are to be in the world, but the output draws scans, which it does there anyway.
 
     Examples
     --------
@@ -91,16 +105,23 @@ def extract_log(
     >>> extract_log(folder / "log.npz", folder / "features.parquet", Extractor("liu")).scans
     5
     """
+    load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
     topics = log.topics if log.topic is None else [log.topic]
     if topic_column is None:
         topic_column = len(topics) > 1
-    scans, beams, valid = 0, 0, 0
+    scans, beams, valid, unplaced = 0, 0, 0, 0
     found = dict.fromkeys(COUNTED, 0)
-    with open_writer(output, topics if topic_column else ()) as writer:
+    writer = open_writer(output, topics if topic_column else ())
+    if world and writer.needs_scan:
+        raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
+    with writer:
         for topic, scan in track(log.items(), Path(log.name).name, len(log)):
             features = extractor(scan)
+            if world:
+                unplaced += scan.pose is None
+                features = in_world(features, scan)
             # Drawings of scans are named after the topic; tables need not repeat the only one.
             writer.write(features, scan, topic if topic_column or writer.needs_scan else "")
             scans += 1
@@ -108,6 +129,8 @@ def extract_log(
             valid += int(np.count_nonzero(scan.valid))
             for name, count in features.counts().items():
                 found[name] += count
+        if unplaced and unplaced == scans:
+            raise LogError(log.name, "no scan has a pose, expected poses: of a bag, by their topic")
     return Extraction(
         log=str(path),
         output=str(output),
@@ -117,5 +140,15 @@ def extract_log(
         invalid=1 - valid / beams if beams else 0.0,
         seconds=time.perf_counter() - started,
         skipped=log.skipped,
+        unplaced=unplaced,
         faults=list(log.faults),
     )
+
+
+def in_world(features: Features, scan: LaserScan) -> Features:
+    """Move the features of a scan to the frame of its pose; without a pose, none are left."""
+    if scan.pose is not None:
+        return features.transform(*scan.pose, scan.pose_covariance, frame_id=WORLD_FRAME)
+    empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
+    nothing = np.full(len(scan), -1, np.int32)
+    return replace(features, **empty, clusters=nothing, frame_id=WORLD_FRAME)

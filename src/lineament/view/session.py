@@ -15,6 +15,7 @@ from ..errors import LineamentError
 from ..explain.explain import explain
 from ..extractor import Extractor
 from ..logs import open_log
+from ..progress import compiling_now
 from ..scan import LaserScan
 from .store import ScanStore
 
@@ -64,6 +65,7 @@ class Session:
             "error": self._error,
             "skipped": self._log.skipped,
             "faults": list(self._log.faults),
+            "compiling": compiling_now(),
         }
 
     def stamps(self, first: int, count: int) -> dict[str, Any]:

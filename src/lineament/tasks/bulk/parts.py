@@ -36,6 +36,7 @@ class Task:
     method: Method
     noise: RangeNoise | None
     reading: dict[str, Any]  # as for `open_log`
+    world: bool = False
 
 
 def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:  # noqa: ARG005
@@ -58,6 +59,7 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
             part,
             Extractor(task.method, noise=task.noise),
             topic_column=True,
+            world=task.world,
             track=_reporting(report),
             **task.reading,
         )

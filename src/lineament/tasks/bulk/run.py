@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, cast
 
 from ..._version import __version__
-from ...extractor import Extractor
+from ...extractor import Extractor, load_kernels
 from ...features import COUNTED
 from ...files import made_folder
 from ...logs import find_logs, open_log
@@ -68,6 +68,7 @@ def extract_logs(
     executor: Executor | None = None,
     ending: str = ".parquet",
     resume: bool = False,
+    world: bool = False,
     show: Callable[[str], None] = lambda text: None,  # noqa: ARG005
     **reading: Any,
 ) -> Bulk:
@@ -94,6 +95,8 @@ def extract_logs(
     resume : bool
         Skip logs that are complete: done by this version with this configuration, the file of the
         size in the manifest, and the log unchanged.
+    world : bool
+        Whether the tables have the features in the world, as for `extract_log`.
     show : callable
         ``show(text)`` is called twice a second with the progress.
     **reading
@@ -119,13 +122,15 @@ def extract_logs(
     >>> extract_logs(home, home / "out", Extractor("liu"), resume=True).whole
     2
     """
-    started = time.perf_counter()
     settings = _settings(reading)
     open_writer(f"part-0{ending}")  # refuses an unknown ending before anything is computed
+    if executor is None or isinstance(executor, Threads):  # once here, not in each process
+        load_kernels([extractor])
+    started = time.perf_counter()
     found = [full_path(log) for log in find_logs(logs)]
     manifest = Manifest(made_folder(folder))
     names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
-    configuration = _configuration(extractor, settings)
+    configuration = _configuration(extractor, settings) | ({"world": True} if world else {})
     rows = [
         Row(
             log=log,
@@ -138,7 +143,8 @@ def extract_logs(
     ]
     todo = _unfinished(rows, manifest) if resume else rows
     home = os.path.abspath(folder)  # noqa: PTH100
-    tasks = [Task(row, home, extractor.method, extractor.noise, settings) for row in todo]
+    method, noise = extractor.method, extractor.noise
+    tasks = [Task(row, home, method, noise, settings, world) for row in todo]
     manifest.rows |= {row.log: row for row in todo}
     with Threads() if executor is None else nullcontext(executor) as workers:
         _run(tasks, workers, manifest, show)

@@ -11,7 +11,7 @@ const $ = (id) => document.getElementById(id);
 const LAYERS = ["clusters", "segments", "corners", "edges", "arcs", "breakpoints"];
 const NARROW = "(max-width: 60rem)"; // where the answers stand below the panels
 const PATIENCE = 700; // milliseconds after which the page says what it waits for
-const WAITING = "working: the first time, a method is compiled, which takes up to half a minute";
+const WAITING = "working …";
 
 class App {
   plane = new Plane();
@@ -93,8 +93,11 @@ class App {
   load(index) {
     return this.#loader.run(async () => {
       const panels = [...this.panels];
-      const waiting = setTimeout(() => {
-        for (const panel of panels) panel.caption.textContent = WAITING;
+      let loaded = false;
+      const waiting = setInterval(async () => {
+        const { compiling } = await ask("log").catch(() => ({}));
+        if (loaded) return;
+        for (const panel of panels) panel.caption.textContent = compiling || WAITING;
       }, PATIENCE);
       try {
         const asked = panels.map((panel) => ask("scan", { i: index, method: panel.method }));
@@ -104,7 +107,8 @@ class App {
         });
         this.#loaded(index);
       } finally {
-        clearTimeout(waiting);
+        loaded = true;
+        clearInterval(waiting);
       }
     });
   }

@@ -1,0 +1,96 @@
+"""`Odometer`: where the sensor has come to, and how fast it goes, from the motions of a tracker."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..scan import Array, Pose
+from ..scan.poses import Twist, compose
+from .estimate import Motion
+from .tracker import FASTEST, Tracks
+
+
+class Travel(NamedTuple):
+    """Where the sensor is in the frame of its first scan, and how fast it goes in its own.
+
+    Attributes
+    ----------
+    pose : (x, y, theta)
+        [m, m, rad]; theta in [-π, π].
+    covariance : ndarray, shape (3, 3)
+        Of the pose [m, m, rad], along the axes of the first scan.
+    twist : (vx, vy, omega)
+        Velocity since the last scan [m/s, m/s, rad/s], forward and to the left.
+    twist_covariance : ndarray, shape (3, 3)
+        Of the twist. Where stamps give no velocity, the twist is 0, with deviations of 50.
+    """
+
+    pose: Pose
+    covariance: Array
+    twist: Twist
+    twist_covariance: Array
+
+
+class Odometer:
+    """Adds up the motions of one sensor: odometry by its scans.
+
+    The covariance of each `Motion` is propagated to first order. Two motions that follow each other
+    share the scan between them, whose errors they have with opposite signs: taken as independent,
+    as they are here, they give more than the error of the pose, not less.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, drive, room
+    >>> tracker, odometer, extract = ln.Tracker(), Odometer(), ln.Extractor("liu:scale_free")
+    >>> for scan in drive(room(), [(-2, 0), (-1, 0)], SENSORS["paper"], speed=1, rate=10):
+    ...     travel = odometer(tracker(extract(scan)), scan.stamp)
+    >>> round(travel.pose[0], 2), [round(speed, 1) for speed in travel.twist]
+    (1.0, [1.0, 0.0, 0.0])
+    """
+
+    def __init__(self) -> None:
+        self._pose: Pose = (0.0, 0.0, 0.0)
+        self._covariance = np.zeros((3, 3))
+        self._stamp = math.nan
+
+    def __call__(self, tracks: Tracks, stamp: float) -> Travel:
+        """Go on by the motion to the next scan, which was taken at `stamp` [s]."""
+        motion, duration, self._stamp = tracks.motion, stamp - self._stamp, stamp
+        twist, twist_covariance = (0.0, 0.0, 0.0), np.eye(3) * FASTEST**2
+        if motion is not None:
+            of_pose, of_motion = compose_jacobians(self._pose, motion.pose)
+            self._covariance = (
+                of_pose @ self._covariance @ of_pose.T + of_motion @ motion.covariance @ of_motion.T
+            )
+            self._pose = compose(self._pose, motion.pose)
+            if duration > 0:
+                found = motion.twist(duration)
+                if all(abs(speed) <= FASTEST for speed in found):
+                    twist, twist_covariance = found, _twist_covariance(motion, duration)
+        return Travel(self._pose, self._covariance, twist, twist_covariance)
+
+
+def compose_jacobians(pose: Pose, motion: Pose) -> tuple[Array, Array]:
+    """Return the derivatives, (3, 3) each, of `compose` by its pose and by its motion."""
+    dx, dy, _ = motion
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    of_pose = np.array([[1.0, 0.0, -s * dx - c * dy], [0.0, 1.0, c * dx - s * dy], [0, 0, 1.0]])
+    return of_pose, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _twist_covariance(motion: Motion, duration: float) -> Array:
+    """Covariance of the twist of a motion, by the derivative of `twist_between`.
+
+    With h half the turn, v = (k x + h y, k y - h x) / duration and k = h cot h.
+    """
+    x, y, turn = motion.pose
+    h = turn / 2
+    k, slope = 1.0 - h * h / 3, -h / 3
+    if abs(h) > 1e-4:  # below, the series is closer than the differences
+        k, slope = h / math.tan(h), (1 / math.tan(h) - h / math.sin(h) ** 2) / 2
+    jacobian = np.array([[k, h, slope * x + y / 2], [-h, k, slope * y - x / 2], [0.0, 0.0, 1.0]])
+    jacobian /= duration
+    covariance: Array = jacobian @ motion.covariance @ jacobian.T
+    return covariance

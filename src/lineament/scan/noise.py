@@ -1,0 +1,75 @@
+"""Noise of ranges."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from numbers import Real
+from typing import TypeVar
+
+from .fields import Array, number
+
+Distance = TypeVar("Distance", float, Array)
+
+
+@dataclass(frozen=True, slots=True)
+class RangeNoise:
+    """Noise of one range, as standard deviations.
+
+    The variance of a range ρ is ``sigma² + (proportional ρ)² + quantum²/12``; the bearing of
+    each beam is off by ``bearing``. A part that is negative or not finite is a ValueError.
+
+    Parameters
+    ----------
+    sigma, proportional : float
+        Constant part [m], and the part that grows with the range [m/m].
+    bearing : float
+        Noise of the bearing [rad].
+    quantum : float
+        Step of the lattice on which ranges are reported [m].
+
+    Examples
+    --------
+    >>> RangeNoise(sigma=0.03, proportional=0.01).range_variance(4.0)
+    0.0025
+    """
+
+    sigma: float = 0.0
+    proportional: float = 0.0
+    bearing: float = 0.0
+    quantum: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("sigma", "proportional", "bearing", "quantum"):
+            value = getattr(self, name)
+            if type(value) is float and 0 <= value < math.inf:
+                continue
+            value = number(f"RangeNoise.{name}", value)
+            if not 0 <= value < math.inf:
+                raise ValueError(f"RangeNoise.{name} is {value}, expected a finite number ≥ 0")
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, noise: NoiseLike) -> RangeNoise:
+        """Return a noise as it is; a number is its sigma [m].
+
+        Examples
+        --------
+        >>> RangeNoise.of(0.01) == RangeNoise(sigma=0.01)
+        True
+        """
+        if isinstance(noise, RangeNoise):
+            return noise
+        if not isinstance(noise, Real) or isinstance(noise, bool):
+            raise TypeError(
+                f"noise is {noise!r:.60}, expected a RangeNoise, or its sigma in metres"
+            )
+        return cls(sigma=float(noise))
+
+    def range_variance(self, distance: Distance) -> Distance:
+        """Variance [m²] of a range of `distance` [m], or of each of an array of them."""
+        return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
+
+
+#: A noise, or its sigma [m].
+NoiseLike = RangeNoise | float

@@ -1,0 +1,97 @@
+"""Odometry by scans: exact without noise, with covariances that hold, and its derivatives."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament.motion import Motion, Odometer, Tracker
+from lineament.motion.odometry import _twist_covariance, compose_jacobians
+from lineament.scan.poses import compose, relative, twist_between
+from lineament.simulation import SENSORS, drive, room
+
+SPREAD = np.array([[4.0, 1.0, -0.5], [1.0, 2.0, 0.3], [-0.5, 0.3, 1.0]]) * 1e-4
+MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5)]
+
+
+def derivative(function, at, step=1e-6):
+    columns = [
+        (np.array(function(at + offset)) - function(at - offset)) / (2 * step)
+        for offset in np.eye(len(at)) * step
+    ]
+    return np.transpose(columns)
+
+
+def tracks(motion):
+    return SimpleNamespace(motion=motion)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_derivatives_are_those_of_differences(motion):
+    pose = (1.0, -2.0, 0.7)
+    of_pose, of_motion = compose_jacobians(pose, motion)
+    found = derivative(lambda at: compose(tuple(at), motion), np.array(pose))
+    np.testing.assert_allclose(of_pose, found, atol=1e-8)
+    found = derivative(lambda at: compose(pose, tuple(at)), np.array(motion))
+    np.testing.assert_allclose(of_motion, found, atol=1e-8)
+    by = derivative(lambda at: twist_between((0, 0, 0), tuple(at), 0.1), np.array(motion))
+    expected = by @ SPREAD @ by.T
+    np.testing.assert_allclose(_twist_covariance(Motion(*motion, SPREAD), 0.1), expected, rtol=1e-6)
+
+
+def test_the_pose_and_its_covariance_add_up():
+    odometer, truth = Odometer(), (0.0, 0.0, 0.0)
+    first = odometer(tracks(None), 5.0)
+    assert (first.pose, first.twist) == ((0, 0, 0), (0, 0, 0))
+    assert not first.covariance.any()
+    np.testing.assert_array_equal(first.twist_covariance, np.eye(3) * 2500)
+    for k, motion in enumerate(MOTIONS[:3]):
+        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.1 + k / 10)
+        truth = compose(truth, motion)
+        assert travel.pose == pytest.approx(truth)
+        assert travel.twist == pytest.approx(twist_between((0, 0, 0), motion, 0.1))
+    rng = np.random.default_rng(0)
+    ends = []
+    for _ in range(20_000):
+        pose = (0.0, 0.0, 0.0)
+        for motion in MOTIONS[:3]:
+            pose = compose(pose, tuple(rng.multivariate_normal(motion, SPREAD)))
+        ends.append(np.subtract(pose, truth))
+    spread = np.cov(np.transpose(ends))
+    # Of 20 000 draws a variance is known to 1 %: white, what was drawn has unit covariance.
+    white = np.linalg.inv(np.linalg.cholesky(travel.covariance))
+    np.testing.assert_allclose(white @ spread @ white.T, np.eye(3), atol=0.05)
+
+
+@pytest.mark.parametrize(("stamp", "moves"), [(5.1, True), (5.0, False), (4.9, False), (5.001, 0)])
+def test_stamps_that_give_no_velocity(stamp, moves):
+    odometer = Odometer()
+    odometer(tracks(None), 5.0)
+    travel = odometer(tracks(Motion(0.3, 0.0, 0.0, SPREAD)), stamp)
+    assert travel.pose == (0.3, 0.0, 0.0)  # the way is known all the same
+    assert (travel.twist != (0, 0, 0)) == bool(moves)
+    assert (travel.twist_covariance[0, 0] == 2500) != bool(moves)
+
+
+def test_a_drive_ends_within_its_covariance():
+    """Over 12 drives the errors in units of their covariance are those of χ², or less.
+
+    Less, since two motions share a scan whose errors have opposite signs in them.
+    """
+    extract, walk = ln.Extractor("optimal"), [(-1.5, -0.5), (0.5, -0.5), (0.5, 0.5)]
+    errors, of_twists = [], []
+    for seed in range(12):
+        scans = list(drive(room(), walk, SENSORS["utm30lx"], speed=1.0, rate=5, seed=seed))
+        tracker, odometer = Tracker(roughness=0.0), Odometer()
+        for before, scan in zip([None, *scans], scans, strict=False):
+            travel = odometer(tracker(extract(scan)), scan.stamp)
+            if before is not None:
+                off = np.subtract(travel.twist, twist_between(before.pose, scan.pose, 0.2))
+                of_twists.append(off @ np.linalg.solve(travel.twist_covariance, off))
+        off = np.subtract(travel.pose, relative(scans[0].pose, scan.pose))
+        off[2] = math.remainder(off[2], 2 * math.pi)
+        errors.append(off @ np.linalg.solve(travel.covariance, off))
+    assert np.mean(errors) < 3 + 4 * math.sqrt(6 / len(errors))
+    assert 2 < np.mean(of_twists) < 4
