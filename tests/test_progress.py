@@ -2,10 +2,13 @@
 
 import io
 import os
+import re
 import subprocess
 import sys
+from contextlib import nullcontext
 from types import ModuleType, SimpleNamespace
 
+import numpy as np
 import pytest
 from numba import config, njit
 from rich.progress import Progress
@@ -14,6 +17,8 @@ from rich.status import Status
 import lineament as ln
 from lineament import cli, progress
 from lineament.cli import progress as cli_progress
+from lineament.live import LiveConfig, Pipeline, run_live
+from lineament.methods.workspace import Block as WorkingBlock
 from lineament.progress import (
     Compiling,
     compiled_seconds,
@@ -22,6 +27,8 @@ from lineament.progress import (
     compiling_shown,
 )
 from lineament.tasks import extract as extraction
+from lineament.tasks.bulk import extract_logs
+from lineament.tasks.demo import run_demo
 
 
 @pytest.fixture
@@ -52,7 +59,7 @@ def _branch():
 
 
 def _root():
-    return branch() + leaf() + len(str(module.other()))
+    return branch() + leaf() + len(str(module.elsewhere()))
 
 
 def _other():
@@ -68,7 +75,7 @@ class Kernel:
 
 leaf, branch, root, other = map(Kernel, (_leaf, _branch, _root, _other))
 module = ModuleType("module")
-module.other = other
+module.elsewhere = other
 
 
 def run_method(block):
@@ -114,7 +121,17 @@ def test_one_piece_of_work_is_shown_from_its_first_function_to_its_end(states, c
     assert [state.total for state in states] == [5] * len(states)
     assert sorted(state.done for state in states) == [state.done for state in states]
     assert (states[0].done, states[0].seconds, states[-1].done) == (1, 1.0, 5)
-    assert states[0].left > 0 == states[-1].left
+    assert states[-1].left == 0
+    size = {
+        function: len(function.__code__.co_code) for function in (_root, _branch, _leaf, _other)
+    }
+    # A kernel takes longer by what it calls, and the first guess counts for two seconds.
+    before_root = states[-5]
+    assert before_root.done == 3
+    worked = sum(size.values()) - size[_root]
+    left = size[_root] + 0.15 * sum(size.values()) + len(lone.py_func.__code__.co_code) * 1.15
+    speed = (worked + 2 * 1500) / (before_root.seconds + 2)
+    assert before_root.left == pytest.approx(left / speed)
     assert compiled_seconds() == 7  # what is compiled within another is not counted twice
     assert str(states[-1]) == "compiled kernels in 7 s; they are cached for the next run"
 
@@ -274,6 +291,52 @@ def test_speeds_are_without_it(monkeypatch, capsys):
     for _ in cli_progress.tracker(quiet=False)(range(4), "reading", 4):
         seconds.now, seconds.compiled = seconds.now + 41, seconds.compiled + 40
     assert capsys.readouterr().err.splitlines()[1] == "reading: 2/4, 1.0/s, 2 s left"
+    terminal = on_terminal(monkeypatch)
+    for _ in cli_progress.tracker(quiet=False)(range(4), "reading", 4):
+        seconds.compiled += 40  # longer than all took
+    assert re.search(r"4/4\D.*\d{9}/s", terminal.getvalue())
+
+
+def test_the_first_run_of_an_extractor_is_one_piece_of_work(monkeypatch):
+    pieces = []
+
+    def record(functions, classes):
+        pieces.append((functions, classes))
+        return nullcontext()
+
+    monkeypatch.setattr("lineament.extractor.compiling", record)
+    scan = ln.LaserScan([2.0] * 9, 0.0, 0.01)
+    extractor, other = ln.Extractor("pdbs"), ln.Extractor("liu")
+    extractor(scan)
+    extractor(scan)
+    other.batch(np.full((3, 9), 2.0), angle_min=0.0, angle_increment=0.01)
+    other(scan)
+    methods = [type(each.method) for each in (extractor, other)]
+    assert pieces == [([method.run], [method, WorkingBlock]) for method in methods]
+
+
+def test_kernels_of_a_demo_of_many_logs_and_of_a_node_are_loaded_first(tmp_path, monkeypatch):
+    class LoadedError(Exception):
+        """Ends what begins with it."""
+
+    def load(extractors):
+        raise LoadedError([extractor.method.name for extractor in extractors])
+
+    for module in ("tasks.demo", "tasks.bulk.run"):
+        monkeypatch.setattr(f"lineament.{module}.load_kernels", load)
+    with pytest.raises(LoadedError, match=r"\['optimal', 'liu', 'liu'\]"):
+        run_demo(tmp_path)
+    ln.logs.save_npz(tmp_path / "a.npz", [ln.LaserScan([2.0] * 9, 0.0, 0.01)] * 3)
+    with pytest.raises(LoadedError, match="pdbs"):
+        extract_logs([tmp_path / "a.npz"], tmp_path / "out", ln.Extractor("pdbs"))
+
+    seen = []
+    call = Pipeline.__call__
+    monkeypatch.setattr(Pipeline, "__call__", lambda *a: (seen.append(a[1]), call(*a))[1])
+    config = LiveConfig(log=str(tmp_path / "a.npz"), rate=0, ros=0, track=True, method="pdbs")
+    run_live(config, write=seen.append)
+    # Twice, as the motion of tracks is estimated from the second scan on.
+    assert seen[:3] == ["", "", "lineament finds features on /scan by pdbs"]
 
 
 def test_extraction_is_timed_without_it(tmp_path, monkeypatch, clock):
