@@ -211,7 +211,7 @@ class Results:
         """Motion against relations that people verified: up to a minute apart, and beyond."""
         rows = []
         for log, of in self.numbers("tracking").items():
-            for source in ("the log’s corrected poses", "features", "ICP", "features, no odometry"):
+            for source in MOTIONS if of["near"] else ():
                 near, far = of["near"][source], of["far_apart"].get(source)
                 pairs = [(near[f"way_{k}"], near[f"turn_{k}"]) for k in ("mean", "std")]
                 way, turn = zip(*pairs, strict=True)
@@ -331,6 +331,8 @@ SOME = (
     *("optimal", "liu:paper, paper’s numbers", "liu:tuned", "iepf:paper", "split_and_merge:paper"),
     *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
 )
+#: What motions are from, in the table of relations.
+MOTIONS = "the log’s corrected poses", "features", "ICP", "features, no odometry"
 #: Tables of recordings.
 RECORDED = ("maps", "relations", "tracking", "real", "arena")
 
