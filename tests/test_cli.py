@@ -91,7 +91,7 @@ def test_options_of_method_and_noise_arrive(options, extractor, npz, tmp_path, c
     assert run(["extract", str(npz), "-o", str(out), "-q", *options.split()]) == 0
     assert capfd.readouterr() == ("", "")
     lines = [json.loads(line) for line in out.read_text(encoding="utf-8").splitlines()]
-    found = [extractor(scan).to_dict() for scan in ln.open_log(npz)]
+    found = [{"pose": list(scan.pose), **extractor(scan).to_dict()} for scan in ln.open_log(npz)]
     assert lines == [{"scan": k, **features} for k, features in enumerate(found)]
 
 

@@ -108,7 +108,9 @@ def test_a_number_is_the_sigma_of_a_noise(scan):
         (lambda _: ln.extract(ln.Tracker, angle_min=0.0, angle_increment=1.0), "vector of numbers"),
         (lambda s: ln.extract(s, range_max=3.0), "own bearings and limits"),
         (lambda s: ln.extract(s, angle_increment=3.0), "own bearings and limits"),
-        (lambda s: ln.Extractor().batch(s), "matrix: call|matrix; call"),
+        (lambda s: ln.Extractor().batch(s), "no LaserScan, expected a matrix"),
+        (lambda s: ln.Extractor().batch([s, s]), "no LaserScan, expected a matrix"),
+        (lambda s: ln.Tracker()(s), "LaserScan, expected Features"),
         (lambda s: ln.extract(s, noise="little"), "'little'.*RangeNoise.*sigma"),
         (lambda s: ln.extract(s, noise=True), "True.*RangeNoise"),
         (lambda s: ln.extract(s, method=3), "method is 3, expected.*optimal"),
@@ -410,6 +412,10 @@ def test_plot_of_features_scans_and_logs(scan, log):
     low, high = ax.get_ylim()
     assert low < -1.7
     assert high > 1.3
+    flat = ln.plot(ln.LaserScan([1.0, 9.0], angles=[0.0, 0.01]))  # its panel is flat
+    flat.figure.draw_without_rendering()
+    legend, label = flat.get_legend(), flat.xaxis.label
+    assert legend.get_window_extent().y1 < label.get_window_extent().y0
     title = ln.plot(log, scan=4, method="iepf", min_piece=5).get_title(loc="left")
     assert title == "drive.npz · scan 4 · iepf"
     assert ln.plot(log.path).get_title(loc="left") == "drive.npz · scan 0 · optimal"

@@ -295,9 +295,11 @@ def load_kernels(extractors: Iterable[Extractor]) -> None:
 
 
 def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
-    if isinstance(ranges, LaserScan):
+    first = ranges[0] if isinstance(ranges, list | tuple) and ranges else ranges
+    if isinstance(first, LaserScan):
         raise TypeError(
-            "ranges is a LaserScan, expected a matrix; call the extractor with the scan"
+            "batch takes no LaserScan, expected a matrix of ranges, one scan a row, with "
+            "angle_min=... and angle_increment=...; an extractor itself takes a scan"
         )
     try:
         rows = np.asarray(ranges, dtype=np.float64)

@@ -136,9 +136,14 @@ class Tracker:
 
         Raises
         ------
+        TypeError
+            If it is given something else than features. The tracks are then as they were.
         ValueError
-            If the odometry is not three finite numbers; the tracks are then as they were.
+            If the odometry is not three finite numbers. Likewise.
         """
+        if not isinstance(features, Features):
+            kind = type(features).__name__
+            raise TypeError(f"features is of type {kind}, expected Features: what extract returns")
         if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
             raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
         corners = features.corners

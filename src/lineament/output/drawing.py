@@ -25,7 +25,7 @@ THREE_SIGMA = 1 - math.exp(-4.5)
 LARGEST_ELLIPSE = 0.5
 #: A plan leaves out beams that lie far out, of which this share may be on each side of each axis
 #: and `FEW` in all, where its area is so many times smaller without them.
-FEW_BEYOND, FEW, SMALLER = 0.025, 0.06, 1.5
+FEW_BEYOND, FEW, SMALLER = 0.05, 0.1, 1.5
 #: What keeps a text away from a place: less than this is another corner or some points.
 _COLLISION = 60
 

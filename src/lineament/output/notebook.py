@@ -32,6 +32,7 @@ _LEAST_WIDTH, _FOOT = 440.0, 22.0
 _SHARE, _FACTOR = 0.97, 1.6
 #: Rows of a kind in the table below a picture of features.
 MOST_ROWS = 5
+_LEGEND = {"ncols": 4, "fontsize": 8, "frameon": False, "borderaxespad": 0}
 #: Readable on white and on black.
 _BREAK_COLOR, _NOISE_COLOR = "#b5832a", "#8b949e"
 
@@ -87,6 +88,8 @@ def plot(
     if seen is not None and len(seen) != len(features.clusters):
         beams = len(features.clusters)
         raise ValueError(f"scan has {len(seen)} beams, expected the {beams} of the features")
+    from matplotlib.transforms import offset_copy
+
     if ax is None:
         from matplotlib import pyplot
 
@@ -101,7 +104,8 @@ def plot(
     canvas.style_plane(ax, title or "Features", about, shown)
     extent = float(np.ptp(shown, axis=0).max())
     drawing.draw_features(ax, features, seen or LaserScan([], 0.0, 1.0), extent)
-    ax.legend(loc="upper left", bbox_to_anchor=(0, -0.1), ncols=4, fontsize=8, frameon=False)
+    below = offset_copy(ax.transAxes, ax.get_figure(root=True), y=-32, units="points")
+    ax.legend(loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, **_LEGEND)
     return ax
 
 

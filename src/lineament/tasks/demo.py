@@ -103,7 +103,7 @@ def _draw(
         title=title,
     )
     corners = features.corners
-    quality = np.where(corners["kind"] == "edge", 0.0, corners["quality"])
+    quality = np.where(corners["kind"] == "corner", corners["quality"], 0.0)
     if quality.any():
         k = int(quality.argmax())
         caption = "How sure it is: the corner of the highest quality, close up."
@@ -139,16 +139,17 @@ def _drive(
 ) -> tuple[
     list[tuple[Pose, Features]], list[tuple[str, LaserScan, Features]], tuple[int, LaserScan, Any]
 ]:
-    """Return what was found at each pose, some scans, and the scan of the best corners.
+    """Return what was found at each pose, some scans, and the scan to show.
 
-    Corners count by their quality, edges do not.
+    That is one with many corners of high quality, and few measurements in no segment.
     """
     posed, moments, most = [], [], -1.0
     kept = set(np.linspace(0, total - 1, _MOMENTS).round().astype(int).tolist())
     for index, scan in enumerate(open_log(log)):
         features = extractor(scan)
-        corners = features.corners
-        quality = float(np.nansum(corners["quality"][corners["kind"] != "edge"]))
+        corners, explained = features.corners, features.segments["n_points"].sum()
+        quality = float(np.nansum(corners["quality"][corners["kind"] != "edge"] ** 2))
+        quality *= (explained / max(int(scan.valid.sum()), 1)) ** 2  # not one full of clutter
         if quality > most:
             most, best = quality, (index, scan, features)
         if index in kept:
