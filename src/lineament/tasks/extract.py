@@ -23,7 +23,7 @@ class Extraction:
     """Result of the extraction of one log.
 
     Topics of the scans; number of scans and of features of each kind; share of invalid beams; wall
-    time [s] from opening the log to the finished file, without that of loading kernels; number of
+    time [s] from opening the log to the finished file, without that of loading code; number of
     faulty lines or records that were skipped, the first of which are in `faults`; number of scans
     whose features are left out, since they are to be in the world and the scan has no pose.
     """
@@ -106,6 +106,7 @@ def extract_log(
     5
     """
     load_kernels([extractor])
+    open_writer(output)  # Imports what its format needs, which is no part of the speed either.
     started = time.perf_counter()
     log = open_log(path, **reading)
     topics = log.topics if log.topic is None else [log.topic]
