@@ -230,7 +230,9 @@ def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
     assert page.count("data:image/png;base64,") == 2 * 4  # on white and on black
     assert page.index("<figure") < page.index("<dl>")
     assert str(folder / "index.html") in capsys.readouterr().out
-    # Without poses there is no map, but scans.
+    # Without poses there is no map, but scans; that of another log is removed.
+    (tmp_path / "demo").mkdir()
+    (tmp_path / "demo" / "map.png").touch()
     log = corner_log(tmp_path / "still.npz", 2)
     assert run(["demo", str(log), "-q", "-o", str(tmp_path / "demo")]) == 0
     pictures = {path.stem for path in (tmp_path / "demo").glob("*.png")}

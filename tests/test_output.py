@@ -435,7 +435,7 @@ def test_page_has_a_picture_for_either_light():
     parsed = _Page(page.image_part("a", light, dark=dark))
     start = "data:image/png;base64,"
     (source,) = (attributes for tag, attributes in parsed.tags if tag == "source")
-    assert source["media"] == "(prefers-color-scheme: dark) and screen"
+    assert source["media"] == "screen and (prefers-color-scheme: dark)"
     assert base64.b64decode(source["srcset"].removeprefix(start)) == dark
     (image,) = (attributes for tag, attributes in parsed.tags if tag == "img")
     assert base64.b64decode(image["src"].removeprefix(start)) == light

@@ -198,7 +198,7 @@ def image_part(caption: str, png: bytes, name: str = "", dark: bytes = b"") -> s
     if dark:
         black = base64.b64encode(dark).decode("ascii")
         source = (
-            '<source media="(prefers-color-scheme: dark) and screen" '
+            '<source media="screen and (prefers-color-scheme: dark)" '
             f'srcset="data:image/png;base64,{black}">'
         )
     width, height = (round(_SCALE * side) for side in struct.unpack(">2I", png[16:24]))

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Methods in the pictures; the first makes the table.
 DEMO_METHODS = ("optimal", "liu:scale_free", "liu:paper")
+#: Names of the pictures; of the last two a log has one.
+_PICTURES = ("scan", "corner", "trace", "methods", "map", "scans")
 #: How many scans one picture shows.
 _MOMENTS = 6
 
@@ -55,6 +57,8 @@ def run_demo(
     summary = extract_log(log, target / "features.parquet", extractor, track=track)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
+    for name in _PICTURES:  # of another log
+        (target / f"{name}.png").unlink(missing_ok=True)
     pictures = list(track(_draw(target, log, extractor, summary.scans), "drawing", 5))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
