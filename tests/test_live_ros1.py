@@ -1,6 +1,5 @@
 """ROS 1 against a real master and rospy's own nodes; skipped where rospy is not installed."""
 
-import importlib.util
 import math
 import os
 import shutil
@@ -11,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,8 @@ SCAN = "sensor_msgs/LaserScan"
 def rospy() -> Iterator[None]:
     """Make rospy importable, here and in child processes, where it is installed."""
     with pytest.MonkeyPatch.context() as patch:
-        if importlib.util.find_spec("rospy") is None and (DEBIAN / "rospy").is_dir():
+        # By the path alone: a module that an earlier fixture loaded is not there for children.
+        if PathFinder.find_spec("rospy") is None and (DEBIAN / "rospy").is_dir():
             patch.setattr(sys, "path", [*sys.path, str(DEBIAN)])
         pytest.importorskip("rospy", reason="ROS 1 is not installed: see make ros1")
         yield
