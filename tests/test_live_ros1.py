@@ -1,5 +1,6 @@
 """ROS 1 against a real master and rospy's own nodes; skipped where rospy is not installed."""
 
+import gc
 import math
 import os
 import shutil
@@ -41,7 +42,16 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
+
+
+@pytest.fixture(autouse=True)
+def _sockets_of_rospy() -> Iterator[None]:
+    """Let go of the sockets that rospy leaves open here, where no warning of them counts."""
+    yield
+    gc.collect()
+
 
 #: Where Debian installs rospy, for the Python that it has.
 DEBIAN = Path("/usr/lib/python3/dist-packages")
