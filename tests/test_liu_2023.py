@@ -115,6 +115,7 @@ def assert_reproduced(scan, may_tie=False, **changes):
     return len(found.lines), tie
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
 @pytest.mark.parametrize("sensor", ["paper", "utm30lx", "lms361", "rplidar", "ld19"])
 def test_simulated_scans_are_reproduced(sensor, changes):
@@ -122,6 +123,7 @@ def test_simulated_scans_are_reproduced(sensor, changes):
     assert sum(lines) > len(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
 @pytest.mark.parametrize("log", LOGS)
 def test_recorded_scans_are_reproduced(data_dir, log, changes):
