@@ -81,14 +81,13 @@ def fitted_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
     return methods
 
 
-def drawn_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
-    """Make the methods of pictures: of the rivals as published the paper's IEPF alone."""
+def is_drawn(name: str) -> bool:
+    """Whether pictures show a method: of the rivals as published the paper's IEPF alone.
+
+    Tables have all of them.
+    """
     left_out = (LITERAL, LITERAL_BEST, LIU_SHARED, BLIND)
-    return {
-        name: extract
-        for name, extract in fitted_methods(setting, progress).items()
-        if name == "iepf:paper" or not (name in left_out or name.endswith(":paper"))
-    }
+    return name == "iepf:paper" or not (name in left_out or name.endswith(":paper"))
 
 
 def _with_lines(extract: Extractor, scan: LaserScan) -> Features:

@@ -14,7 +14,7 @@ from ..methods.pdbs import RULES
 from ..output import canvas, drawing
 from ..scan import LaserScan
 from ..simulation import SENSORS
-from .contenders import drawn_methods
+from .contenders import fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, median_of
 from .scans import Frame, scene_numbers, simulated_frames
 from .scenes import TRUE, pictures
@@ -60,7 +60,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
     few = {name: methods[name](shown.scan) for name in ("liu", "pdbs, fixed")}
     alike = like_figure_10(setting.seed)
-    found = {name: e(alike.scan) for name, e in drawn_methods(setting, progress).items()}
+    found = {name: e(alike.scan) for name, e in fitted_methods(setting, progress).items()}
     found = {TRUE: alike.truth} | found
     counts = numbers["example"] = {
         name: {

@@ -19,7 +19,7 @@ from ..motion import Tracker
 from ..output import canvas, drawing
 from ..scan import Array, LaserScan
 from ..scan.poses import compose
-from .contenders import LIU_PAPER, PDBS_LINES, Extract, drawn_methods
+from .contenders import LIU_PAPER, PDBS_LINES, Extract, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
 from .scans import frame_times
 from .scenes import pictures
@@ -57,7 +57,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         return Findings(TITLE, text)
     progress("reading")
     frames, in_row = read(setting.museum, setting.frames)
-    methods = drawn_methods(setting, progress)
+    methods = fitted_methods(setting, progress)
     scores, of_methods = {}, {}
     for name, extract in each(methods, progress, f"{len(frames)} scans"):
         scores[name], of_methods[name] = _measured(extract, frames)

@@ -13,7 +13,7 @@ from ..output.figures import scan_figure
 from ..scan import LaserScan
 from ..simulation import SENSORS
 from .compare import compare_scan
-from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, drawn_methods
+from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, fitted_methods, is_drawn
 from .findings import Figure, Findings, Progress, Setting, Table, median_of
 from .scans import INDOORS, recorded_scans, scene_numbers, simulated_frames
 
@@ -35,7 +35,7 @@ _COLUMNS = {
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Score and draw scans of simulated scenes and of recordings."""
-    methods = drawn_methods(setting, progress)
+    methods = fitted_methods(setting, progress)
     tables, figures = [], []
     numbers: dict[str, Any] = {}
     everything = dict.fromkeys(methods, Scores())
@@ -112,8 +112,9 @@ def pictures(name: str, about: str, scan: LaserScan, found: Mapping[str, Feature
     beyond = int((ranges > farthest).sum())
     left_out = f" {beyond} points beyond {farthest:.0f} m are left out." if beyond else ""
     first = {method: found[method] for method in FIRST if method in found}
+    others = {m: found[m] for m in found if m not in first and is_drawn(m)}
     figures = []
-    for part, shown in (("", first), ("-others", {m: found[m] for m in found if m not in first})):
+    for part, shown in (("", first), ("-others", others)):
         if shown:
             figure = scan_figure(scan, shown, panel=canvas.PAGE_WIDTH / 3, farthest=farthest)
             caption = f"{about}{', further methods' if part else ''}.{left_out}"
