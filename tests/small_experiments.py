@@ -1,0 +1,48 @@
+"""Experiments on little: a small setting, and a folder of recordings."""
+
+import pytest
+
+from lineament.reproduce import (
+    all_methods,
+    contenders,
+    grid,
+    layers,
+    noise,
+    real,
+    scans,
+    scenes,
+    similarity,
+    success,
+    two_corners,
+)
+from lineament.reproduce.grid import Parameters
+from lineament.simulation import SENSORS
+
+PAPER = SENSORS["paper"]
+#: Found on a small grid elsewhere; here it is only to be quick.
+CHOSEN = Parameters("relative", 8, 6, 0.25)
+
+
+def silent(about):
+    assert about
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Few methods, sensors, kinds and parameters, and times of single calls."""
+    few = {"METHODS": ("liu", "pdbs", "iepf"), "best_parameters": lambda *_: CHOSEN}
+    for module, changes in (
+        (contenders, few),
+        (noise, {"best_parameters": lambda *_: CHOSEN}),
+        (scans, {"_COPIES": 1, "_BATCHES": 1}),
+        (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),
+        (all_methods, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES": ("room", "hall")}),
+        (success, {"MORE": 2}),
+        (two_corners, {"SCANS_A_FRAME": 2}),
+        (scenes, {"INDOORS": ("room",)}),
+        (similarity, {"INDOORS": ("room",), "SHOWN": ("iepf", "pdbs, fitted")}),
+        (layers, {"RULES": ("fixed", "dietmayer")}),
+        (real, {"SHOWN": "iepf"}),
+    ):
+        for name, value in changes.items():
+            monkeypatch.setattr(module, name, value)

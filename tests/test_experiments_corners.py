@@ -1,0 +1,165 @@
+"""Figure 9 and Table 2: the parts of the experiments on corners, by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from handmade import corner, features
+from small_experiments import PAPER
+
+import lineament as ln
+from lineament.reproduce import (
+    Setting,
+    grid,
+    repetition,
+    scans,
+    two_corners,
+)
+from lineament.reproduce.grid import Parameters
+from lineament.reproduce.two_corners import DISTANCE, POSES, WORLD, A, B
+from lineament.simulation import truth
+
+
+class TestRepetition:
+    @pytest.fixture
+    def made(self):
+        """Every form at three radii and three thresholds; the tangent as the paper has it."""
+        ar = {("tangent", 8, 6, 0.66): 0.9, ("tangent", 8, 8, 0.66): 0.91}
+        ar |= {("product", 2, 8, 0.66): 0.7, ("product", 2, 6, 0.5): 0.6}
+        other = {"f1": 0.5}
+        return {
+            p: other | {"of_actual": ar.get(p, 0.1 * (p[0] != "relative")), "among_found": 1 - p[3]}
+            for form in grid.FORMS
+            for half_width in grid.HALF_WIDTHS
+            for radius in (5, 6, 8)
+            for threshold in (0.5, 0.66, 0.8)
+            for p in [Parameters(form, half_width, radius, threshold)]
+        }
+
+    def test_largest_is_among_those_asked_for(self, made):
+        assert grid.largest(made, "of_actual") == ("tangent", 8, 8, 0.66)
+        assert grid.largest(made, "of_actual", response="product") == ("product", 2, 8, 0.66)
+        fixed = {"response": "product", "support_radius": 6}
+        assert grid.largest(made, "of_actual", **fixed) == ("product", 2, 6, 0.5)
+        assert grid.largest(made, "among_found", threshold=0.8).threshold == 0.8
+        assert grid.largest(made, "among_found").threshold == 0.5
+
+    def test_readings_are_alike_whose_peak_is_at_the_papers_parameters(self, made):
+        flat = [paper.reading for paper in repetition._papers() if paper.response != "relative"]
+        flat.remove("product, half-width 2")
+        assert repetition._alike(made) == flat
+        made[Parameters("tangent", 8, 8, 0.66)]["of_actual"] = 0.95
+        flat.remove("tangent, half-width 8")
+        assert repetition._alike(made) == flat
+
+    def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(self, made):
+        rows = {name: cells for name, *cells in repetition._peaks(made).rows}
+        assert rows["paper"] == [6, "lost", 0.66, "lost", "lost", "lost"]
+        assert rows["tangent, half-width 8"] == [8, 0.91, 0.66, 0.9, 0.9, 0.91]
+        assert rows["product, half-width 2"] == [8, 0.7, 0.5, 0.6, 0.1, 0.7]
+        assert rows["relative, half-width 2"] == [None, 0.0, 0.5, 0.0, 0.0, 0.0]
+
+    def test_average_repetition_by_hand(self):
+        turn = 0.002
+        before = features(corners=[corner(*p) for p in ((1, 0), (2, 0), (3, 0), (0, 4))])
+        after = features(corners=[corner(*p) for p in ((1, 0.03), (2.04, 0), (7, 7))])
+        turned = after.transform(0, 0, -turn)
+        assert grid.average_repetition(before, turned, turn) == (2 / 4 + 2 / 3) / 2
+        assert grid.average_repetition(before, before, 0.06) == 0.25  # One of four is near enough.
+        assert grid.average_repetition(before, features(), 0.0) == 0.0
+        assert math.isnan(grid.average_repetition(features(), features(), 0.0))
+
+    def test_everything_a_corner_repeats_well_and_is_wrong(self):
+        everywhere = grid.repetition(Parameters("tangent", 8, 6, 0.0), range(1))
+        assert everywhere["among_found"] > 0.9
+        assert everywhere["precision"] < 0.1
+        assert everywhere["corners_per_view"] > 100
+        nothing = grid.repetition(Parameters("relative", 8, 6, 5.0), range(1))
+        assert [nothing[name] for name in (*grid.CRITERIA, "corners_per_view")] == [0.0] * 3
+
+    def test_parameters_are_chosen_on_scenes_that_are_not_reported(self):
+        setting = Setting(frames=50, seed=3)
+        chosen_on, reported = (grid.repetition_scenes(setting, reported=r) for r in (False, True))
+        assert len(chosen_on) == len(reported) == 100
+        assert not set(chosen_on) & set(reported)
+        later = grid.repetition_scenes(Setting(frames=50, seed=4), reported=False)
+        assert not set(reported) & set(later)
+
+
+class TestTwoCorners:
+    def test_both_corners_are_seen_well_from_all_five_places(self):
+        assert math.dist(A, B) == pytest.approx(2.302, abs=1e-12)
+        for pose in POSES:
+            seen = truth(WORLD, pose, PAPER).transform(*pose)
+            for vertex, convex in ((A, True), (B, False)):
+                is_it = np.hypot(*(seen.corners["position"] - vertex).T) < 1e-9
+                assert is_it.sum() == 1
+                assert seen.corners["convex"][is_it][0] == convex
+                sides = seen.corners["segments"][is_it][0]
+                assert (seen.segments["n_points"][sides] >= 6).all()
+            # No wall is a side of both: their errors are independent.
+            assert len(set(seen.corners["segments"].ravel())) >= 4
+            found = two_corners.found_distances([truth(WORLD, pose, PAPER)], pose)
+            assert found == pytest.approx([DISTANCE], abs=1e-9)
+
+    def test_distance_is_of_the_nearest_corners_and_of_nothing_too_far(self):
+        along = (B - A) / DISTANCE
+        views = [
+            features(corners=[corner(*p) for p in positions])
+            for positions in (
+                (A - 0.01 * along, A + 0.2 * along, B),
+                (A,),
+                (A, B + 0.26 * along),
+                (A - 0.24 * along, B),
+                (),
+            )
+        ]
+        found = two_corners.found_distances(views, (0.0, 0.0, 0.0))
+        assert found == pytest.approx([DISTANCE + 0.01, DISTANCE + 0.24])
+
+    def test_bound_is_that_of_both_corners_along_their_line(self, monkeypatch):
+        """Variances of 4 and 9 mm² along the line from A to B add up, those across do not count."""
+        along = (B - A) / DISTANCE
+        across = np.array((-along[1], along[0]))
+        rows = [corner(*A), corner(*B)]
+        for row, variance in zip(rows, (4e-6, 9e-6), strict=True):
+            row["covariance"] = variance * np.outer(along, along) + 1e-2 * np.outer(across, across)
+        monkeypatch.setattr(two_corners, "truth", lambda *_: features(corners=rows))
+        assert two_corners.distance_bound((0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(13e-6))
+
+    def test_tables_by_hand(self):
+        found = {"liu": [np.array([DISTANCE - 0.0125] * 2), np.empty(0)], "iepf": [np.empty(0)] * 2}
+        overall = two_corners._overall(found, np.array([0.003, 0.004]), 4)
+        liu, iepf, bound = (dict(zip(overall.columns, row, strict=True)) for row in overall.rows)
+        assert liu["paper: mean [m]"] == "2.302"
+        assert liu["here: mean [m]"] == "2.2895"
+        assert liu["RMS error ÷ bound"] == pytest.approx(12.5 / math.sqrt(12.5))
+        assert liu["share of scans with both"] == pytest.approx(2 / 20)
+        assert iepf["here: mean [m]"] is iepf["paper: mean [m]"] is None
+        assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
+        off, spread, share = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
+        assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
+        assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
+        assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
+
+    def test_drawn_is_the_scan_with_the_median_error(self, monkeypatch):
+        """Errors of 1, 3 and 2 cm, and one without both corners, which is the worst."""
+        along, (x, y, turn) = (B - A) / DISTANCE, POSES[0]
+        rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+        found = [
+            features(corners=[corner(*((place - (x, y)) @ rotation)) for place in places])
+            for places in [(A, B + off * along) for off in (0.01, 0.03, 0.02)] + [(A,)]
+        ]
+        monkeypatch.setattr(two_corners, "batch_of", lambda *_: found)
+        assert two_corners._median_view(None, range(4), POSES[0]) == (2, found[2])
+
+    @pytest.mark.slow
+    def test_good_method_spreads_like_the_bound_and_none_spreads_less(self):
+        pose, rng = POSES[4], np.random.default_rng(2)
+        seen = [PAPER.scan(WORLD, pose, rng) for _ in range(200)]
+        extract = ln.Extractor("ransac", noise=PAPER.noise)
+        distances = two_corners.found_distances(scans.batch_of(extract, seen), pose)
+        assert len(distances) > 190
+        error = np.sqrt(np.mean((distances - DISTANCE) ** 2))
+        # 4 standard deviations of a standard deviation of 190 draws are 0.2 of it.
+        assert 0.8 < error / two_corners.distance_bound(pose) < 1.4

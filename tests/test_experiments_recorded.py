@@ -1,0 +1,194 @@
+"""Experiments on recordings: the museum, tracking, and measures that need no truth."""
+
+import json
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from small_experiments import silent, small  # noqa: F401
+
+import lineament as ln
+from lineament.logs import save_npz
+from lineament.reproduce import (
+    Setting,
+    contenders,
+    museum,
+    real,
+    scans,
+    tracking,
+)
+from lineament.reproduce.two_corners import DISTANCE, WORLD
+from lineament.scan.poses import relative
+from lineament.simulation import SENSORS, drive, room
+
+
+class TestMuseum:
+    """A bag of the layout of the museum's: echoes of a drive past the two corners of Table 2."""
+
+    @pytest.fixture
+    def bag(self, tmp_path):
+        pytest.importorskip("rosbags")
+        from ros_bags import Messages, write
+
+        messages, way = Messages(1), [(0.7, 0.9), (3.0, 1.3), (1.6, 2.4)]
+        items = []
+        for scan in drive(WORLD, way, SENSORS["utm30lx"], speed=0.8, rate=10):
+            echoes = [[r, r + 0.5] if r > 0 else [] for r in np.nan_to_num(scan.ranges, posinf=0)]
+            beams = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
+            message = messages.echoes(5 + scan.stamp, echoes, **beams)
+            items.append(("horizontal_laser_2d", int(1e9 * scan.stamp), message))
+            other = messages.scan(5 + scan.stamp, [1.0] * 9)
+            items.append(("another", int(1e9 * scan.stamp), other))
+        return write(tmp_path, "rosbag1", items, "museum")
+
+    @pytest.mark.usefixtures("small")
+    def test_bag_gives_figures_11_to_13_and_tables_2_and_3(self, bag, monkeypatch):
+        monkeypatch.setattr(museum, "SCANS_A_FRAME", 20)
+        findings = museum.run(Setting(2, museum=bag), silent)
+        names = [figure.name for figure in findings.figures]
+        parts = "fig11", "fig11-others", "fig12", "fig13"
+        assert names == [f"museum-{part}" for part in parts]
+        methods, distance = (findings.numbers[key] for key in ("methods", "distance"))
+        assert list(methods) == list(distance)
+        assert methods["iepf"]["corners"] > 3
+        assert methods["iepf"]["mean"] < 0.01 < methods["pdbs, fitted"]["mean"]
+        assert distance["iepf"]["mean"] == pytest.approx(DISTANCE, abs=0.01)
+        assert distance["iepf"]["found"] > 0.8
+        assert distance["pdbs, fitted"]["found"] == 0
+        assert len(distance["iepf"]["places"]) == 5
+        row = next(row for row in findings.tables[1].rows if row[0] == contenders.LIU_PAPER)
+        first = dict(zip(findings.tables[1].columns, row, strict=True))
+        assert (first["method"], first["paper: mean [m]"]) == ("liu, paper’s numbers", "2.302")
+        json.dumps(findings.to_dict(), allow_nan=False)
+
+    def test_scans_are_of_the_museums_topic_and_apart(self, bag):
+        frames, in_row = museum.read(bag, 3)
+        assert [len(scan) for scan in frames] == [1081] * 3
+        assert frames[2].stamp - frames[1].stamp == pytest.approx(frames[1].stamp - frames[0].stamp)
+        assert (np.diff([scan.stamp for scan in in_row]) > 0.09).all()
+        assert in_row[0].stamp > frames[0].stamp
+
+    def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
+        def view(way, **corners):
+            places = {"a": (0, True), "b": (2, False), "c": (3.5, False), "f": (9, False)}
+            shown = {ord(n): (np.array((places[n][0], 0.0)), places[n][1]) for n in corners}
+            return museum.View(None, None, way, shown)
+
+        several = [view(0.1 * k, a=1, b=1, f=1) for k in range(6)]
+        several += [view(1.0 + 0.3 * k, a=1, c=1) for k in range(5)]
+        views, a, b = museum.views_of_two(several)
+        assert (chr(a), chr(b), len(views)) == ("a", "c", 5)
+        assert [v.way for v in museum._at_places(views)] == [v.way for v in views]
+        places = [several.index(v) for v in museum._at_places(several)]
+        assert places == [0, 5, 6, 8, 10]
+        assert museum.views_of_two(several[:4]) is None
+        assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
+
+
+class TestTracking:
+    def test_synthetic_odometry_has_the_errors_that_are_stated(self):
+        poses = [(0.5 * i, 0.0, 0.0) for i in range(2000)]
+        way = tracking.stand_in_odometry(poses, seed=1)
+        steps = np.array([relative(a, b) for a, b in pairwise(way)])
+        np.testing.assert_allclose(steps.mean(axis=0), (0.5, 0.0, 0.0), atol=0.006)
+        np.testing.assert_allclose(steps.std(axis=0), (0.07, 0.07, 0.01), rtol=0.06)
+        assert way == tracking.stand_in_odometry(poses, seed=1)
+
+    @pytest.mark.slow
+    def test_a_small_log(self, tmp_path):
+        path = tmp_path / "small.npz"
+        save_npz(path, list(drive(room(), [(-2, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)))
+        found = tracking.load_recording(path, 12, 0.5)
+        every = tracking.load_recording(path, 99)
+        assert found[0].stamp == every[len(every) // 2].stamp
+        numbers = tracking.measure("small", found, 0, silent)
+        motions, tracks = numbers["motion"], numbers["tracks"]
+        assert numbers["relations"] == numbers["near"] == numbers["far_apart"] == {}
+        assert list(motions) == [
+            *("odometry, synthetic", "features", "ICP"),
+            *("features, no odometry", "ICP, no odometry"),
+        ]
+        for name in ("features", "ICP", "features, no odometry"):
+            assert motions[name]["way_median"] < 0.01
+        assert motions["features"]["unobserved"] == 0
+        assert tracks["features"]["segments"]["kept"] > 0.95
+
+
+class TestReal:
+    """A right angle 2 m ahead, six times from one place and twice from others; and no log."""
+
+    @pytest.fixture
+    def folder(self, tmp_path, monkeypatch):
+        poses = [(0.0, 0.0, 0.0)] * 6 + [(0.4, 0.0, 0.0), (0.4, 0.4, 0.0)]
+        bearings = np.radians(np.arange(-45, 46))
+        rng, found = np.random.default_rng(5), []
+        for k, (x, y, theta) in enumerate(poses):
+            directions = np.column_stack((np.cos(bearings), np.sin(bearings)))
+            # The walls x + y = 2 and x - y = 2 meet at (2, 0).
+            ranges = np.minimum(*((2.0 - x - s * y) / (directions @ (1.0, s)) for s in (1.0, -1.0)))
+            ranges += rng.normal(0.0, 0.003, len(ranges))
+            beams = {"angle_min": bearings[0], "angle_increment": math.radians(1)}
+            found.append(ln.LaserScan(ranges, **beams, pose=(x, y, theta), stamp=0.1 * k))
+        save_npz(tmp_path / "wedge.npz", found)
+        np.savez(tmp_path / "other.npz", azimuth=np.zeros(3))
+        methods = {name: ln.Extractor(name) for name in ("optimal", "iepf")}
+        monkeypatch.setattr(real, "feature_methods", lambda *_: methods)
+        monkeypatch.setattr(real, "LOGS", {"Wedge": "wedge.npz", "Missing": "missing.npz"})
+        for name, value in (("SCANS", 1), ("PAIRS", 4), ("ARENA", 3), ("STILL", 4)):
+            monkeypatch.setattr(real, f"{name}_A_FRAME", value)
+        return tmp_path
+
+    def test_numbers_of_a_tiny_recording(self, folder):
+        findings = real.run(Setting(2, 0, folder), silent)
+        assert findings.text[-1] == "Left out, as they hold no scans: other.npz."
+        free = findings.numbers["free_space"]
+        assert list(free) == ["wedge.npz"]
+        assert free["wedge.npz"]["optimal"] == {
+            "phantom_in_100m": 0.0,
+            "longest_phantom": 0.0,
+            "phantom_scans": 0.0,
+            "covered": 1.0,
+        }
+        # The first five pairs in a row are from one place: each has two walls and their corner.
+        standing = findings.numbers["standing"]["wedge.npz"]["optimal"]
+        for kind, pairs in (("segments", 10), ("corners", 5)):
+            counts = [bins["pairs"] for bins in standing[kind].values()]
+            assert counts == [0, 0, 0, pairs, 0]
+            assert standing[kind]["30-99"]["found_again"] == 1.0
+            assert 0.1 < standing[kind]["30-99"]["nees_median"] < 5.0
+        # The first six are each paired with the next, that with the last, both ways: one corner
+        # and two walls each.
+        (repeats,) = findings.numbers["repeats"].values()
+        found = repeats["optimal"]
+        assert [found[name] for name in ("expected", "rate", "count", "chance")] == [14, 1, 14, 0]
+        assert math.isnan(found["auc"])
+        assert (found["count_without_edges"], found["corners_expected"]) == (14, 14)
+        assert (found["corners_per_scan"], found["corner_rate"], found["segment_rate"]) == (1, 1, 1)
+        assert found["segments_expected"] == 28
+        assert found["corner_rmse"] < 0.02
+        assert findings.numbers["arena"] == {}
+        measures = len(real.FREE_SPACE), 2 * len(real.STANDING_STILL), len(real.REPEATS), 1
+        assert len(findings.tables) == sum(measures)
+        assert {table.columns for table in findings.tables[:-1]} == {
+            ("recording", "optimal", "iepf")
+        }
+        assert findings.tables[3].rows[1][:2] == ("all", 100.0)
+        again = findings.tables[6]
+        assert again.title == "Standing still, segments: found again [%]"
+        assert [row[:2] for row in again.rows[:1]] == [("wedge.npz", 100.0)]
+        json.dumps(findings.to_dict(), allow_nan=False)
+
+    @pytest.mark.slow
+    @pytest.mark.usefixtures("folder")
+    def test_all_recordings(self, data_dir, monkeypatch):
+        logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
+        monkeypatch.setattr(real, "LOGS", logs)
+        findings = real.run(Setting(1, 0, data_dir), silent)
+        assert len(findings.numbers["free_space"]) >= 24
+        unread = set(findings.text[-1].rstrip(".").split(": ")[1].split(", "))
+        assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
+        assert set(scans.STANDING) < set(findings.numbers["standing"])
+        assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
+        assert list(findings.numbers["arena"]) == list(real.ARENAS)
+        json.dumps(findings.to_dict(), allow_nan=False)
