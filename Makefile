@@ -49,7 +49,9 @@ tests: .venv/ready browser ros1
 	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
 
 coverage: .venv/ready
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m 'not slow'
+	rm -f .coverage .coverage.*
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n auto --dist worksteal -m 'not slow'
+	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
 
 # The wheel is pure, and runs in an environment that has nothing else.
@@ -84,5 +86,5 @@ lines:
 	END { for (folder in of) printf "%7d  %s/%s\n", of[folder], top, folder | "sort -rn"; close("sort -rn"); printf "%7d  %s in all\n\n", all, top }'; done
 
 clean:
-	rm -rf .venv dist build demo .coverage
+	rm -rf .venv dist build demo .coverage .coverage.*
 	find src -name '*.nb[ic]' -delete

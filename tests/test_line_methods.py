@@ -235,6 +235,7 @@ def test_covariances_of_corners_have_the_lever_arm(name):
     assert 1.7 < np.mean(nees) < 2.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [None, NOISE], ids=["estimated", "given"])
 @pytest.mark.parametrize("name", [*NAMES, "liu", "pdbs", "optimal", "maps"])
 def test_features_do_not_depend_on_how_they_are_asked_for(name, noise):
