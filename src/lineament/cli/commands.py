@@ -10,6 +10,7 @@ from .extract import extract
 from .live import live
 from .options import (
     HUSH,
+    LIMITS,
     LOG,
     LOG_PATH,
     METHODS,
@@ -140,16 +141,17 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 
 @click.command()
 @click.argument("log", required=False, type=LOG_PATH)
+@LIMITS
 @click.option(
     "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
 )
 @QUIET
-def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
+def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, quiet: bool) -> None:
     """Make a page of a simulated drive, or of LOG."""
     from ..tasks.demo import run_demo
     from .progress import tracker
 
-    facts = run_demo(output, log, track=tracker(quiet))
+    facts = run_demo(output, log, track=tracker(quiet), limits=limits)
     if not quiet:
         width = max(len(name) for name, _ in facts)
         click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))

@@ -5,7 +5,18 @@ from typing import Any
 
 import click
 
-from .options import KEEP_GOING, LOG, PATH, QUIET, SCAN, TOPIC, check_ending, wrong_usage
+from .options import (
+    KEEP_GOING,
+    LIMITS,
+    LOG,
+    PATH,
+    QUIET,
+    SCAN,
+    TOPIC,
+    Place,
+    check_ending,
+    wrong_usage,
+)
 
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 
@@ -17,6 +28,7 @@ SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_defaul
 @click.option("-o", "--output", required=True, type=PATH, help="A picture (.png …) or .html.")
 @TOPIC
 @KEEP_GOING
+@LIMITS
 @QUIET
 def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) -> None:
     """Put methods side by side on a scan of LOG."""
@@ -49,12 +61,12 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
 @click.option(
     "--data",
     envvar="LINEAMENT_DATA",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    type=Place(path_type=Path, exists=True, file_okay=False),
     help="Folder of the recordings.  [default: LINEAMENT_DATA if set]",
 )
 @click.option(
     "--museum",
-    type=click.Path(path_type=Path, exists=True),
+    type=Place(path_type=Path, exists=True),
     help="A bag of the Deutsches Museum, by Cartographer.",
 )
 @QUIET

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
 
 from .._lazy import Pictured
 from ..errors import LogError
+from ..limits import LIMITS, Limits
 from ..scan import LaserScan
 
 T = TypeVar("T")
@@ -24,11 +25,12 @@ ECHOES = ("first", "last", "strongest")
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How ROS messages become scans, as `open_log` takes it; ValueError if a value is wrong."""
+    """How logs are read, as `open_log` takes it; ValueError if a value is wrong."""
 
     echo: str = "first"
     ring: int | None = None
     pose_topic: str | None = None
+    limits: Limits = LIMITS
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
@@ -81,7 +83,7 @@ class Log(Pictured, ABC):
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
     options : ReadOptions
-        How to make scans of messages that hold more than one.
+        How to make scans of messages that hold more than one, and the limits of what is read.
 
     Attributes
     ----------
@@ -117,7 +119,7 @@ class Log(Pictured, ABC):
         self.name = str(path)
         self.topic = topic
         self.keep_going = keep_going
-        self.options = options
+        self.options, self.limits = options, options.limits
         self.skipped = 0
         self.faults: list[str] = []
         self._open()
@@ -150,7 +152,19 @@ class Log(Pictured, ABC):
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
-        yield from self._items()
+        scans, beams = self.limits.scans, self.limits.beams
+        for count, item in enumerate(self._items(), 1):
+            n = len(item[1].ranges)
+            if n <= beams and count <= scans:
+                yield item
+                continue
+            try:
+                self.limits.check("scans", count)
+                self.limits.check("beams", n)  # Most readers checked it before it was made.
+            except ValueError as error:
+                self._fault(LogError(self.name, f"scan {count - 1}: {error}"))
+            if count > scans:
+                return
 
     def __iter__(self) -> Iterator[LaserScan]:
         return map(itemgetter(1), self.items())

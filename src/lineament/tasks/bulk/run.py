@@ -17,6 +17,7 @@ from ..._version import __version__
 from ...extractor import Extractor, load_kernels
 from ...features import COUNTED
 from ...files import made_folder
+from ...limits import Limits
 from ...logs import find_logs, open_log
 from ...logs.base import ReadOptions
 from ...logs.sources import is_address
@@ -100,7 +101,8 @@ def extract_logs(
     show : callable
         ``show(text)`` is called twice a second with the progress.
     **reading
-        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``.
+        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
+        ``limits``.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def extract_logs(
     if executor is None or isinstance(executor, Threads):  # once here, not in each process
         load_kernels([extractor])
     started = time.perf_counter()
-    found = [full_path(log) for log in find_logs(logs)]
+    found = [full_path(log) for log in find_logs(logs, settings["limits"])]
     manifest = Manifest(made_folder(folder))
     names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
     configuration = _configuration(extractor, settings) | ({"world": True} if world else {})
@@ -255,7 +257,8 @@ def _settings(reading: dict[str, Any]) -> dict[str, Any]:
         if name not in defaults:
             raise ValueError(f"{name!r} is unknown, expected one of: {', '.join(defaults)}")
     settings = defaults | reading
-    ReadOptions(settings["echo"], settings["ring"], settings["pose_topic"])  # checks them
+    limits = Limits.of(settings["limits"])
+    ReadOptions(settings["echo"], settings["ring"], settings["pose_topic"], limits)  # checks them
     return settings
 
 
