@@ -1,6 +1,7 @@
 """The command line: arguments only. Every command is one call of the library."""
 
 import errno
+import os
 import sys
 
 import click
@@ -40,9 +41,28 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
+    output = sys.stdout
     try:
         with compiling_shown(show_compiling):
-            cli.main(arguments, prog_name="lineament", standalone_mode=False)
+            return _run(arguments)
+    except (click.Abort, KeyboardInterrupt):
+        return _complain("lineament: stopped", 130)
+    except Terminated as stopped:
+        return _complain("lineament: stopped", 128 + stopped.number)
+    except OSError as error:
+        if error.filename is None and error.errno not in _UNWRITABLE:
+            raise
+        return _unwritten(error.filename, error.strerror)
+    except SystemExit:
+        if sys.stdout is output:
+            raise
+        # It ended in a pipe that nobody reads any more: click exits, with a wrapper around it.
+        return _unwritten(None, os.strerror(errno.EPIPE))
+
+
+def _run(arguments: list[str] | None) -> int:
+    try:
+        cli.main(arguments, prog_name="lineament", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         complain(error.format_message())
         return 2
@@ -53,17 +73,12 @@ def run(arguments: list[str] | None = None) -> int:
         return _complain(f"lineament: {error.format_message()}", 1)
     except LineamentError as error:
         return _complain(f"lineament: {error}", 1)
-    except (click.Abort, KeyboardInterrupt):
-        return _complain("lineament: stopped", 130)
-    except Terminated as stopped:
-        return _complain("lineament: stopped", 128 + stopped.number)
-    except OSError as error:
-        if error.filename is None and error.errno not in _UNWRITABLE:
-            raise
-        where = error.filename or "standard output"
-        sys.stdout = None  # What is left in its buffer is not to be written at the exit.
-        return _complain(f"lineament: {where}: {error.strerror}", 1)
     return 0
+
+
+def _unwritten(name: str | None, reason: str | None) -> int:
+    sys.stdout = None  # What is left in its buffer is not to be written at the exit.
+    return _complain(f"lineament: {name or 'standard output'}: {reason}", 1)
 
 
 def _complain(message: str, status: int) -> int:

@@ -17,6 +17,8 @@ from ..scan import LaserScan
 
 T = TypeVar("T")
 
+#: What is wrong with a file whose end is not where it was.
+SHRUNK = "has become shorter while it was read"
 #: How many messages about faults are kept.
 MAX_FAULTS = 10
 #: Which return of a beam that has several can be asked for.
@@ -103,6 +105,8 @@ class Log(Pictured, ABC):
     endings: ClassVar[tuple[str, ...]]
     #: Whether the reader seeks in the file, which must then not be compressed as a whole.
     needs_seek: ClassVar[bool] = False
+    #: Whether all of it is in memory, whatever becomes of the file.
+    is_held: ClassVar[bool] = False
     #: The one topic of a format whose scans are all of a kind.
     only_topic: ClassVar[str] = "scan"
 
@@ -122,7 +126,9 @@ class Log(Pictured, ABC):
         self.options, self.limits = options, options.limits
         self.skipped = 0
         self.faults: list[str] = []
+        self._size = 0
         self._open()
+        self._check_size()
 
     def _open(self) -> None:
         """Read as much of the file as shows that it is a log, and has the topic."""
@@ -152,6 +158,7 @@ class Log(Pictured, ABC):
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
+        self._check_size()
         scans, beams = self.limits.scans, self.limits.beams
         for count, item in enumerate(self._items(), 1):
             n = len(item[1].ranges)
@@ -165,6 +172,15 @@ class Log(Pictured, ABC):
                 self._fault(LogError(self.name, f"scan {count - 1}: {error}"))
             if count > scans:
                 return
+
+    def _check_size(self) -> None:
+        """Report that the file has become shorter than it was when the log was last read."""
+        try:
+            before, self._size = self._size, self.path.stat().st_size
+        except OSError:
+            return  # What reads it reports that.
+        if self._size < before and not self.is_held and self.path.is_file():
+            self._fault(LogError(self.name, SHRUNK))
 
     def __iter__(self) -> Iterator[LaserScan]:
         return map(itemgetter(1), self.items())

@@ -9,14 +9,12 @@ from pathlib import Path
 
 from ..errors import LogError
 from ..limits import LIMITS, Limits
+from .base import SHRUNK
 
 #: How a gzip file begins.
 GZIP = b"\x1f\x8b"
 #: Mark that some programs put before the first line.
 BOM = b"\xef\xbb\xbf"
-#: What is wrong with a file whose end is not where it was.
-SHRUNK = "became shorter while it was read"
-
 _PROBLEMS: dict[type[OSError], str] = {
     FileNotFoundError: "there is no such file, expected a log",
     PermissionError: "no permission to read it",

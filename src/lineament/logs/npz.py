@@ -44,6 +44,7 @@ class NpzLog(Log):
 
     format = "npz"
     description = "npz (ranges, angle_min, angle_increment)"
+    is_held = True
     endings = (".npz",)
     needs_seek = True
     only_topic = "ranges"

@@ -18,8 +18,8 @@ from ..errors import LogError
 from ..limits import Limits
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
-from .base import Head
-from .lines import SHRUNK, reading
+from .base import SHRUNK, Head
+from .lines import reading
 from .mcap import McapReader
 from .ros import RosLog
 from .ros_bag import Bag, Connection, Fault, RecordBag, decompress

@@ -29,6 +29,7 @@ class RplidarLog(Log):
 
     format = "rplidar"
     description = "RPLIDAR JSON ([range, angle] or [x, y] of units)"
+    is_held = True
     endings = (".json",)
 
     def _open(self) -> None:
