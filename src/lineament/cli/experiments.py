@@ -1,4 +1,4 @@
-"""The commands that compare, measure and simulate. Each imports what it calls when it runs."""
+"""The commands that show, compare and simulate. Each imports what it calls when it runs."""
 
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from .options import (
     KEEP_GOING,
     LIMITS,
     LOG,
+    LOG_PATH,
     PATH,
     QUIET,
     SCAN,
@@ -19,6 +20,24 @@ from .options import (
 )
 
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+
+
+@click.command()
+@click.argument("log", required=False, type=LOG_PATH)
+@LIMITS
+@click.option(
+    "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
+)
+@QUIET
+def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, quiet: bool) -> None:
+    """Make a page of a simulated drive, or of LOG."""
+    from ..tasks.demo import run_demo
+    from .progress import tracker
+
+    facts = run_demo(output, log, track=tracker(quiet), limits=limits)
+    if not quiet:
+        width = max(len(name) for name, _ in facts)
+        click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
 @click.command()
