@@ -226,7 +226,8 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         with Path(path).open("rb") as file:
             data = file.read(LIMITS.line + 1)
-        LIMITS.check("line", len(data))
+        if len(data) > LIMITS.line:
+            raise ValueError(f"it has more than {LIMITS.line} bytes")
         found = tomllib.loads(data.decode())
     except OSError as error:
         raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
