@@ -84,7 +84,7 @@ def plot(
 
 
 @click.command()
-@LOG
+@click.argument("logs", nargs=-1, required=True, type=LOG_PATH)
 @methods_option("A method to choose from; may be given again.  [default: all; with --set, optimal]")
 @SET
 @NOISE
@@ -96,7 +96,7 @@ def plot(
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
-    log: Path | str,
+    logs: tuple[Path | str, ...],
     methods: tuple[str, ...],
     settings: tuple[str, ...],
     noise: float | None,
@@ -105,13 +105,16 @@ def view(
     port: int,
     no_browser: bool,
 ) -> None:
-    """Look at LOG in the browser: scans, features, and why a segment is missing."""
+    """Look at LOGS in the browser: scans, features, and why a segment is missing.
+
+    LOGS are files, folders, patterns, archives or addresses; the page has a list of them.
+    """
     from ..methods import DEFAULT_METHOD, method_names
     from ..view import Session, serve
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
-    session = Session(log, extractors, **reading)
+    session = Session(logs, extractors, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 
 
