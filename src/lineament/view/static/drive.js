@@ -103,7 +103,7 @@ export class Backdrop {
       for (let row = v; row < v + dot; row++) {
         for (let i = row * width + u; i < row * width + u + dot; i++) {
           const alpha = pixels[i] >>> 24;
-          pixels[i] = ((alpha ? Math.min(alpha + 30, 255) : 140) << 24) | paint;
+          pixels[i] = ((alpha ? Math.min(alpha + 20, 210) : 130) << 24) | paint;
         }
       }
     }

@@ -223,7 +223,8 @@ class App {
     const button = $("world");
     button.disabled = !posed;
     button.title = posed ? "The scan in the world frame, with the drive behind it (w)"
-      : complete ? "This log has no poses, which the world frame needs" : "No poses have been read so far";
+      : complete ? "This log has no poses (those of a ROS log may be in a topic: --poses TOPIC)"
+        : "No poses have been read so far";
     $("no-poses").hidden = !complete || posed > 0;
   }
 
