@@ -107,7 +107,7 @@ export class Drawing {
       ctx.beginPath();
       for (const [x, y] of drive.poses.slice(first, end)) {
         const pixel = x === null ? null : plane.toPixels([x, y], size);
-        // What would not be seen as a line of its own costs nothing.
+        // Steps that are too short to be seen are left out.
         if (pixel && before && Math.abs(pixel[0] - before[0]) + Math.abs(pixel[1] - before[1]) < 1.5) continue;
         if (pixel) ctx[before ? "lineTo" : "moveTo"](...pixel);
         before = pixel;
