@@ -3,8 +3,9 @@
 import { addressOf, readAddress } from "./address.js";
 import { Latest, ask } from "./api.js";
 import { Pins, element, showWhy } from "./details.js";
-import { placeBeams, readTheme } from "./drawing.js";
+import { readTheme } from "./drawing.js";
 import { Drive } from "./drive.js";
+import { placeBeams } from "./geometry.js";
 import { listenToKeys } from "./keys.js";
 import { Layers } from "./layers.js";
 import { Panel } from "./panel.js";
@@ -17,7 +18,6 @@ const PATIENCE = 700; // milliseconds after which the page says what it waits fo
 const WAITING = "working …";
 const POLL = 300; // milliseconds between two looks at how far the log is read
 const REST = 300; // milliseconds without a change after which the address is written
-const INSIDE = 0.08; // of a panel's size: nearer to its border the world follows the sensor
 
 class App {
   plane = new Plane();
@@ -47,7 +47,6 @@ class App {
     this.pins = new Pins($("pins"), $("unpin"), $("pins-hint"));
     this.layers = new Layers($("layers"), () => this.redraw());
     this.layers.hide(wanted.hidden);
-    this.layers.allowDrive(false);
     $("sigmas").value = wanted.sigmas ?? "3";
     if (!$("sigmas").value) $("sigmas").value = "3";
     const methods = wanted.methods.filter((name) => this.methods.includes(name));
@@ -65,8 +64,10 @@ class App {
 
   /** Show a log, as a link wants it. */
   async open(number, wanted = {}) {
+    const drive = new Drive(number), isWorld = wanted.world ?? this.world;
     this.drive?.close();
-    Object.assign(this, { number, drive: new Drive(number), asked: null });
+    this.#setWorld(false);
+    Object.assign(this, { number, drive, asked: null });
     this.#wanted = { ...wanted, view: wanted.view ?? null };
     this.#fits = true;
     delete document.body.dataset.scan;
@@ -74,18 +75,21 @@ class App {
     $("name").textContent = this.logName;
     document.title = `${this.logName} – lineament`;
     for (const id of ["topic", "facts"]) $(id).textContent = "";
-    $("problem").hidden = true;
+    for (const id of ["problem", "reading"]) $(id).hidden = true;
     this.timeline.open(number);
     for (const panel of this.panels) panel.clear();
     this.#offerWorld({ posed: 0, complete: false });
     this.redraw();
-    await this.follow(wanted.scan ?? 0, wanted.world ?? this.world);
+    try {
+      await this.follow(wanted.scan ?? 0, isWorld);
+    } catch (error) {
+      if (drive === this.drive) throw error; // no other log was opened meanwhile
+    }
   }
 
   /** Follow how far the log is read; show the first scan, or that of the address, once it is. */
   async follow(scan, isWorld) {
     const { drive } = this;
-    this.world = false;
     for (let shown = false; ;) {
       const log = await ask("log", { log: drive.log });
       if (drive !== this.drive) return; // another log was opened
@@ -162,14 +166,16 @@ class App {
   }
 
   #loaded(index) {
-    const { scan, size } = this.panels[0], { view, beam } = this.#wanted;
+    const { scan, frame, size } = this.panels[0], { view, beam } = this.#wanted;
     $("problem").hidden = true;
     $("topic").textContent = `${scan.topic} in `;
     if (this.asked && this.asked.index !== index) this.asked = null;
     document.body.dataset.scan = index;
     if (view) this.look(() => this.plane.look(view, size));
     else if (view === null) this.fit();
-    else if (this.world) this.#keepInside();
+    else if (frame && !this.#fits && this.world && !this.panels[0].isSensorInside) {
+      Object.assign(this.plane, { x: frame.x, y: frame.y }); // the view moves on with the sensor
+    }
     this.#wanted = {};
     if (beam < scan.beams) this.explain(this.panels[0], beam);
     this.redraw();
@@ -177,25 +183,12 @@ class App {
 
   /** Show the whole scan; in the world, the whole drive. */
   fit() {
-    const [{ scan, frame, size }] = this.panels;
+    const [{ scan, outline, size }] = this.panels;
     if (!scan || !size.width) return;
     this.#fits = true;
-    // Lone measurements may lie anywhere.
-    const { points, clusters } = scan;
-    const clustered = points.filter((point, i) => point && clusters[i] >= 0);
-    const seen = [[0, 0], ...(clustered.length ? clustered : points.filter(Boolean))];
-    const placed = frame ? seen.map((point) => frame.toPlane(point)) : [];
-    const all = [...placed, ...(this.world ? this.drive.outline : [])];
-    this.plane.fit(all.length ? all : [[0, 0]], size);
+    const points = [...outline, ...(this.world ? this.drive.outline : [])];
+    this.plane.fit(points.length ? points : [[0, 0]], size);
     this.redraw();
-  }
-
-  // The view moves on with a sensor that leaves it.
-  #keepInside() {
-    const [{ frame, size }] = this.panels;
-    if (!frame || this.#fits) return;
-    const [u, v] = frame.toPixels([0, 0], size), inside = (x, whole) => Math.abs(x / whole - 0.5) < 0.5 - INSIDE;
-    if (!inside(u, size.width) || !inside(v, size.height)) Object.assign(this.plane, { x: frame.x, y: frame.y });
   }
 
   /** Change what the panels show of the plane. */
@@ -233,7 +226,8 @@ class App {
     $("world").setAttribute("aria-pressed", isWorld);
     this.layers.allowDrive(isWorld);
     for (const panel of this.panels) panel.place(isWorld);
-    if (isWorld) this.drive.load(() => this.resized()).catch(fail);
+    const { drive } = this;
+    if (isWorld) drive.load(() => this.resized()).catch((error) => drive === this.drive && fail(error));
   }
 
   redraw() {

@@ -2,13 +2,15 @@
 
 import { describe, element, listOf } from "./details.js";
 import { Backdrop } from "./drive.js";
-import { Drawing, layerOf } from "./drawing.js";
+import { Drawing } from "./drawing.js";
+import { layerOf } from "./geometry.js";
 import { LAYERS } from "./layers.js";
 import { Frame } from "./plane.js";
 
 const NEAR = 12; // pixels within which something is meant, and how much more by a finger
 const FINGER = 1.8;
 const STILL = 4; // pixels that a click may move
+const INSIDE = 0.08; // of the size: nearer to its border a sensor is about to leave
 
 export class Panel {
   scan = null; // with the features that the method found
@@ -60,6 +62,21 @@ export class Panel {
   place(isWorld) {
     const pose = isWorld ? this.scan?.pose : undefined;
     this.frame = pose === null ? null : new Frame(this.app.plane, pose);
+  }
+
+  /** Points of the plane about which the scan lies; none if it has no place. */
+  get outline() {
+    const { scan, frame } = this;
+    if (!scan || !frame) return [];
+    // Lone measurements may lie anywhere.
+    const clustered = scan.points.filter((point, i) => point && scan.clusters[i] >= 0);
+    const seen = clustered.length ? clustered : scan.points.filter(Boolean);
+    return [[0, 0], ...seen].map((point) => frame.toPlane(point));
+  }
+
+  get isSensorInside() {
+    const { frame, size } = this, [u, v] = frame.toPixels([0, 0], size);
+    return [u / size.width, v / size.height].every((share) => Math.abs(share - 0.5) < 0.5 - INSIDE);
   }
 
   show(scan) {

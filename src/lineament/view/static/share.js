@@ -53,9 +53,10 @@ export class Share {
   }
 
   async #copy() {
-    // Browsers give the clipboard to pages of this machine, and to those by https.
-    if (navigator.clipboard) await navigator.clipboard.writeText(this.link.value);
-    else {
+    try {
+      await navigator.clipboard.writeText(this.link.value);
+    } catch {
+      // Browsers give the clipboard to pages of this machine, and to those by https.
       this.link.select();
       document.execCommand("copy");
     }
