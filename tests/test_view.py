@@ -144,8 +144,9 @@ def test_poses_and_points_of_the_drive(server, log):
     scans = list(open_log(log))
     _, found = asked(server, "/api/poses?log=0&first=4&count=2")
     assert found == {"first": 4, "poses": [[None] * 3, list(scans[5].pose)]}
-    _, found = asked(server, "/api/drive?log=0&first=1&step=2&count=32")
-    assert [scan["index"] for scan in found["scans"]] == [3, 5]  # 1 and 7 have no pose
+    for first, step, count, expected in ((0, 3, 2, [0, 3]), (2, 1, 2, [2, 3]), (1, 2, 32, [3, 5])):
+        _, found = asked(server, f"/api/drive?log=0&first={first}&step={step}&count={count}")
+        assert [scan["index"] for scan in found["scans"]] == expected  # 1, 4 and 7 have no pose
     # A quarter turn: ahead is up, and the wall stays where it is.
     points = np.reshape(found["scans"][1]["points"], (-1, 2))
     expected = [5.0, 7.05] + scans[5].points[3:, ::-1] * [-1.0, 1.0]

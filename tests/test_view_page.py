@@ -67,13 +67,13 @@ def corners(count):
 
 
 def drive(count):
-    """Scans on the way through a room of 8 × 6 m about the origin of the world, with poses."""
+    """Scans with poses on the way through a room, x from -4 to 4 m and y from -2 to 3 m."""
     bearings = np.radians(np.arange(-90, 90, 2))
     for k in range(count):
         x, y, theta = pose = (-2.0 + 0.1 * k, 0.5, 0.05 * k)
         c, s = np.cos(bearings + theta), np.sin(bearings + theta)
         with np.errstate(divide="ignore"):
-            ranges = np.fmin((np.copysign(4, c) - x) / c, (np.copysign(3, s) - y) / s)
+            ranges = np.fmin((np.copysign(4, c) - x) / c, (np.where(s > 0, 3, -2) - y) / s)
         yield LaserScan(
             ranges, bearings[0], np.radians(2), range_max=30.0, stamp=0.1 * k, pose=pose,
             intensities=np.arange(90.0),
@@ -412,6 +412,10 @@ def test_fingers_move_zoom_and_ask(page, address):
     under = y + (half - 130) / scale
     assert zoomed[:2] == pytest.approx([x, under - (half - 100) / zoomed[2]], abs=2 / scale)
     assert page.text("#pins-hint") != ""  # that was no tap
+    page.touch((100, top + 100), (200, top + 100), kind="touchStart")
+    page.touch(kind="touchEnd")  # neither was that
+    time.sleep(0.3)
+    assert page.text("#why h3") is None
     page.click("#fit")
     place = page.seen("app.panels[0].scan.points[30]")
     u, v = page.run(PLACE, place)
@@ -447,8 +451,9 @@ KEYS = [
     ("s", "document.querySelector('dialog[open]')?.id", "sharing"),
     (Keys.ESCAPE, "document.querySelector('dialog[open]')", None),
     ("?", "document.querySelector('dialog[open]')?.id", "keys"),
-    ("w", "document.querySelectorAll('#key-list dt').length > 20", True),  # and nothing else
+    ("c", "document.querySelectorAll('#key-list dt').length > 20", True),
     (Keys.ESCAPE, "document.querySelector('dialog[open]')", None),
+    ("v", "app.panels.length", 1),  # the c did nothing below the list of keys
 ]
 
 
@@ -502,6 +507,9 @@ def test_the_world_frame_has_the_drive_behind_the_scan(page, address):
     x, y, theta = scan.pose
     ahead = x + scan.ranges[45] * np.cos(theta), y + scan.ranges[45] * np.sin(theta)
     assert beam == pytest.approx(ahead)
+    there = "{ const { frame, size } = app.panels[0];"
+    there += "return frame.toMetres(frame.toPixels([1.5, -0.7], size), size); }"
+    assert page.seen(there) == pytest.approx([1.5, -0.7])
     for name in ("clusters", "arcs", "segments", "breakpoints", "edges", "corners"):
         page.click(f"#show-{name}")
     ink = """{ const [u, v] = app.plane.toPixels(%s, app.panels[0].size).map(Math.round);
@@ -531,10 +539,55 @@ def test_the_world_frame_has_the_drive_behind_the_scan(page, address):
     # Near, the view goes with the sensor.
     page.press(Keys.HOME)
     shown(page, 0)
-    page.seen("{ app.look(() => app.plane.look([-2, 0.5, 1], app.panels[0].size)); }")
+    width, height = page.seen(
+        "{ const { size } = app.panels[0]; app.look(() => app.plane.look([-2, 0.5, 1], size));"
+        "return [size.width, size.height]; }"
+    )
+    assert page.seen("app.plane.scale") == pytest.approx(min(width, height))
+    assert width > height
     page.press(Keys.END)
     shown(page, 39)
     assert page.seen("[app.plane.x, app.plane.y]") == pytest.approx(seen[39].pose[:2])
+
+
+SCENE = """
+const { Drawing, readTheme } = await import("/drawing.js");
+const { placeBeams } = await import("/geometry.js");
+const { Frame, Plane } = await import("/plane.js");
+const { LAYERS } = await import("/layers.js");
+const covariance = [[0.002, 0.001], [0.001, 0.004]], spread = { first_beam: 0, last_beam: 3 };
+const scan = {
+  beams: 6, angle_min: 0.2, angle_increment: 0.3, ranges: [3, 3.1, 3, 2.9, null, 2],
+  clusters: [0, 0, 0, 0, -1, -1],
+  arcs: [{ center: [2, 2], radius: 1.3, ...spread }],
+  segments: [{ start: [-3, 1], end: [-1, 2.5] }],
+  breakpoints: [{ position: [-2, -1] }],
+  corners: [{ kind: "corner", position: [1, -2], covariance },
+            { kind: "edge", position: [-3, -2], covariance }],
+};
+placeBeams(scan);
+const size = { width: 400, height: 400 }, plane = Object.assign(new Plane(), { scale: 45 });
+const canvas = Object.assign(document.createElement("canvas"), size), ctx = canvas.getContext("2d");
+const drawing = new Drawing(ctx, plane, new Frame(plane, arguments[0]), size, readTheme());
+for (const layer of LAYERS) layer.draw(true, drawing, { scan, sigmas: 6 });
+drawing.highlight({ kind: "arc", feature: scan.arcs[0] }, scan, 3);
+drawing.beam(scan, 4);
+return [...ctx.getImageData(0, 0, 400, 400).data].filter((_, k) => k % 4 === 3);
+"""
+
+
+def test_a_scan_is_drawn_the_same_at_any_pose(page):
+    """Turned by a quarter and moved, with all that there is to draw: the picture turned."""
+    script = f"return (async function () {{ {SCENE} }}).apply(null, arguments)"
+    pictures = [
+        np.reshape(page.run(script, pose), (400, 400))
+        for pose in ([0, 0, 0], [0, 0, np.pi / 2], [20 / 45, 30 / 45, 0])
+    ]
+    assert np.count_nonzero(pictures[0]) > 2000
+    off = abs(np.rot90(pictures[0]) - pictures[1].astype(int)) > 100
+    assert np.count_nonzero(off) < 20
+    moved = pictures[2][:-30, 20:].astype(int) - pictures[0][30:, :-20]
+    assert np.count_nonzero(abs(moved) > 100) < 300  # the end of the beam that goes out of it
 
 
 def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
