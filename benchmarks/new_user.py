@@ -97,7 +97,15 @@ def main() -> None:
         user.runs("what came with it", "python", HERE / "installed.py", shown="installed.py")
         user.runs("help, for the first time", "lineament", "--help")
         user.runs("help, again", "lineament", "--help")
-        user.runs("a log to try", "lineament", "simulate", "-o", "drive.npz", makes="drive.npz")
+        user.runs(
+            "a log to try",
+            "lineament",
+            "simulate",
+            "building",
+            "-o",
+            "drive.npz",
+            makes="drive.npz",
+        )
         first = ("lineament", "extract", "drive.npz", "-o", "features.csv")
         user.runs("first extract, compiles", *first, makes="features.csv")
         user.runs("second extract", *first[:-1], "features.parquet", makes="features.parquet")
@@ -111,7 +119,7 @@ def main() -> None:
         user.runs("notebook: three cells", "python", "-c", NOTEBOOK, shown="features")
         (folder / "logs").mkdir()
         for seed in range(4):
-            made = ("--seed", seed, "-o", f"logs/{seed}.npz")
+            made = ("building", "--seed", seed, "-o", f"logs/{seed}.npz")
             user.runs(f"log {seed} of a folder", "lineament", "simulate", *made, makes=made[-1])
         folders = ("lineament", "extract", "logs", "-o", "table/")
         user.runs("a folder of logs", *folders, makes="table/log=*/*.parquet")
