@@ -97,15 +97,8 @@ def main() -> None:
         user.runs("what came with it", "python", HERE / "installed.py", shown="installed.py")
         user.runs("help, for the first time", "lineament", "--help")
         user.runs("help, again", "lineament", "--help")
-        user.runs(
-            "a log to try",
-            "lineament",
-            "simulate",
-            "building",
-            "-o",
-            "drive.npz",
-            makes="drive.npz",
-        )
+        drive = ("lineament", "simulate", "building", "--scans", "400", "-o")
+        user.runs("a log to try", *drive, "drive.npz", makes="drive.npz")
         first = ("lineament", "extract", "drive.npz", "-o", "features.csv")
         user.runs("first extract, compiles", *first, makes="features.csv")
         user.runs("second extract", *first[:-1], "features.parquet", makes="features.parquet")
@@ -118,9 +111,9 @@ def main() -> None:
         user.runs("notebook: install", *pip, "nbclient", "ipykernel", shown="pip install ipykernel")
         user.runs("notebook: three cells", "python", "-c", NOTEBOOK, shown="features")
         (folder / "logs").mkdir()
-        for seed in range(4):
-            made = ("building", "--seed", seed, "-o", f"logs/{seed}.npz")
-            user.runs(f"log {seed} of a folder", "lineament", "simulate", *made, makes=made[-1])
+        for seed in "123":
+            made = f"logs/{seed}.npz"
+            user.runs(f"log {seed} of a folder", *drive, made, "--seed", seed, makes=made)
         folders = ("lineament", "extract", "logs", "-o", "table/")
         user.runs("a folder of logs", *folders, makes="table/log=*/*.parquet")
         extra = f"{wheel}[live]"

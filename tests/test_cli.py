@@ -155,7 +155,7 @@ WRONG = [
     ("bench ple --data bench.npz -m pdbs", 2, "max_vertices"),
     ("bench ple --data bench.npz -m iepf -m hough --json a.json", 2, "one -m"),
     ("bench ple --data no.npz -m iepf", 1, "no.npz"),
-    ("simulate -o a.npz", 2, "WORLD"),
+    ("simulate -o a.npz --moving --speed 0", 2, "speed"),  # WORLD is the building
     ("simulate palace -o a.npz", 2, "world is 'palace', expected one of building, room"),
     ("simulate building -o a.npz --sensor sonar", 2, "sensor is 'sonar', expected one of paper"),
     ("simulate building -o a.npz --noise -1", 2, "sigma"),

@@ -1,8 +1,11 @@
 """The documents name what there is."""
 
+import doctest
 import re
 from dataclasses import fields
 from pathlib import Path
+
+import pytest
 
 import lineament as ln
 from lineament.cli.commands import COMMANDS
@@ -50,3 +53,20 @@ def test_every_public_name_resolves_and_is_documented():
         value = getattr(ln, name)
         assert isinstance(value, str) or value.__doc__
     assert dir(ln) == sorted(ln.__all__)
+
+
+@pytest.mark.parametrize("name", ["choosing", "faq", "invalid"])
+def test_examples_of_documents(name):
+    path = str(ROOT / "docs" / f"{name}.md")
+    flags = doctest.NORMALIZE_WHITESPACE
+    failed, tried = doctest.testfile(
+        path, module_relative=False, encoding="utf-8", optionflags=flags
+    )
+    assert tried >= 5
+    assert not failed
+
+
+def test_pages_lead_somewhere():
+    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([\w/.-]+)(?:#[\w-]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} leads to {target}"
