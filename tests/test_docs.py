@@ -69,3 +69,19 @@ def test_pages_lead_somewhere():
     for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
         for target in re.findall(r"\]\(([\w/.-]+)(?:#[\w-]*)?\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name} leads to {target}"
+
+
+def test_what_is_said_of_other_projects_has_its_source():
+    text = (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+    sources = set(re.findall(r"^\[([LOSF]\d+)\]: https://", text, re.MULTILINE))
+    tables = text.split("## Speed")[0]
+    rows = [line.split("|")[3:-1] for line in tables.splitlines() if line.startswith("|")]
+    cells = [cell for row in rows if len(row) == 4 for cell in zip("LOSF", row, strict=True)]
+    assert len(cells) > 100
+    used = set()
+    for project, cell in cells:
+        found = re.findall(r"\[([LOSF]\d+)\]", cell)
+        heading = not cell.strip(" -") or "_" in cell.split()[0] or cell.strip() == "FALKOLib"
+        assert heading or "†" in cell or any(name[0] == project for name in found), cell
+        used.update(found)
+    assert used == sources
