@@ -142,3 +142,5 @@ def simulate(
     with wrong_usage():
         sensor = sensor_like(name, sigma=sigma, dropout=dropout, outlier=outlier)
         simulate_log(output, world, sensor, track=tracker(quiet), **settings)
+    if not quiet:
+        click.echo(f"{world}, seen by {name} -> {output}")
