@@ -269,7 +269,7 @@ def test_a_session_takes_many_paths_and_one_bad_log_is_an_error(folder, tmp_path
         ("/api/log?log=wall.npz", 400, "log is 'wall.npz', expected a whole number"),
         ("/api/log?path=wall.npz", 400, "parameter 'path' is unknown, expected log"),
         ("/api/scan?" + "&".join(f"a{k}=1" for k in range(99)), 400, "makes no sense"),
-        ("/api/", 404, "/api/ is not there"),
+        ("/api/", 404, "'/api/' is not there"),
         ("/style.css/../../secret", 404, "is not there"),
         ("/%2e%2e/store.py", 404, "is not there"),
         ("/static/index.html", 404, "is not there"),
