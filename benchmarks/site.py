@@ -1,0 +1,230 @@
+"""Makes the pages of the site that are not written by hand; MkDocs calls it, see mkdocs.yml.
+
+Files of docs/ that end in .py are notebooks: they are run, and an error in one ends the build.
+Below reference/ is a page for each package that the navigation lists, from its docstrings.
+Documents at the root of the repository become pages. In all of them names of the package are
+links, and nothing may be loaded from elsewhere.
+"""
+
+import base64
+import inspect
+import re
+import shutil
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path, PurePosixPath
+from posixpath import relpath
+from typing import Any
+
+import jupytext
+import nbformat
+import numpy as np
+from click import Context, Group, unstyle
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
+
+from lineament.cli import cli
+from lineament.features.records import FIELDS, TABLES
+
+ROOT = Path(__file__).parents[1]
+#: Page of each document at the root.
+DOCUMENTS = {
+    "changelog.md": "CHANGELOG.md",
+    "contributing.md": "CONTRIBUTING.md",
+    "ros.md": "ros/README.md",
+    "security.md": "SECURITY.md",
+}
+#: Before the first cell: pictures that read on white and on black.
+_SETUP = """%matplotlib inline
+from matplotlib_inline.backend_inline import set_matplotlib_formats
+set_matplotlib_formats("png", transparent=True, dpi=130)
+"""
+#: Page and anchor of each documented name; filled while the reference is made.
+_PLACES: dict[str, str] = {}
+#: What mkdocstrings makes of a package itself: its docstring alone.
+_INTRODUCTION = """::: {}
+    options:
+      members: false
+      show_root_heading: false
+      show_root_toc_entry: false"""
+_LOADS = re.compile(r"<(?:script|img|link|iframe)\b[^>]*\b(?:src|href)=\"?(https?:)?//[^>]*>")
+_NAMES = re.compile(r"<(a|pre|h\d)\b.*?</\1>|<code>([\w.]+)(?:\(\))?</code>", re.DOTALL)
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages that are made."""
+    for page, source in DOCUMENTS.items():
+        text = _with_links_to_pages((ROOT / source).read_text("utf-8"), source)
+        files.append(File.generated(config, page, content=text))
+    for name in _listed(config.nav):
+        if name.startswith("reference/"):
+            module = PurePosixPath(name).stem
+            text = _commands() if module == "commands" else _reference(name, module)
+            files.append(File.generated(config, name, content=text))
+    notebooks = [file for file in files if file.src_uri.endswith(".py")]
+    with ThreadPoolExecutor(2) as pool:
+        for file, made in zip(notebooks, pool.map(_run, notebooks), strict=True):
+            files.remove(file)
+            for uri, content in made.items():
+                files.append(File.generated(config, uri, content=content))
+    return files
+
+
+def on_page_content(html: str, page: Page, **_: Any) -> str:
+    """Make names of the package links to where they are documented."""
+
+    def linked(found: re.Match[str]) -> str:
+        name = found[2]
+        if name is None or name not in _PLACES:
+            return found[0]
+        there, here = _PLACES[name], PurePosixPath(page.file.src_uri)
+        return f'<a href="{relpath(there, here.parent)}">{found[0]}</a>'
+
+    return _NAMES.sub(linked, html)
+
+
+def on_post_page(output: str, page: Page, **_: Any) -> str:
+    """Refuse pages that would load something from elsewhere."""
+    if found := _LOADS.search(output):
+        if 'rel="canonical"' not in found[0]:
+            raise PluginError(f"{page.file.src_uri} loads {found[0]}")
+    return output
+
+
+def _listed(nav: Any) -> list[str]:
+    """Return the pages of a navigation, in order."""
+    if isinstance(nav, str):
+        return [nav]
+    parts = nav.values() if isinstance(nav, dict) else nav
+    return [page for part in parts for page in _listed(part)]
+
+
+def _with_links_to_pages(text: str, source: str) -> str:
+    """Turn the links of a document outside of docs/ into links between pages."""
+    text = re.sub(r"\]\((?:\.\./)?docs/", "](", text)
+    for page, document in DOCUMENTS.items():
+        text = text.replace(f"]({document})", f"]({page})")
+    return text
+
+
+def _reference(page: str, module: str) -> str:
+    """Write the page of a package: what it is, a table of its names, and each of them."""
+    package = import_module(module)
+    text, rows = [f"# {module}", _INTRODUCTION.format(module)], ["| name | what it is |\n|---|---|"]
+    for name in _public(package):
+        value, home = getattr(package, name), f"{module}.{name}"
+        if inspect.ismodule(value):
+            rows.append(f"| [`{name}`]({home}.md) | {_summary(value)} |")
+            continue
+        if inspect.isclass(value) or inspect.isfunction(value):
+            home = f"{value.__module__}.{value.__qualname__}"
+        if home not in _PLACES:  # else it is on an earlier page
+            if isinstance(value, np.dtype):
+                text.append(f"## `{home}` {{ #{home} }}\n\n{_fields(value)}")
+            elif inspect.isclass(value) or inspect.isfunction(value):
+                text.append(f"::: {module}.{name}")
+            else:
+                rows.append(f"| `{name}` | {_value(value)} |")
+                continue
+            _PLACES[home] = f"{page[:-3]}.html#{module}.{name}"
+            _PLACES.setdefault(name, _PLACES[home])
+        place = _PLACES[f"{module}.{name}"] = _PLACES[home]
+        target = place.rpartition("/")[2].replace(".html#", ".md#")
+        rows.append(f"| [`{name}`]({target}) | {_summary(value)} |")
+    return "\n\n".join([*text[:2], "\n".join(rows), *text[2:]])
+
+
+def _public(package: Any) -> list[str]:
+    """Return the public names of a module: those that it lists, or what it defines."""
+    own = (
+        name
+        for name, value in vars(package).items()
+        if getattr(value, "__module__", "") == package.__name__ and not name.startswith("_")
+    )
+    return [name for name in getattr(package, "__all__", own) if name != "__version__"]
+
+
+def _summary(value: Any) -> str:
+    """Return the first sentence of a docstring."""
+    if isinstance(value, np.dtype):
+        return "type of its records"
+    first = (inspect.getdoc(value) or "").partition("\n\n")[0]
+    return " ".join(first.split()).replace("``", "`").replace("|", "\\|")
+
+
+def _value(value: Any) -> str:
+    """Return a constant as code, or the keys of a mapping."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"`{key}`" for key in value)
+    return f"`{str(value).replace('|', 'or')}`"
+
+
+def _fields(dtype: np.dtype[Any]) -> str:
+    """Return a table of the fields of a record."""
+    table = next(name for name, of in TABLES.items() if of is dtype)
+    rows = [
+        f"| `{field.name}` | `{np.dtype(field.form)}` | {field.unit} | {field.about} |"
+        for field in FIELDS
+        if field.table == table
+    ]
+    head = f"A record of `{table}`.\n\n| field | type | unit | meaning |\n|---|---|---|---|\n"
+    return head + "\n".join(rows)
+
+
+def _commands() -> str:
+    """Write the page of the commands: the help of each."""
+    text = ["# Commands", "As `--help` prints it."]
+    waiting = [("lineament", cli)]
+    while waiting:
+        name, command = waiting.pop(0)
+        with Context(command, info_name=name, terminal_width=100, max_content_width=100) as context:
+            text.append(f"## {name}\n\n``` {{ .text .output }}\n{command.get_help(context)}\n```")
+        if isinstance(command, Group):
+            waiting += [(f"{name} {part}", one) for part, one in command.commands.items()]
+    return "\n\n".join(text)
+
+
+def _run(file: File) -> dict[str, str | bytes]:
+    """Run a notebook; return its page, its pictures, and itself."""
+    notebook = jupytext.read(file.abs_src_path)
+    setup = nbformat.v4.new_code_cell(_SETUP)
+    notebook.cells.insert(0, setup)
+    folder = ROOT / "build" / "tutorials" / PurePosixPath(file.src_uri).stem
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    quiet = ["--IPKernelApp.log_level=40"]
+    client = NotebookClient(notebook, timeout=120, kernel_name="python3", extra_arguments=quiet)
+    try:
+        client.execute(cwd=folder)
+    except CellExecutionError as error:
+        raise PluginError(f"{file.src_uri}: {unstyle(str(error))}") from None
+    notebook.cells.remove(setup)
+    stem, made, text = file.src_uri[:-3], {}, []
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            text.append(cell.source)
+            continue
+        text.append(f"```python\n{cell.source}\n```")
+        for output in cell.outputs:
+            data = output.get("data", {})
+            if "image/png" in data:
+                picture = f"{stem}_{len(made) + 1}.png"
+                made[picture] = base64.b64decode(data["image/png"])
+                alt = cell.metadata.get("alt", "")
+                text.append(f"![{alt}]({PurePosixPath(picture).name}){{ .plot }}")
+            elif "text/html" in data:
+                html = re.sub(r'<style scoped>.*?</style>| border="1" class="dataframe"', "",
+                              data["text/html"], flags=re.DOTALL)
+                text.append(f'<div class="output">{html}</div>')
+            elif written := data.get("text/plain", output.get("text", "")):
+                if output.get("name") != "stderr":
+                    text.append(f'``` {{ .text .output }}\n{written.rstrip()}\n```')
+    name = PurePosixPath(stem).name + ".ipynb"
+    text.append(f"*This page is a notebook: [{name}]({name}).*")
+    made[f"{stem}.ipynb"] = nbformat.writes(notebook)
+    made[f"{stem}.md"] = "\n\n".join(text)
+    return made
