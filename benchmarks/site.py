@@ -10,7 +10,7 @@ import base64
 import inspect
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path, PurePosixPath
@@ -40,8 +40,9 @@ DOCUMENTS = {
 }
 #: Before the first cell: pictures that read on white and on black.
 _SETUP = """%matplotlib inline
-from matplotlib_inline.backend_inline import set_matplotlib_formats
-set_matplotlib_formats("png", transparent=True, dpi=130)
+import matplotlib
+matplotlib.rcParams |= {"figure.facecolor": "none", "axes.facecolor": "none", "figure.dpi": 120}
+matplotlib.rcParams |= {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 """
 #: Page and anchor of each documented name; filled while the reference is made.
 _PLACES: dict[str, str] = {}
@@ -51,6 +52,8 @@ _INTRODUCTION = """::: {}
       members: false
       show_root_heading: false
       show_root_toc_entry: false"""
+#: What pandas adds to its tables: the theme has its own style.
+_OF_PANDAS = re.compile(r'<style scoped>.*?</style>| border="1" class="dataframe"', re.DOTALL)
 _LOADS = re.compile(r"<(?:script|img|link|iframe)\b[^>]*\b(?:src|href)=\"?(https?:)?//[^>]*>")
 _NAMES = re.compile(r"<(a|pre|h\d)\b.*?</\1>|<code>([\w.]+)(?:\(\))?</code>", re.DOTALL)
 
@@ -58,7 +61,7 @@ _NAMES = re.compile(r"<(a|pre|h\d)\b.*?</\1>|<code>([\w.]+)(?:\(\))?</code>", re
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made."""
     for page, source in DOCUMENTS.items():
-        text = _with_links_to_pages((ROOT / source).read_text("utf-8"), source)
+        text = _with_links_to_pages((ROOT / source).read_text("utf-8"))
         files.append(File.generated(config, page, content=text))
     for name in _listed(config.nav):
         if name.startswith("reference/"):
@@ -77,9 +80,11 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_content(html: str, page: Page, **_: Any) -> str:
     """Make names of the package links to where they are documented."""
 
+    is_reference = page.file.src_uri.startswith("reference/")
+
     def linked(found: re.Match[str]) -> str:
         name = found[2]
-        if name is None or name not in _PLACES:
+        if name is None or name not in _PLACES or ("." not in name and not is_reference):
             return found[0]
         there, here = _PLACES[name], PurePosixPath(page.file.src_uri)
         return f'<a href="{relpath(there, here.parent)}">{found[0]}</a>'
@@ -90,8 +95,7 @@ def on_page_content(html: str, page: Page, **_: Any) -> str:
 def on_post_page(output: str, page: Page, **_: Any) -> str:
     """Refuse pages that would load something from elsewhere."""
     if found := _LOADS.search(output):
-        if 'rel="canonical"' not in found[0]:
-            raise PluginError(f"{page.file.src_uri} loads {found[0]}")
+        raise PluginError(f"{page.file.src_uri} loads {found[0]}")
     return output
 
 
@@ -103,7 +107,7 @@ def _listed(nav: Any) -> list[str]:
     return [page for part in parts for page in _listed(part)]
 
 
-def _with_links_to_pages(text: str, source: str) -> str:
+def _with_links_to_pages(text: str) -> str:
     """Turn the links of a document outside of docs/ into links between pages."""
     text = re.sub(r"\]\((?:\.\./)?docs/", "](", text)
     for page, document in DOCUMENTS.items():
@@ -132,6 +136,8 @@ def _reference(page: str, module: str) -> str:
                 continue
             _PLACES[home] = f"{page[:-3]}.html#{module}.{name}"
             _PLACES.setdefault(name, _PLACES[home])
+            if module == "lineament":
+                _PLACES[f"ln.{name}"] = _PLACES[home]
         place = _PLACES[f"{module}.{name}"] = _PLACES[home]
         target = place.rpartition("/")[2].replace(".html#", ".md#")
         rows.append(f"| [`{name}`]({target}) | {_summary(value)} |")
@@ -189,42 +195,44 @@ def _commands() -> str:
 
 
 def _run(file: File) -> dict[str, str | bytes]:
-    """Run a notebook; return its page, its pictures, and itself."""
+    """Run a notebook; return its page, its pictures, and itself, by their names."""
     notebook = jupytext.read(file.abs_src_path)
-    setup = nbformat.v4.new_code_cell(_SETUP)
-    notebook.cells.insert(0, setup)
-    folder = ROOT / "build" / "tutorials" / PurePosixPath(file.src_uri).stem
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(_SETUP))
+    stem = PurePosixPath(file.src_uri).stem
+    folder = ROOT / "build" / "tutorials" / stem
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     quiet = ["--IPKernelApp.log_level=40"]
-    client = NotebookClient(notebook, timeout=120, kernel_name="python3", extra_arguments=quiet)
+    client = NotebookClient(notebook, timeout=300, kernel_name="python3", extra_arguments=quiet)
     try:
         client.execute(cwd=folder)
     except CellExecutionError as error:
         raise PluginError(f"{file.src_uri}: {unstyle(str(error))}") from None
-    notebook.cells.remove(setup)
-    stem, made, text = file.src_uri[:-3], {}, []
-    for cell in notebook.cells:
-        if cell.cell_type == "markdown":
-            text.append(cell.source)
-            continue
-        text.append(f"```python\n{cell.source}\n```")
-        for output in cell.outputs:
-            data = output.get("data", {})
-            if "image/png" in data:
-                picture = f"{stem}_{len(made) + 1}.png"
-                made[picture] = base64.b64decode(data["image/png"])
-                alt = cell.metadata.get("alt", "")
-                text.append(f"![{alt}]({PurePosixPath(picture).name}){{ .plot }}")
-            elif "text/html" in data:
-                html = re.sub(r'<style scoped>.*?</style>| border="1" class="dataframe"', "",
-                              data["text/html"], flags=re.DOTALL)
-                text.append(f'<div class="output">{html}</div>')
-            elif written := data.get("text/plain", output.get("text", "")):
-                if output.get("name") != "stderr":
-                    text.append(f'``` {{ .text .output }}\n{written.rstrip()}\n```')
-    name = PurePosixPath(stem).name + ".ipynb"
-    text.append(f"*This page is a notebook: [{name}]({name}).*")
-    made[f"{stem}.ipynb"] = nbformat.writes(notebook)
-    made[f"{stem}.md"] = "\n\n".join(text)
-    return made
+    del notebook.cells[0]
+    made: dict[str, str | bytes] = {}
+    text = [part for cell in notebook.cells for part in _cell(cell, stem, made)]
+    text.append(f"*This page is a notebook: [{stem}.ipynb]({stem}.ipynb).*")
+    made |= {f"{stem}.ipynb": nbformat.writes(notebook), f"{stem}.md": "\n\n".join(text)}
+    home = PurePosixPath(file.src_uri).parent
+    return {str(home / name): content for name, content in made.items()}
+
+
+def _cell(cell: Any, stem: str, made: dict[str, str | bytes]) -> Iterator[str]:
+    """Write a cell, and what it has shown, as Markdown; its pictures go to `made`."""
+    if cell.cell_type == "markdown":
+        yield cell.source
+        return
+    yield f"```python\n{cell.source}\n```"
+    for output in cell.outputs:
+        if output.output_type == "error":  # while a picture was drawn, after the cell
+            raise PluginError(f"{stem}: {unstyle(chr(10).join(output.traceback))}")
+        data = output.get("data", {})
+        if "image/png" in data:
+            picture = f"{stem}_{len(made) + 1}.png"
+            made[picture] = base64.b64decode(data["image/png"])
+            yield f"![{cell.metadata['alt']}]({picture}){{ .plot }}"
+        elif "text/html" in data:
+            yield f'<div class="output">{_OF_PANDAS.sub("", data["text/html"])}</div>'
+        elif output.get("name") != "stderr":
+            written = data.get("text/plain", output.get("text", ""))
+            yield f"``` {{ .text .output }}\n{written.rstrip()}\n```"

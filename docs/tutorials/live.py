@@ -1,43 +1,55 @@
 # %% [markdown]
 # # Live on a robot
 #
-# `lineament live` listens to a scanner and publishes what it finds, over DDS: everything that speaks
-# ROS 2 hears it, and ROS need not be installed. Here a log plays the robot, in a process beside this
-# notebook, which subscribes to the features as a program on the robot would.
+# `lineament live` listens to a scanner and publishes what it finds, over DDS:
+# everything that speaks ROS 2 hears it, and ROS need not be installed. Here a log
+# plays the robot, in a process beside this notebook, which subscribes to the
+# features as a program on the robot would.
 
 # %%
 import os
 import subprocess
 import sys
 
-from lineament.simulation import SENSORS, simulate_log
+from lineament.logs import save_log
+from lineament.simulation import SENSORS, building, drive
 
-simulate_log("robot.npz", "building", SENSORS["utm30lx"], scans=300, rate=10)
+world, _ = building()
+scans = drive(
+    world, [(0.8, 5.0), (12.0, 5.0)], SENSORS["utm30lx"], speed=0.8, rate=10
+)
+save_log("robot.npz", scans)
 
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
-  <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
-  <Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers>
-</Discovery></Domain></CycloneDDS>"""  # stays on this machine; on a robot it is left out
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General>
+  <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
+</General><Discovery>
+  <ParticipantIndex>auto</ParticipantIndex>
+  <Peers><Peer address="127.0.0.1"/></Peers>
+</Discovery></Domain></CycloneDDS>"""  # this machine alone; on a robot it is left out
 domain = 101 + os.getpid() % 100  # the ROS_DOMAIN_ID of the robot
 
-command = [sys.executable, "-m", "lineament", "live", "--from", "robot.npz"]
+command = [sys.executable, "-m", "lineament", "live", "--from", "robot.npz", "--track"]
 node = subprocess.Popen(
-    [*command, "--track", "--domain", str(domain)],
-    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    [*command, "--domain", str(domain)],
+    stdout=subprocess.PIPE,
+    stderr=subprocess.STDOUT,
+    text=True,
 )
-for line in node.stderr:
+for line in node.stdout:
     print(line.rstrip())
     if "finds features" in line:
         break
 
 # %% [markdown]
-# On a robot, `lineament live --track` is all of it: it takes the scans of `/scan` in place of a log.
+# On a robot, `lineament live --track` is all of it: it takes the scans of `/scan`
+# in place of a log.
 #
 # ## Subscribe
 #
-# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`. In a node of ROS 2 the
-# message comes from `create_subscription`. Without ROS, its type is written down for Cyclone DDS,
-# which `pip install 'lineament[live]'` brings along:
+# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`. In
+# a node of ROS 2 the message comes from `create_subscription`. Without ROS, its
+# type is written down for Cyclone DDS, which `pip install 'lineament[live]'`
+# brings along:
 
 # %%
 import numpy as np
@@ -57,22 +69,29 @@ def message(package, kind, **fields):
 Time = message("builtin_interfaces", "Time", sec=int32, nanosec=uint32)
 Header = message("std_msgs", "Header", stamp=Time, frame_id=str)
 PointField = message(
-    "sensor_msgs", "PointField", name=str, offset=uint32, datatype=uint8, count=uint32
+    "sensor_msgs",
+    "PointField",
+    name=str,
+    offset=uint32,
+    datatype=uint8,
+    count=uint32,
 )
 PointCloud2 = message(
     "sensor_msgs", "PointCloud2", header=Header, height=uint32, width=uint32,
-    fields=sequence[PointField], is_bigendian=bool, point_step=uint32, row_step=uint32,
-    data=sequence[uint8], is_dense=bool,
+    fields=sequence[PointField], is_bigendian=bool, point_step=uint32,
+    row_step=uint32, data=sequence[uint8], is_dense=bool,
 )  # fmt: skip
 participant = DomainParticipant(domain)
-reader = DataReader(participant, Topic(participant, "rt/scan/features", PointCloud2))
+reader = DataReader(
+    participant, Topic(participant, "rt/scan/features", PointCloud2)
+)
 
 # %% [markdown]
 # ## Read
 #
 # A point is a feature, its numbers are the named fields of the message
-# ([formats](../formats.md#feature-cloud-sensor_msgspointcloud2) lists them). NumPy sees them as they
-# are, whoever sent them:
+# ([formats](../formats.md#feature-cloud-sensor_msgspointcloud2) lists them).
+# NumPy sees them as they are, whoever sent them:
 
 # %%
 TYPES = {5: "<i4", 6: "<u4", 7: "<f4"}  # of PointField.datatype
@@ -85,14 +104,16 @@ for cloud in reader.take_iter(timeout=duration(seconds=20)):
 
 for stamp, points in clouds[::10]:
     kinds = np.bincount(points["kind"], minlength=3)
-    print(f"{stamp.sec}.{stamp.nanosec // 10**8} s: %d segments, %d corners, %d arcs" % tuple(kinds))
+    time = stamp.sec + stamp.nanosec / 1e9
+    print(f"{time:.1f} s:", *kinds, "segments, corners and edges, arcs")
 
 # %% [markdown]
 # ## Tracks
 #
-# With `--track` the field `track` is a number that lasts from scan to scan. Here are the walls of the
-# last scan, and where each corner that is in it has been before, in the frame of the scanner: the
-# robot drives, and the corners come towards it.
+# With `--track` the field `track` is a number that lasts from scan to scan. Here
+# are the walls of the last scan, and where each of its corners has been before,
+# in the frame of the scanner: the robot drives down a corridor, and the corners
+# come towards it.
 
 # %% alt="Walls of the last scan, and the ways of its corners in the frame of the scanner"
 from matplotlib import pyplot as plt
@@ -100,25 +121,30 @@ from matplotlib import pyplot as plt
 figure, axes = plt.subplots(figsize=(8, 5))
 last = clouds[-1][1]
 for wall in last[last["kind"] == 0]:
-    axes.plot(wall[["start_x", "end_x"]].item(), wall[["start_y", "end_y"]].item(), color="#1b1f24")
+    x, y = wall[["start_x", "end_x"]].item(), wall[["start_y", "end_y"]].item()
+    axes.plot(x, y, color="#1b1f24")
 for corner in last[(last["kind"] == 1) & (last["corner"] != 2)]:
-    way = np.concatenate([p[(p["kind"] == 1) & (p["track"] == corner["track"])] for _, p in clouds])
+    same = [
+        p[(p["kind"] == 1) & (p["track"] == corner["track"])] for _, p in clouds
+    ]
+    way = np.concatenate(same)
     axes.plot(way["x"], way["y"], ".-", color="#cc3311", ms=3, lw=0.8)
-    axes.annotate(corner["track"], (corner["x"], corner["y"]), fontsize=8, color="#57606a")
+    axes.annotate(corner["track"], (corner["x"], corner["y"]), fontsize=8)
 axes.plot(0, 0, ">", color="#0077bb", ms=9)
-axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+_ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 
 # %% [markdown]
 # ## Stop
 #
-# SIGINT and SIGTERM end the node cleanly, and its last lines say what it has done.
+# SIGINT and SIGTERM end the node cleanly, and its last lines say what it has
+# done.
 
 # %%
 node.terminate()
-print(node.stderr.read().strip())
+print(node.stdout.read().strip())
 print("exit status", node.wait(20))
 
 # %% [markdown]
-# Beside the features there are `/scan/corners`, `/scan/markers` for RViz, `/scan/odometry` and
-# `/scan/dock`, each with its covariance; [live](../live.md) describes them, the options, and how to
-# see the same in Foxglove.
+# Beside the features there are `/scan/corners`, `/scan/markers` for RViz,
+# `/scan/odometry` and `/scan/dock`, each with its covariance; [live](../live.md)
+# describes them, the options, and how to see the same in Foxglove.
