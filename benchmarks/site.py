@@ -31,13 +31,6 @@ from lineament.cli import cli
 from lineament.features.records import FIELDS, TABLES
 
 ROOT = Path(__file__).parents[1]
-#: Page of each document at the root.
-DOCUMENTS = {
-    "changelog.md": "CHANGELOG.md",
-    "contributing.md": "CONTRIBUTING.md",
-    "ros.md": "ros/README.md",
-    "security.md": "SECURITY.md",
-}
 #: Before the first cell: pictures that read on white and on black.
 _SETUP = """%matplotlib inline
 import matplotlib
@@ -60,8 +53,11 @@ _NAMES = re.compile(r"<(a|pre|h\d)\b.*?</\1>|<code>([\w.]+)(?:\(\))?</code>", re
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made."""
-    for page, source in DOCUMENTS.items():
-        text = _with_links_to_pages((ROOT / source).read_text("utf-8"))
+    documents = config.extra["documents"]
+    for page, source in documents.items():
+        text = re.sub(r"\]\((\.\./)?docs/", "](", (ROOT / source).read_text("utf-8"))
+        for other, document in documents.items():
+            text = text.replace(f"]({document})", f"]({other})")
         files.append(File.generated(config, page, content=text))
     for name in _listed(config.nav):
         if name.startswith("reference/"):
@@ -92,6 +88,13 @@ def on_page_content(html: str, page: Page, **_: Any) -> str:
     return _NAMES.sub(linked, html)
 
 
+def on_post_build(config: Any) -> None:
+    """Write the index of the search as a script, too: pages that are opened from the disk ask."""
+    folder = Path(config.site_dir, "search")
+    index = (folder / "search_index.json").read_text("utf-8")
+    (folder / "search_index.js").write_text(f"var __index = {index}", "utf-8")
+
+
 def on_post_page(output: str, page: Page, **_: Any) -> str:
     """Refuse pages that would load something from elsewhere."""
     if found := _LOADS.search(output):
@@ -105,14 +108,6 @@ def _listed(nav: Any) -> list[str]:
         return [nav]
     parts = nav.values() if isinstance(nav, dict) else nav
     return [page for part in parts for page in _listed(part)]
-
-
-def _with_links_to_pages(text: str) -> str:
-    """Turn the links of a document outside of docs/ into links between pages."""
-    text = re.sub(r"\]\((?:\.\./)?docs/", "](", text)
-    for page, document in DOCUMENTS.items():
-        text = text.replace(f"]({document})", f"]({page})")
-    return text
 
 
 def _reference(page: str, module: str) -> str:

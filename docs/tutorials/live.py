@@ -28,7 +28,15 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General>
 </Discovery></Domain></CycloneDDS>"""  # this machine alone; on a robot it is left out
 domain = 101 + os.getpid() % 100  # the ROS_DOMAIN_ID of the robot
 
-command = [sys.executable, "-m", "lineament", "live", "--from", "robot.npz", "--track"]
+command = [
+    sys.executable,
+    "-m",
+    "lineament",
+    "live",
+    "--from",
+    "robot.npz",
+    "--track",
+]
 node = subprocess.Popen(
     [*command, "--domain", str(domain)],
     stdout=subprocess.PIPE,

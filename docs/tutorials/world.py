@@ -4,8 +4,8 @@
 # Features are found in the frame of the scanner. Where a log has poses, lineament
 # moves them into the world, covariances turned with them. This tutorial makes a
 # map of corners from a drive, and asks how well one corner is known after it has
-# been seen many times. The log is of a robot in an arena of panels, with poses by
-# motion capture or, where that is not at hand, a simulated building.
+# been seen many times. The log is a drive through an office building in Freiburg,
+# with the poses of a SLAM system, or a simulated one where that is not at hand.
 
 # %%
 import os
@@ -15,9 +15,7 @@ import lineament as ln
 from lineament.simulation import SENSORS, simulate_log
 from lineament.tasks.extract import extract_log
 
-path = Path(
-    os.environ.get("LINEAMENT_DATA", "."), "truth/jackal_mocap_02171554.npz"
-)
+path = Path(os.environ.get("LINEAMENT_DATA", "."), "truth/fr079_graph.npz")
 if not path.exists():
     path = Path("building.npz")
     simulate_log(path, "building", SENSORS["utm30lx"])
@@ -87,15 +85,10 @@ figure, axes = plt.subplots(figsize=(6, 5))
 for p, covariance in zip(xy[place], covariances[place]):
     sizes, axis = np.linalg.eigh(covariance)
     turn = np.degrees(np.arctan2(*axis[::-1, 0]))
-    ellipse = Ellipse(
-        p,
-        *2 * np.sqrt(5.99 * sizes),
-        angle=turn,
-        fill=False,
-        ec="#cc3311",
-        alpha=0.4,
+    size = 2 * np.sqrt(5.99 * sizes)
+    axes.add_patch(
+        Ellipse(p, *size, angle=turn, fill=False, ec="#cc3311", alpha=0.5)
     )
-    axes.add_patch(ellipse)
 axes.plot(*xy[place].T, ".", color="#1b1f24", ms=3)
 _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 
@@ -105,20 +98,17 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # The ellipses are those of the noise of the scanner. Weighted by them, the
 # sightings have a mean, and what they are off it should be χ² with two degrees of
 # freedom, with a median of 1.39. In a simulation it is. On a real drive it is far
-# more: poses are off by a centimetre, and panels are not straight. What limits
-# the map then is not the noise.
+# more: the poses are off by centimetres, and that, not the noise of the scanner,
+# is what limits the map.
 
 # %%
 weights = np.linalg.inv(covariances[place])
-mean = np.linalg.solve(
-    weights.sum(axis=0), np.einsum("nij,nj->i", weights, xy[place])
-)
+weighted = np.einsum("nij,nj->i", weights, xy[place])
+mean = np.linalg.solve(weights.sum(axis=0), weighted)
 off = xy[place] - mean
 chi2 = np.median(np.einsum("ni,nij,nj->n", off, weights, off))
 print(f"{place.sum()} sightings of ({mean[0]:.3f}, {mean[1]:.3f}) m")
-print(
-    f"scatter {1000 * off.std():.1f} mm, median of χ² {chi2:.2f}, expected 1.39"
-)
+print(f"scatter {1000 * off.std():.1f} mm, median of χ² {chi2:.1f}, expected 1.4")
 
 # %% [markdown]
 # Bags say how well their poses are known, as `PoseWithCovarianceStamped` or
