@@ -38,7 +38,7 @@ def drawn(file: str, number: int | None) -> Figure:
     if number is None:
         extract = Extractor()
         return map_figure(((scan.pose, extract(scan)) for scan in log), Path(file).name)
-    figure = new_figure(6.4, 5.6)
+    figure = new_figure(4.9, 4.5)
     plot(log, number, ax=figure.subplots()).get_legend().remove()
     return figure
 
@@ -47,7 +47,7 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     for name, (file, number) in PICTURES.items():
         # Few colours are enough for lines, in a quarter of the bytes; paper is transparent.
-        dpi, colors = (110, 96) if number is not None else (80, 32)
+        dpi, colors = (140, 96) if number is not None else (80, 32)
         picture = Image.open(io.BytesIO(figure_bytes(drawn(file, number), dpi=dpi))).convert("RGB")
         few = picture.quantize(colors, dither=Image.Dither.NONE)
         path = FOLDER / f"{name}.png"

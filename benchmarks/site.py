@@ -8,6 +8,7 @@ links, and nothing may be loaded from elsewhere.
 
 import base64
 import inspect
+import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
@@ -31,6 +32,7 @@ from lineament.cli import cli
 from lineament.features.records import FIELDS, TABLES
 
 ROOT = Path(__file__).parents[1]
+os.environ.setdefault("LINEAMENT_DATA", str(ROOT / ".." / "shared" / "data"))
 #: Before the first cell: pictures that read on white and on black.
 _SETUP = """%matplotlib inline
 import matplotlib
@@ -168,7 +170,7 @@ def _fields(dtype: np.dtype[Any]) -> str:
     """Return a table of the fields of a record."""
     table = next(name for name, of in TABLES.items() if of is dtype)
     rows = [
-        f"| `{field.name}` | `{np.dtype(field.form)}` | {field.unit} | {field.about} |"
+        f"| `{field.name}` | `{field.form}` | {field.unit} | {field.about} |"
         for field in FIELDS
         if field.table == table
     ]
