@@ -25,8 +25,8 @@ print(len(log), "scans on", *log.topics)
 # ## Look first
 #
 # `lineament info` reports what a log holds, and `ln.plot` draws a scan of it.
-# Measurements have the colour of their cluster; a number beside a corner is its
-# quality, the share of such corners that are found again from another place.
+# Measurements have the colour of their cluster, diamonds are corners, smaller and
+# lighter ones edges, where a wall ends before what is behind it.
 
 # %% alt="A scan of the log, with segments, corners and clusters"
 axes = ln.plot(path, scan=40)
@@ -42,7 +42,8 @@ axes = ln.plot(path, scan=40)
 from lineament.tasks.extract import extract_log
 
 done = extract_log(path, "features.parquet", ln.Extractor())
-print(f"{done.scans} scans, {done.invalid:.1%} of beams invalid:", done.features)
+print(f"{done.scans} scans, {done.invalid:.1%} of beams invalid")
+done.features
 
 # %%
 import pandas as pd

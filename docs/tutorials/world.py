@@ -21,7 +21,7 @@ if not path.exists():
     simulate_log(path, "building", SENSORS["utm30lx"])
 
 done = extract_log(path, "world.parquet", ln.Extractor(), world=True)
-print(done.scans, "scans:", done.features)
+print(done.scans, "scans,", done.features["corners"], "corners")
 
 # %% [markdown]
 # From the shell that is
