@@ -75,9 +75,16 @@ def on_files(files: Files, config: Any) -> Files:
     return files
 
 
+def on_page_markdown(text: str, config: Any, **_: Any) -> str:
+    """Lead links out of docs/ to the pages of those documents."""
+    for page, document in config.extra["documents"].items():
+        for target in (document, document.removesuffix("/README.md")):
+            text = text.replace(f"](../{target})", f"]({page})")
+    return text
+
+
 def on_page_content(html: str, page: Page, **_: Any) -> str:
     """Make names of the package links to where they are documented."""
-
     is_reference = page.file.src_uri.startswith("reference/")
 
     def linked(found: re.Match[str]) -> str:
