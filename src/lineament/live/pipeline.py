@@ -20,6 +20,8 @@ from .received import Time
 NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
 _LAST = 2.0**31 - 1
+#: The last stamp that a message holds; those of ROS 1 go on for longer.
+_LATEST: Time = (2**31 - 1, NANO - 1)
 #: More beams than any scanner has: buffers of that size are not made for a broken message.
 MOST_BEAMS = 65_536
 #: Publishers whose buffers and tracks are kept; the oldest are forgotten.
@@ -113,7 +115,7 @@ class Pipeline:
                 dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:
             tracks = None
-        time = time or time_of(scan.stamp)
+        time = time_of(scan.stamp) if time is None else min(max(time, (0, 0)), _LATEST)
         return Frame(scan, straight, features, tracks, time, travel, dock)
 
     def hear(self, odometry: Odometry) -> None:
