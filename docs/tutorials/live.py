@@ -8,45 +8,26 @@
 
 # %%
 import os
-import subprocess
 import sys
+from subprocess import PIPE, STDOUT, Popen
 
 from lineament.logs import save_log
 from lineament.simulation import SENSORS, building, drive
 
-world, _ = building()
-scans = drive(
-    world, [(0.8, 5.0), (12.0, 5.0)], SENSORS["utm30lx"], speed=0.8, rate=10
-)
+way = [(0.8, 5.0), (12.0, 5.0)]  # down a corridor
+scans = drive(building()[0], way, SENSORS["utm30lx"], speed=0.8, rate=10)
 save_log("robot.npz", scans)
 
-os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain><General>
-  <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
-</General><Discovery>
-  <ParticipantIndex>auto</ParticipantIndex>
-  <Peers><Peer address="127.0.0.1"/></Peers>
-</Discovery></Domain></CycloneDDS>"""  # this machine alone; on a robot it is left out
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
+<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""  # this machine alone; on a robot it is left out
 domain = 101 + os.getpid() % 100  # the ROS_DOMAIN_ID of the robot
-
-command = [
-    sys.executable,
-    "-m",
-    "lineament",
-    "live",
-    "--from",
-    "robot.npz",
-    "--track",
-]
-node = subprocess.Popen(
-    [*command, "--domain", str(domain)],
-    stdout=subprocess.PIPE,
-    stderr=subprocess.STDOUT,
-    text=True,
-)
-for line in node.stdout:
-    print(line.rstrip())
-    if "finds features" in line:
-        break
+options = f"live --from robot.npz --track --domain {domain}".split()
+command = [sys.executable, "-m", "lineament", *options]
+node = Popen(command, stdout=PIPE, stderr=STDOUT, text=True)
+print(next(line for line in node.stdout if "finds features" in line))
 
 # %% [markdown]
 # On a robot, `lineament live --track` is all of it: it takes the scans of `/scan`
@@ -74,25 +55,18 @@ def message(package, kind, **fields):
     return final(make_idl_struct(kind, f"{package}::msg::dds_::{kind}_", fields))
 
 
-Time = message("builtin_interfaces", "Time", sec=int32, nanosec=uint32)
+# fmt: off
+u4 = uint32
+Time = message("builtin_interfaces", "Time", sec=int32, nanosec=u4)
 Header = message("std_msgs", "Header", stamp=Time, frame_id=str)
-PointField = message(
-    "sensor_msgs",
-    "PointField",
-    name=str,
-    offset=uint32,
-    datatype=uint8,
-    count=uint32,
-)
-PointCloud2 = message(
-    "sensor_msgs", "PointCloud2", header=Header, height=uint32, width=uint32,
-    fields=sequence[PointField], is_bigendian=bool, point_step=uint32,
-    row_step=uint32, data=sequence[uint8], is_dense=bool,
-)  # fmt: skip
+Field = message("sensor_msgs", "PointField", name=str, offset=u4, datatype=uint8, count=u4)
+PointCloud2 = message("sensor_msgs", "PointCloud2", header=Header, height=u4, width=u4,
+                      fields=sequence[Field], is_bigendian=bool, point_step=u4,
+                      row_step=u4, data=sequence[uint8], is_dense=bool)
+# fmt: on
 participant = DomainParticipant(domain)
-reader = DataReader(
-    participant, Topic(participant, "rt/scan/features", PointCloud2)
-)
+topic = Topic(participant, "rt/scan/features", PointCloud2)
+reader = DataReader(participant, topic)
 
 # %% [markdown]
 # ## Read
@@ -131,11 +105,11 @@ last = clouds[-1][1]
 for wall in last[last["kind"] == 0]:
     x, y = wall[["start_x", "end_x"]].item(), wall[["start_y", "end_y"]].item()
     axes.plot(x, y, color="#1b1f24")
-for corner in last[(last["kind"] == 1) & (last["corner"] != 2)]:
-    same = [
-        p[(p["kind"] == 1) & (p["track"] == corner["track"])] for _, p in clouds
-    ]
-    way = np.concatenate(same)
+corners = [points[points["kind"] == 1] for _, points in clouds]
+for corner in corners[-1][corners[-1]["corner"] != 2]:
+    way = np.concatenate(
+        [scan[scan["track"] == corner["track"]] for scan in corners]
+    )
     axes.plot(way["x"], way["y"], ".-", color="#cc3311", ms=3, lw=0.8)
     axes.annotate(corner["track"], (corner["x"], corner["y"]), fontsize=8)
 axes.plot(0, 0, ">", color="#0077bb", ms=9)
