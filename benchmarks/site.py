@@ -207,7 +207,7 @@ def _run(file: File) -> dict[str, str | bytes]:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     quiet = ["--IPKernelApp.log_level=40"]
-    client = NotebookClient(notebook, timeout=300, kernel_name="python3", extra_arguments=quiet)
+    client = NotebookClient(notebook, timeout=900, kernel_name="python3", extra_arguments=quiet)
     try:
         client.execute(cwd=folder)
     except CellExecutionError as error:

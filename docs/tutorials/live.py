@@ -15,7 +15,7 @@ from lineament.logs import save_log
 from lineament.simulation import SENSORS, building, drive
 
 way = [(0.8, 5.0), (12.0, 5.0)]  # down a corridor
-scans = drive(building()[0], way, SENSORS["utm30lx"], speed=0.8, rate=10)
+scans = drive(building()[0], way, SENSORS["utm30lx"], speed=0.4, rate=10)
 save_log("robot.npz", scans)
 
 os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
@@ -81,7 +81,7 @@ clouds = []
 for cloud in reader.take_iter(timeout=duration(seconds=20)):
     dtype = [(field.name, TYPES[field.datatype]) for field in cloud.fields]
     clouds.append((cloud.header.stamp, np.frombuffer(bytes(cloud.data), dtype)))
-    if len(clouds) == 40:
+    if len(clouds) == 50:
         break
 
 for stamp, points in clouds[::10]:
