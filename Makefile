@@ -62,6 +62,7 @@ coverage: .venv/ready
 
 docs: .venv/docs
 	mkdir -p build
+	$(BIN)/lineament warmup --quiet
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "the site is in build/site: open build/site/index.html"
 

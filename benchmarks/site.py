@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from posixpath import relpath
 from typing import Any
 
+import griffe
 import jupytext
 import nbformat
 import numpy as np
@@ -51,6 +52,36 @@ _INTRODUCTION = """::: {}
 _OF_PANDAS = re.compile(r'<style scoped>.*?</style>| border="1" class="dataframe"', re.DOTALL)
 _LOADS = re.compile(r"<(?:script|img|link|iframe)\b[^>]*\b(?:src|href)=\"?(https?:)?//[^>]*>")
 _NAMES = re.compile(r"<(a|pre|h\d)\b.*?</\1>|<code>([\w.]+)(?:\(\))?</code>", re.DOTALL)
+
+
+class OwnDefaults(griffe.Extension):
+    """Gives parameters that share a line each its own default and type; griffe has the first's."""
+
+    def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
+        """Go through all functions and classes."""
+        waiting: list[Any] = [pkg]
+        while waiting:
+            one = waiting.pop()
+            if one.is_alias or one.name == "kernels":
+                continue
+            waiting += one.members.values()
+            if one.docstring and (one.is_function or one.is_class):
+                for section in one.docstring.parsed:
+                    if section.kind is griffe.DocstringSectionKind.parameters:
+                        self._separate(section.value, one.parameters)
+
+    def _separate(self, documented: list[Any], signature: griffe.Parameters) -> None:
+        first = None
+        for parameter in documented:
+            if first is None or parameter.description is not first.description:
+                first = parameter
+                shared = vars(first).copy()
+            elif {parameter.name, first.name} <= {own.name for own in signature}:
+                own, of_first = signature[parameter.name], signature[first.name]
+                if shared["value"] is of_first.default:
+                    parameter.value = own.default
+                if shared["annotation"] is of_first.annotation:
+                    parameter.annotation = own.annotation
 
 
 def on_files(files: Files, config: Any) -> Files:
