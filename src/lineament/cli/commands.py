@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .experiments import bench, compare, reproduce, simulate
+from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
 from .options import (
@@ -142,23 +142,6 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
         seconds = warm_up(methods)
     if not quiet:
         click.echo(f"kernels ready after {seconds:.2f} s")
-
-
-@click.command()
-@click.argument("log", required=False, type=LOG_PATH)
-@click.option(
-    "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
-)
-@QUIET
-def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
-    """Make a page of a simulated drive, or of LOG."""
-    from ..tasks.demo import run_demo
-    from .progress import tracker
-
-    facts = run_demo(output, log, track=tracker(quiet))
-    if not quiet:
-        width = max(len(name) for name, _ in facts)
-        click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
 _ALL = (
