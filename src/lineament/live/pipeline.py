@@ -21,6 +21,8 @@ from .received import Time
 NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
 _LAST = 2.0**31 - 1
+#: The last stamp that a message holds; those of ROS 1 go on for longer.
+_LATEST: Time = (2**31 - 1, NANO - 1)
 #: Publishers whose buffers and tracks are kept; the oldest are forgotten.
 _MOST_PUBLISHERS = 8
 #: Odometry farther from a scan in time says nothing of it [s].
@@ -112,7 +114,7 @@ class Pipeline:
                 dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:
             tracks = None
-        time = time or time_of(scan.stamp)
+        time = time_of(scan.stamp) if time is None else min(max(time, (0, 0)), _LATEST)
         return Frame(scan, straight, features, tracks, time, travel, dock)
 
     def hear(self, odometry: Odometry) -> None:

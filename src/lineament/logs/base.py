@@ -71,7 +71,7 @@ class Head:
 
 
 class Log(Pictured, ABC):
-    """An iterable of :class:`~lineament.LaserScan`; each iteration reads from the start.
+    """An iterable of `lineament.LaserScan`; each iteration reads from the start.
 
     ``log[i]`` is a scan, ``log[i:j]`` a list of them; in a notebook a log is a picture.
 

@@ -68,9 +68,9 @@ def open_log(
     path : path-like
         The file, compressed by gzip or not; the folder of a ROS 2 bag; a zip archive of one log; a
         path behind an archive, ``logs.zip/day/a.log``; or an address that fsspec knows, such as
-        ``s3://bucket/a.bag``. For folders and patterns see :func:`find_logs`.
+        ``s3://bucket/a.bag``. For folders and patterns see `find_logs`.
     topic : str, optional
-        Which scans to read where a log has several kinds; see :attr:`Log.topics`.
+        Which scans to read where a log has several kinds; see `Log.topics`.
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
     echo : str
@@ -85,7 +85,7 @@ def open_log(
     Returns
     -------
     Log
-        An iterable of :class:`~lineament.LaserScan` with a length.
+        An iterable of `lineament.LaserScan` with a length.
 
     Raises
     ------

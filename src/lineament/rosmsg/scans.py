@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..limits import LIMITS, Limits
 from ..scan import LaserScan
+from ..scan.fields import counter_clockwise
 from .wire import Buffer, WireReader
 
 CLOUD = "sensor_msgs/PointCloud2"
@@ -134,14 +135,11 @@ def _scan(
 ) -> LaserScan:
     """Make a scan of the fields of LaserScan, whose seven numbers are `geometry`."""
     angle_min, _, increment, time_increment, scan_time, range_min, range_max = geometry
-    n = len(ranges)
-    if n == 0:
+    if not len(ranges):
         raise ValueError("ranges is empty, expected at least one beam")
-    if increment < 0 and n > 1:
-        ranges = ranges[::-1]
-        intensities = None if intensities is None else intensities[::-1]
-        angle_min, increment = angle_min + (n - 1) * increment, -increment
-        stamp, time_increment = stamp + (n - 1) * time_increment, -time_increment
+    ranges, intensities, angle_min, increment, stamp, time_increment = counter_clockwise(
+        ranges, intensities, angle_min, increment, stamp, time_increment
+    )
     return LaserScan(
         ranges,
         angle_min,

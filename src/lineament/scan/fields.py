@@ -171,6 +171,17 @@ def covariance_of_pose(covariance: ArrayLike) -> Array:
     return matrix
 
 
+def counter_clockwise(
+    ranges: Any, intensities: Any, first: float, step: float, stamp: float, time_step: float
+) -> tuple[Any, Any, float, float, float, float]:
+    """Reverse the beams of a scanner that turns clockwise: bearings increase, times fall."""
+    last = len(ranges) - 1
+    if not step < 0 or last < 1:
+        return ranges, intensities, first, step, stamp, time_step
+    turned = None if intensities is None else intensities[::-1]
+    return ranges[::-1], turned, first + last * step, -step, stamp + last * time_step, -time_step
+
+
 def stamp_seconds(stamp: Any) -> float:
     """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
     if hasattr(stamp, "sec"):

@@ -15,9 +15,11 @@ from .fields import (
     Pose,
     beams_to,
     checked_pose,
+    counter_clockwise,
     covariance_of_pose,
     finite,
     irregular_bearings,
+    number,
     range_limits,
     regular_bearings,
     stamp_seconds,
@@ -249,6 +251,9 @@ class LaserScan(Pictured):
     def from_message(cls, message: Any, *, pose: Pose | None = None) -> Self:
         """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
 
+        Beams of a scanner that turns clockwise (a negative increment) are reversed, and
+        `time_increment` is negative then.
+
         Parameters
         ----------
         message : object
@@ -274,17 +279,25 @@ class LaserScan(Pictured):
             header = getattr(message, "header", None)
             intensities = getattr(message, "intensities", None)
             has_intensities = intensities is not None and len(intensities) > 0
-            return cls(
+            ranges, intensities, angle_min, increment, stamp, time_increment = counter_clockwise(
                 message.ranges,
+                intensities if has_intensities else None,
                 message.angle_min,
-                message.angle_increment,
+                number("angle_increment", message.angle_increment),
+                0.0 if header is None else stamp_seconds(header.stamp),
+                message.time_increment,
+            )
+            return cls(
+                ranges,
+                angle_min,
+                increment,
                 range_min=message.range_min,
                 range_max=message.range_max,
                 scan_time=message.scan_time,
-                time_increment=message.time_increment,
-                stamp=0.0 if header is None else stamp_seconds(header.stamp),
+                time_increment=time_increment,
+                stamp=stamp,
                 frame_id="" if header is None else header.frame_id,
-                intensities=intensities if has_intensities else None,
+                intensities=intensities,
                 pose=pose,
             )
         except AttributeError as error:
