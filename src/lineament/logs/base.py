@@ -13,6 +13,7 @@ from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..scan import LaserScan
+from ..scan.laser_scan import STAMPS
 
 T = TypeVar("T")
 
@@ -29,12 +30,15 @@ class ReadOptions:
     echo: str = "first"
     ring: int | None = None
     pose_topic: str | None = None
+    stamp: str = "first"
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
             raise ValueError(f"echo is {self.echo!r}, expected {' or '.join(ECHOES)}")
         if self.ring is not None and (type(self.ring) is not int or self.ring < 0):
             raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
+        if self.stamp not in STAMPS:
+            raise ValueError(f"stamp is {self.stamp!r}, expected {' or '.join(STAMPS)}")
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -150,7 +154,10 @@ class Log(Pictured, ABC):
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
-        yield from self._items()
+        if self.options.stamp == "first":
+            yield from self._items()
+        else:
+            yield from ((t, scan.stamped(self.options.stamp)) for t, scan in self._items())
 
     def __iter__(self) -> Iterator[LaserScan]:
         return map(itemgetter(1), self.items())

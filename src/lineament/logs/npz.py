@@ -16,7 +16,7 @@ from .lines import reading
 from .sources import ZIP, check_growth
 
 #: One number for the log, or one for each scan.
-SCALARS = ("range_min", "range_max", "scan_time", "time_increment")
+SCALARS = ("range_min", "range_max", "scan_time", "time_increment", "stamp_beam")
 #: The arrays of a log, and their shapes for n scans of m beams.
 SHAPES = {
     "ranges": ("nm",),
@@ -24,6 +24,7 @@ SHAPES = {
     "angle_increment": ("",),
     "angles": ("m",),
     "stamps": ("n",),
+    "stamps_ns": ("n",),
     "poses": ("n3",),
     "intensities": ("nm",),
     **dict.fromkeys((*SCALARS, "frame_id"), ("", "n")),
@@ -36,6 +37,7 @@ class NpzLog(Log):
     Keys: ``ranges`` (N, M) m, NaN where nothing returned; ``angle_min`` and
     ``angle_increment`` rad, or ``angles`` (M,); optional ``range_min``, ``range_max`` m,
     ``scan_time``, ``time_increment`` s, ``frame_id`` (one, or N of them), ``stamps`` (N,) s,
+    ``stamps_ns`` (N,) ns where seconds do not hold them, ``stamp_beam`` (see `LaserScan`),
     ``poses`` (N, 3) m, m, rad (not finite where unknown), ``intensities`` (N, M). Other keys
     are left alone. Arrays stay as stored; rows become float64 as they are read.
     """
@@ -74,6 +76,8 @@ class NpzLog(Log):
             fields |= {key: float(arrays[key]) for key in ("angle_min", "angle_increment")}
         if "stamps" in arrays:
             fields["stamp"] = float(arrays["stamps"][i])
+        if "stamps_ns" in arrays:
+            fields["stamp_ns"] = int(arrays["stamps_ns"][i])
         if "frame_id" in arrays:
             fields["frame_id"] = str(_at(arrays["frame_id"], i))
         if "intensities" in arrays:

@@ -55,6 +55,7 @@ def open_log(
     echo: str = "first",
     ring: int | None = None,
     pose_topic: str | None = None,
+    stamp: str = "first",
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -77,6 +78,8 @@ def open_log(
         Which ring of a point cloud is the scan (ROS logs).
     pose_topic : str, optional
         Which topic gives the poses (ROS logs).
+    stamp : str
+        Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
 
     Returns
     -------
@@ -86,7 +89,7 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring` or `pose_topic` is not a value that it can have.
+        If `echo`, `ring`, `pose_topic` or `stamp` is not a value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, or has no such
         topic. While the log is iterated: if a scan in it is faulty, unless `keep_going`.
@@ -100,7 +103,7 @@ def open_log(
     >>> log.format, len(log), [scan.stamp for scan in log]
     ('carmen', 1, [7.5])
     """
-    options = ReadOptions(echo, ring, pose_topic)
+    options = ReadOptions(echo, ring, pose_topic, stamp)
     source = _located(path)
     head = sources.read_head(source)
     reader = _recognised(head)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import LaserScan
+from ..scan.fields import counter_clockwise
 from .wire import Buffer, WireReader
 
 CLOUD = "sensor_msgs/PointCloud2"
@@ -33,9 +34,8 @@ def laser_scan(data: Buffer, encoding: str) -> LaserScan:
     """Decode a ``sensor_msgs/LaserScan``.
 
     The beams of a scanner that turns clockwise (a negative increment) are reversed, so that
-    bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
-    `time_increment`. ValueError if the message is malformed, has no beams, or its fields make no
-    sense together.
+    bearings increase: see `LaserScan.from_message`. ValueError if the message is malformed, has no
+    beams, or its fields make no sense together.
     """
     reader = WireReader(data, encoding)
     stamp, frame_id = reader.header()
@@ -110,14 +110,14 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     return LaserScan(
         ranges[order],
         angles=angles[order],
-        stamp=stamp,
+        stamp_ns=stamp,
         frame_id=frame_id,
         intensities=points["intensity"][order] if "intensity" in names else None,
     )
 
 
 def _scan(
-    stamp: float,
+    stamp: int,
     frame_id: str,
     geometry: Sequence[float],
     ranges: Array,
@@ -125,25 +125,15 @@ def _scan(
 ) -> LaserScan:
     """Make a scan of the fields of LaserScan, whose seven numbers are `geometry`."""
     angle_min, _, increment, time_increment, scan_time, range_min, range_max = geometry
-    n = len(ranges)
-    if n == 0:
+    if len(ranges) == 0:
         raise ValueError("ranges is empty, expected at least one beam")
-    if increment < 0 and n > 1:
-        ranges = ranges[::-1]
-        intensities = None if intensities is None else intensities[::-1]
-        angle_min, increment = angle_min + (n - 1) * increment, -increment
-        stamp, time_increment = stamp + (n - 1) * time_increment, -time_increment
+    times = {"scan_time": scan_time, "time_increment": time_increment}
     return LaserScan(
-        ranges,
-        angle_min,
-        increment,
+        **counter_clockwise(ranges, intensities, angle_min, increment, **times),
         range_min=range_min,
         range_max=range_max,
-        stamp=stamp,
-        scan_time=scan_time,
-        time_increment=time_increment,
+        stamp_ns=stamp,
         frame_id=frame_id,
-        intensities=intensities,
     )
 
 

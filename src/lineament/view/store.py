@@ -18,7 +18,10 @@ Item = tuple[str, LaserScan]
 
 _NOT_KEPT = -1
 #: What is kept of a scan besides ranges and bearings; intensities are not.
-_FIELDS = ("range_min", "range_max", "stamp", "scan_time", "time_increment", "frame_id", "pose")
+_FIELDS = (
+    *("range_min", "range_max", "stamp", "stamp_ns", "stamp_beam"),
+    *("scan_time", "time_increment", "frame_id", "pose"),
+)
 
 
 class ScanStore:
