@@ -53,8 +53,7 @@ class LaserScan(Pictured):
     stamp : float
         Time of the scan [s]: of its beam `stamp_beam`. Features are where the sensor was then.
     stamp_ns : int, optional
-        The same in whole nanoseconds: `stamp`, which then need not be given, holds a time of today
-        to 0.2 µs.
+        The same in whole nanoseconds, in place of `stamp`, which holds today to 0.2 µs only.
     stamp_beam : float
         Index of the beam that was taken at the stamp, or between which it was; see `stamped`.
     scan_time, time_increment : float
@@ -244,8 +243,7 @@ class LaserScan(Pictured):
     def turned_over(self) -> Self:
         """Return the same scan in the frame of its sensor turned about the x axis.
 
-        What a scanner sees that hangs upside down, in a frame whose z axis points up: bearings
-        change their sign, and the order of the beams is the other way round.
+        Bearings change their sign: what hangs upside down is then in a frame with z upwards.
         """
         own: dict[str, Any] = {"ranges": self.ranges[::-1]}
         own["stamp_beam"] = len(self) - 1 - self.stamp_beam
@@ -310,8 +308,7 @@ class LaserScan(Pictured):
         """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
 
         The beams of a scanner that turns clockwise (a negative increment) are put in the order of
-        increasing bearings; `stamp_beam`, `scan_time` and `time_increment` say when they were
-        taken.
+        increasing bearings; `stamp_beam` and the signs of the times say when they were taken.
 
         Parameters
         ----------
