@@ -125,7 +125,8 @@ def test_only_the_newest_scan_of_each_publisher_is_processed():
 
 def test_frames_have_the_stamp_of_the_message_exactly():
     exactly = 1_700_000_000_123_456_789
-    _, frames, _ = run([wall("a", stamp_ns=exactly)], [wall("a", 2.5)])
+    scan = sweep().stamped("first", exactly)
+    _, frames, _ = run([Received("a", lambda: scan, 0.0)], [wall("a", 2.5)])
     assert [time_of(frame.scan) for frame in frames] == [divmod(exactly, 10**9), (2, 500_000_000)]
 
 
@@ -270,8 +271,9 @@ def spoilt(chance: Random) -> Received:
         fields[name] = chance.choice(NUMBERS)
     seconds, nanoseconds = chance.choice(STAMPS)
     stamp = seconds * 10**9 + nanoseconds if seconds != 5 else 5 * 10**9
-    read = partial(ln.LaserScan, ranges, **fields, stamp_ns=stamp)
-    return Received(chance.choice("ab"), read, 0.0)
+    return Received(
+        chance.choice("ab"), lambda: ln.LaserScan(ranges, **fields).stamped("first", stamp), 0.0
+    )
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from .lines import reading
 from .sources import ZIP, check_growth
 
 #: One number for the log, or one for each scan.
-SCALARS = ("range_min", "range_max", "scan_time", "time_increment", "stamp_beam")
+SCALARS = ("range_min", "range_max", "scan_time", "time_increment")
 #: The arrays of a log, and their shapes for n scans of m beams.
 SHAPES = {
     "ranges": ("nm",),
@@ -27,7 +27,7 @@ SHAPES = {
     "stamps_ns": ("n",),
     "poses": ("n3",),
     "intensities": ("nm",),
-    **dict.fromkeys((*SCALARS, "frame_id"), ("", "n")),
+    **dict.fromkeys((*SCALARS, "stamp_beam", "frame_id"), ("", "n")),
 }
 
 
@@ -76,15 +76,16 @@ class NpzLog(Log):
             fields |= {key: float(arrays[key]) for key in ("angle_min", "angle_increment")}
         if "stamps" in arrays:
             fields["stamp"] = float(arrays["stamps"][i])
-        if "stamps_ns" in arrays:
-            fields["stamp_ns"] = int(arrays["stamps_ns"][i])
         if "frame_id" in arrays:
             fields["frame_id"] = str(_at(arrays["frame_id"], i))
         if "intensities" in arrays:
             fields["intensities"] = arrays["intensities"][i]
         if "poses" in arrays and np.isfinite(arrays["poses"][i]).all():
             fields["pose"] = tuple(arrays["poses"][i].tolist())
-        return LaserScan(arrays["ranges"][i], **fields)
+        scan = LaserScan(arrays["ranges"][i], **fields)
+        beam = float(_at(arrays["stamp_beam"], i)) if "stamp_beam" in arrays else 0.0
+        ns = int(arrays["stamps_ns"][i]) if "stamps_ns" in arrays else None
+        return scan.stamped(beam, ns) if beam or ns is not None else scan
 
 
 def _at(values: NDArray[Any], i: int) -> Any:

@@ -117,7 +117,7 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
     arrays["stamps"] = np.array([scan.stamp for scan in scans])
     if any(scan.stamp_ns != nanoseconds(scan.stamp) for scan in scans):
         arrays["stamps_ns"] = np.array([scan.stamp_ns for scan in scans])
-    for key in (*SCALARS, "frame_id"):
+    for key in (*SCALARS, "stamp_beam", "frame_id"):
         values = np.array([getattr(scan, key) for scan in scans])
         arrays[key] = values[0] if (values == values[0]).all() else values
     if first.intensities is not None:

@@ -94,16 +94,16 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
         order = np.argsort(bearings, kind="stable")
     # Bearings that are the same are set apart.
     apart = _APART * np.arange(len(scan))
-    return LaserScan(
+    still = LaserScan(
         ranges[order],
         angles=np.maximum.accumulate(bearings[order] - apart) + apart,
         range_min=scan.range_min,
         range_max=scan.range_max,
         stamp=scan.stamp,
-        stamp_ns=scan.stamp_ns,
         frame_id=scan.frame_id,
         intensities=None if scan.intensities is None else scan.intensities[order],
-    ).with_pose(scan.pose, scan.pose_covariance)
+    )
+    return still.stamped(0, scan.stamp_ns).with_pose(scan.pose, scan.pose_covariance)
 
 
 def _bearing(scan: LaserScan, beam: float) -> float:

@@ -110,10 +110,9 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     return LaserScan(
         ranges[order],
         angles=angles[order],
-        stamp_ns=stamp,
         frame_id=frame_id,
         intensities=points["intensity"][order] if "intensity" in names else None,
-    )
+    ).stamped(0, stamp)
 
 
 def _scan(
@@ -128,13 +127,9 @@ def _scan(
     if len(ranges) == 0:
         raise ValueError("ranges is empty, expected at least one beam")
     times = {"scan_time": scan_time, "time_increment": time_increment}
-    return LaserScan(
-        **counter_clockwise(ranges, intensities, angle_min, increment, **times),
-        range_min=range_min,
-        range_max=range_max,
-        stamp_ns=stamp,
-        frame_id=frame_id,
-    )
+    fields, first = counter_clockwise(ranges, intensities, angle_min, increment, **times)
+    scan = LaserScan(**fields, range_min=range_min, range_max=range_max, frame_id=frame_id)
+    return scan.stamped(first, stamp)
 
 
 def _echoes(reader: WireReader, n: int) -> tuple[Array, Array, Array]:

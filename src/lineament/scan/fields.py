@@ -181,8 +181,11 @@ def nanoseconds(stamp: float) -> int:
 
 def counter_clockwise(
     ranges: Any, intensities: Any, angle_min: float, increment: float, **times: float
-) -> dict[str, Any]:
-    """Fields of a scan whose beams may run clockwise; `times`: `time_increment`, `scan_time`."""
+) -> tuple[dict[str, Any], int]:
+    """Fields of a scan whose beams may run clockwise, and the index of its first beam in time.
+
+    `times` are `time_increment` and `scan_time`.
+    """
     n, first = len(ranges), 0
     if increment < 0 and n > 1:
         ranges, first = ranges[::-1], n - 1
@@ -190,13 +193,16 @@ def counter_clockwise(
         angle_min, increment = angle_min + first * increment, -increment
         times = {name: -time for name, time in times.items()}
     angles = {"angle_min": angle_min, "angle_increment": increment}
-    return {"ranges": ranges, "intensities": intensities, **angles, **times, "stamp_beam": first}
+    return {"ranges": ranges, "intensities": intensities, **angles, **times}, first
 
 
-def message_fields(message: Any) -> dict[str, Any]:
-    """Fields of a scan for a ``sensor_msgs/LaserScan``; AttributeError if it is something else."""
+def message_fields(message: Any) -> tuple[dict[str, Any], int, int | None]:
+    """Fields of a scan for a ``sensor_msgs/LaserScan``, its first beam, and its stamp [ns].
+
+    AttributeError if the message is something else.
+    """
     intensities = getattr(message, "intensities", None)
-    fields = counter_clockwise(
+    fields, first = counter_clockwise(
         message.ranges,
         None if intensities is None or not len(intensities) else intensities,
         message.angle_min,
@@ -205,14 +211,13 @@ def message_fields(message: Any) -> dict[str, Any]:
         time_increment=message.time_increment,
     )
     fields |= {"range_min": message.range_min, "range_max": message.range_max}
-    header = getattr(message, "header", None)
-    if header is None:
-        return fields
-    stamp = header.stamp
-    if hasattr(stamp, "sec"):  # of ROS 2; and of ROS 1
-        fields["stamp_ns"] = int(stamp.sec) * NANO + int(stamp.nanosec)
-    elif hasattr(stamp, "secs"):
-        fields["stamp_ns"] = int(stamp.secs) * NANO + int(stamp.nsecs)
-    else:
-        fields["stamp"] = float(stamp)
-    return {**fields, "frame_id": header.frame_id}
+    header, ns = getattr(message, "header", None), None
+    if header is not None:
+        fields["frame_id"], stamp = header.frame_id, header.stamp
+        if hasattr(stamp, "sec"):  # of ROS 2; and of ROS 1
+            ns = int(stamp.sec) * NANO + int(stamp.nanosec)
+        elif hasattr(stamp, "secs"):
+            ns = int(stamp.secs) * NANO + int(stamp.nsecs)
+        else:
+            fields["stamp"] = float(stamp)
+    return fields, first, ns

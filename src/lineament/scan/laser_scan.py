@@ -51,11 +51,7 @@ class LaserScan(Pictured):
     range_min, range_max : float
         Limits of valid ranges [m]: ``range_min <= r < range_max``.
     stamp : float
-        Time of the scan [s]: of its beam `stamp_beam`. Features are where the sensor was then.
-    stamp_ns : int, optional
-        The same in whole nanoseconds, in place of `stamp`, which holds today to 0.2 µs only.
-    stamp_beam : float
-        Index of the beam that was taken at the stamp, or between which it was; see `stamped`.
+        Time of the first beam [s], or of another, see `stamped`: features are where it is then.
     scan_time, time_increment : float
         Time of a turn of the mirror, and between beams [s]; 0 if unknown, negative if the mirror
         turns clockwise: the last beam is then taken first.
@@ -88,6 +84,7 @@ class LaserScan(Pictured):
     range_min: float
     range_max: float
     stamp: float
+    #: Index of the beam that was taken at the stamp; it may lie between beams.
     stamp_beam: float
     scan_time: float
     time_increment: float
@@ -107,8 +104,6 @@ class LaserScan(Pictured):
         range_min: float = 0.0,
         range_max: float = math.inf,
         stamp: float = 0.0,
-        stamp_ns: int | None = None,
-        stamp_beam: float = 0.0,
         scan_time: float = 0.0,
         time_increment: float = 0.0,
         frame_id: str = "",
@@ -128,11 +123,8 @@ class LaserScan(Pictured):
             raise ValueError("angles are given together with angle_min or angle_increment")
         own["angle_min"], own["angle_increment"] = first, step
         own["range_min"], own["range_max"] = range_limits(range_min, range_max)
-        if stamp_ns is not None:
-            own["stamp_ns"] = index(stamp_ns)
-            stamp = stamp or own["stamp_ns"] / NANO
         own["stamp"] = finite("stamp", stamp)
-        own["stamp_beam"] = finite("stamp_beam", stamp_beam)
+        own["stamp_beam"] = 0.0
         own["scan_time"] = finite("scan_time", scan_time)
         own["time_increment"] = finite("time_increment", time_increment)
         own["frame_id"] = str(frame_id)
@@ -255,25 +247,32 @@ class LaserScan(Pictured):
         times = {name: -getattr(self, name) for name in ("scan_time", "time_increment")}
         return self._changed(**own, **times)
 
-    def stamped(self, beam: str) -> Self:
+    def stamped(self, beam: str | float, ns: int | None = None) -> Self:
         """Return the same scan with a stamp that is the time of another beam.
 
         Parameters
         ----------
-        beam : str
+        beam : str or float
             ``first``, which is what ROS means; ``middle`` or ``last``, by which some drivers stamp;
-            in the order in which the beams are taken.
+            in the order in which the beams are taken. Or its index, which may lie between beams.
+        ns : int, optional
+            The stamp in nanoseconds, too: as a float, a time of today is known to 0.2 µs only.
 
         Examples
         --------
         >>> LaserScan([1.0, 1.0, 1.0], 0.0, 0.1, time_increment=0.01).stamped("last").stamp_beam
         2.0
         """
-        if beam not in STAMPS:
-            raise ValueError(f"stamp is {beam!r}, expected {', '.join(STAMPS)}")
-        share, last = STAMPS.index(beam) / 2, len(self) - 1
-        is_clockwise = (self.time_increment or self.scan_time) < 0
-        return self._changed(stamp_beam=(1 - share if is_clockwise else share) * last)
+        if isinstance(beam, str):
+            if beam not in STAMPS:
+                raise ValueError(f"stamp is {beam!r}, expected {', '.join(STAMPS)}")
+            share = STAMPS.index(beam) / 2
+            is_clockwise = (self.time_increment or self.scan_time) < 0
+            beam = (1 - share if is_clockwise else share) * (len(self) - 1)
+        fields: dict[str, Any] = {"stamp_beam": finite("stamp_beam", beam)}
+        if ns is not None and ns != self.stamp_ns:
+            fields |= {"stamp_ns": index(ns), "stamp": ns / NANO}
+        return self._changed(**fields)
 
     @classmethod
     def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
@@ -334,7 +333,8 @@ class LaserScan(Pictured):
         7.5
         """
         try:
-            scan = cls(**message_fields(message), pose=pose)
+            fields, first, ns = message_fields(message)
+            scan = cls(**fields, pose=pose).stamped(first, ns)
         except AttributeError as error:
             raise ValueError(f"message is no sensor_msgs/LaserScan: {error}") from None
         return scan.stamped(stamp) if stamp != "first" else scan

@@ -18,10 +18,7 @@ Item = tuple[str, LaserScan]
 
 _NOT_KEPT = -1
 #: What is kept of a scan besides ranges and bearings; intensities are not.
-_FIELDS = (
-    *("range_min", "range_max", "stamp", "stamp_ns", "stamp_beam"),
-    *("scan_time", "time_increment", "frame_id", "pose"),
-)
+_FIELDS = ("range_min", "range_max", "stamp", "scan_time", "time_increment", "frame_id", "pose")
 
 
 class ScanStore:
@@ -64,8 +61,8 @@ class ScanStore:
                 raise IndexError(f"scan {index} is not there")
             if self._starts[index] != _NOT_KEPT:
                 self._file.seek(self._starts[index])
-                topic, fields = pickle.load(self._file)
-                return topic, LaserScan(**fields)
+                topic, fields, stamped = pickle.load(self._file)
+                return topic, LaserScan(**fields).stamped(*stamped)
         return self._found_again(index)
 
     def stamps(self, first: int, count: int) -> list[float]:
@@ -113,4 +110,4 @@ def _pack(topic: str, scan: LaserScan) -> bytes:
     fields["ranges"] = single if is_single else scan.ranges
     names = ("angle_min", "angle_increment") if scan.is_regular else ("angles",)
     fields.update((name, getattr(scan, name)) for name in names)
-    return pickle.dumps((topic, fields))
+    return pickle.dumps((topic, fields, (scan.stamp_beam, scan.stamp_ns)))
