@@ -219,6 +219,7 @@ class Features(Tabled, Pictured):
         """
         return {
             "stamp": self.stamp,
+            "stamp_ns": self.stamp_ns,
             "frame_id": self.frame_id,
             "noise": None if self.noise is None else asdict(self.noise),
             **{name: _records(getattr(self, name)) for name in TABLES},

@@ -106,6 +106,11 @@ class Pipeline:
         if kept.tracker is not None:
             tracks = kept.tracker(features)
             travel = kept.odometer(tracks, scan.stamp)
+            if self._config.deskew == "scans" and twist is None:
+                straight = deskew(scan, kept.tracker.twist)
+                if straight is not scan:
+                    features = kept.extractor(straight)
+                    tracks = kept.tracker.again(features)
             if kept.dock is not None:
                 dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:

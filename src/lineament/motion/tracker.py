@@ -168,6 +168,17 @@ class Tracker:
         numbers[kept] = tracks.corners
         return replace(tracks, corners=numbers)
 
+    def again(self, features: Features) -> Tracks:
+        """Take the last scan in again, deskewed by the twist that it gave.
+
+        The next motion would else be that between a scan that is skewed and one that is not. The
+        twist stays, and the motion is that by which the two differ.
+        """
+        twists, step = self._twists.copy(), self._step
+        tracks = self(features)
+        self._twists, self._step = twists, step
+        return tracks
+
     def _take(self, features: Features, odometry: Pose | None) -> Tracks:
         """Take in a frame without edges."""
         motion = None
