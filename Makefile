@@ -64,6 +64,13 @@ wheel: .venv/ready
 	build/empty/$(notdir $(BIN))/python benchmarks/installed.py
 	cd build/empty && $(notdir $(BIN))/lineament demo --quiet -o demo && ls demo
 
+# The first minutes of a new user, from the built wheel in an empty environment: each step, and its time.
+.PHONY: new-user
+new-user: .venv/ready
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --quiet
+	$(BIN)/python benchmarks/new_user.py dist/lineament-*-py3-none-any.whl
+
 # Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
 mutants: .venv/ready
 	$(BIN)/python benchmarks/mutants.py --count 300 --seed 1

@@ -155,7 +155,7 @@ WRONG = [
     ("bench ple --data bench.npz -m pdbs", 2, "max_vertices"),
     ("bench ple --data bench.npz -m iepf -m hough --json a.json", 2, "one -m"),
     ("bench ple --data no.npz -m iepf", 1, "no.npz"),
-    ("simulate -o a.npz", 2, "WORLD"),
+    ("simulate -o a.npz --moving --speed 0", 2, "speed"),  # WORLD is the building
     ("simulate palace -o a.npz", 2, "world is 'palace', expected one of building, room"),
     ("simulate building -o a.npz --sensor sonar", 2, "sensor is 'sonar', expected one of paper"),
     ("simulate building -o a.npz --noise -1", 2, "sigma"),
@@ -202,7 +202,7 @@ def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsy
     assert "broken.log:2" in said
 
 
-def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
+def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, capsys):
     one, two, trace, dark = (tmp_path / f"{name}.png" for name in ("one", "two", "trace", "dark"))
     base = ["plot", str(npz), "--scan", "3"]
     assert run([*base, "-o", str(one)]) == 0
@@ -210,6 +210,7 @@ def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
     assert run([*base, "-o", str(trace), "--trace"]) == 0
     assert run([*base, "-o", str(dark), "--dark"]) == 0
     assert len({path.read_bytes() for path in (one, two, trace, dark)}) == 4
+    assert f"wall.npz · scan 3 · 10.30 s -> {one}\n" in capsys.readouterr().out
     assert matplotlib.image.imread(one)[..., :3].mean() > 0.8
     assert matplotlib.image.imread(dark)[..., :3].mean() < 0.2
     svg = tmp_path / "dark.svg"

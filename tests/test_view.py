@@ -153,7 +153,7 @@ def test_stamps_come_in_blocks(server):
         ("/api/stamps?first=0&count=0", 400, f"count is 0, expected 1 to {MOST_STAMPS}"),
         ("/api/stamps?first=0&count=4097", 400, "count is 4097"),
         ("/api/scan?" + "&".join(f"a{k}=1" for k in range(99)), 400, "makes no sense"),
-        ("/api/", 404, "/api/ is not there"),
+        ("/api/", 404, "'/api/' is not there"),
         ("/style.css/../../secret", 404, "is not there"),
         ("/%2e%2e/store.py", 404, "is not there"),
         ("/static/index.html", 404, "is not there"),

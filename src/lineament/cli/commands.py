@@ -50,7 +50,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
 @click.option("--dark", is_flag=True, help="Draw on black.")
 @reading
-@HUSH
+@QUIET
 def plot(
     log: Path | str,
     index: int,
@@ -60,6 +60,7 @@ def plot(
     noise: float | None,
     trace: bool,
     dark: bool,
+    quiet: bool,
     reading: dict[str, Any],
 ) -> None:
     """Draw a scan of LOG and what is found in it."""
@@ -81,6 +82,8 @@ def plot(
     else:
         found = {name: extractor(scan) for name, extractor in extractors.items()}
         plot_scan(scan, found, output, title=title, dark=dark)
+    if not quiet:
+        click.echo(f"{title} -> {output}")
 
 
 @click.command()

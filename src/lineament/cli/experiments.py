@@ -109,7 +109,7 @@ def ple(
 
 
 @click.command()
-@click.argument("world")
+@click.argument("world", default="building")
 @click.option("-o", "--output", required=True, type=PATH, help="Log to write: .npz, .log, .log.gz.")
 @click.option("--sensor", "name", default="utm30lx", show_default=True, help="Preset of a scanner.")
 @click.option("--scans", type=click.IntRange(min=1), help="[default: the whole drive, or 100]")
@@ -133,8 +133,8 @@ def simulate(
 ) -> None:
     """Record a simulated log, with true poses.
 
-    WORLD is "building", driven through from end to end; or a kind of random scene, seen from one
-    place: room, star, corridor, hall, grazing, layers.
+    WORLD is "building" (the default), driven through from end to end; or a kind of random scene,
+    seen from one place: room, star, corridor, hall, grazing, layers.
     """
     from ..simulation import sensor_like, simulate_log
     from .progress import tracker
@@ -142,3 +142,5 @@ def simulate(
     with wrong_usage():
         sensor = sensor_like(name, sigma=sigma, dropout=dropout, outlier=outlier)
         simulate_log(output, world, sensor, track=tracker(quiet), **settings)
+    if not quiet:
+        click.echo(f"{world}, seen by {name} -> {output}")

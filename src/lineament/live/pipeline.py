@@ -17,8 +17,8 @@ from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 
-#: The seconds of a stamp in ROS 2 have 31 bits.
-_LAST = 2**31 - 1
+#: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
+_LATEST = 2**31 * NANO - 1
 #: More beams than any scanner has: buffers of that size are not made for a broken message.
 MOST_BEAMS = 65_536
 #: Publishers whose buffers and tracks are kept; the oldest are forgotten.
@@ -37,7 +37,7 @@ def check_beams(scan: LaserScan) -> None:
 
 def time_of(scan: LaserScan) -> tuple[int, int]:
     """Seconds and nanoseconds of the stamp of a scan, clipped to what a message can hold."""
-    return divmod(min(max(scan.stamp_ns, 0), _LAST * NANO), NANO)
+    return divmod(min(max(scan.stamp_ns, 0), _LATEST), NANO)
 
 
 class Frame(NamedTuple):

@@ -206,9 +206,9 @@ def message_fields(message: Any) -> tuple[dict[str, Any], int, int | None]:
         message.ranges,
         None if intensities is None or not len(intensities) else intensities,
         message.angle_min,
-        message.angle_increment,
-        scan_time=message.scan_time,
-        time_increment=message.time_increment,
+        number("angle_increment", message.angle_increment),
+        scan_time=number("scan_time", message.scan_time),
+        time_increment=number("time_increment", message.time_increment),
     )
     fields |= {"range_min": message.range_min, "range_max": message.range_max}
     header, ns = getattr(message, "header", None), None

@@ -36,7 +36,7 @@ def answer(session: Session, target: str) -> bytes:
     """
     path, query = _split(target)
     if path not in _ROUTES:
-        raise RequestError(404, f"{path[:80]} is not there, expected {', '.join(_ROUTES)}")
+        raise RequestError(404, f"{path[:80]!r} is not there, expected {', '.join(_ROUTES)}")
     reply, names = _ROUTES[path]
     for name in query:
         if name not in names:
