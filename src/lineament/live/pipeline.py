@@ -105,7 +105,9 @@ class Pipeline:
         tracks, travel, dock = None, None, None
         if kept.tracker is not None:
             tracks = kept.tracker(features)
-            travel = kept.odometer(tracks, scan.stamp)
+            # A circle of a time that is not known takes as long as from scan to scan.
+            sweep = abs(scan.scan_time) or math.inf
+            travel = kept.odometer(tracks, scan.stamp, sweep if straight is scan else 0.0)
             if self._config.deskew == "scans" and twist is None:
                 straight = deskew(scan, kept.tracker.twist)
                 if straight is not scan:
