@@ -188,8 +188,7 @@ def estimate_motion(matches, prior=(0.0, 0.0, 0.0), covariance=None, *, roughnes
 class NaiveTracker(Tracker):
     """A tracker that looks for pairs three times, and numbers features one by one."""
 
-    def _follow(self, features, prior, spread):
-        motion = Motion(*prior, spread)
+    def _follow(self, features, motion, prior, spread):
         for _ in range(3):
             matches = associate(
                 self._seen, features, motion.pose, motion.covariance,
