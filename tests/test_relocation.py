@@ -8,6 +8,7 @@ import pytest
 from handmade import features, segment
 
 import lineament as ln
+from lineament.live import LiveConfig, Pipeline
 from lineament.motion import Tracker
 from lineament.motion.relocation import is_contradicted, relocated
 from lineament.scan.poses import compose, inverse, poses_along, relative
@@ -86,6 +87,21 @@ def test_after_a_pause_or_a_jump_the_motion_is_right_or_not_observed(sensor):
         if name == "irregular" or i in (0, 1, 4, 5):
             assert all(of), (name, i)
     assert not all(observed["rectangle", 3])
+
+
+def test_odometry_of_a_node_holds_over_a_pause():
+    """A robot stands for 10 s, in each room; where it is not sure, its covariance is wide."""
+    for seed, room in enumerate(ROOMS.values()):
+        pipeline, rng = Pipeline(LiveConfig(track=True)), np.random.default_rng(seed)
+        way = [compose((-1.0, -0.7, 0.4), tuple(p)) for p in poses_along(DRIVE, np.arange(6) * 0.1)]
+        way += [way[-1]] * 3
+        for k, pose in enumerate(way):
+            scan = SENSORS["utm30lx"].scan(room, pose, rng, k / 10 + 10.0 * (k > 5))
+            travel = pipeline("a", scan).travel
+            off = np.subtract(travel.pose, relative(way[0], pose))
+            covariance = travel.covariance + np.eye(3) * 1e-12
+            assert off @ np.linalg.solve(covariance, off) < 16
+            assert k != 6 or np.abs(travel.twist).max() < 0.01
 
 
 # Walls of a room of 8 by 5 m with a niche.

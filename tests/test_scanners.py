@@ -26,6 +26,7 @@ from lineament.motion import Tracker
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment
 from lineament.rosmsg.scans import laser_scan
+from lineament.scan.laser_scan import STAMPS
 from lineament.scan.poses import compose, poses_along, relative
 from lineament.simulation import World, cast_rays
 from lineament.simulation.placing import clearance
@@ -162,12 +163,23 @@ def test_the_motion_between_scans_is_that_of_the_sensor_at_their_stamps():
     assert np.max(squares) < 7
 
 
+def test_beams_of_stamps_that_there_are_not():
+    with pytest.raises(ValueError, match="stamp is 'end', expected first, middle, last"):
+        ln.LaserScan([1.0], 0.0, 0.1).stamped("end")
+    with pytest.raises(ValueError, match="stamp is 'end', expected first or middle or last"):
+        open_log("a.npz", stamp="end")
+    with pytest.raises(ValueError, match="stamp is 'end', expected one of first, middle, last"):
+        LiveConfig(stamp="end")
+
+
 @pytest.mark.parametrize("name", ["a.mcap", "a.ros2.mcap", "a.parquet", "a.csv", "a.jsonl"])
 def test_nanoseconds_are_whole_in_every_output(name, tmp_path):
     scans = [laser_scan(ALL[k].data(k, 0.002), "cdr") for k in range(3)]
     save_npz(tmp_path / "scans.npz", [scan.stamped(20.0) for scan in scans[:1]])
     ((_, scan),) = open_log(tmp_path / "scans.npz").items()
     assert (scan.stamp_ns, scan.stamp_beam) == (EPOCH, 20.0)
+    beams = [open_log(tmp_path / "scans.npz", stamp=beam).scan(0).stamp_beam for beam in STAMPS]
+    assert beams == [20.0, (len(scan) - 1) / 2, len(scan) - 1]
     extract_log(tmp_path / "scans.npz", tmp_path / name, ln.Extractor())
     if name.endswith("mcap"):
         with (tmp_path / name).open("rb") as file:

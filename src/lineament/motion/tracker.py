@@ -118,6 +118,8 @@ class Tracker:
         self._step = 0.0
         self._twists: deque[Twist] = deque(maxlen=2)
         self._next = 0
+        #: The first number that a corner of the last frame was given anew.
+        self._young = 0
 
     def __repr__(self) -> str:
         given = f"{self.max_missed}, gate={self.gate}, roughness={self.roughness}"
@@ -279,7 +281,13 @@ class Tracker:
             self._next += len(born[-1])
             missed[before] = 0
             kept = (missed > 0) & (missed <= self.max_missed)
-            ended.append(tracks[missed > self.max_missed])
+            if kind == "corners":
+                young = kept & (missed == 1) & (tracks >= self._young)
+                self._young = int(born[-1][0]) if len(born[-1]) else self._next
+                for k in np.flatnonzero(young):
+                    same = features.corners[mine < tracks[k]]
+                    kept[k] = not self._is_double(self._seen.corners[k], same, motion)
+            ended.append(tracks[(missed > 0) & ~kept])
             numbers[kind], rest[kind] = mine, kept
             self._tracks[kind] = np.concatenate((mine, tracks[kept]))
             self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
@@ -287,6 +295,20 @@ class Tracker:
         return Tracks(
             **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
         )
+
+    def _is_double(self, before: np.void, corners: NDArray[np.void], motion: Motion | None) -> bool:
+        """Whether a corner that was seen once is one of others, which was seen wrongly then."""
+        x, y, theta = (0.0, 0.0, 0.0) if motion is None else motion.pose
+        c, s = math.cos(theta), math.sin(theta)
+        turn = np.array([[c, -s], [s, c]])
+        corners = corners[corners["convex"] == before["convex"]]
+        off = corners["position"] @ turn.T + (x, y) - before["position"]
+        rough = 2.0 * self.roughness**2 * np.eye(2)
+        spread = turn @ corners["covariance"] @ turn.T + before["covariance"] + rough
+        known = np.isfinite(spread).all(axis=(1, 2))
+        off, spread = off[known], spread[known]
+        squares = (off[:, None] @ np.linalg.pinv(spread) @ off[:, :, None]).ravel()
+        return bool((squares < chi_square(self.gate, 2)).any())
 
 
 def _together(
