@@ -1,17 +1,18 @@
 # make demo: simulate a drive, extract its features, make a page.   make demo LOG=path: of your log.
 # make test: what is checked before each commit.                    make bench: the README's figures.
 # make test-all: what takes longer, besides.                        make lines: what there is to read.
+# make docs: the site of the documents, in build/site.
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
+.PHONY: demo test test-all docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
 test: lint types tests wheel
 
-test-all: coverage
+test-all: coverage docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -53,6 +54,17 @@ coverage: .venv/ready
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n auto --dist worksteal -m 'not slow'
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
+
+# The site of the documents, with its tutorials run; what it needs is installed when it is first made.
+.venv/docs: requirements-docs.lock .venv/ready
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements-docs.lock
+	@touch $@
+
+docs: .venv/docs
+	mkdir -p build
+	$(BIN)/lineament warmup --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	@echo "the site is in build/site: open build/site/index.html"
 
 # The wheel is pure, and runs in an environment that has nothing else.
 wheel: .venv/ready

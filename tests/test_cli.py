@@ -130,6 +130,11 @@ WRONG = [
     ("info other.npz", 1, "other.npz: expected the key"),
     ("info wall.npz --echo second", 2, "--echo"),
     ("info wall.npz --ring -1", 2, "--ring"),
+    ("info wall.npz --limit size=1", 2, "limit 'size' is unknown, expected one of beams, points"),
+    ("info wall.npz --limit beams", 2, "'beams': expected NAME=VALUE"),
+    ("info wall.npz --limit beams=1e6", 2, "limit beams is '1e6', expected a whole number"),
+    ("info wall.npz --limit beams=0", 2, "limit beams is 0, expected a whole number"),
+    ("info wall.npz --limit scans=6", 1, "wall.npz: has 7 scans, more than the limit of 6"),
     ("plot wall.npz --scan 7 -o p.png", 1, "has no scan 7"),
     ("plot wall.npz --scan -1 -o p.png", 1, "has no scan -1"),
     ("plot wall.npz -o p.gif", 2, "p.gif"),
@@ -368,13 +373,15 @@ def show(reading):
 def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
     given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
-    show.main([*given, "--keep-going"], standalone_mode=False)
+    limits = ["--limit", "beams=3", "--limit", "ratio=1_000"]
+    show.main([*given, "--keep-going", *limits], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
     # Nothing is deskewed by a command that reads a log so.
-    assert {**plain, "stamp": "first"} == {
-        "topic": None, "keep_going": False, **vars(ReadOptions())
+    assert plain | {"stamp": "first"} == {
+        "topic": None, "keep_going": False, **vars(ReadOptions()), "limits": None
     }  # fmt: skip
-    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom"]
+    limited = {"beams": 3, "ratio": 1000}
+    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom", limited]
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES

@@ -1,11 +1,14 @@
 """The documents name what there is."""
 
 import doctest
+import pkgutil
 import re
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+import yaml  # which distributed needs
 
 import lineament as ln
 from lineament.cli.commands import COMMANDS
@@ -14,6 +17,28 @@ from lineament.methods.liu import Liu
 
 ROOT = Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "lineament"
+
+
+def listed(nav):
+    if isinstance(nav, str):
+        return [nav]
+    return [
+        page for part in (nav.values() if isinstance(nav, dict) else nav) for page in listed(part)
+    ]
+
+
+def test_site_has_each_page_and_each_public_package_once():
+    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    docs, documents = ROOT / "docs", site["extra"]["documents"]
+    written = [p.relative_to(docs).with_suffix(".md").as_posix() for p in docs.rglob("*.[mp][dy]")]
+    for source in documents.values():
+        assert (ROOT / source).exists()
+    packages = {"commands", "lineament", "lineament.bounds", "lineament.methods.stages"}
+    for found in pkgutil.walk_packages(ln.__path__, "lineament."):
+        if found.ispkg and not found.name.startswith("lineament.cli"):
+            packages |= {found.name} if hasattr(import_module(found.name), "__all__") else set()
+    reference = [f"reference/{package}.md" for package in packages]
+    assert sorted(listed(site["nav"])) == sorted([*written, *documents, *reference])
 
 
 def test_equations_lead_to_functions_in_their_files():

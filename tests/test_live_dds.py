@@ -153,7 +153,7 @@ def test_a_burst_is_accounted_for(participant, remote, reliability):
 
 
 def test_a_flood_of_a_million_beams_is_bounded(participant, peer):
-    source = source_of(participant, depth=2, reliability="reliable")
+    source = source_of(participant, depth=2, reliability="reliable", limits={"beams": 1_000_000})
     peer.garble("/scan", "LaserScan")
     eventually(lambda: peer.listeners("/scan") == source.publishers == 1)
     for _ in range(5):

@@ -22,7 +22,7 @@ from lineament.live import (
     RosSink,
 )
 from lineament.live.counters import Counters
-from lineament.live.pipeline import MOST_BEAMS, check_beams, time_of, twist_of_laser
+from lineament.live.pipeline import time_of, twist_of_laser
 from lineament.live.received import Inbox, received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
@@ -142,10 +142,13 @@ def test_a_malformed_message_is_counted_written_once_and_survived(name):
 
 
 def test_most_beams():
-    for n in (1, MOST_BEAMS):
-        check_beams(ln.LaserScan(np.ones(n), 0.0, 1e-6))
-    with pytest.raises(ValueError, match="has 65537 beams, expected 1 to 65536"):
-        check_beams(ln.LaserScan(np.ones(65_537), 0.0, 1e-6))
+    """The limits of logs hold for messages too."""
+    pipeline = Pipeline(LiveConfig(limits={"beams": 500}))
+    for n in (1, 500):
+        pipeline("a", ln.LaserScan(np.ones(n), 0.0, 1e-3))
+    for n, problem in ((0, "has no beams"), (501, "has 501 beams in a scan, more than the limit")):
+        with pytest.raises(ValueError, match=problem):
+            pipeline("a", ln.LaserScan(np.ones(n), 0.0, 1e-3))
 
 
 def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import METHOD, NOISE, PATH, QUIET, SET, settings_of, wrong_usage
+from .options import (
+    LIMITS,
+    METHOD,
+    NOISE,
+    PATH,
+    QUIET,
+    SET,
+    TEXT_PATH,
+    complain,
+    settings_of,
+    wrong_usage,
+)
 
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report
@@ -50,11 +61,14 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
-@click.option("--from", "log", metavar="LOG", help="Play a log in place of a topic.")
+@click.option(
+    "--from", "log", type=TEXT_PATH, metavar="LOG", help="Play a log in place of a topic."
+)
 @click.option("--log-topic", metavar="TOPIC", help="Topic of the scans in the log.")
 @click.option("--poses", metavar="TOPIC", help="Topic of the poses in the log.")
 @click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud in the log.")
 @click.option("--keep-going", **_FLAG, help="Skip what is faulty in the log.")
+@LIMITS
 @click.option("--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.")
 @click.option("--loop", **_FLAG, help="Start the log again at its end.")
 @click.option(
@@ -88,18 +102,18 @@ def live(
 
         def write(line: str) -> None:
             if not quiet:
-                click.echo(beginning + line, err=True)
+                complain(beginning + line)
 
         def show(report: Report) -> None:
             if is_shown:
                 width = shutil.get_terminal_size().columns - 1
-                click.echo(beginning + str(report)[:width], nl=False, err=True)
+                complain(beginning + str(report)[:width], nl=False)
 
         try:
             with wrong_usage():
                 totals = run_live(configured, is_stopped, write=write, show=show).totals
         finally:
-            click.echo(beginning, nl=False, err=True)
+            complain(beginning, nl=False)
     if not quiet:
         click.echo(totals)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LineamentError
+from ..limits import LIMITS, Limits
 from ..scan import Pose
 from ..scan.laser_scan import STAMPS
 
@@ -106,6 +107,8 @@ class LiveConfig:
         Ring of a point cloud in the log that is the scan.
     keep_going : bool
         Whether to skip what is faulty in the log.
+    limits : dict
+        Limits that differ from those of `lineament.limits.Limits`, of messages and of the log.
     rate : float
         Factor on the speed of the log; 0 for as fast as scans are processed.
     loop : bool
@@ -151,6 +154,7 @@ class LiveConfig:
     poses: str | None = None
     ring: int | None = None
     keep_going: bool = False
+    limits: Mapping[str, Any] = field(default_factory=dict)
     rate: float = 1.0
     loop: bool = False
     foxglove: int | None = None
@@ -159,6 +163,7 @@ class LiveConfig:
     def __post_init__(self) -> None:
         for known in fields(self):
             _check(known.name, str(known.type), getattr(self, known.name))
+        Limits.of(self.limits)
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
         for name, values, n, many in (
@@ -210,12 +215,13 @@ def resolved(topic: str, namespace: str) -> str:
 
 
 def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read parameters of a `LiveConfig` from a TOML file: a flat table, and ``[parameters]``.
+    r"""Read a `LiveConfig` from a TOML file: a flat table, ``[parameters]`` and ``[limits]``.
 
     Raises
     ------
     LineamentError
-        If the file cannot be read, is not TOML, or has an unknown key.
+        If the file cannot be read, is not TOML, is longer than a line of a log may be, or has an
+        unknown key.
 
     Examples
     --------
@@ -226,7 +232,11 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     {'topic': '/front/scan', 'parameters': {'evidence': 12}}
     """
     try:
-        found = tomllib.loads(Path(path).read_bytes().decode())
+        with Path(path).open("rb") as file:
+            data = file.read(LIMITS.line + 1)
+        if len(data) > LIMITS.line:
+            raise ValueError(f"it has more than {LIMITS.line} bytes")
+        found = tomllib.loads(data.decode())
     except OSError as error:
         raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:

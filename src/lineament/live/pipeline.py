@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..extractor import Extractor
 from ..features import Features
+from ..limits import Limits
 from ..methods import get_method
 from ..motion import CornerPose, Dock, Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import deskew
@@ -19,20 +20,12 @@ from .config import LiveConfig
 
 #: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
 _LATEST = 2**31 * NANO - 1
-#: More beams than any scanner has: buffers of that size are not made for a broken message.
-MOST_BEAMS = 65_536
 #: Publishers whose buffers and tracks are kept; the oldest are forgotten.
 _MOST_PUBLISHERS = 8
 #: Odometry farther from a scan in time says nothing of it [s].
 _OLDEST = 0.5
 #: Poses farther apart in time give no velocity [s].
 _LONGEST = 1.0
-
-
-def check_beams(scan: LaserScan) -> None:
-    """Raise ValueError for a scan without beams, or with more than any scanner has."""
-    if not 0 < len(scan) <= MOST_BEAMS:
-        raise ValueError(f"has {len(scan)} beams, expected 1 to {MOST_BEAMS}")
 
 
 def time_of(scan: LaserScan) -> tuple[int, int]:
@@ -89,13 +82,19 @@ class Pipeline:
     """
 
     def __init__(self, config: LiveConfig) -> None:
-        self._config = config
+        self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
     def __call__(self, publisher: str, scan: LaserScan) -> Frame:
-        """Find the features of a scan of a publisher."""
+        """Find the features of a scan of a publisher.
+
+        ValueError for a scan without beams, or with more than the limit.
+        """
+        if not len(scan):
+            raise ValueError("has no beams")
+        self._limits.check("beams", len(scan))
         kept = self._publisher(publisher)
         if self._config.stamp != "first":
             scan = scan.stamped(self._config.stamp)

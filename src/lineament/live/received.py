@@ -7,6 +7,7 @@ from functools import cache, partial
 from threading import Condition
 from typing import NamedTuple, Protocol
 
+from ..limits import LIMITS, Limits
 from ..rosmsg.poses import Odometry, odometry
 from ..rosmsg.scans import Decoder, decoders
 from ..rosmsg.wire import Buffer
@@ -98,16 +99,21 @@ class Inbox:
 
 
 def received_scan(
-    publisher: str, data: Buffer, encoding: str, kind: str, echo: str = "first"
+    publisher: str,
+    data: Buffer,
+    encoding: str,
+    kind: str,
+    echo: str = "first",
+    limits: Limits = LIMITS,
 ) -> Received:
     """Return what a source gives of a serialised scan, of type `kind`, that has just arrived."""
-    read = partial(_decoder(kind, echo), data, encoding)
+    read = partial(_decoder(kind, echo, limits), data, encoding)
     return Received(publisher, read, time.monotonic())
 
 
 @cache
-def _decoder(kind: str, echo: str) -> Decoder:
-    known = decoders(echo, ring=None)
+def _decoder(kind: str, echo: str, limits: Limits) -> Decoder:
+    known = decoders(echo, None, limits)
     if kind not in known:
         raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
     return known[kind]

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LogError
+from ..limits import Limits
 from ..scan import LaserScan
 from .base import Head, Log
 from .lines import reading
-from .sources import ZIP, check_growth
+from .sources import ZIP
 
 #: One number for the log, or one for each scan.
 SCALARS = ("range_min", "range_max", "scan_time", "time_increment")
@@ -44,13 +46,14 @@ class NpzLog(Log):
 
     format = "npz"
     description = "npz (ranges, angle_min, angle_increment)"
+    is_held = True
     endings = (".npz",)
     needs_seek = True
     only_topic = "ranges"
 
     def _open(self) -> None:
         self._check_topic()
-        self._arrays = _load(self.source)
+        self._arrays = _load(self.source, self.limits)
         self._n = len(self._arrays["ranges"])
 
     @classmethod
@@ -92,25 +95,40 @@ def _at(values: NDArray[Any], i: int) -> Any:
     return values[i] if values.ndim else values[()]
 
 
-def _load(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _load(path: str | os.PathLike[str], limits: Limits) -> dict[str, NDArray[Any]]:
+    error = partial(LogError, path)
     with reading(path), Path(path).open("rb") as file:
         try:
             with np.load(file, allow_pickle=False) as archive:
                 found = list(archive.files)
                 size = sum(member.file_size for member in archive.zip.infolist())
-                check_growth(path, size, Path(path).stat().st_size)
+                limits.check_growth(size, Path(path).stat().st_size, error)
+                if "ranges" in found:
+                    for limit, n in zip(("scans", "beams"), _shape(archive), strict=False):
+                        limits.check(limit, n, error)
                 arrays = {key: np.asarray(archive[key]) for key in SHAPES if key in found}
         except LogError:
             raise
         # A damaged archive fails in a dozen ways, in zipfile, zlib, struct and numpy's parser.
-        except Exception as error:
-            problem = f"is no whole npz archive: {type(error).__name__}: {error}"
+        except Exception as broken:
+            problem = f"is no whole npz archive: {type(broken).__name__}: {broken}"
             raise LogError(path, problem.replace("\n", " ")) from None
     try:
         _check(arrays, found)
-    except ValueError as error:
-        raise LogError(path, str(error)) from None
+    except ValueError as wrong:
+        raise error(str(wrong)) from None
     return arrays
+
+
+def _shape(archive: Any) -> tuple[int, ...]:
+    """Return the shape of the ranges, before memory is taken for them."""
+    with archive.zip.open("ranges.npy") as member:
+        if not member.peek(6).startswith(np.lib.format.MAGIC_PREFIX):
+            return ()
+        version = np.lib.format.read_magic(member)
+        read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
+        shape: tuple[int, ...] = read(member)[0]
+    return shape
 
 
 def _check(arrays: dict[str, NDArray[Any]], found: list[str]) -> None:

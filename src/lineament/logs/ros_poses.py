@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..limits import LIMITS, Limits
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, stamped_poses
 from ..rosmsg.wire import Buffer
 from ..scan import Array, LaserScan, Pose
@@ -35,7 +36,8 @@ class PoseFinder:
     same x axis, whose z axis points up.
     """
 
-    def __init__(self, wanted: str) -> None:
+    def __init__(self, wanted: str, limits: Limits = LIMITS) -> None:
+        self._limits = limits
         self.topic, _, chain = wanted.partition(":")
         frames = [_frame(name) for name in chain.split("->")] if chain else []
         if chain and (len(frames) < 2 or not all(frames)):
@@ -51,7 +53,7 @@ class PoseFinder:
     def learn(self, connection: Connection, data: Buffer) -> list[tuple[str, LaserScan]]:
         """Take a message with poses, and return the scans, by topic, that waited for it."""
         is_chain, is_static = len(self.topics) > 1, connection.topic != self.topic
-        for found in stamped_poses(data, connection.encoding, connection.type):
+        for found in stamped_poses(data, connection.encoding, connection.type, self._limits):
             edge = (_frame(found.frame), _frame(found.child_frame)) if is_chain else ("", "")
             if edge in self._tracks:
                 stamp = -math.inf if is_static else found.stamp

@@ -53,8 +53,8 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
     scan : LaserScan
     twist : (v_x, v_y, omega) or None
         Velocity of the sensor in its own frame [m/s, m/s, rad/s], from two poses
-        (:func:`~lineament.scan.poses.twist_between`) or of the last scans
-        (:attr:`lineament.motion.Tracker.twist`). None where it is not known.
+        (`lineament.scan.poses.twist_between`) or of the last scans
+        (`lineament.motion.Tracker.twist`). None where it is not known.
 
     Returns
     -------

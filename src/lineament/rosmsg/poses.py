@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits import LIMITS, Limits
 from ..scan import Array, Pose
 from ..scan.fields import NANO, covariance_of_pose
 from ..scan.poses import Twist
@@ -57,9 +58,11 @@ class Odometry(NamedTuple):
     child_frame: str
 
 
-def stamped_poses(data: Buffer, encoding: str, kind: str) -> Iterator[StampedPose]:
+def stamped_poses(
+    data: Buffer, encoding: str, kind: str, limits: Limits = LIMITS
+) -> Iterator[StampedPose]:
     """Decode the poses in a message of a type that has some; ValueError if it is malformed."""
-    reader = WireReader(data, encoding)
+    reader = WireReader(data, encoding, limits)
     for _ in range(reader.count() if kind in TRANSFORMS else 1):
         found = _stamped_pose(reader, POSE_TYPES.get(kind, True))
         if kind in _WITH_COVARIANCE:
