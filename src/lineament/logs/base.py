@@ -163,12 +163,11 @@ class Log(Pictured, ABC):
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
         self._check_size()
-        beam = self.options.stamp
-        scans, beams = self.limits.scans, self.limits.beams
-        for count, item in enumerate(self._items(), 1):
-            n = len(item[1].ranges)
+        scans, beams, stamp = self.limits.scans, self.limits.beams, self.options.stamp
+        for count, (topic, scan) in enumerate(self._items(), 1):
+            n = len(scan.ranges)
             if n <= beams and count <= scans:
-                yield item if beam == "first" else (item[0], item[1].stamped(beam))
+                yield topic, scan if stamp == "first" else scan.stamped(stamp)
                 continue
             try:
                 self.limits.check("scans", count)

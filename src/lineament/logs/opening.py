@@ -56,8 +56,8 @@ def open_log(
     echo: str = "first",
     ring: int | None = None,
     pose_topic: str | None = None,
-    stamp: str = "first",
     limits: Mapping[str, int] | None = None,
+    stamp: str = "first",
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -80,10 +80,10 @@ def open_log(
         Which ring of a point cloud is the scan (ROS logs).
     pose_topic : str, optional
         Which topic gives the poses (ROS logs).
-    stamp : str
-        Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
     limits : mapping, optional
         Limits of :class:`~lineament.limits.Limits` that are to be others, by name.
+    stamp : str
+        Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
 
     Returns
     -------
