@@ -34,6 +34,9 @@ contracted = njit(fastmath={"contract"}, **_INTERNAL)
 #: The least number above 0: no range is 0.
 LEAST_RANGE = 5e-324
 
+#: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
+NEAREST, FARTHEST = 1e-6, 1e3
+
 
 @helper
 def usable(r, range_min, range_max):

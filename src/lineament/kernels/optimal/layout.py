@@ -16,8 +16,8 @@ POINTS = 11
 #: line that ends before it begins, or -1; first and last measurement of each cluster.
 BEAM, BROKEN, ORIGIN, CLUSTER_FIRST, CLUSTER_LAST = range(5)
 BEAMS = 5
-#: The candidates that run along, and their energies; the anchor of each group of candidates; before,
-#: whether a measurement is a spike.
+#: The candidates that run along, and their energies; the anchor of each group of candidates;
+#: before, whether a measurement is a spike.
 RUNNER, VALUE, ANCHOR, SPIKE = CLUSTER_FIRST, SCRATCH, CLUSTER_LAST, CLUSTER_FIRST
 #: Of a row of `pieces`, by surface: the line a x + b y = 1 [1/m]; its centroid [m] and direction;
 #: the covariance of its offset there and its angle; root mean square and misfit [m]. Of an arc:

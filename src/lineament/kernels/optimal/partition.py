@@ -191,8 +191,9 @@ def _open_groups(points, beams, sums, first, j, oldest, evidence, total, found):
                 lower = min(lower, key[q])
                 continue
             low = first + q * GROUP
-            # Each line is at least as bad as one up to the anchor and one from there on.
-            rest = cost(sums, anchor[q], j)
+            # Each line is at least as bad as one up to the anchor and one from there on. Of few
+            # measurements, the differences of the running sums have lost too many digits.
+            rest = cost(sums, anchor[q], j) if j - anchor[q] >= BLOCK else 0.0
             key[q] = lowest[q] - began + (rest if rest < math.inf else 0.0)
             if key[q] + began >= total:
                 lower = min(lower, key[q])
