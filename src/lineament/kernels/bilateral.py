@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import LEAST_RANGE, contracted, helper, kernel
+from . import LARGEST, contracted, helper, kernel
 from . import layout as at
 
 F = np.float32
@@ -35,15 +35,15 @@ def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, ci
     n, beams = floats.shape[1] - at.EXTRA, at.beams_of(floats)
     # Wider than the scan, the window takes in all of it, once.
     h, wraps = min(half_width, n), circular and n > half_width
-    least, away = max(range_min, LEAST_RANGE), F(-1e4 * sigma_r)
-    ranges, filtered = beams[at.RANGE], beams[at.FILTERED]
+    least, away = max(range_min, 1.0 / LARGEST), F(-1e4 * sigma_r)
+    most, ranges, filtered = min(range_max, LARGEST), beams[at.RANGE], beams[at.FILTERED]
     _pad(ranges, n, least, min(range_max, FARTHEST), h, wraps, away, scratch[0])
     _sum_up(sigma_d, sigma_r, h, scratch)
     near, weight, shift = scratch[0, h:], scratch[1, h:], scratch[2, h:]
     for i in range(n):
         value = ranges[i]
         moved = value + shift[i] / weight[i] if near[i] != away else value
-        filtered[i] = moved if (value >= least) & (value < range_max) else math.nan
+        filtered[i] = moved if (value >= least) & (value < most) else math.nan
 
 
 @helper

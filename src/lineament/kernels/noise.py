@@ -12,10 +12,13 @@ import numpy as np
 
 from . import FARTHEST, NEAREST, helper, kernel, sums, usable
 from . import layout as at
-from .optimal.constants import MOST_DEVIATION, SIGMAS
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
 LEAST_SIGMA = 1e-4
+#: Nor worse, at its farthest measurement [m]: what is farther off is clutter.
+MOST_SIGMA = 0.1
+#: Deviations beyond which errors are no noise.
+_SIGMAS = 3.0
 _BITS_OF_INFINITY = 0x7FF0000000000000
 #: Square of a deviation of a normal distribution, over that which a third of its squares is below.
 _THIRD = 1.0 / 0.4307**2
@@ -68,7 +71,7 @@ def fit_noise(points, beam, count, row, spare, fewest):
     apart: it grows with range where these differ by more than chance. `points` are x, y and range
     first, and two rows of scratch.
     """
-    least, most = LEAST_SIGMA * LEAST_SIGMA, MOST_DEVIATION * MOST_DEVIATION
+    least, most = LEAST_SIGMA * LEAST_SIGMA, MOST_SIGMA * MOST_SIGMA
     middle, used = _fill_triples(points, beam, count, row)
     if used < fewest:
         return least, 0.0
@@ -76,7 +79,7 @@ def fit_noise(points, beam, count, row, spare, fewest):
     far, far_square, far_count = _least_third(points, count, row, spare, middle, math.inf)
     constant, growth = (near * near_count + far * far_count) / (near_count + far_count), 0.0
     both = 1.0 / max(near_count, 1.0) + 1.0 / max(far_count, 1.0)
-    chance = SIGMAS * math.sqrt(2.0 * _OVERLAP * both)
+    chance = _SIGMAS * math.sqrt(2.0 * _OVERLAP * both)
     if near_count > 0.0 and far > near * (1.0 + chance):
         growth = (far - near) / (far_square - near_square)
         constant = near - growth * near_square
@@ -137,7 +140,7 @@ def _least_third(points, count, row, spare, low, high):
         n += 1.0 if kept[i] < math.inf else 0.0
     if n == 0.0:
         return 0.0, 0.0, 0.0
-    limit = SIGMAS * SIGMAS * _THIRD * ranked(kept, count, int(n) // 3)
+    limit = _SIGMAS * _SIGMAS * _THIRD * ranked(kept, count, int(n) // 3)
     total, squares, used = 0.0, 0.0, 0.0
     for i in range(count):
         within = kept[i] <= limit

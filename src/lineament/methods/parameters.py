@@ -52,7 +52,7 @@ class Bounds:
     def check(self, name: str, value: Any) -> None:
         """Refuse a value out of bounds, with the name of the parameter."""
         if not self.holds(value):
-            many = self.kind is int and isinstance(value, Integral) and value >= _MANY
+            many = self.kind is int and isinstance(value, Integral) and int(value) >= _MANY
             less = f" and < {_MANY}" if many and self.below > _MANY else ""
             raise ValueError(f"{name} is {value!r}, expected {self}{less}")
 
