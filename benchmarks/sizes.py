@@ -30,9 +30,8 @@ def microseconds(extractor: ln.Extractor, scan: ln.LaserScan) -> float:
 
 def main() -> None:
     extractor = ln.Extractor()
-    print(
-        "| beams | median [µs] | worst [µs] | which | median of a beam [ns] |\n|---|---|---|---|---|"
-    )
+    print("| beams | median [µs] | worst [µs] | which | median of a beam [ns] |")
+    print("|---|---|---|---|---|")
     for n in SIZES:
         took = {name: microseconds(extractor, scan) for name, scan in hard_scans(n).items()}
         median, worst = statistics.median(took.values()), max(took, key=lambda name: took[name])
