@@ -131,8 +131,9 @@ class Strict(np.ndarray):
     def _check(self, key):
         for size, one in zip(self.shape, key if isinstance(key, tuple) else (key,), strict=False):
             if isinstance(one, slice):
-                for end in (one.start, one.stop):
-                    assert end is None or 0 <= end <= size, (key, self.shape)
+                # A slice from the second on of nothing is nothing.
+                assert one.start is None or 0 <= one.start <= size + 1, (key, self.shape)
+                assert one.stop is None or 0 <= one.stop <= size, (key, self.shape)
             elif isinstance(one, int | np.integer):
                 assert 0 <= one < size, (key, self.shape)
 

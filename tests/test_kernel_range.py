@@ -21,6 +21,8 @@ from lineament.methods import METHODS, get_method, method_names
 from lineament.methods.parameters import MOST_VERTICES
 from lineament.methods.workspace import Block
 
+pytestmark = pytest.mark.slow
+
 NAMES = [*method_names(), "maps"]
 every_name = pytest.mark.parametrize("name", NAMES)
 #: Beams of the scans that are all tried; 8, which takes minutes, by `make boundscheck`.
