@@ -10,6 +10,7 @@ from liu_2023 import bilateral_filter
 
 from lineament import Extractor
 from lineament.features import TABLES
+from lineament.kernels import LARGEST
 
 
 def assert_same_run(scan, extractor: Extractor) -> dict:
@@ -105,45 +106,55 @@ def direction_of(line):
     return np.array([math.cos(line["angle"]), math.sin(line["angle"])])
 
 
-def assert_sound(features, scan, name):
-    """Hold what is true of the features of any scan, by a method without edges and slits."""
+def assert_positive_definite(covariances):
+    """In units of the deviations: offsets may be Gm where angles are nrad."""
+    for own in covariances:
+        assert (own.diagonal() > 0).all()
+        scale = np.sqrt(own.diagonal())
+        assert (np.linalg.eigvalsh(own / np.outer(scale, scale)) > 0).all()
+
+
+def assert_sound(features, scan, name, max_vertices=0):
+    """Hold what is true of the features of any scan, by a method without edges and slits.
+
+    A budget of vertices joins pieces of several clusters, which stay as they are: such a segment
+    has the cluster of its first measurement.
+    """
     for table in (getattr(features, kind) for kind in TABLES):
         for field in table.dtype.names:
             assert table[field].dtype.kind == "U" or np.isfinite(table[field]).all(), field
     segments, corners, n = features.segments, features.corners, len(scan)
-    for table in (segments, corners):
-        variances = table["covariance"].diagonal(axis1=1, axis2=2)
-        assert (variances > 0).all()
-        if name.startswith("liu"):  # Its lines may be so alike that hardly a digit is left.
-            assert (np.linalg.det(table["covariance"]) > -1e-9 * variances.prod(axis=1)).all()
-        else:
-            assert (np.linalg.eigvalsh(table["covariance"]) > 0).all()
+    assert_positive_definite(segments["covariance"])
+    assert_positive_definite(corners["covariance"])
     assert (segments["n_points"] >= (3 if name.startswith("liu") else 2)).all()
     assert (segments["rms"] >= 0).all()
-    valid = np.flatnonzero(scan.valid)
+    # What is farther than any scanner sees, or nearer, is missing, as beams are that are not valid.
+    usable = scan.valid & (scan.ranges >= 1 / LARGEST) & (scan.ranges < LARGEST)
+    valid = np.flatnonzero(usable)
     for line in segments:
         first, last = int(line["first_beam"]), int(line["last_beam"])
-        assert scan.valid[[first, last]].all()
+        assert usable[[first, last]].all()
         beams = valid[(valid - first) % n <= (last - first) % n]
         # On a ring, the measurement at which it was opened belongs to its first and its last line.
         assert line["n_points"] == len(beams)
         assert (line["end"] - line["start"]) @ direction_of(line) > 0
-        assert set(features.clusters[beams]) == {line["cluster"]}
+        own = {features.clusters[first]} if max_vertices else set(features.clusters[beams])
+        assert own == {line["cluster"]}
     for corner in corners:
         before, after = corner["segments"]
         assert 0 <= min(before, after) <= max(before, after) < len(segments)
-        assert segments["cluster"][before] == segments["cluster"][after]
+        assert max_vertices or segments["cluster"][before] == segments["cluster"][after]
         assert corner["beam"] == segments["first_beam"][after]
         assert 0 <= corner["opening"] <= math.pi
         assert corner["kind"] == "corner"
     for point in features.breakpoints:
         known = point["beam"][point["beam"] >= 0]
-        assert scan.valid[known].all()
+        assert usable[known].all()
         assert len(known) == (1 if point["kind"] == "scan_end" else 2)
         assert (point["occluder"] in known) == (point["kind"] == "jump")
-    assert (features.clusters[~scan.valid] == -1).all()
-    # Clusters are runs of valid beams, numbered in their order; one may go over the seam.
-    labels = features.clusters[scan.valid]
+    assert (features.clusters[~usable] == -1).all()
+    # Clusters are runs of usable beams, numbered in their order; one may go over the seam.
+    labels = features.clusters[usable]
     parts = np.split(labels, np.flatnonzero(np.diff(labels)) + 1)
     runs = [int(part[0]) for part in parts if len(part) and part[0] >= 0]
     if scan.is_full_circle and len(runs) > 1 and runs[0] == runs[-1]:

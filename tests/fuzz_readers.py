@@ -127,6 +127,9 @@ class Readers:
         sample, options = made
         return f"{sample.kind}: {'read' if check(sample, self._folders, options) else 'refused'}"
 
+    def close(self) -> None:
+        """Nothing is open."""
+
     def keep(self, made: tuple[Sample, dict[str, Any]]) -> None:
         """Take an input into the corpus."""
         self.samples.append(made[0])

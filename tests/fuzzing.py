@@ -146,8 +146,9 @@ def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None
             beside = saved.with_suffix(".part")
             beside.write_text(json.dumps(found))
             beside.replace(saved)
+    for target in targets.values():
+        target.close()
     shutil.rmtree(scratch)
-    os._exit(0)  # without the reader's thread of the viewer
 
 
 def _keep(state: Path, number: int, name: str, made: Any, what: str) -> None:

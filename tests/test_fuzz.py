@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from contextlib import closing
 from pathlib import Path
 from random import Random
 
@@ -89,7 +90,8 @@ def test_where_lengths_and_offsets_stand(samples):
 )
 def test_inputs_of_each_kind(target, inputs, tmp_path):
     made = target(tmp_path)
-    outcomes = {made.check(made.make(Random(seed))) for seed in range(inputs)}
+    with closing(made):
+        outcomes = {made.check(made.make(Random(seed))) for seed in range(inputs)}
     assert len(outcomes) > 1
 
 

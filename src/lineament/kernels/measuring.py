@@ -27,7 +27,8 @@ class Options(NamedTuple):
 def measure(floats, ints, row, bearings, circular, noise, options, tables):
     """Write the features of a scan, from points, clusters and pieces.
 
-    They come behind those of the scans before it.
+    They come behind those of the scans before it. A piece whose line has no length is no segment:
+    the list of pieces keeps those that are, and corners join only these.
 
     Parameters
     ----------
@@ -47,18 +48,25 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
     places, beam = work.points[at.MEASURED_X : at.MEASURED_RHO + 1], work.marks[at.BEAM]
     x, y, rho = places[0], places[1], places[2]
     segment_ints, corner_ints = segments.view(np.int32), corners.view(np.int32)
-    pieces = counts[at.PIECES]
+    pieces, kept, number = counts[at.PIECES], np.int64(0), work.waiting[at.FIRST]
     segment, corner = offsets[row, 0], offsets[row, 1]
     for k in range(pieces):
-        first, last, n = cut[at.FIRST, k], cut[at.LAST, k], segment + k
+        first, last, n = cut[at.FIRST, k], cut[at.LAST, k], segment + kept
         # The first point of a ring is repeated at its end, and counts once.
         last -= counts[at.CLOSED] != 0 and last - first + 1 == counts[at.POINTS]
         a, b = _clear_of_corners(cut[at.BEFORE], pieces, k, first, last, how.trim)
         line = fit_line(x, y, rho, a, b, noise, how.fit)
         count = last - first + 1
         misfit = _misfit(line, rho[(first + last) // 2], count, noise)
-        write_segment(places, beam, first, last, count, line, misfit, segments, segment_ints, n)
+        has_length = write_segment(
+            places, beam, first, last, count, line, misfit, segments, segment_ints, n
+        )
         segment_ints[n, col.S_CLUSTER] = work.marks[at.LABEL, first]
+        number[k] = kept if has_length else -1
+        kept += has_length
+    if kept < pieces:
+        _keep_numbered(cut, work.response, number, pieces)
+        pieces = counts[at.PIECES] = kept
     for k in range(pieces):
         before = cut[at.BEFORE, k]
         if before < 0:
@@ -88,6 +96,20 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
         places, beam, first, last, clusters, circular, how.gap, bearings.shape[1], breaks,
         offsets[row, 3],
     )  # fmt: skip
+
+
+@helper
+def _keep_numbered(cut, response, number, pieces):
+    """Keep the pieces that have a number, in place; a corner with one that has none is no more."""
+    for k in range(pieces):
+        n, before = number[k], cut[at.BEFORE, k]
+        if n >= 0:
+            cut[at.FIRST, n], cut[at.LAST, n], response[n] = (
+                cut[at.FIRST, k],
+                cut[at.LAST, k],
+                response[k],
+            )
+            cut[at.BEFORE, n] = number[before] if before >= 0 else -1
 
 
 @helper

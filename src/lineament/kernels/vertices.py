@@ -51,7 +51,7 @@ def _list_pieces(work, count, ring):
     for k in range(1, count):
         if kind[k] == BEGIN:
             continue
-        pieces[at.FIRST, n], pieces[at.LAST, n], response[n] = point[k - 1], point[k], math.nan
+        pieces[at.FIRST, n], pieces[at.LAST, n], response[n] = point[k - 1], point[k], 0.0
         pieces[at.BEFORE, n] = -1 if k == 1 or kind[k - 1] == BEGIN else n - 1
         n += 1
     if ring:

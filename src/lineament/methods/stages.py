@@ -260,6 +260,7 @@ def fit_line(points: ArrayLike, *, noise: NoiseLike | None = None, fit: str = "t
     block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
     block.counts[at.PIECES] = 1
     block.measure(fit=FITS[fit], sharp=False)
+    block.offsets[1, 0] = 1  # Points along one beam may give no segment, but a line they have.
     line: np.void = block.written()[0][0]
     return line
 
