@@ -44,7 +44,13 @@ def deviation(features, rho):
 
 
 def assert_sound(scan, features, extractor):
-    """Hold what is true of the features of any scan."""
+    """Hold what is true of the features of any scan, and of maps of it.
+
+    The vertices of a map are where the error of the ranges is the least, by so many vertices: they
+    may be far from what is measured there, but lie on its ray, and they are there however well
+    they are known.
+    """
+    is_map = extractor.method.max_vertices > 0
     n, segments, corners, arcs = len(scan), features.segments, features.corners, features.arcs
     for table in (segments, corners, arcs):
         for name in table.dtype.names:
@@ -70,43 +76,71 @@ def assert_sound(scan, features, extractor):
     labels = set(features.clusters.tolist()) - {-1}
     assert labels == set(range(len(labels)))
     if features.noise is not None and extractor.noise is None:
-        farthest = features.noise.proportional * scan.ranges[scan.valid & (scan.ranges < 1e6)].max()
+        farthest = features.noise.proportional * scan.ranges[scan.valid & (scan.ranges < 1e6)].max(
+            initial=0.0
+        )
         assert 0 < math.hypot(features.noise.sigma, farthest) <= MOST * (1 + 1e-9)
     for segment in segments:
-        assert_drawn_where_it_was_measured(scan, features, segment)
+        assert_straight(scan, segment)
+        if is_map:
+            assert_drawn_on_its_rays(scan, segment)
+        else:
+            assert_drawn_where_it_was_measured(scan, features, segment, extractor.method.evidence)
     for corner in corners:
-        assert_known(corner, segments)
+        assert is_map or math.sqrt(np.linalg.eigvalsh(corner["covariance"])[-1]) <= MOST
+        assert_joined(corner, segments)
 
 
-def assert_drawn_where_it_was_measured(scan, features, segment):
-    """Its direction is that of its ends; these are near its own measurements, or at a corner."""
-    first, last, start, end = (
-        segment[name] for name in ("first_beam", "last_beam", "start", "end")
-    )
+def beams_of(scan, segment):
+    first, last = segment["first_beam"], segment["last_beam"]
     beams = (first + np.arange((last - first) % len(scan) + 1)) % len(scan)
-    beams = beams[scan.valid[beams]]
-    own = scan.points[beams]
+    return beams[scan.valid[beams]]
+
+
+def assert_straight(scan, segment):
+    """Its direction is that of its ends, which are on both sides of its centroid."""
+    first, start, end = (segment[name] for name in ("first_beam", "start", "end"))
     along = np.array([math.cos(segment["angle"]), math.sin(segment["angle"])])
     across = np.array([-along[1], along[0]])
     assert (end - start) @ along > 0
     assert (end - start) @ across == pytest.approx(0, abs=1e-6 * scan.ranges[first])
     assert (start - segment["centroid"]) @ along < 0 < (end - segment["centroid"]) @ along
+
+
+def assert_drawn_on_its_rays(scan, segment):
+    """Its ends are on the rays of its first and its last measurement, or beside these."""
+    beams = beams_of(scan, segment)
+    for place, nearest in (("start", beams[0]), ("end", beams[-1])):
+        others = scan.angles[scan.valid & (np.arange(len(scan)) != nearest)] - scan.angles[nearest]
+        turn = math.atan2(*segment[place][::-1]) - scan.angles[nearest]
+        beside = np.abs(np.arctan2(np.sin(others), np.cos(others)))
+        assert abs(math.remainder(turn, 2 * math.pi)) <= np.sort(beside)[:2].max() + 1e-9
+
+
+def assert_drawn_where_it_was_measured(scan, features, segment, evidence):
+    """Its ends are near its own measurements, or at a corner.
+
+    A measurement is on a line unless that costs half the evidence, in squares of its deviation.
+    """
+    start, end, beams = segment["start"], segment["end"], beams_of(scan, segment)
+    own = scan.points[beams]
     spacing = np.hypot(*np.diff(own, axis=0).T)
     step = abs(math.sin(scan.angles[beams[1]] - scan.angles[beams[0]]))
     assert np.hypot(*(end - start)) >= step * scan.ranges[beams].min()
     sharp = features.corners[features.corners["kind"] == "corner"]["position"].tolist()
     for place, nearest, step in ((start, own[0], spacing[0]), (end, own[-1], spacing[-1])):
-        error = 3 * deviation(features, scan.ranges[beams].max())
+        off = deviation(features, scan.ranges[beams].max())
+        error = 3 * off
         if place.tolist() in sharp:
             assert np.hypot(*(place - nearest)) <= max(REACH, step + error)
         else:
+            error = max(3.0, math.sqrt(evidence / 2)) * off
             assert np.hypot(*(own - place).T).min() <= step + error
 
 
-def assert_known(corner, segments):
-    """It is of one of three kinds, between the right segments, and its place is known."""
+def assert_joined(corner, segments):
+    """It is of one of three kinds, between the right segments."""
     assert 0 <= corner["quality"] <= 1
-    assert math.sqrt(np.linalg.eigvalsh(corner["covariance"])[-1]) <= MOST
     a, b = corner["segments"]
     assert min(a, b) >= -1
     assert max(a, b) < len(segments)

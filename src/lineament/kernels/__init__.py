@@ -7,6 +7,8 @@ quantum), see `lineament.RangeNoise`. Parameters of a method come as a plain tup
 passes in half the time of a named one; the kernel names them.
 """
 
+import math
+
 from numba import njit
 
 #: Compiled on first use, cached on disk, without the GIL. No fastmath: NaN means something here.
@@ -37,8 +39,18 @@ LARGEST = 1e60
 #: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
 NEAREST, FARTHEST = 1e-6, 1e3
 
+#: Errors are correlated by no more than this: rounded, their covariances stay positive definite.
+_MOST_ALIKE = 1.0 - 1e-9
+
 
 @helper
 def usable(r, range_min, range_max):
     """Whether a range is finite, positive, at least `range_min` and below `range_max`."""
     return (r > 0.0) & (r >= range_min) & (r < range_max)
+
+
+@helper
+def as_covariance(value, first, second):
+    """Bound a covariance by the variances: it is theirs where one error outweighs all others."""
+    most = _MOST_ALIKE * math.sqrt(first) * math.sqrt(second)
+    return min(max(value, -most), most)

@@ -7,12 +7,9 @@ representation*, ICRA 2003.
 
 import math
 
-from . import helper, sums
+from . import as_covariance, helper, sums
 from .noise import LEAST_SIGMA
 
-#: Largest correlation of offset and angle: where one point outweighs all others it is 1, but for
-#: rounding, and no filter can use that.
-_CORRELATION = 1.0 - 1e-9
 #: How a line is fitted (equations 23, 24, and what is better).
 TOTAL, Y_OF_X, WEIGHTED, SLOPE_INTERCEPT = range(4)
 FITS = {
@@ -76,8 +73,7 @@ def fit_line(x, y, rho, first, last, noise, kind):
         # Points that coincide have no direction: any angle is as good.
         return cx, cy, c, s, var_offset, 0.0, math.pi**2 / 12.0, rms
     var_angle = aa / (t_sum * t_sum)
-    most = _CORRELATION * math.sqrt(var_offset) * math.sqrt(var_angle)
-    covariance = min(max(oa / (w_sum * t_sum), -most), most)
+    covariance = as_covariance(oa / (w_sum * t_sum), var_offset, var_angle)
     return cx, cy, c, s, var_offset, covariance, var_angle, rms
 
 

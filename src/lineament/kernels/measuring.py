@@ -9,7 +9,14 @@ from ..features import records as col
 from . import helper, kernel
 from . import layout as at
 from .line_fit import fit_line, normal_variance, range_variance
-from .writing import grade_corner, intersect, write_breaks, write_opening, write_segment
+from .writing import (
+    grade_corner,
+    intersect,
+    write_breaks,
+    write_opening,
+    write_place,
+    write_segment,
+)
 
 
 class Options(NamedTuple):
@@ -157,9 +164,5 @@ def _local_spacing(x, y, i, count):
 @helper
 def _place_at_beam(x, y, rho, spacing, variance, corners, k):
     """Put a corner on its point: off by up to half a spacing, and by the noise along the beam."""
-    across, along, c, s = spacing * spacing / 12.0, variance, x / rho, y / rho
-    corners[k, col.C_POSITION], corners[k, col.C_POSITION + 1] = x, y
-    corners[k, col.C_COVARIANCE] = across + along * c * c
-    corners[k, col.C_COVARIANCE + 1] = along * c * s
-    corners[k, col.C_COVARIANCE + 2] = along * c * s
-    corners[k, col.C_COVARIANCE + 3] = across + along * s * s
+    across, c, s = spacing * spacing / 12.0, x / rho, y / rho
+    write_place(corners, k, x, y, across + variance, c, s, across, -s, c)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import helper
+from . import as_covariance, helper
 from ..features import records as at
 
 #: Spread of a corner at which half are found again from another place, and how fast that falls.
@@ -99,10 +99,10 @@ def intersect(lines, a, b, x, y, near, corners, k):
 def write_place(corners, k, x, y, first, ax, ay, second, bx, by):
     """Write where a corner is, with variances along two unit vectors: Σ = v₁ a aᵀ + v₂ b bᵀ."""
     corners[k, at.C_POSITION], corners[k, at.C_POSITION + 1] = x, y
-    covariance = ax * ay * first + bx * by * second
-    corners[k, at.C_COVARIANCE] = ax * ax * first + bx * bx * second
-    corners[k, at.C_COVARIANCE + 1], corners[k, at.C_COVARIANCE + 2] = covariance, covariance
-    corners[k, at.C_COVARIANCE + 3] = ay * ay * first + by * by * second
+    xx, yy = ax * ax * first + bx * bx * second, ay * ay * first + by * by * second
+    xy = as_covariance(ax * ay * first + bx * by * second, xx, yy)
+    corners[k, at.C_COVARIANCE], corners[k, at.C_COVARIANCE + 1] = xx, xy
+    corners[k, at.C_COVARIANCE + 2], corners[k, at.C_COVARIANCE + 3] = xy, yy
 
 
 @helper
