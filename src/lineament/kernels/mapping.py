@@ -139,8 +139,10 @@ def _passes(walls, grid, begins, members, origin, end, shy, spread):
 
 @kernel
 def judge(poses, beams, walls, grid, begins, members, settings, found):
-    """Sum up the evidence of beams for poses: rows of `found` are (log-likelihood ratio, weights
-    of the beams explained, short, and passing through a wall).
+    """Sum up the evidence of beams for poses.
+
+    Rows of `found` become the log-likelihood ratio, and the weights of the beams that are
+    explained, short, and passing through a wall.
 
     `settings`: log-likelihood ratio of a beam explained, short, and passing through; variance that
     is added to all; how far past a wall's end it explains, and how near to it a beam may pass [m].
@@ -176,7 +178,7 @@ def judge(poses, beams, walls, grid, begins, members, settings, found):
 @helper
 def _pair(local, walls, near, place, turned, pose_spread, rough, best, best_d2):
     """Find the wall that fits a local wall best: its number and squared deviation."""
-    x, y, angle = place
+    x, y = place
     ux, uy = turned
     back, on = local[3], local[4]
     for k in near:
@@ -247,8 +249,15 @@ def refine(poses, local, walls, grid, begins, members, settings, pairs, informat
                     if at >= 0:
                         near = members[begins[at] : begins[at + 1]]
                         best, best_d2 = _pair(
-                            wall, walls, near, (px, py, angle), (ux, uy), spread, rough,
-                            best, best_d2,
+                            wall,
+                            walls,
+                            near,
+                            (px, py),
+                            (ux, uy),
+                            spread,
+                            rough,
+                            best,
+                            best_d2,
                         )
                 pairs[h, i] = best
                 if best < 0:

@@ -11,9 +11,10 @@
 """
 
 from .evidence import Evidence
-from .line_map import COLUMN, WALL, LineMap
+from .line_map import LineMap
 from .local_map import LocalMap, Query
 from .locate import VERDICTS, Location, locate
+from .walls import COLUMN, WALL
 
 __all__ = [
     "COLUMN",

@@ -119,18 +119,16 @@ def _spread(
 
 def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
     """Votes of the walls for each turn of the local map, by degrees, shape (360,), at most 1."""
-    votes = np.zeros(360)
-    for of_local in (False, True):
-        table = local if of_local else walls
+    spectra = []
+    for table in (local, walls):
         lengths = np.minimum(np.linalg.norm(table["end"] - table["start"], axis=1), 10.0)
         degrees = np.rint(np.degrees(table["angle"])).astype(np.int64) % 360
         histogram = np.bincount(degrees, lengths, minlength=360)
         both = table["side"] == 0
         histogram += np.bincount((degrees[both] + 180) % 360, lengths[both], minlength=360)
-        spectrum = np.fft.rfft(histogram)
-        votes = spectrum.conj() * votes if of_local else spectrum
-    smooth = np.fft.rfft(np.roll(np.bincount(np.arange(7), [1, 2, 3, 4, 3, 2, 1], 360), -3))
-    turned = np.fft.irfft(votes * smooth, 360)
+        spectra.append(np.fft.rfft(histogram))
+    smooth = np.roll(np.bincount(np.arange(7), [1, 2, 3, 4, 3, 2, 1], 360), -3)
+    turned = np.fft.irfft(spectra[0].conj() * spectra[1] * np.fft.rfft(smooth), 360)
     return np.asarray(np.maximum(turned / turned.max(initial=1e-12), 0.0))
 
 
@@ -171,7 +169,7 @@ def hypotheses(
 
 def _voted(poses: Array, voters: NDArray[np.intp], weights: Array, most: int) -> Array:
     """Return the means of poses in the boxes with the most votes; each corner has one a box."""
-    best: list[tuple[Array, Array]] = []
+    counts, means = [], []
     n_turns = round(2 * math.pi / TURN)
     for shift in (0.0, 0.5):
         at = np.floor(poses / (BOX, BOX, 2 * math.pi / n_turns) + shift).astype(np.int64)
@@ -197,8 +195,9 @@ def _voted(poses: Array, voters: NDArray[np.intp], weights: Array, most: int) ->
             ],
             axis=1,
         )
-        best.append((votes[order], mean))
-    votes, found = (np.concatenate(parts) for parts in zip(*best, strict=True))
+        counts.append(votes[order])
+        means.append(mean)
+    votes, found = np.concatenate(counts), np.concatenate(means)
     return np.asarray(found[np.argsort(-votes, kind="stable")[:most]])
 
 

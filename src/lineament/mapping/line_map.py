@@ -12,35 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import LineamentError
 from ..features import ARC, CORNER, SEGMENT, Features, make_records
 from ..kernels.mapping import WALL_COLUMNS, list_walls
-from ..motion.association import chi_square
 from ..output import open_writer
-from ..output.writer import Found
-from ..scan import Array, Pose
+from ..scan import Array, LaserScan, Pose
+from .hypotheses import meetings
+from .plans import read_plan
+from .walls import COLUMN, Merger, walls_of
 
-#: A straight wall. Its covariance is that of (offset along the left normal at the centroid, angle)
-#: [m², m·rad, rad²]. `side` is 1 where it was seen from its left alone, 0 where from either side.
-WALL = np.dtype(
-    [
-        ("start", "f8", 2),
-        ("end", "f8", 2),
-        ("centroid", "f8", 2),
-        ("angle", "f8"),
-        ("covariance", "f8", (2, 2)),
-        ("side", "i4"),
-        ("views", "i4"),
-    ],
-    align=True,
-)
-#: A round column or a bend: its covariance is that of (x, y, radius) [m²].
-COLUMN = np.dtype(
-    [("center", "f8", 2), ("radius", "f8"), ("covariance", "f8", (3, 3)), ("views", "i4")],
-    align=True,
-)
-
-#: Walls on one line are one wall if no more lies between them [m]: a door is wider.
-GAP = 0.2
-#: Segments that are shorter, or less sure of their direction, make no wall [m, rad].
-SHORTEST, LEAST_SURE = 0.1, 0.2
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
 #: Size of the cells by which walls are found [m], how far around a wall they reach, most cells.
@@ -122,8 +99,6 @@ class LineMap:
     @cached_property
     def corners(self) -> NDArray[np.void]:
         """Where two walls end together: records of `hypotheses.MEETING`."""
-        from .hypotheses import meetings
-
         return meetings(self.walls)
 
     @cached_property
@@ -173,8 +148,6 @@ class LineMap:
         sigma : float
             As for the map.
         """
-        from .merging import Merger
-
         merger = Merger()
         spreads = None if pose_covariances is None else iter(pose_covariances)
         places = None if poses is None else iter(poses)
@@ -210,8 +183,6 @@ class LineMap:
         LineamentError
             If the file cannot be read or has no walls.
         """
-        from .plans import read_plan
-
         return cls(*read_plan(path, layers), sigma=sigma)
 
     def to_features(self) -> Features:
@@ -237,17 +208,7 @@ class LineMap:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""
         with open_writer(path) as writer:
-            writer.add(Found(self.to_features(), None, "", (0.0, 0.0, 0.0)))
-
-
-def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> NDArray[np.void]:
-    """Make records of walls from both ends of each, shape (n, 2, 2)."""
-    walls = np.zeros(len(ends), WALL)
-    walls["start"], walls["end"], walls["centroid"] = ends[:, 0], ends[:, 1], ends.mean(axis=1)
-    along = ends[:, 1] - ends[:, 0]
-    walls["angle"] = np.arctan2(along[:, 1], along[:, 0])
-    walls["covariance"], walls["side"], walls["views"] = covariance, side, 1
-    return walls
+            writer.write(self.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
 
 
 def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float) -> Index:
@@ -279,8 +240,3 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     members = np.empty(begins[-1], np.int64)
     list_walls(table, grid, _AROUND, begins[:-1].copy(), members)
     return Index(table, grid, begins, members)
-
-
-def joint_chi_square(quantile: float = 0.99) -> float:
-    """Return the χ² within which two lines are one."""
-    return chi_square(quantile, 2)

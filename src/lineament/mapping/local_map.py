@@ -11,10 +11,9 @@ from ..kernels.mapping import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import compose
+from ..scan.poses import compose, relative
 from .hypotheses import meetings
-from .line_map import SHORTEST, WALL
-from .merging import Merger
+from .walls import SHORTEST, WALL, Merger
 
 #: A scan is kept after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, 0.26
@@ -73,7 +72,7 @@ class LocalMap:
     ...     features = extract(scan)
     ...     local.add(features, tracker(features))
     >>> local
-    LocalMap(5 scans, 1.0 m)
+    LocalMap(6 scans, 1.0 m)
     """
 
     def __init__(self, way: float = 5.0) -> None:
@@ -148,8 +147,6 @@ class _Sight:
 
 def _seen_from(sight: _Sight, last: _Sight) -> tuple[Pose, Array]:
     """Pose of a scan in the frame of the last one, and its covariance."""
-    from ..scan.poses import relative
-
     pose = relative(last.pose, sight.pose)
     c, s = np.cos(last.pose[2]), np.sin(last.pose[2])
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
@@ -199,5 +196,3 @@ def beams_of(features: Features, scan: LaserScan, pose: Pose, covariance: Array)
     beams[:, 5] = sigma**2 + covariance[0, 0] + covariance[1, 1] + r**2 * covariance[2, 2]
     beams[:, 6] = 1.0
     return beams
-
-

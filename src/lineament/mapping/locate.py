@@ -201,10 +201,10 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int)
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
-    covariance = np.linalg.inv(information + np.diag((1e-2, 1e-2, 1e-2)))
+    covariance = np.asarray(np.linalg.inv(information + np.diag((1e-2, 1e-2, 1e-2))), np.float64)
     chance = math.log(max(tries, 1))
     n = len(query.beams)
-    evidences = [Evidence(row[0] - chance, *row[1:], n) for row in found.tolist()]
+    evidences = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     first = evidences[0]
     others = [
         (_pose(pose), other)

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import LineamentError, needed_by
 from ..features import ARC, SEGMENT, Features, make_records
-from .line_map import COLUMN, walls_of
+from .walls import COLUMN, Merger, walls_of
 
 #: Metres of the units that $INSUNITS of a DXF names.
 UNITS = {
@@ -100,19 +101,19 @@ def _draw(
         columns.append((x, y, entity.dxf.radius))
     elif kind == "ARC":
         vertices = [(v.x, v.y) for v in entity.flattening(SAG / unit)]
-        lines.extend([*a, *b] for a, b in zip(vertices[:-1], vertices[1:], strict=True))
+        lines.extend([*a, *b] for a, b in pairwise(vertices))
 
 
 def _read_table(path: str | os.PathLike[str]) -> Plan:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from .merging import Merger
-
-    columns = (
-        "kind scan x y angle start_x start_y end_x end_y cov_00 cov_01 cov_11 cov_02 cov_12 "
-        "cov_22 radius misfit"
-    ).split()
+    columns = [
+        *["kind", "scan", "x", "y", "angle", "start_x", "start_y", "end_x", "end_y"],
+        "radius",
+        "misfit",
+    ]
+    columns += [f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22")]
     try:
         table = pq.read_table(path, columns=columns)
     except OSError as error:
@@ -154,5 +155,3 @@ def _arcs(of: dict[str, Any]) -> NDArray[np.void]:
         for j in range(3):
             records["covariance"][:, i, j] = of[f"cov_{min(i, j)}{max(i, j)}"]
     return records
-
-

@@ -42,7 +42,7 @@ def adjusted(
     if not len(used):
         return pose, np.zeros((3, 3))
     walls, local = index.walls[pairs[used]], query.walls[used]
-    rows = (2 * used[:, None] + [0, 1]).ravel()
+    rows = np.ravel(2 * used[:, None] + np.arange(2))
     for _ in range(2):
         error, jacobian, same, a = _errors(pose, local, walls)
         # Signs are those of the plan's walls.
@@ -65,20 +65,22 @@ def _add_walls(spread: Array, walls: Array, numbers: NDArray[np.int64], a: Array
         at = np.flatnonzero(numbers == k)
         own = np.array([[walls[at[0], 6], walls[at[0], 7]], [walls[at[0], 7], walls[at[0], 8]]])
         whole = lever[at].reshape(-1, 2)
-        rows = (2 * at[:, None] + [0, 1]).ravel()
+        rows = (2 * at[:, None] + np.arange(2)).ravel()
         spread[np.ix_(rows, rows)] += whole @ own @ whole.T
 
 
 def _errors(
     pose: Array, local: NDArray[np.void], walls: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Offsets and angles (2n,) of local walls from those of the plan, derivatives (2n, 3), whether
-    both lead the same way (1, -1), and the places along the plan's walls from their middles."""
+    """Offsets and angles (2n,) of local walls from the plan's, with derivatives (2n, 3).
+
+    Also whether both lead the same way (1, -1), and the places from the middle of the plan's.
+    """
     x, y, theta = pose
     c, s = math.cos(theta), math.sin(theta)
     lever = local["centroid"] @ np.array([[c, s], [-s, c]])
     v, angle = walls[:, 2:4], theta + local["angle"]
-    r = lever + (x, y) - walls[:, :2]
+    r = lever + np.array((x, y)) - walls[:, :2]
     cosine = v[:, 0] * np.cos(angle) + v[:, 1] * np.sin(angle)
     sine = v[:, 0] * np.sin(angle) - v[:, 1] * np.cos(angle)
     same = np.where(cosine >= 0, 1.0, -1.0)

@@ -1,14 +1,38 @@
-"""Which segments are one wall: the χ² of their common line decides."""
+"""Walls and columns: their records, and which segments are one wall, by χ² of their common line."""
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
 from ..motion.association import chi_square
 from ..scan import Array
-from .line_map import COLUMN, GAP, LEAST_SURE, SHORTEST, WALL
+
+#: A straight wall. Its covariance is that of (offset along the left normal at the centroid, angle)
+#: [m², m·rad, rad²]. `side` is 1 where it was seen from its left alone, 0 where from either side.
+WALL = np.dtype(
+    [
+        ("start", "f8", 2),
+        ("end", "f8", 2),
+        ("centroid", "f8", 2),
+        ("angle", "f8"),
+        ("covariance", "f8", (2, 2)),
+        ("side", "i4"),
+        ("views", "i4"),
+    ],
+    align=True,
+)
+#: A round column or a bend: its covariance is that of (x, y, radius) [m²].
+COLUMN = np.dtype(
+    [("center", "f8", 2), ("radius", "f8"), ("covariance", "f8", (3, 3)), ("views", "i4")],
+    align=True,
+)
+
+#: Walls on one line are one wall if no more lies between them [m]: a door is wider.
+GAP = 0.2
+#: Segments that are shorter, or less sure of their direction, make no wall [m, rad].
+SHORTEST, LEAST_SURE = 0.1, 0.2
 
 #: Lines whose directions differ by more are never one [rad].
 _TURN = 0.35
@@ -117,11 +141,20 @@ class Merger:
         return walls[walls["views"] >= min_views], columns
 
 
+def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> NDArray[np.void]:
+    """Make records of walls from both ends of each, shape (n, 2, 2)."""
+    walls = np.zeros(len(ends), WALL)
+    walls["start"], walls["end"], walls["centroid"] = ends[:, 0], ends[:, 1], ends.mean(axis=1)
+    along = ends[:, 1] - ends[:, 0]
+    walls["angle"] = np.arctan2(along[:, 1], along[:, 0])
+    walls["covariance"], walls["side"], walls["views"] = covariance, side, 1
+    return walls
+
+
 def _difference(
     walls: NDArray[np.void], wall: np.void, u: Array, turn: Array
 ) -> tuple[Array, Array]:
-    """Return offset and angle of a wall from the lines of others, at its centroid, and their
-    covariance, shapes (n, 2) and (n, 2, 2)."""
+    """Offset and angle (n, 2) of a wall from others at its centroid, and covariances (n, 2, 2)."""
     between = wall["centroid"] - walls["centroid"]
     along = (between * u).sum(axis=1)
     off = u[:, 0] * between[:, 1] - u[:, 1] * between[:, 0]
