@@ -57,6 +57,8 @@ def test_ranges_are_taken_as_a_scan(scan, call):
     for name in TABLES:
         assert found[name].tobytes() == expected[name].tobytes()
     assert found.scan.range_max == 2.2
+    found = call(scan.ranges, angles=scan.angles, **limits, method="liu")
+    assert found.segments.tobytes() == expected.segments.tobytes()
     assert len(found.segments) != len(ln.extract(scan, method="liu").segments)
 
 
@@ -384,12 +386,18 @@ def test_hostile_scans_have_pictures(ranges):
 def test_scan_and_log_in_a_notebook(scan, log):
     posed = scan.with_pose((1.0, 2.0, 0.0))
     text = "".join(ET.fromstring(posed._repr_html_()).itertext())
+    drawn_and_listed = ln.extract(posed)._repr_html_().split("<svg", 1)[1].split("<table")
+    drawn, listed = (part.removesuffix("</div>") for part in drawn_and_listed)
+    assert drawn in posed._repr_html_()
+    assert listed in posed._repr_html_()
     for fact in ("360 beams", "357 valid", "2.500 s", "0 to 5 m", "laser", "1.000 m, 2.000 m"):
         assert fact in text
     html = log._repr_html_()
     assert "drive.npz" in html
     assert "5, the first is drawn" in html
     assert len(parsed(html)["svg"]) == 2
+    counts = ln.extract(log[0]).counts()
+    assert f"{counts['segments']} segments" in html
 
 
 def test_a_log_that_cannot_be_read_shows_why(tmp_path):

@@ -201,6 +201,7 @@ def extract(
     noise: NoiseLike | None = None,
     angle_min: float | None = None,
     angle_increment: float | None = None,
+    angles: ArrayLike | None = None,
     range_min: float = 0.0,
     range_max: float = math.inf,
     **parameters: Any,
@@ -213,7 +214,7 @@ def extract(
         The scan, or its ranges [m].
     method, noise, **parameters
         As in `Extractor`.
-    angle_min, angle_increment, range_min, range_max
+    angle_min, angle_increment, angles, range_min, range_max
         As in `LaserScan`; for ranges, not for a scan, which has them.
 
     Raises
@@ -228,7 +229,7 @@ def extract(
     >>> extract([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01, method="liu", min_points=4)
     Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
-    made = _scan_of(scan, angle_min, angle_increment, range_min, range_max)
+    made = _scan_of(scan, (angle_min, angle_increment, angles), (range_min, range_max))
     return Extractor(method, noise=noise, **parameters)(made)
 
 
@@ -239,6 +240,7 @@ def trace(
     noise: NoiseLike | None = None,
     angle_min: float | None = None,
     angle_increment: float | None = None,
+    angles: ArrayLike | None = None,
     range_min: float = 0.0,
     range_max: float = math.inf,
     **parameters: Any,
@@ -252,20 +254,21 @@ def trace(
     >>> trace([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01).spacing.round(2).tolist()
     [nan, 0.02, 0.02]
     """
-    made = _scan_of(scan, angle_min, angle_increment, range_min, range_max)
+    made = _scan_of(scan, (angle_min, angle_increment, angles), (range_min, range_max))
     return Extractor(method, noise=noise, **parameters).trace(made)
 
 
-def _scan_of(given: Any, first: float | None, step: float | None, *limits: float) -> LaserScan:
+def _scan_of(given: Any, bearings: tuple[Any, Any, Any], limits: tuple[float, float]) -> LaserScan:
     """Make a scan of ranges and their bearings; a scan stays as it is."""
-    bare = first is None and step is None
+    bare = all(bearing is None for bearing in bearings)
     if isinstance(given, LaserScan):
         if not bare or limits != (0.0, math.inf):
             raise TypeError("a LaserScan has its own bearings and limits: pass it alone")
         return given
     if bare or isinstance(given, str | Path):
         raise _no_scan(given)
-    return LaserScan(given, first, step, range_min=limits[0], range_max=limits[1])
+    first, step, angles = bearings
+    return LaserScan(given, first, step, angles=angles, range_min=limits[0], range_max=limits[1])
 
 
 def _no_scan(given: Any) -> TypeError:

@@ -127,22 +127,26 @@ def _scan_of(source: Any, index: Any) -> tuple[LaserScan, str]:
 def picture(shown: Features | LaserScan | Log) -> str:
     """Return a picture and a table as HTML that needs nothing else: what notebooks show.
 
-    Nothing is extracted for it: of a log its first scan is drawn, and a scan alone has no features.
+    Of a log the first scan is drawn. Features of scans are those of the default method.
     """
-    if isinstance(shown, Log):
-        facts = {"format": shown.format}
-        try:
-            facts["topics"] = ", ".join(shown.topics)
-            facts["scans"] = f"{len(shown)}, the first is drawn" if len(shown) else "none"
-            drawn = svg(shown[0]) if len(shown) else ""
-        except LineamentError as error:
-            facts["error"], drawn = str(error), ""
-        return _page(shown.name, drawn, _facts(facts))
+    if isinstance(shown, Features):
+        return _page(
+            f"{_counts(shown)} · {shown.stamp:.3f} s", svg(shown.scan, shown), _rows(shown)
+        )
     if isinstance(shown, LaserScan):
-        return _page(_title(shown), svg(shown), _facts(_about(shown)))
-    table, left = _rows(shown)
-    note = f"<p>{left} more: <code>.to_pandas()</code></p>" if left else ""
-    return _page(f"{_counts(shown)} · {shown.stamp:.3f} s", svg(shown.scan, shown), table + note)
+        found = extract(shown)
+        return _page(_title(shown), svg(shown, found), _facts(_about(shown)) + _rows(found))
+    facts, drawn = {"format": shown.format}, ""
+    try:
+        facts["topics"] = ", ".join(shown.topics)
+        facts["scans"] = f"{len(shown)}, the first is drawn" if len(shown) else "none"
+        if len(shown):
+            found = extract(first := shown[0])
+            drawn = svg(first, found)
+            facts["features"] = _counts(found)
+    except LineamentError as error:
+        facts["error"] = str(error)
+    return _page(shown.name, drawn, _facts(facts))
 
 
 def svg(scan: LaserScan | None, features: Features | None = None) -> str:
@@ -283,11 +287,8 @@ def _about(scan: LaserScan) -> dict[str, str]:
     return facts
 
 
-def _rows(features: Features) -> tuple[str, int]:
-    """Make the table of the longest segments, the best corners and the largest arcs.
-
-    Returns how many segments, corners and arcs are not in it, too.
-    """
+def _rows(features: Features) -> str:
+    """Make the table of the longest segments, the best corners and the largest arcs."""
     rows, total = [], 0
     for name, by, at, deviation in (
         ("segments", "length", "centroid", (0, 0)),
@@ -304,7 +305,9 @@ def _rows(features: Features) -> tuple[str, int]:
             x, y = one[at]
             kind = one["kind"] if name == "corners" else name[:-1]
             rows.append((kind, f"{x:.3f}", f"{y:.3f}", _what(name, one), sigma))
-    return _table(("", "x [m]", "y [m]", "", "σ [mm]"), rows), total - len(rows)
+    left = total - len(rows)
+    note = f"<p>{left} more: <code>.to_pandas()</code></p>" if left else ""
+    return _table(("", "x [m]", "y [m]", "", "σ [mm]"), rows) + note
 
 
 def _what(name: str, one: np.void) -> str:
