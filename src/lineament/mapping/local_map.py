@@ -1,7 +1,8 @@
 """`LocalMap`: what was seen on the last metres of the way, in one frame."""
 
+import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from ..kernels.mapping import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import compose, relative
+from ..scan.poses import compose, inverse
+from .adjust import adjust
 from .hypotheses import meetings
-from .walls import SHORTEST, WALL, Merger
+from .walls import SHORTEST, WALL
 
 #: A scan is kept after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, 0.26
@@ -83,9 +85,15 @@ class LocalMap:
         self._last: _Sight | None = None
 
     def __repr__(self) -> str:
-        scans = [*self._kept] + ([self._last] if self._last else [])
-        way = self._last.way - scans[0].way if self._last else 0.0
-        return f"LocalMap({len(scans)} scans, {way:.1f} m)"
+        return f"LocalMap({len(self._sights)} scans, {self._way:.1f} m)"
+
+    @property
+    def _sights(self) -> list["_Sight"]:
+        return [*self._kept, *([self._last] if self._last else [])]
+
+    @property
+    def _way(self) -> float:
+        return sum(sight.way for sight in self._sights[1:])
 
     def add(self, features: Features, tracks: Tracks, scan: LaserScan | None = None) -> None:
         """Add a scan: its features, and what the tracker says of them.
@@ -95,62 +103,56 @@ class LocalMap:
         scan = features.scan if scan is None else scan
         if scan is None:
             raise ValueError("the features have no scan, expected it as the third argument")
-        before = self._last
-        if before is None or tracks.motion is None:
+        before, motion = self._last, tracks.motion
+        if before is None or motion is None:
             self._kept.clear()
-            self._last = _Sight(features, scan, (0.0, 0.0, 0.0), np.zeros((3, 3)), 0.0, 0.0)
+            self._last = _Sight(features, scan, tracks.segments)
             return
-        motion = tracks.motion
-        of_pose, of_motion = compose_jacobians(before.pose, motion.pose)
+        if not self._kept or before.way > SPACING or before.turn > TURN:
+            self._kept.append(before)
+            before = _Sight(features, scan, tracks.segments)
+        of_pose, of_motion = compose_jacobians(before.motion, motion.pose)
         self._last = _Sight(
             features,
             scan,
-            compose(before.pose, motion.pose),
+            tracks.segments,
+            compose(before.motion, motion.pose),
             of_pose @ before.covariance @ of_pose.T + of_motion @ motion.covariance @ of_motion.T,
-            before.way + float(np.hypot(motion.x, motion.y)),
+            before.way + math.hypot(motion.x, motion.y),
             before.turn + abs(motion.theta),
         )
-        kept = self._kept[-1] if self._kept else None
-        if (
-            kept is None
-            or self._last.way - kept.way > SPACING
-            or self._last.turn - kept.turn > TURN
-        ):
-            self._kept.append(before)
-        while self._kept and self._last.way - self._kept[0].way > self.way:
+        while self._kept and self._way > self.way:
             self._kept.popleft()
 
     def query(self) -> Query:
         """Return walls and beams in the frame of the last scan; ValueError before there is one."""
         if self._last is None:
             raise ValueError("the local map is empty, expected a scan")
-        merger, beams = Merger(), []
-        for sight in (self._last, *reversed(self._kept)):
-            pose, spread = _seen_from(sight, self._last)
-            merger.add(sight.features.transform(*pose, spread))
-            beams.append(beams_of(sight.features, sight.scan, pose, spread))
-        walls, _ = merger.result()
-        return query_of(walls, None, np.concatenate(beams))
+        sights = self._sights
+        poses: list[Pose] = [(0.0, 0.0, 0.0)]
+        for sight in sights[:0:-1]:
+            poses.append(compose(poses[-1], inverse(sight.motion)))
+        motions = [(sight.motion, sight.covariance) for sight in sights[1:]]
+        seen = [(sight.features.segments, sight.numbers) for sight in sights]
+        placed, spreads, walls, covariance = adjust(poses[::-1], motions, seen)
+        beams = [
+            beams_of(sight.features, sight.scan, pose, spread)
+            for sight, pose, spread in zip(sights, placed, spreads, strict=True)
+        ]
+        return query_of(walls, covariance, np.concatenate(beams[::-1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sight:
-    """A scan, its pose in the frame of the first, and way and turn up to it."""
+    """A scan, the numbers of its segments, and motion, way and turn since the one kept before."""
 
     features: Features
     scan: LaserScan
-    pose: Pose
-    covariance: Array
-    way: float
-    turn: float
-
-
-def _seen_from(sight: _Sight, last: _Sight) -> tuple[Pose, Array]:
-    """Pose of a scan in the frame of the last one, and its covariance."""
-    pose = relative(last.pose, sight.pose)
-    c, s = np.cos(last.pose[2]), np.sin(last.pose[2])
-    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-    return pose, turn @ (last.covariance - sight.covariance) @ turn.T + 1e-12 * np.eye(3)
+    numbers: NDArray[np.int64]
+    motion: Pose = (0.0, 0.0, 0.0)
+    covariance: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    way: float = 0.0
+    turn: float = 0.0
 
 
 def query_of_scan(features: Features, scan: LaserScan | None = None) -> Query:
