@@ -12,9 +12,6 @@ from ..scan import Array, Pose
 from ..scan.poses import compose
 from .walls import WALL
 
-#: The motions between scans come from the same segments: they count by so little, to hold what
-#: the walls leave free.
-_MOTION = 10.0
 _ROUNDS = 3
 
 
@@ -144,7 +141,7 @@ def _add_motions(
         of_pose, of_motion = compose_jacobians((x, y, theta), motion)
         error = state[k + 1] - compose((x, y, theta), motion)
         error[2] = math.remainder(error[2], 2 * math.pi)
-        weight = np.linalg.inv(_MOTION * of_motion @ covariance @ of_motion.T + 1e-10 * np.eye(3))
+        weight = np.linalg.inv(of_motion @ covariance @ of_motion.T)
         jacobian = np.hstack((-of_pose, np.eye(3)))
         after = size if k == len(motions) - 1 else 3 * k + 3
         at = np.concatenate((3 * k + np.arange(3), after + np.arange(3)))
