@@ -7,6 +7,8 @@ A wall is a row of `WALL_COLUMNS` numbers, a local wall one of `LOCAL_COLUMNS`, 
 
 import math
 
+import numpy as np
+
 from . import helper, kernel
 
 #: start x, y; direction x, y; length; whether it is seen from its left alone; variance of its
@@ -183,9 +185,7 @@ def judge(poses, beams, walls, grid, begins, members, settings, found):
             if at >= 0:
                 near = members[begins[at] : begins[at + 1]]
                 deviation = _misfit(walls, near, ex, ey, direction, pose, margin, spread)
-            if _passes(
-                walls, grid, begins, members, (ox, oy), end, direction, pose, shy, spread
-            ):
+            if _passes(walls, grid, begins, members, (ox, oy), end, direction, pose, shy, spread):
                 passes += weight
                 total += weight * through
             elif deviation < math.inf:
@@ -323,54 +323,69 @@ def refine(poses, local, walls, grid, begins, members, settings, pairs, informat
             turn = min(turn, 0.002 + math.sqrt(m8 / det))
 
 
+@helper
+def _is_alike(anchor, other, alike):
+    """Whether two anchors may be the same: ends of walls, or corners with equal openings."""
+    kind, kind_of_other = anchor[3], other[3]
+    if kind > 1.5 or kind_of_other > 1.5:
+        return kind == kind_of_other
+    if kind != kind_of_other and kind >= 0.0 and kind_of_other >= 0.0:
+        return False
+    return abs(anchor[4] - other[4]) <= alike
+
+
+@helper
+def _count(box, weight, x, y, theta):
+    """Count a vote; turns are from those in the box, which are never far from it."""
+    full = 2.0 * math.pi
+    if box[0] > 0.0:
+        theta = box[3] + (theta - box[3] + 0.5 * full) % full - 0.5 * full
+    share = weight / (box[0] + weight)
+    box[0] += weight
+    box[1] += share * (x - box[1])
+    box[2] += share * (y - box[2])
+    box[3] += share * (theta - box[3])
+
+
 @kernel
-def vote(local, plan, turns, settings, shift, boxes, voters, touched):
+def vote(local, plan, turns, settings, boxes, voters, touched):
     """Count votes for poses in boxes: an anchor of the local map has one a box, its first.
 
-    Rows of `boxes` become the votes and the mean pose; returns how many boxes are in `touched`.
-    `turns`: votes of the walls by degrees, the slot of each box of turns, how many slots.
+    There are two sets of boxes, which overlap by half. Rows of `boxes`, (2, n, 4), become the votes
+    and the mean pose; returns how many boxes of each set are in `touched`. `turns`: votes of the
+    walls by degrees, the slot of each box of turns in either set, how many slots.
     """
     low_x, low_y, size, rows, alike, least, of_ends = settings
     by_turn, slots, n_slots = turns
-    full, count, n_turns = 2.0 * math.pi, 0, len(slots)
-    width = full / n_turns
+    full, n_turns = 2.0 * math.pi, slots.shape[1]
+    counts = [0, 0]
+    cosines, sines = np.cos(plan[:, 2]), np.sin(plan[:, 2])
     for i in range(len(local)):
-        x, y, angle, kind, opening = local[i]
+        x, y, angle = local[i, 0], local[i, 1], local[i, 2]
+        cosine, sine = math.cos(angle), math.sin(angle)
+        share = of_ends if local[i, 3] > 1.5 else 1.0
         for j in range(len(plan)):
-            other = plan[j, 3]
-            if kind > 1.5 or other > 1.5:
-                if kind != other:
-                    continue
-            elif kind * other >= 0.0 and kind != other and kind + other >= 0.0:
+            if not _is_alike(local[i], plan[j], alike):
                 continue
-            elif abs(opening - plan[j, 4]) > alike:
-                continue
-            theta = (plan[j, 2] - angle) % full
-            weight = by_turn[int(theta * 180.0 / math.pi + 0.5) % 360]
+            theta = plan[j, 2] - angle
+            theta -= full * math.floor(theta / full)
+            weight = by_turn[int(theta * 360.0 / full + 0.5) % 360]
             if weight < least:
                 continue
-            if kind > 1.5:
-                weight *= of_ends
-            c, s = math.cos(theta), math.sin(theta)
+            c, s = cosines[j] * cosine + sines[j] * sine, sines[j] * cosine - cosines[j] * sine
             px, py = plan[j, 0] - c * x + s * y, plan[j, 1] - s * x - c * y
-            at = int((px - low_x) / size + shift) * rows + int((py - low_y) / size + shift)
-            at = at * n_slots + slots[int(theta / width + shift) % n_turns]
-            if voters[at] == 0:
-                touched[count] = at
-                count += 1
-            elif voters[at] == i + 1:
-                continue
-            voters[at] = i + 1
-            # The mean of turns in one box: those that are a turn apart are not far from another.
-            box = boxes[at]
-            if box[0] > 0.0:
-                theta = box[3] + (theta - box[3] + 0.5 * full) % full - 0.5 * full
-            share = weight / (box[0] + weight)
-            box[0] += weight
-            box[1] += share * (px - box[1])
-            box[2] += share * (py - box[2])
-            box[3] += share * (theta - box[3])
-    return count
+            for k in range(2):
+                shift = 0.5 * k
+                at = int((px - low_x) / size + shift) * rows + int((py - low_y) / size + shift)
+                at = at * n_slots + slots[k, int(theta * n_turns / full + shift) % n_turns]
+                if voters[k, at] == i + 1:
+                    continue
+                if voters[k, at] == 0:
+                    touched[k, counts[k]] = at
+                    counts[k] += 1
+                voters[k, at] = i + 1
+                _count(boxes[k, at], share * weight, px, py, theta)
+    return counts[0], counts[1]
 
 
 @kernel
@@ -382,10 +397,8 @@ def choose(poses, order, way, turn, chosen):
         for n in range(count):
             other = chosen[n]
             away = abs((poses[k, 2] - poses[other, 2] + math.pi) % (2.0 * math.pi) - math.pi)
-            if away < turn:
-                if math.hypot(poses[k, 0] - poses[other, 0], poses[k, 1] - poses[other, 1]) < way:
-                    is_new = False
-                    break
+            between = math.hypot(poses[k, 0] - poses[other, 0], poses[k, 1] - poses[other, 1])
+            is_new &= away >= turn or between >= way
         if is_new:
             chosen[count] = k
             count += 1

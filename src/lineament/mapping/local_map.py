@@ -24,6 +24,8 @@ SPACING, TURN = 0.3, 0.26
 #: is the tracker's guess.
 ODOMETRY = (0.005, 0.1), (0.005, 0.1), (0.005, 0.1)
 UNSURE = (0.05, 1.0), (0.05, 1.0), (0.02, 0.2)
+#: How far a sensor may go between scans in a direction that is not observed [m].
+FASTEST = 0.5
 #: One beam is kept for each square of so much [m] in which beams end, and at most so many.
 _SQUARE, MOST_BEAMS = 0.25, 160
 
@@ -140,13 +142,16 @@ class LocalMap:
         if odometry is not None and before.odometry is not None:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
         way, turn = math.hypot(*moved[:2]), abs(moved[2])
-        deviations = [a + b * c for (a, b), c in zip(sure, (way, way, turn), strict=True)]
+        spread = np.diag(
+            [(a + b * c) ** 2 for (a, b), c in zip(sure, (way, way, turn), strict=True)]
+        )
+        if sure is UNSURE:
+            spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
         of_pose, of_motion = compose_jacobians(before.motion, moved)
-        of_motion *= deviations
         self._last = _Sight(
             *seen,
             compose(before.motion, moved),
-            of_pose @ before.covariance @ of_pose.T + of_motion @ of_motion.T,
+            of_pose @ before.covariance @ of_pose.T + of_motion @ spread @ of_motion.T,
             before.way + way,
             before.turn + turn,
         )
