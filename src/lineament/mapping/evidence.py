@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.mapping import judge
+from ..kernels.mapping.beams import judge
 from ..scan import Array
 from .line_map import Index
 

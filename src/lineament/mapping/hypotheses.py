@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.mapping import vote
+from ..kernels.mapping.votes import vote
 from ..scan import Array
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LineamentError
 from ..features import ARC, CORNER, SEGMENT, Features, make_records
-from ..kernels.mapping import WALL_COLUMNS, list_walls
+from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings

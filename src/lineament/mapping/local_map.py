@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..kernels.mapping import BEAM_COLUMNS, LOCAL_COLUMNS
+from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
@@ -91,7 +91,7 @@ class LocalMap:
     ...     features = extract(scan)
     ...     local.add(features, tracker(features))
     >>> local
-    LocalMap(6 scans, 1.0 m)
+    LocalMap(4 scans, 1.0 m)
     """
 
     def __init__(self, way: float = 5.0) -> None:
@@ -142,9 +142,8 @@ class LocalMap:
         if odometry is not None and before.odometry is not None:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
         way, turn = math.hypot(*moved[:2]), abs(moved[2])
-        spread = np.diag(
-            [(a + b * c) ** 2 for (a, b), c in zip(sure, (way, way, turn), strict=True)]
-        )
+        deviations = [a + b * c for (a, b), c in zip(sure, (way, way, turn), strict=True)]
+        spread = np.diag(np.square(deviations))
         if sure is UNSURE:
             spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
         of_pose, of_motion = compose_jacobians(before.motion, moved)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
-from ..kernels.mapping import choose
+from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from .evidence import Evidence, evidence_of
