@@ -114,7 +114,7 @@ def assert_positive_definite(covariances):
         assert (np.linalg.eigvalsh(own / np.outer(scale, scale)) > 0).all()
 
 
-def assert_sound(features, scan, name, max_vertices=0):
+def assert_sound(features, scan, method):
     """Hold what is true of the features of any scan, by a method without edges and slits.
 
     A budget of vertices joins pieces of several clusters, which stay as they are: such a segment
@@ -124,9 +124,10 @@ def assert_sound(features, scan, name, max_vertices=0):
         for field in table.dtype.names:
             assert table[field].dtype.kind == "U" or np.isfinite(table[field]).all(), field
     segments, corners, n = features.segments, features.corners, len(scan)
+    max_vertices = getattr(method, "max_vertices", 0)  # which pdbs does without
     assert_positive_definite(segments["covariance"])
     assert_positive_definite(corners["covariance"])
-    assert (segments["n_points"] >= (3 if name.startswith("liu") else 2)).all()
+    assert (segments["n_points"] >= (method.min_points if method.name == "liu" else 2)).all()
     assert (segments["rms"] >= 0).all()
     # What is farther than any scanner sees, or nearer, is missing, as beams are that are not valid.
     usable = scan.valid & (scan.ranges >= 1 / LARGEST) & (scan.ranges < LARGEST)

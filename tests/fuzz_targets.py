@@ -112,8 +112,7 @@ class Methods(Target):
         if method.name == "optimal":
             assert_optimal_sound(scan, features, extractor)
         else:
-            budget = getattr(method, "max_vertices", 0)  # which pdbs does without
-            assert_sound(features, scan, method.name, budget)
+            assert_sound(features, scan, method)
         again = extractor(scan)
         for name in TABLES:  # whatever the buffers held before
             assert features[name].tobytes() == again[name].tobytes(), name

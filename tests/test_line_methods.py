@@ -262,3 +262,15 @@ def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):
     for ranges in (np.full(len(angles), np.nan), 2.0 + np.arange(len(angles)) % 2):
         features = extractor(scan_of(ranges, angles))
         assert len(features.segments) == len(features.corners) == 0
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_line_along_its_beams_is_no_segment(turn):
+    """Whose first and last measurement are at one place along it; the next ones are numbered on."""
+    ranges = np.r_[2.0, 1.0, 2.0, np.full(3, np.nan), 4.0 / np.cos(0.01 * np.arange(-10, 11))]
+    scan = LaserScan(ranges[::turn], -0.01, 0.01)
+    features = Extractor("iepf:paper", clusters="fixed", distance=1.5)(scan)
+    (wall,) = features.segments
+    assert wall["n_points"] == 21
+    (label,) = set(features.clusters[ranges[::turn] > 3.9].tolist())
+    assert wall["cluster"] == label
