@@ -6,6 +6,7 @@ from itertools import islice, product
 
 import numpy as np
 import pytest
+from equality import direction_of
 from hostile import all_hostile, hostile_scans
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -82,9 +83,15 @@ def assert_sound(scan, features, extractor):
         assert 0 < math.hypot(features.noise.sigma, farthest) <= MOST * (1 + 1e-9)
     for segment in segments:
         assert_straight(scan, segment)
-        if is_map:
+        centroid = segment["centroid"]
+        ahead = [(segment[name] - centroid) @ direction_of(segment) for name in ("start", "end")]
+        if is_map:  # whose centroids are moved to the nearest point of the new segment
+            off = 1e-9 * np.hypot(*centroid)
+            assert ahead[0] <= off
+            assert ahead[1] >= -off
             assert_drawn_on_its_rays(scan, segment)
         else:
+            assert ahead[0] < 0 < ahead[1]
             assert_drawn_where_it_was_measured(scan, features, segment, extractor.method.evidence)
     for corner in corners:
         assert is_map or math.sqrt(np.linalg.eigvalsh(corner["covariance"])[-1]) <= MOST
@@ -98,13 +105,12 @@ def beams_of(scan, segment):
 
 
 def assert_straight(scan, segment):
-    """Its direction is that of its ends, which are on both sides of its centroid."""
+    """Its direction is that of its ends."""
     first, start, end = (segment[name] for name in ("first_beam", "start", "end"))
-    along = np.array([math.cos(segment["angle"]), math.sin(segment["angle"])])
+    along = direction_of(segment)
     across = np.array([-along[1], along[0]])
     assert (end - start) @ along > 0
     assert (end - start) @ across == pytest.approx(0, abs=1e-6 * scan.ranges[first])
-    assert (start - segment["centroid"]) @ along < 0 < (end - segment["centroid"]) @ along
 
 
 def assert_drawn_on_its_rays(scan, segment):

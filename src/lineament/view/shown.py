@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LineamentError
+from ..kernels import FARTHEST
 from ..logs import open_log, save_npz
 from ..scan import LaserScan
 from .store import ScanStore
@@ -58,14 +59,15 @@ class ShownLog:
     def drive(self, first: int, step: int, count: int) -> dict[str, Any]:
         """Return poses and points of every `step`-th scan, for a picture of the whole drive.
 
-        The points [m] are in the world frame, x and y in turn, at most `MOST_POINTS` of a scan.
+        The points [m] are in the world frame, x and y in turn, at most `MOST_POINTS` of a scan, and
+        none that is farther than any scanner sees.
         Scans without a pose, and those that have not been read, are left out.
         """
         scans = []
         for index in range(first, min(first + step * count, len(self.store)), step):
             _, scan = self.store.item(index)
             if scan.pose is not None:
-                points = _in_world(scan, *scan.pose).round(3).ravel().tolist()
+                points = [round(value, 3) for value in _in_world(scan, *scan.pose).ravel().tolist()]
                 scans.append({"index": index, "pose": scan.pose, "points": points})
         return {"scans": scans}
 
@@ -90,7 +92,7 @@ class ShownLog:
 
 def _in_world(scan: LaserScan, x: float, y: float, theta: float) -> NDArray[np.float64]:
     """Return some points of a scan at a pose, in the world frame, shape (n, 2)."""
-    seen = scan.valid.nonzero()[0]
+    seen = (scan.valid & (scan.ranges < FARTHEST)).nonzero()[0]
     px, py = scan.points[seen[:: -(-len(seen) // MOST_POINTS) or 1]].T
     c, s = np.cos(theta), np.sin(theta)
     return np.column_stack([x + c * px - s * py, y + s * px + c * py])
