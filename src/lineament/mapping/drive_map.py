@@ -12,6 +12,12 @@ from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, poses_along, relative, twist_between
+from .evidence import evidence_of, thinned
+from .locate import _distinct as distinct
+from .line_map import make_index
+from .local_map import query_of_scan
+from .refine import COARSE, FINE, refined
+from .walls import COLUMN, WALL
 
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
@@ -23,15 +29,21 @@ _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 _CONTINUED = (0.25, 0.35), (0.3, 0.3)
 #: How surfaces are off straight lines [m].
 _ROUGHNESS = 0.01
+#: A robot is not thought to go on faster [m/s, rad/s].
+_FAST = 1.2
 _ROUNDS = 4
-#: A measurement is explained within this of a wall, contradicts one that it passes by more [m].
-_NEAR, _BEYOND = 0.1, 0.3
-#: Most beams that are looked at.
-_BEAMS = 90
 #: With at least this share of the beams explained, less contradicted, a place is taken at once.
 _SURE = 0.75
-#: Bins of turns, how many of them are tried, and the deviations from there [m, rad].
-_BINS, _TRIED, _AROUND = 120, 10, (0.4, 0.4, 0.07)
+#: Poses are tried by so many beams; so many of them are refined.
+_FEW, _TRIED = 40, 32
+#: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
+_WIDE, _TIGHT = 0.12, 0.04
+#: Poses that are tried are so far from each other [m, rad].
+_APART = (0.15, 0.06)
+#: With less than this share of the beams explained, less contradicted, the way is lost.
+_LOST = 0.15
+#: Bins of turns, and how many of them are tried.
+_BINS, _TURNS = 120, 12
 
 Numbers = NDArray[np.int64]
 
@@ -44,7 +56,7 @@ class KeyFrame:
     ----------
     index : int
         Of its scan in the log.
-    features : Features
+    scan, features
         In the frame of the sensor.
     walls : ndarray of int64, shape (n,)
         Which wall each of the segments shows.
@@ -55,6 +67,7 @@ class KeyFrame:
     """
 
     index: int
+    scan: LaserScan
     features: Features
     walls: Numbers
     pose: Pose
@@ -93,7 +106,7 @@ class Drive:
         if not self.frames:
             empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
             self._around = Features(**empty, clusters=np.empty(0, np.int32))
-            self._key(features, Motion(0.0, 0.0, 0.0, np.zeros((3, 3))))
+            self._key(features, Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), scan, True)
         else:
             prior, spread = self._expected(scan.stamp, odometry)
             motion, is_lost = self._place(scan, features, prior, spread)
@@ -102,7 +115,7 @@ class Drive:
             if math.hypot(x, y) >= SPACING or abs(turn) >= TURN or is_lost:
                 if is_lost:
                     self.lost.append(len(self.frames))
-                self._key(features, motion)
+                self._key(features, motion, scan, is_lost)
             else:
                 self.scans.append((len(self.frames) - 1, motion.pose))
                 self._last = scan.stamp, odometry, motion.pose
@@ -112,10 +125,9 @@ class Drive:
 
     def _go_on(self, stamp: float, pose: Pose) -> None:
         duration = stamp - self._last[0]
-        if duration > 0:
+        if duration > 0.02:
             twist = twist_between(self._last[2], pose, duration)
-            if max(map(abs, twist)) < 5.0:
-                self._twist = twist
+            self._twist = tuple(max(-_FAST, min(_FAST, speed)) for speed in twist)
 
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
@@ -124,7 +136,9 @@ class Drive:
             (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
             step = relative(self._last[1], odometry)
         else:
-            (least_way, least_turn), (by_way, by_turn) = _CONTINUED
+            _, (by_way, by_turn) = _CONTINUED
+            least_way = min(0.02 + 0.4 * max(duration, 0.0), 0.3)
+            least_turn = min(0.02 + 0.8 * max(duration, 0.0), 2.0)
             x, y, turn = poses_along(self._twist, [min(max(duration, 0.0), 0.5)])[0].tolist()
             step = x, y, turn
         way = least_way + by_way * math.hypot(step[0], step[1])
@@ -134,19 +148,42 @@ class Drive:
     def _place(
         self, scan: LaserScan, features: Features, prior: Pose, spread: Array
     ) -> tuple[Motion, bool]:
-        """Find the pose by the walls around; if it explains too little, by all likely turns."""
+        """Find the pose by the walls around; if it may be another, the one that explains most."""
         motion = self._match(features, prior, spread)
-        beams = _beams(scan)
-        best = _score(beams, motion.pose, self._around)
-        if best >= _SURE:
+        query = query_of_scan(features, scan)
+        best = evidence_of(np.array([motion.pose]), query.beams, self._index, _TIGHT)[0]
+        way, turn = math.sqrt(spread[0, 0]), math.sqrt(spread[2, 2])
+        if best[1] - best[3] >= _SURE and way < 0.1 and motion.observable:
             return motion, False
-        around = np.diag(_AROUND) ** 2
-        for turn in _turns(self._around, features, prior[2]):
-            found = self._match(features, (prior[0], prior[1], turn), around)
-            score = _score(beams, found.pose, self._around)
-            if score > best + 0.02:
-                motion, best = found, score
-        return motion, best < 0.3
+        tried = self._tried(features, prior, way, turn)
+        few = evidence_of(tried, thinned(query.beams, _FEW), self._index, _WIDE)[:, 0]
+        few -= _unlikely(tried, prior, way, turn)
+        poses = tried[distinct(tried, few, _APART, _TRIED)]
+        poses = np.concatenate((poses, [motion.pose]))
+        fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
+        poses = np.concatenate((fine, poses))
+        scores = evidence_of(poses, query.beams, self._index, _TIGHT)[:, 0]
+        scores -= _unlikely(poses, prior, way, turn)
+        scores[-1] += 0.5
+        k = int(scores.argmax())
+        if k < len(poses) - 1:
+            x, y, theta = poses[k].tolist()
+            motion = self._match(features, (x, y, theta), np.diag((0.05, 0.05, 0.02)) ** 2)
+        both = np.array([motion.pose, poses[k]])
+        found = evidence_of(both, query.beams, self._index, _TIGHT)
+        if found[1, 0] > found[0, 0] + 1.0:
+            x, y, theta = poses[k].tolist()
+            motion = Motion(x, y, theta, np.diag((0.05, 0.05, 0.02)) ** 2)
+        explained, contradicted = found[found[:, 0].argmax(), (1, 3)]
+        return motion, bool(explained - contradicted < _LOST)
+
+    def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
+        """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
+        steps = np.arange(-2, 3) * min(max(way, 0.1), 0.3)
+        turns = prior[2] + np.arange(-3, 4) * min(max(turn / 2, 0.05), 0.1)
+        turns = np.append(turns, _turns(self._around, features, prior[2], turn))
+        x, y, theta = np.meshgrid(prior[0] + steps, prior[1] + steps, turns, indexing="ij")
+        return np.column_stack((x.ravel(), y.ravel(), theta.ravel()))
 
     def _match(self, features: Features, prior: Pose, spread: Array) -> Motion:
         motion, matches = Motion(*prior, spread), None
@@ -160,10 +197,14 @@ class Drive:
             motion = estimate_motion(matches, prior, spread, roughness=_ROUGHNESS)
         return motion
 
-    def _key(self, features: Features, motion: Motion) -> None:
+    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_new: bool) -> None:
         """Take a key frame: the walls around it are those known and those of this scan."""
         pose = compose(self.frames[-1].pose, motion.pose) if self.frames else (0.0, 0.0, 0.0)
         around = self._around.transform(*inverse(motion.pose))
+        if is_new:
+            empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
+            around = Features(**empty, clusters=np.empty(0, np.int32))
+            self._numbers, self._seen = self._numbers[:0], self._seen[:0]
         matches = associate(around, features, roughness=_ROUGHNESS)
         here = len(self.frames)
         walls = np.full(len(features.segments), -1, np.int64)
@@ -176,6 +217,7 @@ class Drive:
         _fuse(segments, before, features.segments[now])
         self._seen[before] = here
         kept = self._seen >= here - REMEMBERED
+        kept &= ~_passed(segments, scan) | (self._seen == here)
         place = np.cumsum(kept) - 1
         mine = np.empty(len(walls) + 1, np.int32)
         mine[now], mine[new], mine[-1] = place[before], kept.sum() + np.arange(len(new)), -1
@@ -193,9 +235,19 @@ class Drive:
             corners=np.concatenate((corners, others)),
             arcs=np.concatenate((features.arcs, arcs[near])),
         )
+        self._index = make_index(_as_walls(self._around.segments), np.zeros(0, COLUMN), 0.0)
         self._numbers = np.concatenate((self._numbers[kept], walls[new]))
         self._seen = np.concatenate((self._seen[kept], np.full(len(new), here)))
-        self.frames.append(KeyFrame(len(self.scans), features, walls, pose, motion))
+        self.frames.append(KeyFrame(len(self.scans), scan, features, walls, pose, motion))
+
+
+def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
+    """Segments as walls that are seen from their left."""
+    walls = np.zeros(len(segments), WALL)
+    for name in ("start", "end", "centroid", "angle", "covariance"):
+        walls[name] = segments[name]
+    walls["side"] = walls["views"] = 1
+    return walls[segments["length"] > 1e-3]
 
 
 def _fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void]) -> None:
@@ -226,7 +278,7 @@ def _fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void])
         wall["n_points"] = max(wall["n_points"], other["n_points"])
 
 
-def _turns(around: Features, features: Features, expected: float) -> list[float]:
+def _turns(around: Features, features: Features, expected: float, spread: float) -> list[float]:
     """Turns by which segments seen now lie along walls around, the likeliest first [rad]."""
     before, now = around.segments, features.segments
     off = before["angle"][:, np.newaxis] - now["angle"]
@@ -237,41 +289,31 @@ def _turns(around: Features, features: Features, expected: float) -> list[float]
     # Large turns are less likely.
     middles = (np.arange(_BINS) + 0.5) / _BINS * 2 * math.pi
     far = np.abs(np.remainder(middles - expected + math.pi, 2 * math.pi) - math.pi)
-    votes = votes * np.exp(-0.5 * (far / 1.2) ** 2)
+    votes = votes * np.exp(-0.5 * (far / max(spread, 0.5)) ** 2)
     peaks = (votes >= np.roll(votes, 1)) & (votes > np.roll(votes, -1))
-    order = np.argsort(-np.where(peaks, votes, 0.0), kind="stable")[:_TRIED]
+    order = np.argsort(-np.where(peaks, votes, 0.0), kind="stable")[:_TURNS]
     return [math.remainder(float(middles[k]), 2 * math.pi) for k in order if votes[k] > 0]
 
 
-def _beams(scan: LaserScan) -> Array:
-    """Bearings and ranges of some valid beams, shape (n, 2)."""
-    valid = np.flatnonzero(scan.valid)
-    if len(valid) > _BEAMS:
-        valid = valid[np.linspace(0, len(valid) - 1, _BEAMS).astype(int)]
-    return np.column_stack((scan.angles[valid], scan.ranges[valid]))
+def _unlikely(poses: Array, prior: Pose, way: float, turn: float) -> Array:
+    """How unlikely poses (n, 3) are by what is expected [nats]; far off no worse than unlikely."""
+    off = poses - prior
+    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+    far = (off[:, 0] ** 2 + off[:, 1] ** 2) / (2 * max(way, 0.1) ** 2)
+    return np.asarray(far + np.log1p((off[:, 2] / turn) ** 2 / 2))
 
 
-def _score(beams: Array, pose: Pose, around: Features) -> float:
-    """Share of the beams that end on a wall around, less twice those that pass through one.
-
-    Where nothing is known, no beam counts. Walls are met from their left alone.
-    """
-    x, y, theta = pose
-    bearing = beams[:, 0] + theta
-    ux, uy = np.cos(bearing)[:, np.newaxis], np.sin(bearing)[:, np.newaxis]
-    ranges = beams[:, 1:]
-    (px, py), (qx, qy) = around.segments["start"].T, around.segments["end"].T
-    px, py, qx, qy = px - x, py - y, qx - x, qy - y
+def _passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:
+    """Whether beams pass through each wall, away from its ends, and end far behind."""
+    valid = scan.valid
+    bearing, ranges = scan.angles[valid][:, np.newaxis], scan.ranges[valid][:, np.newaxis]
+    ux, uy = np.cos(bearing), np.sin(bearing)
+    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
     wx, wy = qx - px, qy - py
     length = np.maximum(np.hypot(wx, wy), 1e-9)
     ex, ey = ranges * ux - px, ranges * uy - py
-    along, off = (ex * wx + ey * wy) / length, (wx * ey - wy * ex) / length
-    is_seen = (px * qy - py * qx > 0) & (np.abs(along - length / 2) < length / 2 + _NEAR)
-    ends_there = (is_seen & (np.abs(off) < _NEAR)).any(axis=1)
-    side_p, side_q = ux * py - uy * px, ux * qy - uy * qx
-    inner = 0.05 * length
-    at_p = side_p + inner * (ux * wy - uy * wx) / length
-    at_q = side_q - inner * (ux * wy - uy * wx) / length
-    passes = ((at_p < 0) & (at_q > 0) & (off < -_BEYOND)).any(axis=1) & ~ends_there
-    count = max(len(beams), 1)
-    return float(ends_there.sum() - 2.0 * passes.sum()) / count
+    off = (wx * ey - wy * ex) / length
+    margin = np.minimum(0.1, 0.2 * length) * (ux * wy - uy * wx) / length
+    # The start lies to the right of a beam that passes, the end to its left.
+    passes = (ux * py - uy * px < -abs(margin)) & (ux * qy - uy * qx > abs(margin)) & (off < -0.3)
+    return np.asarray(passes.sum(axis=0) >= 3)
