@@ -15,10 +15,13 @@ WALL_COLUMNS = 9
 #: centroid x, y; angle; length from the centroid back to the start and on to the end; variance of
 #: offset, covariance, variance of angle.
 LOCAL_COLUMNS = 8
-#: origin x, y; direction x, y; range; variance of the range; weight.
-BEAM_COLUMNS = 7
-#: A beam is explained within so many deviations.
+#: origin x, y; direction x, y; range; variance of the range; weight; covariance xx, xy, yy of the
+#: end by the pose.
+BEAM_COLUMNS = 10
+#: Beyond such a squared deviation a wall does not explain a beam.
 GATE = 9.0
+#: Beyond such a one, behind a wall, it has passed through it.
+THROUGH = 16.0
 
 
 @kernel
@@ -60,9 +63,23 @@ def _cell_of(grid, x, y):
 
 
 @helper
-def _misfit(walls, near, x, y, direction, margin, spread):
-    """Return the least squared deviation of a beam's end from the walls near it, inf if none."""
+def _variance(wall, along, direction, pose):
+    """Variance of a beam's end across a wall, by range, pose, and wall."""
     dx, dy, variance = direction
+    xx, xy, yy = pose
+    ux, uy, a = wall[2], wall[3], along - 0.5 * wall[4]
+    towards = ux * dy - uy * dx
+    total = variance * towards * towards + uy * uy * xx - 2.0 * ux * uy * xy + ux * ux * yy
+    return total + wall[6] + 2.0 * a * wall[7] + a * a * wall[8]
+
+
+@helper
+def _misfit(walls, near, x, y, direction, pose, margin, spread):
+    """Return how far a beam's end is from the walls near it: -2 log of the density, inf if none.
+
+    The density is that of the end across the wall, over that of one with the variance `spread`.
+    """
+    dx, dy, _ = direction
     least = math.inf
     for k in near:
         ux, uy, length = walls[k, 2], walls[k, 3], walls[k, 4]
@@ -70,21 +87,20 @@ def _misfit(walls, near, x, y, direction, margin, spread):
         along = rx * ux + ry * uy
         if along < -margin or along > length + margin:
             continue
-        towards = ux * dy - uy * dx
-        if walls[k, 5] > 0.0 and towards >= 0.0:
+        if walls[k, 5] > 0.0 and ux * dy - uy * dx >= 0.0:
             continue
-        off, a = ux * ry - uy * rx, along - 0.5 * length
-        total = variance * towards * towards + spread
-        total += walls[k, 6] + 2.0 * a * walls[k, 7] + a * a * walls[k, 8]
-        least = min(least, off * off / total)
+        off = ux * ry - uy * rx
+        total = spread + _variance(walls[k], along, direction, pose)
+        if off * off < GATE * total:
+            least = min(least, off * off / total + math.log(total / spread))
     return least
 
 
 @helper
-def _stops(walls, near, origin, end, shy, deviations, spread):
+def _stops(walls, near, origin, end, direction, pose, shy, spread):
     """Whether a beam passes through one of the walls near it, away from the wall's ends."""
     ox, oy = origin
-    ex, ey, variance = end
+    ex, ey = end
     for k in near:
         px, py, ux, uy, length = walls[k, 0], walls[k, 1], walls[k, 2], walls[k, 3], walls[k, 4]
         before = ux * (oy - py) - uy * (ox - px)
@@ -97,18 +113,17 @@ def _stops(walls, near, origin, end, shy, deviations, spread):
         edge = min(shy, 0.25 * length)
         if along < edge or along > length - edge:
             continue
-        a = along - 0.5 * length
-        total = variance + spread + walls[k, 6] + 2.0 * a * walls[k, 7] + a * a * walls[k, 8]
-        if after * after > deviations * deviations * total:
+        total = spread + _variance(walls[k], along, direction, pose)
+        if after * after > THROUGH * total:
             return True
     return False
 
 
 @helper
-def _passes(walls, grid, begins, members, origin, end, shy, spread):
+def _passes(walls, grid, begins, members, origin, end, direction, pose, shy, spread):
     """Whether a beam passes through a wall: the cells along it are looked at in turn."""
     ox, oy = origin
-    ex, ey, _ = end
+    ex, ey = end
     low_x, low_y, cell = grid[0], grid[1], grid[2]
     columns, rows = int(grid[3]), int(grid[4])
     i, j = math.floor((ox - low_x) / cell), math.floor((oy - low_y) / cell)
@@ -126,7 +141,7 @@ def _passes(walls, grid, begins, members, origin, end, shy, spread):
         if 0 <= i < columns and 0 <= j < rows:
             at = i * rows + j
             near = members[begins[at] : begins[at + 1]]
-            if _stops(walls, near, origin, end, shy, 4.0, spread):
+            if _stops(walls, near, origin, end, direction, pose, shy, spread):
                 return True
         if next_i < next_j:
             i += step_i
@@ -157,16 +172,23 @@ def judge(poses, beams, walls, grid, begins, members, settings, found):
             dx, dy = c * beams[b, 2] - s * beams[b, 3], s * beams[b, 2] + c * beams[b, 3]
             r, variance, weight = beams[b, 4], beams[b, 5], beams[b, 6]
             ex, ey = ox + r * dx, oy + r * dy
+            # The covariance of the end, turned with the pose.
+            xx, xy, yy = beams[b, 7], beams[b, 8], beams[b, 9]
+            half, twice, mean = 0.5 * (xx - yy), 2.0 * c * s, 0.5 * (xx + yy)
+            even = (c * c - s * s) * half - twice * xy
+            pose = (mean + even, twice * half + (c * c - s * s) * xy, mean - even)
+            direction, end = (dx, dy, variance), (ex, ey)
             deviation = math.inf
             at = _cell_of(grid, ex, ey)
             if at >= 0:
                 near = members[begins[at] : begins[at + 1]]
-                deviation = _misfit(walls, near, ex, ey, (dx, dy, variance), margin, spread)
-            end = (ex, ey, variance)
-            if _passes(walls, grid, begins, members, (ox, oy), end, shy, spread):
+                deviation = _misfit(walls, near, ex, ey, direction, pose, margin, spread)
+            if _passes(
+                walls, grid, begins, members, (ox, oy), end, direction, pose, shy, spread
+            ):
                 passes += weight
                 total += weight * through
-            elif deviation <= GATE:
+            elif deviation < math.inf:
                 hits += weight
                 total += weight * max(explained - 0.5 * deviation, short)
             else:
@@ -299,3 +321,74 @@ def refine(poses, local, walls, grid, begins, members, settings, pairs, informat
             poses[h, 2] -= (m2 * gx + m5 * gy + m8 * gt) / det
             way = min(way, 0.01 + math.sqrt(max(m0, m4) / det))
             turn = min(turn, 0.002 + math.sqrt(m8 / det))
+
+
+@kernel
+def vote(local, plan, turns, settings, shift, boxes, voters, touched):
+    """Count votes for poses in boxes: an anchor of the local map has one a box, its first.
+
+    Rows of `boxes` become the votes and the mean pose; returns how many boxes are in `touched`.
+    `turns`: votes of the walls by degrees, the slot of each box of turns, how many slots.
+    """
+    low_x, low_y, size, rows, alike, least, of_ends = settings
+    by_turn, slots, n_slots = turns
+    full, count, n_turns = 2.0 * math.pi, 0, len(slots)
+    width = full / n_turns
+    for i in range(len(local)):
+        x, y, angle, kind, opening = local[i]
+        for j in range(len(plan)):
+            other = plan[j, 3]
+            if kind > 1.5 or other > 1.5:
+                if kind != other:
+                    continue
+            elif kind * other >= 0.0 and kind != other and kind + other >= 0.0:
+                continue
+            elif abs(opening - plan[j, 4]) > alike:
+                continue
+            theta = (plan[j, 2] - angle) % full
+            weight = by_turn[int(theta * 180.0 / math.pi + 0.5) % 360]
+            if weight < least:
+                continue
+            if kind > 1.5:
+                weight *= of_ends
+            c, s = math.cos(theta), math.sin(theta)
+            px, py = plan[j, 0] - c * x + s * y, plan[j, 1] - s * x - c * y
+            at = int((px - low_x) / size + shift) * rows + int((py - low_y) / size + shift)
+            at = at * n_slots + slots[int(theta / width + shift) % n_turns]
+            if voters[at] == 0:
+                touched[count] = at
+                count += 1
+            elif voters[at] == i + 1:
+                continue
+            voters[at] = i + 1
+            # The mean of turns in one box: those that are a turn apart are not far from another.
+            box = boxes[at]
+            if box[0] > 0.0:
+                theta = box[3] + (theta - box[3] + 0.5 * full) % full - 0.5 * full
+            share = weight / (box[0] + weight)
+            box[0] += weight
+            box[1] += share * (px - box[1])
+            box[2] += share * (py - box[2])
+            box[3] += share * (theta - box[3])
+    return count
+
+
+@kernel
+def choose(poses, order, way, turn, chosen):
+    """Choose poses in an order, each farther from all before than a way or a turn; how many."""
+    count = 0
+    for k in order:
+        is_new = True
+        for n in range(count):
+            other = chosen[n]
+            away = abs((poses[k, 2] - poses[other, 2] + math.pi) % (2.0 * math.pi) - math.pi)
+            if away < turn:
+                if math.hypot(poses[k, 0] - poses[other, 0], poses[k, 1] - poses[other, 1]) < way:
+                    is_new = False
+                    break
+        if is_new:
+            chosen[count] = k
+            count += 1
+            if count == len(chosen):
+                break
+    return count

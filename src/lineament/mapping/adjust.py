@@ -1,170 +1,173 @@
-"""Poses and walls adjusted together, so that the covariance of a wall holds that of the poses."""
+"""Poses and walls of a local map, adjusted together: each measurement counts once."""
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan import Array
-from .graph import Edges, factorised, normal_equations, wrapped
+from ..motion.association import chi_square
+from ..motion.odometry import compose_jacobians
+from ..scan import Array, Pose
+from ..scan.poses import compose
+from .walls import WALL
 
-#: Sights that are off by more than so many deviations count less.
-_KERNEL = 3.0
-_ROUNDS, _SMALL = 12, 1e-5
-#: Walls whose covariances are found at a time.
-_BATCH = 200
-
-
-@dataclass(slots=True, eq=False)
-class Sights:
-    """Walls as key frames see them, each in the frame of its sensor.
-
-    Attributes
-    ----------
-    frames, walls : ndarray of int64, shape (m,)
-        Which key frame sees which wall.
-    centroids, angles : ndarray, shapes (m, 2) and (m,)
-        Of the segment [m, rad].
-    covariances : ndarray, shape (m, 2, 2)
-        Of its offset along the left normal at the centroid, and of its angle.
-    ends : ndarray, shape (m, 2)
-        From the centroid back to its start and on to its end, along its direction [m].
-    """
-
-    frames: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    centroids: Array
-    angles: Array
-    covariances: Array
-    ends: Array
-
-    def placed(self, poses: Array) -> tuple[Array, Array]:
-        """Centroids (m, 2) and angles (m,) in the frame of the poses."""
-        at = poses[self.frames]
-        c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
-        x, y = self.centroids.T
-        moved = np.column_stack((at[:, 0] + c * x - s * y, at[:, 1] + s * x + c * y))
-        return moved, at[:, 2] + self.angles
-
-
-@dataclass(slots=True, eq=False)
-class Lines:
-    """Lines of walls.
-
-    Attributes
-    ----------
-    points, angles : ndarray, shapes (w, 2) and (w,)
-        A point of each, and its direction; what is seen of it is to its left [m, rad].
-    covariances : ndarray, shape (w, 2, 2)
-        Of the offset at the point along the left normal, and of the angle.
-    """
-
-    points: Array
-    angles: Array
-    covariances: Array
-
-
-def lines_of(sights: Sights, poses: Array, count: int) -> Lines:
-    """Return the means of the sights of each wall, by their information."""
-    places, angles = sights.placed(poses)
-    weight = 1.0 / sights.covariances[:, 0, 0]
-    total = np.maximum(np.bincount(sights.walls, weight, count), 1e-12)
-    points = np.column_stack(
-        [np.bincount(sights.walls, weight * places[:, k], count) / total for k in range(2)]
-    )
-    sure = 1.0 / sights.covariances[:, 1, 1]
-    sine = np.bincount(sights.walls, sure * np.sin(angles), count)
-    cosine = np.bincount(sights.walls, sure * np.cos(angles), count)
-    directions = np.arctan2(sine, cosine)
-    # The mean of the centroids says more of the direction than any one sight of a long wall.
-    return Lines(points, directions, np.zeros((count, 2, 2)))
+_ROUNDS = 3
 
 
 def adjust(
-    poses: Array, edges: Edges, sights: Sights, count: int, covariances: bool = False
-) -> tuple[Array, Lines, Array]:
-    """Adjust poses and walls together by Gauss-Newton; the first pose stays.
+    poses: Sequence[Pose],
+    motions: Sequence[tuple[Pose, Array]],
+    seen: Sequence[tuple[NDArray[np.void], NDArray[np.int64]]],
+) -> tuple[list[Pose], Array, NDArray[np.void], Array]:
+    """Adjust the poses of scans, and the walls that they saw, in the frame of the last scan.
 
-    Returns the poses, the walls, with covariances that hold those of the poses where they are
-    asked for, and the weight of each sight. Walls are eliminated (Schur), so that the
-    equations are of the poses alone.
+    Parameters
+    ----------
+    poses : sequence of (x, y, theta)
+        First poses, the last of which stays.
+    motions : sequence of (pose, covariance)
+        From each scan to the next.
+    seen : sequence of (segments, numbers)
+        Segments of each scan; those of the same number, from 0, are the same wall.
+
+    Returns
+    -------
+    poses : list of (x, y, theta)
+    covariances : ndarray, shape (n, 3, 3)
+        Of the poses.
+    walls : structured array of `WALL`
+    covariance : ndarray, shape (2m, 2m)
+        Of (offset, angle) of all walls.
     """
-    state, lines = poses.copy(), lines_of(sights, poses, count)
-    information = np.linalg.inv(sights.covariances)
-    solved, gain, own = None, None, None
-    for _ in range(_ROUNDS):
-        off, of_pose, of_wall = _linear(sights, state, lines)
-        squares = np.einsum("ni,nij,nj->n", off, information, off)
-        weights = _KERNEL**2 / np.maximum(squares, _KERNEL**2)
-        weighted = information * weights[:, np.newaxis, np.newaxis]
-        matrix, gradient = normal_equations(state, edges, np.ones(len(edges.ends)))
-        own = np.zeros((count, 2, 2))
-        np.add.at(own, sights.walls, np.einsum("nji,njk,nkl->nil", of_wall, weighted, of_wall))
-        own += np.diag((1e-6, 1e-6))
-        own_inverse = np.linalg.inv(own)
-        towards = np.zeros((count, 2))
-        np.add.at(towards, sights.walls, np.einsum("nji,njk,nk->ni", of_wall, weighted, off))
-        by_pose = np.zeros((len(state), 3))
-        np.add.at(by_pose, sights.frames, np.einsum("nji,njk,nk->ni", of_pose, weighted, off))
-        both = _blocks(np.einsum("nji,njk,nkl->nil", of_pose, weighted, of_wall),
-                       sights.frames, sights.walls, len(state), count)  # fmt: skip
-        poses_alone = _blocks(np.einsum("nji,njk,nkl->nil", of_pose, weighted, of_pose),
-                              sights.frames, sights.frames, len(state), len(state))  # fmt: skip
-        numbers = np.arange(count)
-        gain = both @ _blocks(own_inverse, numbers, numbers, count, count)
-        solved = factorised(matrix + poses_alone - gain @ both.T)
-        right = -(gradient + by_pose.ravel()) + gain @ towards.ravel()
-        step = solved.solve(right)
-        turn = np.einsum("nij,nj->ni", own_inverse, -towards - (both.T @ step).reshape(-1, 2))
-        state = state + step.reshape(-1, 3)
-        state[:, 2] = wrapped(state[:, 2])
-        normals = np.column_stack((-np.sin(lines.angles), np.cos(lines.angles)))
-        lines = Lines(
-            lines.points + turn[:, :1] * normals, wrapped(lines.angles + turn[:, 1]), own_inverse
-        )
-        if max(np.abs(step).max(), np.abs(turn).max()) < _SMALL:
-            break
-    if covariances and solved is not None and gain is not None:
-        lines.covariances = _covariances(lines.covariances, gain, solved)
-    return state, lines, weights
+    segments = np.concatenate([of_scan for of_scan, _ in seen])
+    scans = np.repeat(np.arange(len(seen)), [len(of_scan) for of_scan, _ in seen])
+    _, first, number = np.unique(
+        np.concatenate([numbers for _, numbers in seen])[::-1],
+        return_index=True,
+        return_inverse=True,
+    )
+    first, number = len(segments) - 1 - first, number[::-1]
+    state = np.array(poses, np.float64)
+    # Each wall begins as it was seen last.
+    centers, angles = _placed(state[scans[first]], segments[first])
+    weights = np.linalg.inv(segments["covariance"] + 1e-12 * np.eye(2))
+    share = np.ones(len(segments))
+    n_free = 3 * (len(poses) - 1)
+    size = n_free + 2 * len(first)
+    for step in range(_ROUNDS):
+        error, jacobian, at = _errors(state, centers, angles, segments, scans, number, n_free)
+        if step:
+            d2 = np.einsum("ni,nij,nj->n", error, weights, error)
+            share = np.minimum(1.0, chi_square(0.99, 2) / np.maximum(d2, 1e-12))
+        weighted = share[:, None, None] * weights @ jacobian
+        normal, right = np.zeros((size + 3, size + 3)), np.zeros(size + 3)
+        # The last pose stays: what belongs to it goes to three lines that are left out.
+        blocks = jacobian.transpose(0, 2, 1) @ weighted
+        np.add.at(normal, (at[:, :, None], at[:, None, :]), blocks)
+        np.add.at(right, at, (weighted.transpose(0, 2, 1) @ error[:, :, None])[:, :, 0])
+        _add_motions(normal, right, state, motions, size)
+        inverse = np.linalg.inv(normal[:size, :size])
+        change = -inverse @ right[:size]
+        state[:-1] += change[:n_free].reshape(-1, 3)
+        shift, turn = change[n_free:].reshape(-1, 2).T
+        centers += shift[:, None] * np.stack((-np.sin(angles), np.cos(angles)), axis=1)
+        angles += turn
+    spreads = np.zeros((len(poses), 3, 3))
+    for k in range(len(poses) - 1):
+        spreads[k] = inverse[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
+    covariance = inverse[n_free:, n_free:].copy()
+    walls = _walls(state, centers, angles, segments, scans, number)
+    misfit = np.bincount(number, segments["misfit"] ** 2) / walls["views"]
+    covariance[np.arange(0, len(covariance), 2), np.arange(0, len(covariance), 2)] += misfit
+    for k in range(len(walls)):
+        walls["covariance"][k] = covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
+    return [(x, y, theta) for x, y, theta in state.tolist()], spreads, walls, covariance
 
 
-def _linear(sights: Sights, poses: Array, lines: Lines) -> tuple[Array, Array, Array]:
-    """Offset and angle of each sight from its wall, and their derivatives by pose and wall."""
-    places, angles = sights.placed(poses)
-    w = sights.walls
-    a, points = lines.angles[w], lines.points[w]
-    ux, uy = np.cos(a), np.sin(a)
-    arm = places - points
-    off = np.column_stack((-uy * arm[:, 0] + ux * arm[:, 1], wrapped(angles - a)))
-    lever = places - poses[sights.frames, :2]
-    of_pose = np.zeros((len(w), 2, 3))
-    of_pose[:, 0, 0], of_pose[:, 0, 1] = -uy, ux
-    of_pose[:, 0, 2] = uy * lever[:, 1] + ux * lever[:, 0]
-    of_pose[:, 1, 2] = 1.0
-    of_wall = np.zeros((len(w), 2, 2))
-    of_wall[:, 0, 0], of_wall[:, 1, 1] = -1.0, -1.0
-    of_wall[:, 0, 1] = -(ux * arm[:, 0] + uy * arm[:, 1])
-    return off, of_pose, of_wall
+def _placed(poses: Array, segments: NDArray[np.void]) -> tuple[Array, Array]:
+    """Centroids (n, 2) and angles (n,) of segments, each seen from its pose (n, 3)."""
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x, y = segments["centroid"].T
+    places = poses[:, :2] + np.stack((c * x - s * y, s * x + c * y), axis=1)
+    return places, segments["angle"] + poses[:, 2]
 
 
-def _blocks(values: Array, rows: Any, columns: Any, n: int, m: int) -> Any:
-    """Sparse matrix of blocks (k, a, b), those at the same place added up."""
-    from scipy.sparse import coo_array
+def _errors(
+    state: Array,
+    centers: Array,
+    angles: Array,
+    segments: NDArray[np.void],
+    scans: NDArray[np.int64],
+    number: NDArray[np.int64],
+    n_free: int,
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Offsets and angles (n, 2) of segments from their walls, by pose and wall (n, 2, 5), where."""
+    places, turned = _placed(state[scans], segments)
+    angle = angles[number]
+    u = np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    normal = np.stack((-u[:, 1], u[:, 0]), axis=1)
+    lever, between = places - state[scans, :2], places - centers[number]
+    error = np.stack(
+        (
+            (normal * between).sum(axis=1),
+            np.remainder(turned - angle + math.pi, 2 * math.pi) - math.pi,
+        ),
+        axis=1,
+    )
+    jacobian = np.zeros((len(segments), 2, 5))
+    jacobian[:, 0, :2] = normal
+    jacobian[:, 0, 2] = normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]
+    jacobian[:, 0, 3], jacobian[:, 0, 4] = -1.0, -(u * between).sum(axis=1)
+    jacobian[:, 1, 2], jacobian[:, 1, 4] = 1.0, -1.0
+    at = np.empty((len(segments), 5), np.int64)
+    is_last = scans == len(state) - 1
+    size = n_free + 2 * len(centers)
+    at[:, :3] = np.where(is_last, size, 3 * scans)[:, None] + np.arange(3)
+    at[:, 3:] = n_free + 2 * number[:, None] + np.arange(2)
+    return error, jacobian, at
 
-    _, a, b = values.shape
-    i = np.broadcast_to((a * rows[:, None] + np.arange(a))[:, :, None], values.shape)
-    j = np.broadcast_to((b * columns[:, None] + np.arange(b))[:, None, :], values.shape)
-    return coo_array((values.ravel(), (i.ravel(), j.ravel())), shape=(a * n, b * m)).tocsc()
+
+def _add_motions(
+    normal: Array,
+    right: Array,
+    state: Array,
+    motions: Sequence[tuple[Pose, Array]],
+    size: int,
+) -> None:
+    """Add the motions from each scan to the next."""
+    for k, (motion, covariance) in enumerate(motions):
+        x, y, theta = state[k].tolist()
+        of_pose, of_motion = compose_jacobians((x, y, theta), motion)
+        error = state[k + 1] - compose((x, y, theta), motion)
+        error[2] = math.remainder(error[2], 2 * math.pi)
+        weight = np.linalg.inv(of_motion @ covariance @ of_motion.T)
+        jacobian = np.hstack((-of_pose, np.eye(3)))
+        after = size if k == len(motions) - 1 else 3 * k + 3
+        at = np.concatenate((3 * k + np.arange(3), after + np.arange(3)))
+        normal[np.ix_(at, at)] += jacobian.T @ weight @ jacobian
+        right[at] += jacobian.T @ weight @ error
 
 
-def _covariances(own: Array, gain: Any, solved: Any) -> Array:
-    """Add to the covariances of walls, were the poses known, those that the poses bring."""
-    found = own.copy()
-    for first in range(0, len(own), _BATCH):
-        columns = gain[:, 2 * first : 2 * (first + _BATCH)].toarray()
-        spread = columns.T @ solved.solve(columns)
-        for k in range(columns.shape[1] // 2):
-            found[first + k] += spread[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
-    return found
+def _walls(
+    state: Array,
+    centers: Array,
+    angles: Array,
+    segments: NDArray[np.void],
+    scans: NDArray[np.int64],
+    number: NDArray[np.int64],
+) -> NDArray[np.void]:
+    """Return the walls, from the first to the last place at which each was seen."""
+    walls = np.zeros(len(centers), WALL)
+    walls["centroid"], walls["angle"], walls["side"] = centers, angles, 1
+    walls["views"] = np.bincount(number)
+    u = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    c, s = np.cos(state[scans, 2]), np.sin(state[scans, 2])
+    for name, first in (("start", np.inf), ("end", -np.inf)):
+        x, y = segments[name].T
+        places = state[scans, :2] + np.stack((c * x - s * y, s * x + c * y), axis=1)
+        along = ((places - centers[number]) * u[number]).sum(axis=1)
+        extreme = np.full(len(centers), first)
+        (np.minimum if name == "start" else np.maximum).at(extreme, number, along)
+        walls[name] = centers + extreme[:, None] * u
+    return walls

@@ -59,11 +59,3 @@ def evidence_of(poses: Array, beams: Array, index: Index, spread: float) -> Arra
     found[:, 0] /= TOGETHER
     found[:, 1:] /= max(beams[:, 6].sum(), 1e-12)
     return found
-
-
-def thinned(beams: Array, count: int) -> Array:
-    """Return about so many of the beams, evenly spread."""
-    if len(beams) <= count:
-        return beams
-    chosen: NDArray[np.intp] = np.linspace(0, len(beams) - 1, count).astype(np.intp)
-    return np.ascontiguousarray(beams[chosen])

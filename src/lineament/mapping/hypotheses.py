@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.mapping import vote
 from ..scan import Array
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
@@ -27,6 +28,8 @@ REACH, LEAST_SINE = 0.35, 0.35
 ARM = 0.08
 #: Corners whose openings differ by more are not the same [rad].
 ALIKE = math.radians(12)
+#: Ends of walls vote if the wall is so long [m], by this weight; turns count from this vote on.
+LONG, OF_ENDS, LEAST_TURN = 0.5, 0.5, 0.3
 #: Size of the boxes in which poses are counted [m, rad].
 BOX, TURN = 0.6, math.radians(12)
 
@@ -37,16 +40,10 @@ def meetings(walls: NDArray[np.void], reach: float = REACH) -> NDArray[np.void]:
         return np.zeros(0, MEETING)
     ends = np.stack((walls["start"], walls["end"]), axis=1)
     low, high = ends.min(axis=1) - reach, ends.max(axis=1) + reach
-    order = np.argsort(low[:, 0], kind="stable")
     # Only walls whose boxes overlap can meet.
-    first, second = [], []
-    last = np.searchsorted(low[order, 0], high[order, 0], side="right")
-    for place, i in enumerate(order):
-        near = order[place + 1 : last[place]]
-        near = near[(low[near, 1] <= high[i, 1]) & (high[near, 1] >= low[i, 1])]
-        first.append(np.full(len(near), i))
-        second.append(near)
-    i, j = np.concatenate(first), np.concatenate(second)
+    beside = (low[:, None, 0] <= high[:, 0]) & (low[:, 0] <= high[:, None, 0])
+    beside &= (low[:, None, 1] <= high[:, 1]) & (low[:, 1] <= high[:, None, 1])
+    i, j = np.nonzero(np.triu(beside, 1))
     u = np.stack((np.cos(walls["angle"]), np.sin(walls["angle"])), axis=1)
     sine = _cross(u[i], u[j])
     crossing = np.abs(sine) > LEAST_SINE
@@ -132,73 +129,54 @@ def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
     return np.asarray(np.maximum(turned / turned.max(initial=1e-12), 0.0))
 
 
-def hypotheses(
-    local: NDArray[np.void],
-    local_corners: NDArray[np.void],
-    walls: NDArray[np.void],
-    corners: NDArray[np.void],
-    most: int,
-) -> Array:
-    """Return the poses for which most corners vote, shape (n, 3), those of the most votes first.
+def anchors(walls: NDArray[np.void], corners: NDArray[np.void]) -> Array:
+    """Return what votes: corners and ends of long walls, rows of x, y, direction, kind, opening.
 
-    A corner of the local map that is like one of the plan votes for the pose that puts it there,
-    by how well the walls agree with the turn.
+    Kinds are 0 and 1 for corners that are free or solid, -1 where that is not known, and 2 and 3
+    for the starts and ends of walls.
     """
-    q, m = local_corners, corners
-    if not len(q) or not len(m):
-        return np.zeros((0, 3))
-    alike = np.abs(q["opening"][:, None] - m["opening"]) < ALIKE
-    alike &= (q["solid"][:, None] == m["solid"]) | (q["solid"][:, None] < 0) | (m["solid"] < 0)
-    theta = m["bisector"] - q["bisector"][:, None]
-    by_turn = directions(local, walls)[np.rint(np.degrees(theta)).astype(np.int64) % 360]
-    alike &= by_turn > 0.3
-    i, j = np.nonzero(alike)
-    theta = np.remainder(theta[i, j], 2 * math.pi)
-    c, s = np.cos(theta), np.sin(theta)
-    x, y = q["position"][i].T
-    poses = np.stack(
-        (
-            m["position"][j, 0] - c * x + s * y,
-            m["position"][j, 1] - s * x - c * y,
-            theta,
-        ),
-        axis=1,
-    )
-    return _voted(poses, i, by_turn[i, j], most)
+    table = np.zeros((len(corners), 5))
+    table[:, :2], table[:, 2] = corners["position"], corners["bisector"]
+    table[:, 3], table[:, 4] = corners["solid"], corners["opening"]
+    long = walls[np.linalg.norm(walls["end"] - walls["start"], axis=1) > LONG]
+    tables = [table]
+    for turn, of in ((0.0, long), (math.pi, long[long["side"] == 0])):
+        for kind, name in ((2, "start"), (3, "end")):
+            table = np.zeros((len(of), 5))
+            table[:, :2], table[:, 2] = of[name], of["angle"] + turn
+            table[:, 3] = kind if not turn else 5 - kind
+            tables.append(table)
+    return np.concatenate(tables)
 
 
-def _voted(poses: Array, voters: NDArray[np.intp], weights: Array, most: int) -> Array:
-    """Return the means of poses in the boxes with the most votes; each corner has one a box."""
-    counts, means = [], []
+def hypotheses(local: Array, plan: Array, by_turn: Array, most: int) -> Array:
+    """Return the poses of the local map for which most votes are, shape (n, 3), the best first.
+
+    An anchor of the local map that is like one of the plan votes for the pose that puts it there,
+    by how well the walls agree with the turn. Boxes in which votes are counted overlap by half.
+    """
     n_turns = round(2 * math.pi / TURN)
+    reach = np.hypot(*local[:, :2].T).max(initial=0.0) + BOX
+    low, high = plan[:, :2].min(axis=0) - reach, plan[:, :2].max(axis=0) + reach
+    columns, rows = np.ceil((high - low) / BOX).astype(int) + 1
+    settings = (*low.tolist(), BOX, int(rows), ALIKE, LEAST_TURN, OF_ENDS)
+    found = []
+    degrees = np.flatnonzero(by_turn >= LEAST_TURN)
     for shift in (0.0, 0.5):
-        at = np.floor(poses / (BOX, BOX, 2 * math.pi / n_turns) + shift).astype(np.int64)
-        at[:, 2] %= n_turns
-        at[:, :2] -= at[:, :2].min(axis=0, initial=0)
-        rows = int(at[:, 1].max(initial=0)) + 1
-        key = (at[:, 0] * rows + at[:, 1]) * n_turns + at[:, 2]
-        boxes, box = np.unique(key, return_inverse=True)
-        # A corner counts once a box, by the first of its votes there.
-        _, single = np.unique(box * (voters.max(initial=0) + 1) + voters, return_index=True)
-        box, kept, weight = box[single], poses[single], weights[single]
-        votes = np.bincount(box, weight, minlength=len(boxes))
-        order = np.argsort(-votes, kind="stable")[:most]
-        total = np.bincount(box, minlength=len(boxes))[order]
-        turns = np.exp(1j * kept[:, 2])
-        mean = np.stack(
-            [np.bincount(box, kept[:, k], minlength=len(boxes))[order] / total for k in (0, 1)]
-            + [
-                np.arctan2(
-                    np.bincount(box, turns.imag, minlength=len(boxes))[order],
-                    np.bincount(box, turns.real, minlength=len(boxes))[order],
-                )
-            ],
-            axis=1,
-        )
-        counts.append(votes[order])
-        means.append(mean)
-    votes, found = np.concatenate(counts), np.concatenate(means)
-    return np.asarray(found[np.argsort(-votes, kind="stable")[:most]])
+        # Only turns that walls agree with have boxes.
+        spread = (degrees[:, None] + np.array([-0.5, 0.5])) / 360 * n_turns + shift
+        used = np.unique(np.floor(spread).astype(np.int64) % n_turns)
+        slots = np.full(n_turns, -1)
+        slots[used] = np.arange(len(used))
+        boxes = np.zeros((columns * rows * len(used), 4))
+        voters = np.zeros(len(boxes), np.int32)
+        touched = np.empty(len(boxes), np.int64)
+        count = vote(local, plan, (by_turn, slots, len(used)), settings, shift, boxes, voters, touched)
+        best = boxes[touched[:count]]
+        best = best[np.argsort(-best[:, 0], kind="stable")[:most]]
+        found.append(best)
+    votes = np.concatenate(found)
+    return np.asarray(votes[np.argsort(-votes[:, 0], kind="stable")[:most], 1:])
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -14,7 +14,7 @@ from ..features import ARC, CORNER, SEGMENT, Features, make_records
 from ..kernels.mapping import WALL_COLUMNS, list_walls
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
-from .hypotheses import meetings
+from .hypotheses import anchors, meetings
 from .plans import read_plan
 from .walls import COLUMN, Merger, walls_of
 
@@ -100,6 +100,11 @@ class LineMap:
     def corners(self) -> NDArray[np.void]:
         """Where two walls end together: records of `hypotheses.MEETING`."""
         return meetings(self.walls)
+
+    @cached_property
+    def anchors(self) -> Array:
+        """What votes for poses: corners and ends of walls, see `hypotheses.anchors`."""
+        return anchors(self.walls, self.corners)
 
     @cached_property
     def index(self) -> Index:

@@ -4,12 +4,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
+from ..kernels.mapping import choose
 from ..scan import Array, LaserScan, Pose
-from .evidence import Evidence, evidence_of, thinned
-from .hypotheses import hypotheses
+from .evidence import Evidence, evidence_of
+from .hypotheses import anchors, directions, hypotheses
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan
 from .refine import COARSE, FINE, adjusted, refined
@@ -23,8 +24,8 @@ LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
 )
 
 #: Poses that are tried by few beams, refined, and judged by all beams.
-TRIED, REFINED, JUDGED = 400, 32, 12
-_FEW_BEAMS = 40
+TRIED, SIFTED, REFINED, JUDGED = 400, 100, 32, 12
+_FEWEST_BEAMS, _FEW_BEAMS = 16, 40
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
 _NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance.
@@ -122,20 +123,27 @@ def locate(
         query = query.query()
     elif isinstance(query, Features):
         query = query_of_scan(query, scan)
-    index = plan.index
-    tried = hypotheses(query.walls, query.corners, plan.walls, plan.corners, TRIED)
+    tried = _tried(query, plan)
     if guess is not None:
         tried = _near_guess(tried, guess, covariance)
-    poses = _refined(tried, query, plan)
+    poses, found = _searched(tried, query, plan)
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
-    poses = np.concatenate((poses, _slid(poses[:1], query, plan)))
-    found = evidence_of(poses, query.beams, index, _TIGHT)
-    kept = _distinct(poses, found[:, 0], _SAME, JUDGED)
-    return _judged(poses[kept], found[kept], query, plan, len(tried))
+    control = -math.inf
+    if guess is None:
+        image = query.mirrored()
+        _, odds = _searched(_tried(image, plan), image, plan)
+        control = float(odds[:, 0].max(initial=-math.inf))
+    return _judged(poses, found, query, plan, len(tried), control)
 
 
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
+
+
+def _tried(query: Query, plan: LineMap) -> Array:
+    """Poses of a local map for which its corners and ends of walls vote."""
+    local = anchors(query.walls, query.corners)
+    return hypotheses(local, plan.anchors, directions(query.walls, plan.walls), TRIED)
 
 
 def _near_guess(tried: Array, guess: Pose, covariance: ArrayLike | None) -> Array:
@@ -151,18 +159,29 @@ def _near_guess(tried: Array, guess: Pose, covariance: ArrayLike | None) -> Arra
     return np.concatenate((np.add(guess, around), tried[near]))
 
 
-def _refined(tried: Array, query: Query, plan: LineMap) -> Array:
-    """Try poses by few beams, and refine the best; the best come first."""
+def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
+    """Try poses by few beams, refine the best, and judge them by all; the best come first."""
     if not len(tried):
-        return tried
-    few = thinned(query.beams, _FEW_BEAMS)
-    found = evidence_of(tried, few, plan.index, _WIDE)
-    kept = _distinct(tried, found[:, 0], _NEAR, REFINED)
-    poses, _, _ = refined(tried[kept], query, plan.index, COARSE)
+        return tried, np.zeros((0, 4))
+    for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
+        found = evidence_of(tried, _few(query.beams, count), plan.index, _WIDE)
+        tried = tried[_distinct(tried, found[:, 0], _NEAR, most)]
+    poses, _, _ = refined(tried, query, plan.index, COARSE)
     poses, _, _ = refined(poses, query, plan.index, FINE)
     found = evidence_of(poses, query.beams, plan.index, _TIGHT)
+    best = found[:, 0].argmax()
+    slid = _slid(poses[best : best + 1], query, plan)
+    poses = np.concatenate((poses, slid))
+    found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
     kept = _distinct(poses, found[:, 0], _SAME, JUDGED)
-    return np.asarray(poses[kept])
+    return poses[kept], found[kept]
+
+
+def _few(beams: Array, count: int) -> Array:
+    """Return about so many of the beams, evenly spread."""
+    if len(beams) <= count:
+        return beams
+    return beams[np.linspace(0, len(beams) - 1, count).astype(np.intp)]
 
 
 def _slid(poses: Array, query: Query, plan: LineMap) -> Array:
@@ -181,23 +200,18 @@ def _main_direction(query: Query) -> float:
     return float(np.angle((lengths * np.exp(4j * query.walls["angle"])).sum()) / 4)
 
 
-def _distinct(poses: Array, scores: Array, apart: tuple[float, float], most: int) -> list[int]:
+def _distinct(
+    poses: Array, scores: Array, apart: tuple[float, float], most: int
+) -> NDArray[np.int64]:
     """Return the best poses, each farther from all better ones than `apart`."""
-    kept: list[int] = []
-    for k in np.argsort(-scores, kind="stable").tolist():
-        if kept:
-            off = poses[kept] - poses[k]
-            turn = np.abs(np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi)
-            way = np.hypot(off[:, 0], off[:, 1])
-            if ((way < apart[0]) & (turn < apart[1])).any():
-                continue
-        kept.append(k)
-        if len(kept) == most:
-            break
-    return kept
+    chosen = np.empty(most, np.int64)
+    order = np.argsort(-scores, kind="stable")
+    return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
 
 
-def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int) -> Location:
+def _judged(
+    poses: Array, found: Array, query: Query, plan: LineMap, tries: int, control: float
+) -> Location:
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
@@ -218,6 +232,7 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int)
         first.log_odds < NO_CHANCE
         or first.explained < LEAST_EXPLAINED
         or first.contradicted > MOST_CONTRADICTED
+        or control > found[0, 0] + SURE
     ):
         verdict = LOST
     elif values[1] > UNSURE**2:
@@ -228,6 +243,8 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int)
         direction = _common_line(line, np.array([pose[2] for pose, _ in others]) - poses[0, 2])
         if direction is not None:
             verdict, unobserved = UNOBSERVED, direction
+    elif control > found[0, 0] - SURE:
+        verdict = AMBIGUOUS
     else:
         verdict = LOCATED
     return Location(verdict, _pose(best), covariance, first, unobserved, others)

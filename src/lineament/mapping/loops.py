@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..motion.association import chi_square
 from ..scan import Array, Pose
 from ..scan.poses import compose, relative
-from .adjust import Lines, Sights
+from .joint import Lines, Sights
 from .drive_map import KeyFrame
 from .graph import Edges, wrapped
 from .line_map import LineMap

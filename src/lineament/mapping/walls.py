@@ -32,7 +32,7 @@ COLUMN = np.dtype(
 #: Walls on one line are one wall if no more lies between them [m]: a door is wider.
 GAP = 0.2
 #: Segments that are shorter, or less sure of their direction, make no wall [m, rad].
-SHORTEST, LEAST_SURE = 0.1, 0.2
+SHORTEST, LEAST_SURE = 0.15, 0.2
 
 #: Lines whose directions differ by more are never one [rad].
 _TURN = 0.35

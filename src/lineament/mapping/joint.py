@@ -1,0 +1,170 @@
+"""Poses and walls adjusted together, so that the covariance of a wall holds that of the poses."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scan import Array
+from .graph import Edges, factorised, normal_equations, wrapped
+
+#: Sights that are off by more than so many deviations count less.
+_KERNEL = 3.0
+_ROUNDS, _SMALL = 12, 1e-5
+#: Walls whose covariances are found at a time.
+_BATCH = 200
+
+
+@dataclass(slots=True, eq=False)
+class Sights:
+    """Walls as key frames see them, each in the frame of its sensor.
+
+    Attributes
+    ----------
+    frames, walls : ndarray of int64, shape (m,)
+        Which key frame sees which wall.
+    centroids, angles : ndarray, shapes (m, 2) and (m,)
+        Of the segment [m, rad].
+    covariances : ndarray, shape (m, 2, 2)
+        Of its offset along the left normal at the centroid, and of its angle.
+    ends : ndarray, shape (m, 2)
+        From the centroid back to its start and on to its end, along its direction [m].
+    """
+
+    frames: NDArray[np.int64]
+    walls: NDArray[np.int64]
+    centroids: Array
+    angles: Array
+    covariances: Array
+    ends: Array
+
+    def placed(self, poses: Array) -> tuple[Array, Array]:
+        """Centroids (m, 2) and angles (m,) in the frame of the poses."""
+        at = poses[self.frames]
+        c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
+        x, y = self.centroids.T
+        moved = np.column_stack((at[:, 0] + c * x - s * y, at[:, 1] + s * x + c * y))
+        return moved, at[:, 2] + self.angles
+
+
+@dataclass(slots=True, eq=False)
+class Lines:
+    """Lines of walls.
+
+    Attributes
+    ----------
+    points, angles : ndarray, shapes (w, 2) and (w,)
+        A point of each, and its direction; what is seen of it is to its left [m, rad].
+    covariances : ndarray, shape (w, 2, 2)
+        Of the offset at the point along the left normal, and of the angle.
+    """
+
+    points: Array
+    angles: Array
+    covariances: Array
+
+
+def lines_of(sights: Sights, poses: Array, count: int) -> Lines:
+    """Return the means of the sights of each wall, by their information."""
+    places, angles = sights.placed(poses)
+    weight = 1.0 / sights.covariances[:, 0, 0]
+    total = np.maximum(np.bincount(sights.walls, weight, count), 1e-12)
+    points = np.column_stack(
+        [np.bincount(sights.walls, weight * places[:, k], count) / total for k in range(2)]
+    )
+    sure = 1.0 / sights.covariances[:, 1, 1]
+    sine = np.bincount(sights.walls, sure * np.sin(angles), count)
+    cosine = np.bincount(sights.walls, sure * np.cos(angles), count)
+    directions = np.arctan2(sine, cosine)
+    # The mean of the centroids says more of the direction than any one sight of a long wall.
+    return Lines(points, directions, np.zeros((count, 2, 2)))
+
+
+def adjust(
+    poses: Array, edges: Edges, sights: Sights, count: int, covariances: bool = False
+) -> tuple[Array, Lines, Array]:
+    """Adjust poses and walls together by Gauss-Newton; the first pose stays.
+
+    Returns the poses, the walls, with covariances that hold those of the poses where they are
+    asked for, and the weight of each sight. Walls are eliminated (Schur), so that the
+    equations are of the poses alone.
+    """
+    state, lines = poses.copy(), lines_of(sights, poses, count)
+    information = np.linalg.inv(sights.covariances)
+    solved, gain, own = None, None, None
+    for _ in range(_ROUNDS):
+        off, of_pose, of_wall = _linear(sights, state, lines)
+        squares = np.einsum("ni,nij,nj->n", off, information, off)
+        weights = _KERNEL**2 / np.maximum(squares, _KERNEL**2)
+        weighted = information * weights[:, np.newaxis, np.newaxis]
+        matrix, gradient = normal_equations(state, edges, np.ones(len(edges.ends)))
+        own = np.zeros((count, 2, 2))
+        np.add.at(own, sights.walls, np.einsum("nji,njk,nkl->nil", of_wall, weighted, of_wall))
+        own += np.diag((1e-6, 1e-6))
+        own_inverse = np.linalg.inv(own)
+        towards = np.zeros((count, 2))
+        np.add.at(towards, sights.walls, np.einsum("nji,njk,nk->ni", of_wall, weighted, off))
+        by_pose = np.zeros((len(state), 3))
+        np.add.at(by_pose, sights.frames, np.einsum("nji,njk,nk->ni", of_pose, weighted, off))
+        both = _blocks(np.einsum("nji,njk,nkl->nil", of_pose, weighted, of_wall),
+                       sights.frames, sights.walls, len(state), count)  # fmt: skip
+        poses_alone = _blocks(np.einsum("nji,njk,nkl->nil", of_pose, weighted, of_pose),
+                              sights.frames, sights.frames, len(state), len(state))  # fmt: skip
+        numbers = np.arange(count)
+        gain = both @ _blocks(own_inverse, numbers, numbers, count, count)
+        solved = factorised(matrix + poses_alone - gain @ both.T)
+        right = -(gradient + by_pose.ravel()) + gain @ towards.ravel()
+        step = solved.solve(right)
+        turn = np.einsum("nij,nj->ni", own_inverse, -towards - (both.T @ step).reshape(-1, 2))
+        state = state + step.reshape(-1, 3)
+        state[:, 2] = wrapped(state[:, 2])
+        normals = np.column_stack((-np.sin(lines.angles), np.cos(lines.angles)))
+        lines = Lines(
+            lines.points + turn[:, :1] * normals, wrapped(lines.angles + turn[:, 1]), own_inverse
+        )
+        if max(np.abs(step).max(), np.abs(turn).max()) < _SMALL:
+            break
+    if covariances and solved is not None and gain is not None:
+        lines.covariances = _covariances(lines.covariances, gain, solved)
+    return state, lines, weights
+
+
+def _linear(sights: Sights, poses: Array, lines: Lines) -> tuple[Array, Array, Array]:
+    """Offset and angle of each sight from its wall, and their derivatives by pose and wall."""
+    places, angles = sights.placed(poses)
+    w = sights.walls
+    a, points = lines.angles[w], lines.points[w]
+    ux, uy = np.cos(a), np.sin(a)
+    arm = places - points
+    off = np.column_stack((-uy * arm[:, 0] + ux * arm[:, 1], wrapped(angles - a)))
+    lever = places - poses[sights.frames, :2]
+    of_pose = np.zeros((len(w), 2, 3))
+    of_pose[:, 0, 0], of_pose[:, 0, 1] = -uy, ux
+    of_pose[:, 0, 2] = uy * lever[:, 1] + ux * lever[:, 0]
+    of_pose[:, 1, 2] = 1.0
+    of_wall = np.zeros((len(w), 2, 2))
+    of_wall[:, 0, 0], of_wall[:, 1, 1] = -1.0, -1.0
+    of_wall[:, 0, 1] = -(ux * arm[:, 0] + uy * arm[:, 1])
+    return off, of_pose, of_wall
+
+
+def _blocks(values: Array, rows: Any, columns: Any, n: int, m: int) -> Any:
+    """Sparse matrix of blocks (k, a, b), those at the same place added up."""
+    from scipy.sparse import coo_array
+
+    _, a, b = values.shape
+    i = np.broadcast_to((a * rows[:, None] + np.arange(a))[:, :, None], values.shape)
+    j = np.broadcast_to((b * columns[:, None] + np.arange(b))[:, None, :], values.shape)
+    return coo_array((values.ravel(), (i.ravel(), j.ravel())), shape=(a * n, b * m)).tocsc()
+
+
+def _covariances(own: Array, gain: Any, solved: Any) -> Array:
+    """Add to the covariances of walls, were the poses known, those that the poses bring."""
+    found = own.copy()
+    for first in range(0, len(own), _BATCH):
+        columns = gain[:, 2 * first : 2 * (first + _BATCH)].toarray()
+        spread = columns.T @ solved.solve(columns)
+        for k in range(columns.shape[1] // 2):
+            found[first + k] += spread[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
+    return found
