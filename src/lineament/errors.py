@@ -15,7 +15,7 @@ EXTRAS = {
     "pandas": "pandas",
     "polars": "polars",
     "rerun": "rerun",
-    "scipy": "evaluation",
+    "scipy": "mapping",
     "shapely": "evaluation",
 }
 

@@ -12,10 +12,11 @@ from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, poses_along, relative, twist_between
-from .evidence import evidence_of, thinned
+from .evidence import _THROUGH as THROUGH
+from .evidence import TOGETHER, evidence_of
+from .line_map import Index, make_index
+from .local_map import Query, beams_of
 from .locate import _distinct as distinct
-from .line_map import make_index
-from .local_map import query_of_scan
 from .refine import COARSE, FINE, refined
 from .walls import COLUMN, WALL
 
@@ -32,16 +33,19 @@ _ROUGHNESS = 0.01
 #: A robot is not thought to go on faster [m/s, rad/s].
 _FAST = 1.2
 _ROUNDS = 4
-#: With at least this share of the beams explained, less contradicted, a place is taken at once.
-_SURE = 0.75
+#: With at least this share of the beams explained, less contradicted, a place is taken at once;
+#: more where the deviation of what is expected is larger than that [m].
+_SURE, _SURER, _NARROW = 0.75, 0.88, 0.1
 #: Poses are tried by so many beams; so many of them are refined.
-_FEW, _TRIED = 40, 32
+_BEAMS, _FEW, _TRIED = 120, 40, 32
+#: What a beam that passes through a wall says [nats], and what it takes off those explained.
+_MILD, _PASSED = -0.8, 0.5
 #: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
 _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
-_LOST = 0.15
+_LOST = 0.25
 #: Bins of turns, and how many of them are tried.
 _BINS, _TURNS = 120, 12
 
@@ -98,6 +102,8 @@ class Drive:
         #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its twist.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
         self._twist = (0.0, 0.0, 0.0)
+        #: Time from scan to scan, on average: stamps of logs come in bunches.
+        self._pace = 0.1
 
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
@@ -125,9 +131,11 @@ class Drive:
 
     def _go_on(self, stamp: float, pose: Pose) -> None:
         duration = stamp - self._last[0]
+        self._pace += 0.1 * (min(max(duration, 0.0), 1.0) - self._pace)
         if duration > 0.02:
             twist = twist_between(self._last[2], pose, duration)
-            self._twist = tuple(max(-_FAST, min(_FAST, speed)) for speed in twist)
+            x, y, turn = (max(-_FAST, min(_FAST, speed)) for speed in twist)
+            self._twist = x, y, turn
 
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
@@ -137,8 +145,9 @@ class Drive:
             step = relative(self._last[1], odometry)
         else:
             _, (by_way, by_turn) = _CONTINUED
-            least_way = min(0.02 + 0.4 * max(duration, 0.0), 0.3)
-            least_turn = min(0.02 + 0.8 * max(duration, 0.0), 2.0)
+            duration = max(duration, self._pace)
+            least_way = min(0.02 + 0.4 * duration, 0.3)
+            least_turn = min(0.02 + 0.8 * duration, 2.0)
             x, y, turn = poses_along(self._twist, [min(max(duration, 0.0), 0.5)])[0].tolist()
             step = x, y, turn
         way = least_way + by_way * math.hypot(step[0], step[1])
@@ -150,19 +159,22 @@ class Drive:
     ) -> tuple[Motion, bool]:
         """Find the pose by the walls around; if it may be another, the one that explains most."""
         motion = self._match(features, prior, spread)
-        query = query_of_scan(features, scan)
+        walls = _as_walls(features.segments)
+        none = np.zeros((2 * len(walls), 2 * len(walls)))
+        query = Query(walls, none, _some(beams_of(features, scan), _BEAMS))
         best = evidence_of(np.array([motion.pose]), query.beams, self._index, _TIGHT)[0]
         way, turn = math.sqrt(spread[0, 0]), math.sqrt(spread[2, 2])
-        if best[1] - best[3] >= _SURE and way < 0.1 and motion.observable:
+        sure = _SURE if way < _NARROW else _SURER
+        if best[1] - best[3] >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = evidence_of(tried, thinned(query.beams, _FEW), self._index, _WIDE)[:, 0]
+        few = _scores(tried, _some(query.beams, _FEW), self._index, _WIDE)
         few -= _unlikely(tried, prior, way, turn)
         poses = tried[distinct(tried, few, _APART, _TRIED)]
         poses = np.concatenate((poses, [motion.pose]))
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = evidence_of(poses, query.beams, self._index, _TIGHT)[:, 0]
+        scores = _scores(poses, query.beams, self._index, _TIGHT)
         scores -= _unlikely(poses, prior, way, turn)
         scores[-1] += 0.5
         k = int(scores.argmax())
@@ -170,12 +182,13 @@ class Drive:
             x, y, theta = poses[k].tolist()
             motion = self._match(features, (x, y, theta), np.diag((0.05, 0.05, 0.02)) ** 2)
         both = np.array([motion.pose, poses[k]])
-        found = evidence_of(both, query.beams, self._index, _TIGHT)
-        if found[1, 0] > found[0, 0] + 1.0:
+        found = _scores(both, query.beams, self._index, _TIGHT)
+        if found[1] > found[0] + 1.0:
             x, y, theta = poses[k].tolist()
             motion = Motion(x, y, theta, np.diag((0.05, 0.05, 0.02)) ** 2)
-        explained, contradicted = found[found[:, 0].argmax(), (1, 3)]
-        return motion, bool(explained - contradicted < _LOST)
+        found = evidence_of(both, query.beams, self._index, _TIGHT)
+        explained, contradicted = found[found[:, 1].argmax(), (1, 3)]
+        return motion, bool(explained - _PASSED * contradicted < _LOST)
 
     def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
@@ -241,13 +254,30 @@ class Drive:
         self.frames.append(KeyFrame(len(self.scans), scan, features, walls, pose, motion))
 
 
+def _some(beams: Array, count: int) -> Array:
+    """Return so many of the beams, evenly spread."""
+    if len(beams) <= count:
+        return beams
+    return np.ascontiguousarray(beams[np.linspace(0, len(beams) - 1, count).astype(int)])
+
+
+def _scores(poses: Array, beams: Array, index: Index, spread: float) -> Array:
+    """How well poses explain the beams [nats]; a wall that beams pass may have gone away."""
+    found = evidence_of(poses, beams, index, spread)
+    passed = len(beams) / TOGETHER * found[:, 3]
+    return np.asarray(found[:, 0] + (_MILD - THROUGH) * passed)
+
+
 def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
     """Segments as walls that are seen from their left."""
     walls = np.zeros(len(segments), WALL)
     for name in ("start", "end", "centroid", "angle", "covariance"):
         walls[name] = segments[name]
     walls["side"] = walls["views"] = 1
-    return walls[segments["length"] > 1e-3]
+    walls["covariance"][:, 0, 0] += segments["misfit"] ** 2
+    length = np.maximum(segments["length"], 1e-3)
+    walls["covariance"][:, 1, 1] += 4 * (segments["misfit"] / length) ** 2
+    return walls[segments["length"] > 0.05]
 
 
 def _fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void]) -> None:
@@ -279,7 +309,7 @@ def _fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void])
 
 
 def _turns(around: Features, features: Features, expected: float, spread: float) -> list[float]:
-    """Turns by which segments seen now lie along walls around, the likeliest first [rad]."""
+    """List the turns by which segments lie along walls around, the likeliest first [rad]."""
     before, now = around.segments, features.segments
     off = before["angle"][:, np.newaxis] - now["angle"]
     weight = np.minimum(before["length"][:, np.newaxis], now["length"])

@@ -38,11 +38,12 @@ class Edges:
 
     def together(self, other: "Edges") -> "Edges":
         """Return these edges, then others."""
-        both = zip(self._arrays(), other._arrays(), strict=True)
-        return Edges(*(np.concatenate(pair) for pair in both))
-
-    def _arrays(self) -> tuple[Array, ...]:
-        return self.ends, self.motions, self.information, self.robust
+        return Edges(
+            np.concatenate((self.ends, other.ends)),
+            np.concatenate((self.motions, other.motions)),
+            np.concatenate((self.information, other.information)),
+            np.concatenate((self.robust, other.robust)),
+        )
 
     def errors(self, poses: Array) -> Array:
         """How far the poses are off each motion, in its first frame, shape (m, 3)."""
@@ -59,7 +60,7 @@ class Edges:
         return np.asarray(np.einsum("ni,nij,nj->n", off, self.information, off))
 
     def jacobians(self, poses: Array) -> tuple[Array, Array]:
-        """Derivatives of the errors by both poses, shape (m, 3, 3) each."""
+        """Return the derivatives of the errors by both poses, shape (m, 3, 3) each."""
         a, b = poses[self.ends[:, 0]], poses[self.ends[:, 1]]
         c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
         dx, dy = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1]

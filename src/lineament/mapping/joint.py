@@ -11,9 +11,9 @@ from .graph import Edges, factorised, normal_equations, wrapped
 
 #: Sights that are off by more than so many deviations count less.
 _KERNEL = 3.0
-_ROUNDS, _SMALL = 12, 1e-5
+_ROUNDS, _SMALL = 6, 1e-4
 #: Walls whose covariances are found at a time.
-_BATCH = 200
+_BATCH, _DENSE = 200, 6000
 
 
 @dataclass(slots=True, eq=False)
@@ -102,7 +102,7 @@ def adjust(
         own = np.zeros((count, 2, 2))
         np.add.at(own, sights.walls, np.einsum("nji,njk,nkl->nil", of_wall, weighted, of_wall))
         own += np.diag((1e-6, 1e-6))
-        own_inverse = np.linalg.inv(own)
+        own_inverse: Array = np.asarray(np.linalg.inv(own), np.float64)
         towards = np.zeros((count, 2))
         np.add.at(towards, sights.walls, np.einsum("nji,njk,nk->ni", of_wall, weighted, off))
         by_pose = np.zeros((len(state), 3))
@@ -161,10 +161,16 @@ def _blocks(values: Array, rows: Any, columns: Any, n: int, m: int) -> Any:
 
 def _covariances(own: Array, gain: Any, solved: Any) -> Array:
     """Add to the covariances of walls, were the poses known, those that the poses bring."""
-    found = own.copy()
-    for first in range(0, len(own), _BATCH):
-        columns = gain[:, 2 * first : 2 * (first + _BATCH)].toarray()
-        spread = columns.T @ solved.solve(columns)
+    found, n = own.copy(), gain.shape[0]
+    batch = n if n <= _DENSE else _BATCH
+    for first in range(0, len(own), batch):
+        columns = gain[:, 2 * first : 2 * (first + batch)]
+        if n <= _DENSE:
+            # One inverse is quicker than a solution for each wall.
+            spread = columns.T @ solved.solve(np.eye(n))
+        else:
+            spread = solved.solve(columns.toarray()).T
         for k in range(columns.shape[1] // 2):
-            found[first + k] += spread[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
+            pair = slice(2 * k, 2 * k + 2)
+            found[first + k] += spread[pair] @ columns[:, pair].toarray()
     return found

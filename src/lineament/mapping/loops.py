@@ -1,6 +1,7 @@
 """Loops: places that were seen before, found by `locate` alone, and walls that are one."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,13 +9,13 @@ from numpy.typing import NDArray
 
 from ..motion.association import chi_square
 from ..scan import Array, Pose
-from ..scan.poses import compose, relative
-from .joint import Lines, Sights
+from ..scan.poses import relative
 from .drive_map import KeyFrame
 from .graph import Edges, wrapped
+from .joint import Lines, Sights
 from .line_map import LineMap
-from .local_map import Query, beams_of, query_of
-from .locate import LOCATED, locate
+from .local_map import Query, beams_of, moved_beams, thinned
+from .locate import locate
 from .walls import GAP, WALL
 
 #: What is looked for is of this way before a key frame; where, of this way around another [m].
@@ -46,16 +47,14 @@ def find_loops(
     spread : (float, float)
         Deviations of the poses from each other [m, rad].
     """
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
-    due = np.flatnonzero(np.diff(np.floor(way / _EVERY), prepend=-1))
+    way = _way(poses)
     covariance = np.diag((spread[0], spread[0], spread[1])) ** 2
     ends, motions, information = [], [], []
     plans: dict[int, LineMap | None] = {}
-    for q in due.tolist():
-        places = _stretches(poses, way, q, 2.0 + 2.0 * spread[0])
-        if not places:
-            continue
-        query = _query(frames, poses, way, q, sights, lines)
+    reach = 2.0 + 2.0 * spread[0]
+    for q in _due(way, _EVERY):
+        places = _stretches(poses, way, q, reach)
+        query = _query(frames, poses, way, q, sights, lines) if places else None
         if query is None:
             continue
         for j in places:
@@ -68,7 +67,7 @@ def find_loops(
                 continue
             guess = relative(_pose(poses[j]), _pose(poses[q]))
             found = locate(query, plan, guess, covariance)
-            if found.verdict == LOCATED:
+            if found:
                 ends.append((j, q))
                 motions.append(found.pose)
                 information.append(np.linalg.inv(found.covariance + _FLOOR))
@@ -78,6 +77,27 @@ def find_loops(
         np.array(information).reshape(-1, 3, 3),
         np.ones(len(ends), dtype=bool),
     )
+
+
+def queries(
+    frames: list[KeyFrame], poses: Array, sights: Sights, lines: Lines, every: float
+) -> Iterator[tuple[int, Query]]:
+    """Return key frames so far apart [m], and what was seen on the last metres before each."""
+    way = _way(poses)
+    for q in [*_due(way, every)[1:], len(poses) - 1]:
+        query = _query(frames, poses, way, q, sights, lines)
+        if query is not None:
+            yield q, query
+
+
+def _way(poses: Array) -> Array:
+    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
+
+
+def _due(way: Array, every: float) -> list[int]:
+    """Return the first key frame of each so many metres."""
+    due: list[int] = np.flatnonzero(np.diff(np.floor(way / every), prepend=-1)).tolist()
+    return due
 
 
 def _stretches(poses: Array, way: Array, q: int, reach: float) -> list[int]:
@@ -97,7 +117,7 @@ def _stretches(poses: Array, way: Array, q: int, reach: float) -> list[int]:
 def _query(
     frames: list[KeyFrame], poses: Array, way: Array, q: int, sights: Sights, lines: Lines
 ) -> Query | None:
-    """What was seen on the last metres before a key frame, in its frame."""
+    """Return what was seen on the last metres before a key frame, in its frame."""
     last = np.flatnonzero((way <= way[q]) & (way >= way[q] - _QUERY))
     last = last[last <= q]
     walls = walls_at(poses[q], last, sights, lines, poses)
@@ -107,8 +127,11 @@ def _query(
     for k in np.unique(np.linspace(0, len(last) - 1, _SCANS).astype(int)).tolist():
         frame = frames[last[k]]
         pose = relative(here, _pose(poses[last[k]]))
-        beams.append(beams_of(frame.features, frame.scan, pose, np.zeros((3, 3))))
-    return query_of(walls, None, np.concatenate(beams[::-1]))
+        beams.append(moved_beams(beams_of(frame.features, frame.scan), pose, np.zeros((3, 3))))
+    n = len(walls)
+    blocks = np.zeros((n, 2, n, 2))
+    blocks[np.arange(n), :, np.arange(n)] = walls["covariance"]
+    return Query(walls, blocks.reshape(2 * n, 2 * n), thinned(np.concatenate(beams[::-1])))
 
 
 def walls_at(
@@ -190,7 +213,7 @@ def merged(sights: Sights, lines: Lines, poses: Array) -> NDArray[np.int64]:
     count = len(lines.points)
     every = np.ones(len(sights.walls), dtype=bool)
     low, high = _extents(sights, lines, poses, every)
-    first, last = np.full(count, np.inf), np.full(count, -np.inf)
+    first, last = np.full(count, 1e9), np.full(count, -1e9)
     np.minimum.at(first, sights.walls, low)
     np.maximum.at(last, sights.walls, high)
     views = np.bincount(sights.walls, minlength=count)
