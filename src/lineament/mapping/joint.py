@@ -1,6 +1,6 @@
 """Poses and walls adjusted together, so that the covariance of a wall holds that of the poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from .graph import Edges, factorised, normal_equations, wrapped
 #: Sights that are off by more than so many deviations count less.
 _KERNEL = 3.0
 _ROUNDS, _SMALL = 6, 1e-4
+#: Walls that were seen so often show how rough surfaces are, up to this [m]; median of χ².
+_OFTEN, _ROUGHEST, _MEDIAN = 8, 0.05, 0.4549
 #: Walls whose covariances are found at a time.
 _BATCH, _DENSE = 200, 6000
 
@@ -38,6 +40,8 @@ class Sights:
     angles: Array
     covariances: Array
     ends: Array
+    #: How far surfaces are from straight, which is in the covariances [m].
+    rough: float = 0.0
 
     def placed(self, poses: Array) -> tuple[Array, Array]:
         """Centroids (m, 2) and angles (m,) in the frame of the poses."""
@@ -128,6 +132,37 @@ def adjust(
     if covariances and solved is not None and gain is not None:
         lines.covariances = _covariances(lines.covariances, gain, solved)
     return state, lines, weights
+
+
+def roughened(sights: Sights, rough: float) -> Sights:
+    """Return the sights of surfaces that are so far from straight [m]."""
+    added = rough**2 - sights.rough**2
+    covariances = sights.covariances.copy()
+    covariances[:, 0, 0] += added
+    covariances[:, 1, 1] += 4 * added / np.maximum(np.ptp(sights.ends, axis=1), 0.1) ** 2
+    return replace(sights, covariances=covariances, rough=rough)
+
+
+def roughness(sights: Sights, lines: Lines, poses: Array) -> float:
+    """Return how far surfaces are from straight [m], by how far sights are off their walls.
+
+    With it, the median of the squared offsets over their variances is that of χ², of the sights of
+    walls that were seen often: of these, the wall itself takes little off.
+    """
+    off, _, _ = _linear(sights, poses, lines)
+    often = np.bincount(sights.walls)[sights.walls] >= _OFTEN
+    squares = off[often, 0] ** 2
+    variances = sights.covariances[often, 0, 0] - sights.rough**2
+    if not len(squares):
+        return sights.rough
+    low, high = 0.0, _ROUGHEST
+    for _ in range(30):
+        middle = (low + high) / 2
+        if np.median(squares / (variances + middle**2)) > _MEDIAN:
+            low = middle
+        else:
+            high = middle
+    return high
 
 
 def _linear(sights: Sights, poses: Array, lines: Lines) -> tuple[Array, Array, Array]:

@@ -9,12 +9,12 @@ from ..scan import Array, Pose
 from ..scan.poses import compose, inverse, relative
 from .drive_map import KeyFrame
 from .graph import Edges, optimise, wrapped
-from .joint import Lines, Sights, adjust
+from .joint import Lines, Sights, adjust, roughened, roughness
 from .line_map import LineMap
 from .locate import locate
 from .loops import find_loops, merged, queries, whole_walls
 
-#: Surfaces are off straight lines by so much [m].
+#: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
 #: What walls say of a motion is known by the walls already: of motions, a 25th counts, and
 #: nothing below these deviations [m, m, rad].
@@ -83,6 +83,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int =
     )
     poses = np.array([frame.pose for frame in frames])
     poses, lines, _ = adjust(poses, chain, sights, count)
+    sights = roughened(sights, roughness(sights, lines, poses))
     own, loops, refused = sights, None, 0
     for spread in _SPREADS:
         found = find_loops(frames, poses, own, lines, spread)
@@ -157,21 +158,18 @@ def _sights(frames: list[KeyFrame]) -> Sights:
     """Walls as the key frames see them."""
     segments = np.concatenate([frame.features.segments for frame in frames])
     numbers = np.concatenate([np.full(len(f.walls), k) for k, f in enumerate(frames)])
-    rough = _ROUGH**2 + segments["misfit"] ** 2
-    covariances = segments["covariance"].copy()
-    covariances[:, 0, 0] += rough
-    covariances[:, 1, 1] += 4 * rough / np.maximum(segments["length"], 0.1) ** 2
     u = np.column_stack((np.cos(segments["angle"]), np.sin(segments["angle"])))
     ends = [((segments[e] - segments["centroid"]) * u).sum(axis=1) for e in ("start", "end")]
     kept = segments["length"] > 0.1
-    return Sights(
+    sights = Sights(
         numbers[kept],
         np.concatenate([frame.walls for frame in frames])[kept],
         segments["centroid"][kept],
         segments["angle"][kept],
-        covariances[kept],
+        segments["covariance"][kept],
         np.column_stack(ends)[kept],
     )
+    return roughened(sights, _ROUGH)
 
 
 def _pose(row: Array) -> Pose:
