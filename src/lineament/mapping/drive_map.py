@@ -12,13 +12,22 @@ from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, poses_along, relative, twist_between
-from .evidence import _THROUGH as THROUGH
-from .evidence import TOGETHER, evidence_of
-from .line_map import Index, make_index
+from .evidence import evidence_of
 from .local_map import Query, beams_of
 from .locate import _distinct as distinct
+from .placing import (
+    PASSED,
+    ROUGHNESS,
+    as_walls,
+    fuse,
+    index_of,
+    likely_turns,
+    passed,
+    scored,
+    some,
+    unlikely,
+)
 from .refine import COARSE, FINE, refined
-from .walls import COLUMN, WALL
 
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
@@ -28,8 +37,6 @@ REMEMBERED = 30
 _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 #: The same where it goes on as it did: robots turn at once.
 _CONTINUED = (0.25, 0.35), (0.3, 0.3)
-#: How surfaces are off straight lines [m].
-_ROUGHNESS = 0.01
 #: A robot is not thought to go on faster [m/s, rad/s].
 _FAST = 1.2
 _ROUNDS = 4
@@ -38,16 +45,12 @@ _ROUNDS = 4
 _SURE, _SURER, _NARROW = 0.75, 0.88, 0.1
 #: Poses are tried by so many beams; so many of them are refined.
 _BEAMS, _FEW, _TRIED = 120, 40, 32
-#: What a beam that passes through a wall says [nats], and what it takes off those explained.
-_MILD, _PASSED = -0.8, 0.5
 #: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
 _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
 _LOST = 0.25
-#: Bins of turns, and how many of them are tried.
-_BINS, _TURNS = 120, 12
 
 Numbers = NDArray[np.int64]
 
@@ -159,42 +162,42 @@ class Drive:
     ) -> tuple[Motion, bool]:
         """Find the pose by the walls around; if it may be another, the one that explains most."""
         motion = self._match(features, prior, spread)
-        walls = _as_walls(features.segments)
+        walls = as_walls(features.segments)
         none = np.zeros((2 * len(walls), 2 * len(walls)))
-        query = Query(walls, none, _some(beams_of(features, scan), _BEAMS))
+        query = Query(walls, none, some(beams_of(features, scan), _BEAMS))
         best = evidence_of(np.array([motion.pose]), query.beams, self._index, _TIGHT)[0]
         way, turn = math.sqrt(spread[0, 0]), math.sqrt(spread[2, 2])
         sure = _SURE if way < _NARROW else _SURER
         if best[1] - best[3] >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = _scores(tried, _some(query.beams, _FEW), self._index, _WIDE)
-        few -= _unlikely(tried, prior, way, turn)
+        few = scored(tried, some(query.beams, _FEW), self._index, _WIDE)
+        few -= unlikely(tried, prior, way, turn)
         poses = tried[distinct(tried, few, _APART, _TRIED)]
         poses = np.concatenate((poses, [motion.pose]))
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = _scores(poses, query.beams, self._index, _TIGHT)
-        scores -= _unlikely(poses, prior, way, turn)
+        scores = scored(poses, query.beams, self._index, _TIGHT)
+        scores -= unlikely(poses, prior, way, turn)
         scores[-1] += 0.5
         k = int(scores.argmax())
         if k < len(poses) - 1:
             x, y, theta = poses[k].tolist()
             motion = self._match(features, (x, y, theta), np.diag((0.05, 0.05, 0.02)) ** 2)
         both = np.array([motion.pose, poses[k]])
-        found = _scores(both, query.beams, self._index, _TIGHT)
+        found = scored(both, query.beams, self._index, _TIGHT)
         if found[1] > found[0] + 1.0:
             x, y, theta = poses[k].tolist()
             motion = Motion(x, y, theta, np.diag((0.05, 0.05, 0.02)) ** 2)
         found = evidence_of(both, query.beams, self._index, _TIGHT)
         explained, contradicted = found[found[:, 1].argmax(), (1, 3)]
-        return motion, bool(explained - _PASSED * contradicted < _LOST)
+        return motion, bool(explained - PASSED * contradicted < _LOST)
 
     def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
         steps = np.arange(-2, 3) * min(max(way, 0.1), 0.3)
         turns = prior[2] + np.arange(-3, 4) * min(max(turn / 2, 0.05), 0.1)
-        turns = np.append(turns, _turns(self._around, features, prior[2], turn))
+        turns = np.append(turns, likely_turns(self._around, features, prior[2], turn))
         x, y, theta = np.meshgrid(prior[0] + steps, prior[1] + steps, turns, indexing="ij")
         return np.column_stack((x.ravel(), y.ravel(), theta.ravel()))
 
@@ -202,12 +205,12 @@ class Drive:
         motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
             found = associate(
-                self._around, features, motion.pose, motion.covariance, roughness=_ROUGHNESS
+                self._around, features, motion.pose, motion.covariance, roughness=ROUGHNESS
             )
             if matches is not None and found.same_as(matches):
                 break
             matches = found
-            motion = estimate_motion(matches, prior, spread, roughness=_ROUGHNESS)
+            motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
         return motion
 
     def _key(self, features: Features, motion: Motion, scan: LaserScan, is_new: bool) -> None:
@@ -218,7 +221,7 @@ class Drive:
             empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
             around = Features(**empty, clusters=np.empty(0, np.int32))
             self._numbers, self._seen = self._numbers[:0], self._seen[:0]
-        matches = associate(around, features, roughness=_ROUGHNESS)
+        matches = associate(around, features, roughness=ROUGHNESS)
         here = len(self.frames)
         walls = np.full(len(features.segments), -1, np.int64)
         before, now = matches.segments.T
@@ -227,10 +230,10 @@ class Drive:
         walls[new] = self._next + np.arange(len(new))
         self._next += len(new)
         segments = around.segments.copy()
-        _fuse(segments, before, features.segments[now])
+        fuse(segments, before, features.segments[now])
         self._seen[before] = here
         kept = self._seen >= here - REMEMBERED
-        kept &= ~_passed(segments, scan) | (self._seen == here)
+        kept &= ~passed(segments, scan) | (self._seen == here)
         place = np.cumsum(kept) - 1
         mine = np.empty(len(walls) + 1, np.int32)
         mine[now], mine[new], mine[-1] = place[before], kept.sum() + np.arange(len(new)), -1
@@ -248,102 +251,7 @@ class Drive:
             corners=np.concatenate((corners, others)),
             arcs=np.concatenate((features.arcs, arcs[near])),
         )
-        self._index = make_index(_as_walls(self._around.segments), np.zeros(0, COLUMN), 0.0)
+        self._index = index_of(as_walls(self._around.segments))
         self._numbers = np.concatenate((self._numbers[kept], walls[new]))
         self._seen = np.concatenate((self._seen[kept], np.full(len(new), here)))
         self.frames.append(KeyFrame(len(self.scans), scan, features, walls, pose, motion))
-
-
-def _some(beams: Array, count: int) -> Array:
-    """Return so many of the beams, evenly spread."""
-    if len(beams) <= count:
-        return beams
-    return np.ascontiguousarray(beams[np.linspace(0, len(beams) - 1, count).astype(int)])
-
-
-def _scores(poses: Array, beams: Array, index: Index, spread: float) -> Array:
-    """How well poses explain the beams [nats]; a wall that beams pass may have gone away."""
-    found = evidence_of(poses, beams, index, spread)
-    passed = len(beams) / TOGETHER * found[:, 3]
-    return np.asarray(found[:, 0] + (_MILD - THROUGH) * passed)
-
-
-def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
-    """Segments as walls that are seen from their left."""
-    walls = np.zeros(len(segments), WALL)
-    for name in ("start", "end", "centroid", "angle", "covariance"):
-        walls[name] = segments[name]
-    walls["side"] = walls["views"] = 1
-    walls["covariance"][:, 0, 0] += segments["misfit"] ** 2
-    length = np.maximum(segments["length"], 1e-3)
-    walls["covariance"][:, 1, 1] += 4 * (segments["misfit"] / length) ** 2
-    return walls[segments["length"] > 0.05]
-
-
-def _fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void]) -> None:
-    """Move walls to the mean of their line and the one that is seen now, by their covariances."""
-    for k, other in zip(at.tolist(), seen, strict=True):
-        wall = walls[k]
-        angle = wall["angle"]
-        u = np.array((math.cos(angle), math.sin(angle)))
-        n = np.array((-u[1], u[0]))
-        between = other["centroid"] - wall["centroid"]
-        along = float(between @ u)
-        turn = math.remainder(other["angle"] - angle, 2 * math.pi)
-        rough = np.diag((_ROUGHNESS**2, (2 * _ROUGHNESS / max(other["length"], 0.1)) ** 2))
-        arm = np.array(((1.0, -along), (0.0, 1.0)))
-        spread = arm @ (other["covariance"] + rough) @ arm.T
-        gain = wall["covariance"] @ np.linalg.inv(wall["covariance"] + spread)
-        shift, turned = gain @ (float(between @ n) - along * math.tan(turn), turn)
-        left = (np.eye(2) - gain) @ wall["covariance"]
-        wall["covariance"] = (left + left.T) / 2
-        wall["angle"] = math.remainder(angle + turned, 2 * math.pi)
-        wall["centroid"] += shift * n
-        u = np.array((math.cos(wall["angle"]), math.sin(wall["angle"])))
-        ends = np.stack((wall["start"], wall["end"], other["start"], other["end"]))
-        places = (ends - wall["centroid"]) @ u
-        wall["start"] = wall["centroid"] + places.min() * u
-        wall["end"] = wall["centroid"] + places.max() * u
-        wall["length"] = places.max() - places.min()
-        wall["n_points"] = max(wall["n_points"], other["n_points"])
-
-
-def _turns(around: Features, features: Features, expected: float, spread: float) -> list[float]:
-    """List the turns by which segments lie along walls around, the likeliest first [rad]."""
-    before, now = around.segments, features.segments
-    off = before["angle"][:, np.newaxis] - now["angle"]
-    weight = np.minimum(before["length"][:, np.newaxis], now["length"])
-    bins = np.floor(np.mod(off, 2 * math.pi) / (2 * math.pi) * _BINS).astype(int) % _BINS
-    votes = np.bincount(bins.ravel(), weight.ravel(), _BINS)
-    votes = votes + 0.5 * (np.roll(votes, 1) + np.roll(votes, -1))
-    # Large turns are less likely.
-    middles = (np.arange(_BINS) + 0.5) / _BINS * 2 * math.pi
-    far = np.abs(np.remainder(middles - expected + math.pi, 2 * math.pi) - math.pi)
-    votes = votes * np.exp(-0.5 * (far / max(spread, 0.5)) ** 2)
-    peaks = (votes >= np.roll(votes, 1)) & (votes > np.roll(votes, -1))
-    order = np.argsort(-np.where(peaks, votes, 0.0), kind="stable")[:_TURNS]
-    return [math.remainder(float(middles[k]), 2 * math.pi) for k in order if votes[k] > 0]
-
-
-def _unlikely(poses: Array, prior: Pose, way: float, turn: float) -> Array:
-    """How unlikely poses (n, 3) are by what is expected [nats]; far off no worse than unlikely."""
-    off = poses - prior
-    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
-    far = (off[:, 0] ** 2 + off[:, 1] ** 2) / (2 * max(way, 0.1) ** 2)
-    return np.asarray(far + np.log1p((off[:, 2] / turn) ** 2 / 2))
-
-
-def _passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:
-    """Whether beams pass through each wall, away from its ends, and end far behind."""
-    valid = scan.valid
-    bearing, ranges = scan.angles[valid][:, np.newaxis], scan.ranges[valid][:, np.newaxis]
-    ux, uy = np.cos(bearing), np.sin(bearing)
-    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
-    wx, wy = qx - px, qy - py
-    length = np.maximum(np.hypot(wx, wy), 1e-9)
-    ex, ey = ranges * ux - px, ranges * uy - py
-    off = (wx * ey - wy * ex) / length
-    margin = np.minimum(0.1, 0.2 * length) * (ux * wy - uy * wx) / length
-    # The start lies to the right of a beam that passes, the end to its left.
-    passes = (ux * py - uy * px < -abs(margin)) & (ux * qy - uy * qx > abs(margin)) & (off < -0.3)
-    return np.asarray(passes.sum(axis=0) >= 3)

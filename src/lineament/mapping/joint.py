@@ -151,7 +151,10 @@ def roughness(sights: Sights, lines: Lines, poses: Array) -> float:
     """
     off, _, _ = _linear(sights, poses, lines)
     often = np.bincount(sights.walls)[sights.walls] >= _OFTEN
-    squares = off[often, 0] ** 2
+    # Poses and walls take their part of the errors.
+    free = 3 * len(poses) + 2 * len(lines.points)
+    left = max(1.0 - free / (2 * len(off)), 0.2) if len(off) else 1.0
+    squares = off[often, 0] ** 2 / left
     variances = sights.covariances[often, 0, 0] - sights.rough**2
     if not len(squares):
         return sights.rough

@@ -81,6 +81,8 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int =
         _sights(frames),
         1 + max(int(f.walls.max(initial=0)) for f in frames),
     )
+    if not len(sights.walls):
+        raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
     poses = np.array([frame.pose for frame in frames])
     poses, lines, _ = adjust(poses, chain, sights, count)
     sights = roughened(sights, roughness(sights, lines, poses))
