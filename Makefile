@@ -1,17 +1,18 @@
 # make demo: simulate a drive, extract its features, make a page.   make demo LOG=path: of your log.
 # make test: what is checked before each commit.                    make bench: the README's figures.
 # make test-all: what takes longer, besides.                        make lines: what there is to read.
+# make docs: the site of the documents, in build/site.
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
+.PHONY: demo test test-all docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
 test: lint types tests wheel
 
-test-all: coverage
+test-all: coverage docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -54,6 +55,17 @@ coverage: .venv/ready
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
 
+# The site of the documents, with its tutorials run; what it needs is installed when it is first made.
+.venv/docs: requirements-docs.lock .venv/ready
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements-docs.lock
+	@touch $@
+
+docs: .venv/docs
+	mkdir -p build
+	$(BIN)/lineament warmup --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	@echo "the site is in build/site: open build/site/index.html"
+
 # The wheel is pure, and runs in an environment that has nothing else.
 wheel: .venv/ready
 	rm -rf dist build/empty
@@ -63,6 +75,13 @@ wheel: .venv/ready
 	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
 	build/empty/$(notdir $(BIN))/python benchmarks/installed.py
 	cd build/empty && $(notdir $(BIN))/lineament demo --quiet -o demo && ls demo
+
+# The first minutes of a new user, from the built wheel in an empty environment: each step, and its time.
+.PHONY: new-user
+new-user: .venv/ready
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --quiet
+	$(BIN)/python benchmarks/new_user.py dist/lineament-*-py3-none-any.whl
 
 # Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
 mutants: .venv/ready

@@ -56,16 +56,22 @@ def _measure_answers(log: Path) -> None:
         started = time.perf_counter()
         session.wait()
         print(f"log read: {time.perf_counter() - started:.1f} s")
-        answer(session, "/api/scan?i=0&method=optimal")  # the kernels are ready then
+        answer(session, "/api/scan?log=0&i=0&method=optimal")  # the kernels are ready then
         rng = np.random.default_rng(1)
         for what, beam in (("scan", ""), ("trace", "&beam=500")):
             times = []
             for index in rng.integers(SCANS, size=ASKED):
                 started = time.perf_counter()
-                answer(session, f"/api/{what}?i={index}&method=optimal{beam}")
+                answer(session, f"/api/{what}?log=0&i={index}&method=optimal{beam}")
                 times.append(1e3 * (time.perf_counter() - started))
             middle, late = statistics.median(times), statistics.quantiles(times, n=10)[-1]
             print(f"/api/{what}: median {middle:.1f} ms, nine of ten within {late:.1f} ms")
+        started, step = time.perf_counter(), -(-SCANS // 400)
+        size = sum(
+            len(answer(session, f"/api/drive?log=0&first={first}&step={step}&count=32"))
+            for first in range(0, SCANS, 32 * step)
+        )
+        print(f"the drive: {time.perf_counter() - started:.2f} s, {size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":

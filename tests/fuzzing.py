@@ -1,167 +1,251 @@
-"""Damaged logs of every format against what every reader promises.
+"""A million inputs of every kind, on both cores: python tests/fuzzing.py --inputs 1000000.
 
-Run for long: python tests/fuzzing.py --seconds 600. Each input is a small log of the project's own
-writers, or the beginning of a recording in the folder LINEAMENT_DATA, that was damaged. The run
-ends at the first input that breaks the promise, which is left in a folder.
+Damaged logs, scans for all methods with any parameters, all writers, requests to the viewer,
+messages to the node. The state is in a folder: a run that was interrupted goes on. An input that
+raises, hangs, crashes, or takes too long is kept there, with what was raised, and the run goes on;
+the table at the end counts them. Recordings in the folder LINEAMENT_DATA lend their beginnings.
+
+An input is a function of the seed, its number, and, for logs, of the corpus: inputs that ran lines
+of the readers which none had run before.
 """
 
 import argparse
 import faulthandler
 import gc
+import json
 import os
+import pickle
+import resource
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
+import traceback
 import warnings
 from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from random import Random
+from types import CodeType, FrameType
 from typing import Any
 
-import numpy as np
-from mutations import Sample, mutated, own_samples, recorded_samples
-
-from lineament import LaserScan, LogError
-from lineament.logs import find_logs, open_log, summarize
-from lineament.logs.base import Topic
-
-#: Bounds for each input in a long run: processor time [s], wall clock [s], address space [bytes].
-SECONDS, PATIENCE, MEMORY = 2.0, 60, 3 << 30
-
-#: Ways to open; what is wrong with the topic of poses must be one clear line too.
-OPTIONS: tuple[dict[str, Any], ...] = (
-    {},
-    {"echo": "strongest"},
-    {"echo": "last"},
-    {"ring": 0},
-    {"pose_topic": "/odom"},
-    {"pose_topic": "/tf:odom->base"},
-)
+#: Bounds for each input: processor time [s], wall clock [s], address space [bytes].
+SECONDS, PATIENCE, MEMORY = 5.0, 90, 6 << 30
+#: What is fuzzed, and in how many of a hundred inputs.
+SHARES = {"methods": 57, "readers": 25, "messages": 10, "viewer": 5, "writers": 3}
+#: Inputs after which the state is saved.
+SAVED = 200
 
 
-def check(sample: Sample, folders: tuple[Path, Path], options: dict[str, Any]) -> bool:
-    """Read a log in every way there is; True if a scan came out.
+class Lines:
+    """Lines of some files that no input has run yet: watched by the tracer of Python."""
 
-    `folders` are those of `scratch`: the input stays in the first one until the next, and from the
-    second one temporary files must go with their logs, and not wait for the collector.
-    """
-    folder, temporary = folders
-    for path in folder.iterdir():
-        path.unlink()
-    for name, data in sample.files.items():
-        (folder / name).write_bytes(data)
-    path = folder / sample.opened
-    count = 0
-    for found in one_line_or(folder, lambda: find_logs(path), default=[str(path)]):
-        for keep in (False, True):
-            count += one_line_or(folder, lambda f=found, k=keep: read(f, k, options), default=0)
-    left = {path.name: path.read_bytes() for path in folder.iterdir()}
-    assert left == sample.files, f"files changed: {sorted(sample.files)} are {sorted(left)}"
-    assert not list(temporary.iterdir()), list(temporary.iterdir())
-    return count > 0
+    def __init__(self, watched: tuple[str, ...]) -> None:
+        self._watched = watched
+        self._missing: dict[CodeType, set[int]] = {}
+        self._new = 0
 
+    def new(self, call: Callable[[], Any]) -> tuple[Any, int]:
+        """Call, and return what it gives and how many lines were run for the first time."""
+        self._new = 0
+        sys.settrace(self._called)
+        try:
+            return call(), self._new
+        finally:
+            sys.settrace(None)
 
-def one_line_or(folder: Path, call: Any, default: Any) -> Any:
-    """Call; a LogError gives the default, if it is one line that names a file in the folder."""
-    try:
-        return call()
-    except LogError as error:
-        line = str(error)
-    assert line.isprintable(), repr(line)
-    assert line.startswith(str(folder)), line
-    return default
+    def _called(self, frame: FrameType, *_: Any) -> Any:
+        code = frame.f_code
+        missing = self._missing.get(code)
+        if missing is None:
+            is_watched = any(name in code.co_filename for name in self._watched)
+            lines = {line for *_, line in code.co_lines() if line} if is_watched else set()
+            missing = self._missing[code] = lines
+        return self._ran if missing else None
 
-
-def read(path: str, keep_going: bool, options: dict[str, Any]) -> int:
-    """Use all that a log offers; how many scans came out."""
-    log = open_log(path, keep_going=keep_going, **options)
-    assert len(log) >= 0
-    assert all(isinstance(topic, Topic) for topic in log.contents())
-    count = 0
-    for topic, scan in log.items():
-        check_scan(scan)
-        assert topic in log.topics
-        count += 1
-    assert log.skipped == 0 or keep_going
-    assert all(fault.isprintable() for fault in log.faults)
-    lines = summarize(log).lines()
-    assert all(line.isprintable() for line in lines), lines
-    return count
+    def _ran(self, frame: FrameType, event: str, _: Any) -> Any:
+        missing = self._missing[frame.f_code]
+        if event == "line" and frame.f_lineno in missing:
+            missing.discard(frame.f_lineno)
+            self._new += 1
+        return self._ran
 
 
-def check_scan(scan: LaserScan) -> None:
-    """Check that a scan is one, whoever made it."""
-    assert type(scan) is LaserScan
-    n = len(scan)
-    for values in (scan.ranges, scan.angles):
-        assert values.shape == (n,)
-        assert values.dtype == np.float64
-        assert not values.flags.writeable
-    assert np.isfinite(scan.angles).all()
-    assert (np.diff(scan.angles) > 0).all(), scan.angles
-    assert np.isfinite([scan.stamp, scan.scan_time, scan.time_increment]).all()
-    assert 0 <= scan.range_min < scan.range_max
-    assert scan.intensities is None or scan.intensities.shape == (n,)
-    assert scan.pose is None or np.isfinite(scan.pose).all()
-    assert isinstance(scan.frame_id, str)
-    assert scan.points.shape == (n, 2)
-    assert repr(scan)
+def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None:
+    """Check the inputs of one worker, from where its state ends."""
+    from fuzz_readers import Readers
+    from fuzz_targets import Messages, Methods, Viewer, Writers
 
-
-def scratch(work: Path) -> tuple[Path, Path]:
-    """Make a folder for inputs, and one for temporary files, which readers then use."""
-    folders = work / "input", work / "temporary"
-    for folder in folders:
-        folder.mkdir(exist_ok=True)
-    tempfile.tempdir = str(folders[1])
-    return folders
-
-
-def chosen(samples: list[Sample], chance: Random) -> Sample:
-    """Choose a format, then one of its samples."""
-    kind = chance.choice(sorted({sample.kind for sample in samples}))
-    return chance.choice([sample for sample in samples if sample.kind == kind])
-
-
-def _too_slow(*_: object) -> None:
-    raise TimeoutError(f"took more than {SECONDS} s of processor time")
-
-
-def main() -> None:
-    import resource  # There is none on Windows.
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as own:
-        samples = own_samples(Path(own))
-    if "LINEAMENT_DATA" in os.environ:
-        samples += recorded_samples(Path(os.environ["LINEAMENT_DATA"]))
-    folders = scratch(Path(tempfile.mkdtemp(prefix="fuzzing-")))
-    print(f"an input that breaks the promise is left in {folders[0]}", flush=True)
+    scratch = Path(tempfile.mkdtemp(prefix="fuzzing-"))
+    recordings = os.environ.get("LINEAMENT_DATA")
+    targets = {
+        "methods": Methods(scratch),
+        "messages": Messages(scratch),
+        "viewer": Viewer(scratch),
+        "writers": Writers(scratch),
+        "readers": Readers(scratch, Path(recordings) if recordings else None),
+    }
+    corpus = state / f"corpus-{worker}"
+    corpus.mkdir(exist_ok=True)
+    for path in sorted(corpus.iterdir()):
+        targets["readers"].keep(pickle.loads(path.read_bytes()))
+    lines = Lines(Readers.watched)
+    saved = state / f"worker-{worker}.json"
+    counts = Counter(json.loads(saved.read_text())["counts"]) if saved.exists() else Counter()
+    slowest: dict[str, float] = json.loads(saved.read_text())["slowest"] if saved.exists() else {}
+    hours = json.loads(saved.read_text())["hours"] if saved.exists() else 0.0
+    begin = json.loads(saved.read_text())["next"] if saved.exists() else worker
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGPROF, _too_slow)
     warnings.simplefilter("error")
     unraisable: list[Any] = []
     sys.unraisablehook = unraisable.append
     gc.disable()  # What only the collector would remove shows, as it comes only now and then.
-    chance, counts = Random(given.seed), Counter[tuple[str, str]]()
-    deadline = time.monotonic() + given.seconds
-    while time.monotonic() < deadline:
-        sample = mutated(chosen(samples, chance), samples, chance)
+    names = list(SHARES)
+    started = time.monotonic()
+    current = state / f"worker-{worker}.now"
+    for number in range(begin, inputs, workers):
+        chance = Random(f"{seed} {number}")
+        name = chance.choices(names, list(SHARES.values()))[0]
+        target = targets[name]
+        made = target.make(chance)
+        current.write_bytes(pickle.dumps((number, name, made)))
         faulthandler.dump_traceback_later(PATIENCE, exit=True)
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        came = check(sample, folders, chance.choice(OPTIONS))
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        assert not unraisable, unraisable
-        counts[sample.kind, "read" if came else "refused"] += 1
-        if counts.total() % 100 == 0:
+        before = time.process_time()
+        try:
+            call = lambda: target.check(made)  # noqa: B023, E731
+            outcome, new = lines.new(call) if name == "readers" else (call(), 0)
+            assert not unraisable, str(unraisable)
+        except Exception:
+            unraisable.clear()
+            _keep(state, number, name, made, traceback.format_exc())
+            outcome, new = "FAULT", 0
+        spent = time.process_time() - before
+        faulthandler.cancel_dump_traceback_later()
+        if spent > SECONDS:
+            _keep(state, number, name, made, f"took {spent:.1f} s")
+            outcome = "SLOW"
+        if new:
+            targets["readers"].keep(made)
+            (corpus / f"{number:08}").write_bytes(pickle.dumps(made))
+        kind = f"{name}/{outcome}"
+        counts[kind] += 1
+        slowest[name] = max(slowest.get(name, 0.0), spent)
+        if number // workers % SAVED == SAVED - 1 or number + workers >= inputs:
             gc.collect()
-    for (kind, outcome), count in sorted(counts.items()):
-        print(f"{kind:<16}{outcome:>10}{count:>10}")
-    print(f"\n{counts.total()} inputs, no fault")
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            found = {
+                "next": number + workers,
+                "hours": hours + (time.monotonic() - started) / 3600,
+                "memory": memory,
+                "slowest": slowest,
+                "counts": counts,
+            }
+            beside = saved.with_suffix(".part")
+            beside.write_text(json.dumps(found))
+            beside.replace(saved)
+    shutil.rmtree(scratch)
+    os._exit(0)  # without the reader's thread of the viewer
+
+
+def _keep(state: Path, number: int, name: str, made: Any, what: str) -> None:
+    (state / "faults").mkdir(exist_ok=True)
+    path = state / "faults" / f"{number:08}-{name}"
+    path.with_suffix(".pickle").write_bytes(pickle.dumps(made))
+    path.with_suffix(".txt").write_text(what)
+
+
+def run(state: Path, seed: int, workers: int, inputs: int) -> None:
+    """Keep the workers at work to the end; one that crashes or hangs goes on with its next."""
+    state.mkdir(parents=True, exist_ok=True)
+    running: dict[int, subprocess.Popen[bytes]] = {}
+    waiting = set(range(workers))
+    try:
+        while waiting or running:
+            for worker in sorted(waiting):
+                words = [str(state), str(seed), str(worker), str(workers), str(inputs)]
+                with (state / f"worker-{worker}.txt").open("ab") as log:
+                    running[worker] = subprocess.Popen(
+                        [sys.executable, __file__, "--work", *words], stdout=log, stderr=log
+                    )
+            waiting.clear()
+            time.sleep(2)
+            for worker, process in list(running.items()):
+                if process.poll() is None:
+                    continue
+                del running[worker]
+                if process.returncode:
+                    _blame(state, worker, process.returncode)
+                    waiting.add(worker)
+            done = sum(found.get("next", 0) // workers for found in _states(state))
+            print(f"\r{done} of {inputs}, {len(list(state.glob('faults/*.txt')))} faults", end="")
+    finally:
+        for process in running.values():
+            process.send_signal(signal.SIGTERM)
+    print()
+
+
+def _blame(state: Path, worker: int, status: int) -> None:
+    """Keep the input at which a worker ended, and skip it."""
+    number, name, made = pickle.loads((state / f"worker-{worker}.now").read_bytes())
+    _keep(state, number, name, made, f"ended the worker with status {status}")
+    saved = state / f"worker-{worker}.json"
+    found = json.loads(saved.read_text()) if saved.exists() else {}
+    empty = {"hours": 0.0, "memory": 0.0, "slowest": {}, "counts": {}}
+    workers = len(list(state.glob("worker-*.now")))
+    found = empty | found | {"next": number + workers}
+    found["counts"][f"{name}/CRASH OR HANG"] = found["counts"].get(f"{name}/CRASH OR HANG", 0) + 1
+    saved.write_text(json.dumps(found))
+
+
+def _states(state: Path) -> list[dict[str, Any]]:
+    with suppress(OSError, ValueError):
+        return [json.loads(path.read_text()) for path in sorted(state.glob("worker-*.json"))]
+    return []
+
+
+def table(state: Path) -> str:
+    """Return what was found as a table in Markdown."""
+    states = _states(state)
+    counts = sum((Counter(found["counts"]) for found in states), Counter())
+    rows = [
+        "|class|inputs|faults|crashes, hangs|over 5 s|slowest [s]|",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in SHARES:
+        own = {kind: n for kind, n in counts.items() if kind.startswith(f"{name}/")}
+        bad = [own.get(f"{name}/{kind}", 0) for kind in ("FAULT", "CRASH OR HANG", "SLOW")]
+        slowest = max(found["slowest"].get(name, 0.0) for found in states)
+        rows.append(f"|{name}|{sum(own.values())}|{'|'.join(map(str, bad))}|{slowest:.2f}|")
+    hours = sum(found["hours"] for found in states)
+    memory = max(found["memory"] for found in states)
+    kept = len(list(state.glob("corpus-*/*")))
+    rows += [
+        "",
+        f"{counts.total()} inputs in {hours:.1f} hours of {len(states)} processes, "
+        f"{memory:.0f} MB of memory at most in one, {kept} logs in the corpus.",
+    ]
+    outcomes = ", ".join(f"{kind} {n}" for kind, n in sorted(counts.items()))
+    return "\n".join([*rows, "", outcomes])
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["--work"]:
+        state, *numbers = sys.argv[2:]
+        work(Path(state), *map(int, numbers))
+        return
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inputs", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--state", type=Path, default=Path("build/fuzzing"))
+    parser.add_argument("--again", type=Path, help="check one kept input (.pickle) alone")
+    given = parser.parse_args()
+    run(given.state, given.seed, given.workers, given.inputs)
+    print(table(given.state))
+    sys.exit(bool(list(given.state.glob("faults/*.txt"))))
 
 
 if __name__ == "__main__":

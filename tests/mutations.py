@@ -110,7 +110,7 @@ def _bag(folder: Path, kind: str) -> Sample:
 _WORDS = (0, 1, 2, 127, 255, 2**15, 2**16 - 1, 2**28, 2**31 - 1, 2**31, 2**32 - 1, 2**63, 2**64 - 1)
 _FLOATS = (0x7F800000, 0x7F800001, 0x7FC00000, 0x7F7FFFFF, 0xFF7FFFFF, 0x7FF0000000000001)
 _NUMBERS = b"nan inf -1 0 1e308 -1e308 1e-320 1e999 999999999 1_0 0x1 null [] {} 1e 9".split()
-_NUMBERS += [b"", b"\x1b[31m", b"\xd9\xa3", b'"', b"1" * 400, b"9" * 5000]
+_NUMBERS += [b"[" * 3000, b"", b"\x1b[31m", b"\xd9\xa3", b'"', b"1" * 400, b"9" * 5000]
 
 
 def _moved(data: bytes, chance: Random, other: bytes) -> bytes:
@@ -145,6 +145,34 @@ def _overwrite(data: bytes, chance: Random, _: bytes) -> bytes:
     return data[:at] + piece + data[at + len(piece) :]
 
 
+def sizes(data: bytes) -> list[tuple[int, str]]:
+    """Return where whole numbers stand that may be lengths, counts, offsets or indices in a file.
+
+    They are those, of 2 to 8 bytes in either order, which are at most its size; (place, format)s.
+    """
+    found = []
+    for size, form in ((8, "<Q"), (4, "<I"), (4, ">I"), (2, "<H"), (2, ">H")):
+        for start in range(size):
+            words = np.frombuffer(data, form, (len(data) - start) // size, start)
+            places = start + size * np.flatnonzero((words > 0) & (words <= len(data)))
+            found += [(place, form) for place in places.tolist()]
+    return found
+
+
+def _size(data: bytes, chance: Random, _: bytes) -> bytes:
+    """Make a length, a count, an offset or an index another one, near or far."""
+    if len(data) < 8 or not (places := sizes(data)):
+        return data
+    wide = [place for place in places if place[1] != "<H" and place[1] != ">H"] or places
+    at, form = chance.choice(chance.choice((wide, places)))
+    (word,) = struct.unpack_from(form, data, at)
+    near = (word - 1, word + 1, 2 * word, word // 2, len(data) - at, len(data), 0, at)
+    changed = bytearray(data)
+    most = 256 ** struct.calcsize(form) - 1
+    struct.pack_into(form, changed, at, chance.choice((*near, *_WORDS)) & most)
+    return bytes(changed)
+
+
 def _number(data: bytes, chance: Random, _: bytes) -> bytes:
     """Write another number, or none, over a word of a text."""
     at = chance.randrange(len(data))
@@ -164,7 +192,7 @@ def _pack(data: bytes, chance: Random, other: bytes) -> bytes:
     return gzip.compress(data, 1) if chance.random() < 0.5 else zipped(**files)
 
 
-_WAYS = (*(_moved,) * 5, *(_flip, _overwrite, _number) * 2, _pack)
+_WAYS = (*(_moved,) * 5, *(_flip, _overwrite, _number) * 2, *(_size,) * 4, _pack)
 
 
 def damaged(data: bytes, chance: Random, other: bytes) -> bytes:

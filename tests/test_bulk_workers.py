@@ -211,7 +211,12 @@ def wait_for(condition):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "workers"),
-    [(signal.SIGINT, "--processes"), (signal.SIGKILL, "--processes"), (signal.SIGINT, "--threads")],
+    [
+        (signal.SIGINT, "--processes"),
+        (signal.SIGTERM, "--processes"),
+        (signal.SIGKILL, "--processes"),
+        (signal.SIGINT, "--threads"),
+    ],
 )
 def test_a_stopped_run_leaves_whole_files_and_is_resumed(how, workers, tmp_path):
     home, out = tmp_path / "logs", tmp_path / "out"
@@ -229,14 +234,14 @@ def test_a_stopped_run_leaves_whole_files_and_is_resumed(how, workers, tmp_path)
         start_new_session=True,
     )
     wait_for(lambda: "done" in outcomes_so_far(out) and halves(out))
-    if how == signal.SIGINT:
+    if how != signal.SIGKILL:
         os.killpg(process.pid, how)
     else:
         process.kill()
     _, errors = process.communicate(timeout=120)
-    assert process.returncode == (130 if how == signal.SIGINT else -how)
+    assert process.returncode == (128 + how if how != signal.SIGKILL else -how)
     assert "Traceback" not in errors
-    if how == signal.SIGINT:
+    if how != signal.SIGKILL:
         assert errors.splitlines()[-1] == "lineament: stopped"
     # Its processes end when the run is gone, and take their half files with them.
     wait_for(lambda: not halves(out))

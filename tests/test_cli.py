@@ -130,6 +130,11 @@ WRONG = [
     ("info other.npz", 1, "other.npz: expected the key"),
     ("info wall.npz --echo second", 2, "--echo"),
     ("info wall.npz --ring -1", 2, "--ring"),
+    ("info wall.npz --limit size=1", 2, "limit 'size' is unknown, expected one of beams, points"),
+    ("info wall.npz --limit beams", 2, "'beams': expected NAME=VALUE"),
+    ("info wall.npz --limit beams=1e6", 2, "limit beams is '1e6', expected a whole number"),
+    ("info wall.npz --limit beams=0", 2, "limit beams is 0, expected a whole number"),
+    ("info wall.npz --limit scans=6", 1, "wall.npz: has 7 scans, more than the limit of 6"),
     ("plot wall.npz --scan 7 -o p.png", 1, "has no scan 7"),
     ("plot wall.npz --scan -1 -o p.png", 1, "has no scan -1"),
     ("plot wall.npz -o p.gif", 2, "p.gif"),
@@ -155,7 +160,7 @@ WRONG = [
     ("bench ple --data bench.npz -m pdbs", 2, "max_vertices"),
     ("bench ple --data bench.npz -m iepf -m hough --json a.json", 2, "one -m"),
     ("bench ple --data no.npz -m iepf", 1, "no.npz"),
-    ("simulate -o a.npz", 2, "WORLD"),
+    ("simulate -o a.npz --moving --speed 0", 2, "speed"),  # WORLD is the building
     ("simulate palace -o a.npz", 2, "world is 'palace', expected one of building, room"),
     ("simulate building -o a.npz --sensor sonar", 2, "sensor is 'sonar', expected one of paper"),
     ("simulate building -o a.npz --noise -1", 2, "sigma"),
@@ -202,7 +207,7 @@ def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsy
     assert "broken.log:2" in said
 
 
-def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
+def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, capsys):
     one, two, trace, dark = (tmp_path / f"{name}.png" for name in ("one", "two", "trace", "dark"))
     base = ["plot", str(npz), "--scan", "3"]
     assert run([*base, "-o", str(one)]) == 0
@@ -210,6 +215,7 @@ def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path):
     assert run([*base, "-o", str(trace), "--trace"]) == 0
     assert run([*base, "-o", str(dark), "--dark"]) == 0
     assert len({path.read_bytes() for path in (one, two, trace, dark)}) == 4
+    assert f"wall.npz · scan 3 · 10.30 s -> {one}\n" in capsys.readouterr().out
     assert matplotlib.image.imread(one)[..., :3].mean() > 0.8
     assert matplotlib.image.imread(dark)[..., :3].mean() < 0.2
     svg = tmp_path / "dark.svg"
@@ -367,10 +373,14 @@ def show(reading):
 def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
     given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
-    show.main([*given, "--keep-going"], standalone_mode=False)
+    limits = ["--limit", "beams=3", "--limit", "ratio=1_000"]
+    show.main([*given, "--keep-going", *limits], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
-    assert plain == {"topic": None, "keep_going": False, **vars(ReadOptions())}
-    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom"]
+    options = {"topic": None, "keep_going": False, **vars(ReadOptions()), "limits": None}
+    # Nothing is deskewed by a command that reads a log so.
+    assert {**plain, "stamp": "first"} == options
+    limited = {"beams": 3, "ratio": 1000}
+    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom", limited]
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES

@@ -1,8 +1,14 @@
 """The documents name what there is."""
 
+import doctest
+import pkgutil
 import re
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
+
+import pytest
+import yaml  # which distributed needs
 
 import lineament as ln
 from lineament.cli.commands import COMMANDS
@@ -11,6 +17,28 @@ from lineament.methods.liu import Liu
 
 ROOT = Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "lineament"
+
+
+def listed(nav):
+    if isinstance(nav, str):
+        return [nav]
+    return [
+        page for part in (nav.values() if isinstance(nav, dict) else nav) for page in listed(part)
+    ]
+
+
+def test_site_has_each_page_and_each_public_package_once():
+    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    docs, documents = ROOT / "docs", site["extra"]["documents"]
+    written = [p.relative_to(docs).with_suffix(".md").as_posix() for p in docs.rglob("*.[mp][dy]")]
+    for source in documents.values():
+        assert (ROOT / source).exists()
+    packages = {"commands", "lineament", "lineament.bounds", "lineament.methods.stages"}
+    for found in pkgutil.walk_packages(ln.__path__, "lineament."):
+        if found.ispkg and not found.name.startswith("lineament.cli"):
+            packages |= {found.name} if hasattr(import_module(found.name), "__all__") else set()
+    reference = [f"reference/{package}.md" for package in packages]
+    assert sorted(listed(site["nav"])) == sorted([*written, *documents, *reference])
 
 
 def test_equations_lead_to_functions_in_their_files():
@@ -33,16 +61,15 @@ def test_equations_state_the_defaults():
         assert name in {field.name for field in fields(Liu)}
 
 
-def test_readme_names_methods_commands_and_public_names():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_methods_commands_and_public_names_are_what_there_is():
+    methods = (ROOT / "docs" / "methods.md").read_text(encoding="utf-8")
     for name in METHODS:
-        assert f"| `{name}`" in text
+        assert f"| `{name}`" in methods
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
     for command in re.findall(r"^lineament (\w+)", text, re.MULTILINE):
         assert command in COMMANDS
     for name in re.findall(r"\bln\.(\w+)", text):
         assert hasattr(ln, name)
-    for target in re.findall(r"\]\(([\w/.]+)\)", text):
-        assert (ROOT / target).exists()
 
 
 def test_every_public_name_resolves_and_is_documented():
@@ -50,3 +77,36 @@ def test_every_public_name_resolves_and_is_documented():
         value = getattr(ln, name)
         assert isinstance(value, str) or value.__doc__
     assert dir(ln) == sorted(ln.__all__)
+
+
+@pytest.mark.parametrize("name", ["choosing", "faq", "invalid"])
+def test_examples_of_documents(name):
+    path = str(ROOT / "docs" / f"{name}.md")
+    flags = doctest.NORMALIZE_WHITESPACE
+    failed, tried = doctest.testfile(
+        path, module_relative=False, encoding="utf-8", optionflags=flags
+    )
+    assert tried >= 5
+    assert not failed
+
+
+def test_pages_lead_somewhere():
+    for page in (ROOT / "README.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([\w/.-]+)(?:#[\w-]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} leads to {target}"
+
+
+def test_what_is_said_of_other_projects_has_its_source():
+    text = (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+    sources = set(re.findall(r"^\[([LOSF]\d+)\]: https://", text, re.MULTILINE))
+    tables = text.split("## Speed")[0]
+    rows = [line.split("|")[3:-1] for line in tables.splitlines() if line.startswith("|")]
+    cells = [cell for row in rows if len(row) == 4 for cell in zip("LOSF", row, strict=True)]
+    assert len(cells) > 100
+    used = set()
+    for project, cell in cells:
+        found = re.findall(r"\[([LOSF]\d+)\]", cell)
+        heading = not cell.strip(" -") or "_" in cell.split()[0] or cell.strip() == "FALKOLib"
+        assert heading or "†" in cell or any(name[0] == project for name in found), cell
+        used.update(found)
+    assert used == sources

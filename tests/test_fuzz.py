@@ -1,14 +1,19 @@
-"""Some hundreds of damaged logs; for more, see fuzzing.py."""
+"""Some hundreds of inputs of each kind; for a million, see fuzzing.py."""
 
 import gc
+import json
+import subprocess
+import sys
 import tempfile
+from pathlib import Path
 from random import Random
 
 import pytest
-from fuzzing import OPTIONS, check, chosen, scratch
+from fuzz_readers import OPTIONS, check, chosen, scratch
+from fuzz_targets import Messages, Methods, Viewer, Writers
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutations import Sample, mutated, own_samples, recorded_samples
+from mutations import Sample, mutated, own_samples, recorded_samples, sizes
 
 settings_of_all = settings(
     max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -63,3 +68,38 @@ def test_damaged_beginnings_of_recordings(data_dir, folders):
     chance = Random(2)
     for sample in samples:
         check(mutated(sample, samples, chance), folders, {})
+
+
+def test_where_lengths_and_offsets_stand(samples):
+    """Structure-aware damage finds the fields that formats have by their own definitions."""
+    files = {sample.kind: next(iter(sample.files.values())) for sample in samples}
+    mcap, bag, archive = files["mcap"], files["rosbag1"], files["zip"]
+    assert (9, "<Q") in sizes(mcap)  # length of the first record, behind magic and opcode
+    assert (13, "<I") in sizes(bag)  # length of the first header, behind the line of the version
+    end = archive.rindex(b"PK\5\6")
+    assert {(end + 12, "<I"), (end + 16, "<I"), (end + 10, "<H")} <= set(sizes(archive))
+    database = next(data for s in samples if s.kind == "sqlite3" for data in s.files.values())
+    assert (28, ">I") in sizes(database) or b"SQLite" not in database  # size in pages
+
+
+@pytest.mark.parametrize(
+    ("target", "inputs"),
+    [(Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60)],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_inputs_of_each_kind(target, inputs, tmp_path):
+    made = target(tmp_path)
+    outcomes = {made.check(made.make(Random(seed))) for seed in range(inputs)}
+    assert len(outcomes) > 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no limits of memory")
+def test_a_run_goes_on_where_it_was_interrupted(tmp_path):
+    script = Path(__file__).with_name("fuzzing.py")
+    for inputs in (40, 40, 60):
+        words = [sys.executable, script, "--inputs", inputs, "--workers", 1, "--state", tmp_path]
+        done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert f"{inputs} inputs in " in done.stdout
+    state = json.loads((tmp_path / "worker-0.json").read_text())
+    assert state["next"] == sum(state["counts"].values()) == 60

@@ -291,7 +291,7 @@ def test_what_a_stopped_recorder_left_beside_a_database(database, tmp_path):
     ("change", "problem"),
     [
         ("DROP TABLE messages", "expected the tables topics and messages; it has: .*topics"),
-        ("ALTER TABLE messages RENAME COLUMN data TO x", "no such column: data"),
+        ("ALTER TABLE messages RENAME COLUMN data TO x", "no such column: m.data"),
         (
             "DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(id) AS (SELECT 1 UNION "
             "ALL SELECT id FROM n) SELECT id, 1 AS topic_id, 2 AS timestamp, x'00' AS data FROM n",

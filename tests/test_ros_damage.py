@@ -2,6 +2,7 @@
 
 import bz2
 import gzip
+import os
 import random
 import re
 import sqlite3
@@ -18,6 +19,7 @@ from ros_bags import every_kind, ranges_of, read
 from text_logs import at_most, zipped
 
 from lineament import LogError
+from lineament.limits import Limits
 from lineament.logs import find_logs, open_log, ros_bag
 
 N = 60
@@ -71,15 +73,16 @@ def test_cut_off_anywhere(altered, kind):
     for share in np.linspace(0.001, 0.999, 100):
         path = altered(kind, lambda data, share=share: data[: int(share * len(data))])
         scans, problem = read(path)
-        # Of a database the page at the cut is read as if it ended with zeros.
-        assert sum(not is_whole(scan) for scan in scans) <= kind.startswith("sqlite3")
+        assert all(map(is_whole, scans))
         assert stamps_of(scans) == STAMPS[: len(scans)]
         # A part of the index may go without any loss.
         assert problem or len(scans) == N
         kept, problem = read(path, keep_going=True)
         assert problem is None or not kept
         assert stamps_of(kept[: len(scans)]) == stamps_of(scans)
-        most = max(most, len(scans))
+        # Of a database the page at the cut is read as if it ended with zeros, if at all.
+        assert sum(not is_whole(scan) for scan in kept) <= kind.startswith("sqlite3")
+        most = max(most, len(kept))
     assert most > 0.8 * N
 
 
@@ -181,6 +184,15 @@ def test_a_ros_1_bag_that_was_not_closed(altered):
     assert "ends without an index: it is cut off, or still recorded" in problem
 
 
+def test_an_empty_ros_1_bag(tmp_path):
+    """Whether it was closed makes a difference."""
+    path = ros_bags.write(tmp_path, "rosbag1", [])
+    assert re.search("has no LaserScan or .*; topics there are: none", read(path)[1])
+    data = bytearray(path.read_bytes())
+    path.write_bytes(changed(data, data.index(b"index_pos=") + len(b"index_pos="), "<Q", 0))
+    assert "ends without an index: it is cut off, or still recorded" in read(path)[1]
+
+
 def field(name, value):
     return struct.pack("<I", len(name) + 1 + len(value)) + name + b"=" + value
 
@@ -242,16 +254,16 @@ PACK = {b"bz2": bz2.compress, b"lz4": lz4.frame.compress, b"zstd": zstandard.com
     ("bomb", "codec"),
     [(rosbag1_bomb, b"bz2"), (rosbag1_bomb, b"lz4"), (mcap_bomb, b"lz4"), (mcap_bomb, b"zstd")],
 )
-def test_bombs(tmp_path, monkeypatch, bomb, codec):
-    monkeypatch.setattr(ros_bag, "MAX_PIECE", 1 << 20)
+def test_bombs(tmp_path, bomb, codec):
+    limits = {"piece": 1 << 20, "ratio": 1 << 40}
     path, data = tmp_path / "bomb", PACK[codec](bytes(1 << 25))
     with at_most(8):
         for size, problem in (
-            (1 << 31, "chunk of 2147483648 bytes, expected at most 1 MiB"),
+            (1 << 31, "has 2147483648 bytes in a record, chunk or message, more than"),
             (1 << 19, "chunk holds other than 524288 bytes|Frame requires too much memory"),
         ):
             bomb(path, codec, data, size)
-            assert re.search(problem, read(path)[1])
+            assert re.search(problem, read(path, limits=limits)[1])
 
 
 @pytest.mark.parametrize("bomb", [rosbag1_bomb, mcap_bomb])
@@ -274,14 +286,14 @@ def test_a_chunk_that_is_shorter_than_its_record(tmp_path):
 @pytest.mark.parametrize("kind", ["rosbag1", "mcap-plain"])
 def test_the_largest_record(bags, kind, monkeypatch):
     """A larger one is refused before memory is taken for it."""
-    monkeypatch.setattr(ros_bag, "MAX_PIECE", 100)
-    assert "expected at most 0 MiB" in read(bags[kind])[1]
+    limits = {"piece": 100}
+    assert "limit of 100 (raise it by --limit piece=N" in read(bags[kind], limits=limits)[1]
     assert ros_bag.decompress("", bytes(100), 100) == bytes(100)
     reader = ros_bag.RecordReader
     monkeypatch.setattr(reader, "__abstractmethods__", frozenset())
-    with reader(bags[kind]) as source:
+    with reader(bags[kind], None, Limits.of(limits)) as source:
         assert len(source.take(100, "piece")) == source.at == 100
-        with pytest.raises(LogError, match=r"byte 100: piece has 101 bytes, expected at most"):
+        with pytest.raises(LogError, match=r"byte 100: has 101 bytes in a record"):
             source.take(101, "piece")
         source.skip(source.left, "rest")
         with pytest.raises(LogError, match=r"is cut off: end has 1 bytes, 0 are left"):
@@ -368,6 +380,16 @@ def test_a_cut_off_bag_that_grows_while_it_is_read(bags, altered, kind):
         stamps.append(scan.stamp)
     assert stamps == STAMPS[:expected]
     assert log.skipped == 1
+
+
+def test_a_database_that_becomes_shorter_within_a_page(altered):
+    """Sqlite would go on, and read what is missing as zeros."""
+    path = altered("sqlite3", bytes)
+    scans = iter(open_log(path))
+    assert next(scans).stamp == 0.0
+    os.truncate(path, path.stat().st_size - 1)
+    with pytest.raises(LogError, match=r"\.db3: has become shorter while it was read"):
+        list(scans)
 
 
 @pytest.mark.parametrize("journal", ["WAL", "MEMORY"])

@@ -8,7 +8,7 @@ import pytest
 from text_logs import check_fault, check_refused, zipped
 
 from lineament import LaserScan, LineamentError, LogError
-from lineament.logs import open_log, save_log, save_npz, sources
+from lineament.logs import open_log, save_log, save_npz
 from lineament.simulation import SENSORS, building, drive
 
 ENDINGS = [".npz", ".log", ".log.gz", ".LOG.GZ"]
@@ -185,7 +185,8 @@ def test_extra_keys_that_npz_cannot_hold(tmp_path, extra, problem):
         ({"angle_min": None}, "expected the keys ranges, and angle_min with angle_increment"),
         ({"ranges": np.ones(3)}, r"ranges has shape \(3,\), expected \(scans, beams\)"),
         ({"ranges": np.ones((0, 3))}, "ranges has no scans"),
-        ({"ranges": np.ones((10**18, 0))}, "ranges has no beams"),  # Any number in no space.
+        ({"ranges": np.ones((10**18, 0))}, "has 1000000000000000000 scans"),  # In no space.
+        ({"ranges": np.ones((4, 0))}, "ranges has no beams"),
         ({"ranges": np.array([["a"]])}, "ranges has type <U1, expected numbers"),
         ({"ranges": np.ones((4, 3), complex)}, "ranges has type complex128"),
         ({"ranges": np.array([[None]])}, "is no whole npz archive: ValueError: Object arrays"),
@@ -218,9 +219,3 @@ def test_faulty_scans_and_topics(tmp_path):
     assert [scan.stamp for scan in scans] == [1.0, 3.0, 4.0]
     assert len(open_log(tmp_path / "a.npz")) == 4
     check_refused("no topic 'scan'; topics there are: ranges", tmp_path / "a.npz", "scan")
-
-
-def test_an_archive_that_grows_too_much(tmp_path, monkeypatch):
-    monkeypatch.setattr(sources, "SMALL_COPY", 1 << 20)
-    np.savez_compressed(tmp_path / "a.npz", **{**GOOD, "ranges": np.zeros((1000, 2000))})
-    check_refused(r"a\.npz: unpacks to more than 300 times its size", tmp_path / "a.npz")

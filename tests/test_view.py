@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from functools import partial
@@ -25,23 +26,24 @@ from text_logs import flaser
 
 from lineament import Extractor, LaserScan
 from lineament.cli import run
-from lineament.errors import LineamentError
+from lineament.errors import LineamentError, LogError
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
 from lineament.view import Session, ViewServer, serve
-from lineament.view.api import MOST_STAMPS, RequestError, answer
+from lineament.view.api import RequestError, answer
 from lineament.view.store import ScanStore
 
 
 def walls(count, beams=31):
-    """Scans of a wall that comes nearer, every third beam invalid in another way."""
+    """Scans of a wall that comes nearer, each with three invalid beams; every third has no pose."""
     bearings = np.linspace(-0.5, 0.5, beams)
     for k in range(count):
         ranges = (3.0 - 0.01 * k) / np.cos(bearings)
         ranges[:3] = np.nan, np.inf, 0.0
-        yield LaserScan(
+        scan = LaserScan(
             ranges, -0.5, 1.0 / (beams - 1), range_max=30.0, stamp=10 + 0.1 * k, frame_id="laser"
         )
+        yield scan if k % 3 == 1 else scan.with_pose((5.0, 7.0 + 0.01 * k, np.pi / 2))
 
 
 @pytest.fixture(scope="module")
@@ -97,15 +99,16 @@ def asked(server, target):
 # The answers.
 
 
-def test_the_log_and_how_far_it_was_read(server):
-    about = {"name": "wall.npz", "format": "npz", "methods": ["pdbs", "tight"]}
-    read = {"scans": 9, "total": 9, "complete": True, "error": "", "skipped": 0, "faults": []}
-    read["compiling"] = ""
-    assert asked(server, "/api/log") == (200, about | read)
+def test_the_log_and_how_far_it_was_read(server, log):
+    about = {"name": str(log), "logs": ["wall.npz"], "methods": ["pdbs", "tight"]}
+    assert asked(server, "/api/logs") == (200, about)
+    read = {"format": "npz", "scans": 9, "total": 9, "posed": 6, "complete": True, "error": ""}
+    read |= {"skipped": 0, "faults": [], "compiling": ""}
+    assert asked(server, "/api/log?log=0") == (200, read)
 
 
 def test_a_scan_comes_with_its_features(server, log):
-    status, found = asked(server, "/api/scan?i=4&method=pdbs")
+    status, found = asked(server, "/api/scan?log=0&i=4&method=pdbs")
     scan = open_log(log).scan(4)
     features = Extractor("pdbs")(scan).to_dict()
     assert status == 200
@@ -119,7 +122,7 @@ def test_a_scan_comes_with_its_features(server, log):
 
 
 def test_a_trace_is_the_explanation_of_its_beam(server, log):
-    status, found = asked(server, "/api/trace?i=4&method=tight&beam=20")
+    status, found = asked(server, "/api/trace?log=0&i=4&method=tight&beam=20")
     expected = explain(Extractor("pdbs", noise_factor=1.0).trace(open_log(log).scan(4)), 20)
     assert status == 200
     assert (found["index"], found["method"], found["beam"]) == (4, "tight", 20)
@@ -129,31 +132,144 @@ def test_a_trace_is_the_explanation_of_its_beam(server, log):
 
 def test_stamps_come_in_blocks(server):
     stamps = [10 + 0.1 * k for k in range(9)]
-    assert asked(server, "/api/stamps?first=0&count=4096")[1]["stamps"] == stamps
-    assert asked(server, "/api/stamps?first=7&count=1")[1] == {"first": 7, "stamps": [stamps[7]]}
-    assert asked(server, "/api/stamps?first=99&count=1")[1]["stamps"] == []
+    assert asked(server, "/api/stamps?log=0&first=0&count=4096")[1]["stamps"] == stamps
+    assert asked(server, "/api/stamps?log=0&first=7&count=1")[1] == {
+        "first": 7,
+        "stamps": [stamps[7]],
+    }
+    assert asked(server, "/api/stamps?log=0&first=99&count=1")[1]["stamps"] == []
+
+
+def test_poses_and_points_of_the_drive(server, log):
+    scans = list(open_log(log))
+    _, found = asked(server, "/api/poses?log=0&first=4&count=2")
+    assert found == {"first": 4, "poses": [[None] * 3, list(scans[5].pose)]}
+    for first, step, count, expected in ((0, 3, 2, [0, 3]), (2, 1, 2, [2, 3]), (1, 2, 32, [3, 5])):
+        _, found = asked(server, f"/api/drive?log=0&first={first}&step={step}&count={count}")
+        assert [scan["index"] for scan in found["scans"]] == expected  # 1, 4 and 7 have no pose
+    # A quarter turn: ahead is up, and the wall stays where it is.
+    points = np.reshape(found["scans"][1]["points"], (-1, 2))
+    expected = [5.0, 7.05] + scans[5].points[3:, ::-1] * [-1.0, 1.0]
+    np.testing.assert_allclose(points, expected, atol=6e-4)
+    np.testing.assert_allclose(points[:, 1], 10.0, atol=6e-4)
+
+
+@pytest.mark.parametrize("beams", [1, 360, 361, 5000])
+def test_a_scan_behind_others_has_few_points(tmp_path, beams):
+    path = tmp_path / "many.npz"
+    save_npz(path, [LaserScan(np.ones(beams), 0.0, 1e-3, pose=(0, 0, 0))])
+    with Session(path, {}) as session:
+        assert session.wait(30)
+        (scan,) = session.drive(0, 0, 1, 32)["scans"]
+    assert len(scan["points"]) == 2 * len(range(0, beams, -(-beams // 360)))
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_scan_is_saved_as_a_log(server, log, index, tmp_path):
+    status, headers, body = ask(server, f"/api/npz?log=0&i={index}")
+    assert (status, headers["Content-Type"]) == (200, "application/octet-stream")
+    path = tmp_path / "saved.npz"
+    path.write_bytes(body)
+    (scan,) = open_log(path)
+    assert_scans_equal(scan, open_log(log).scan(index))
+    assert scan.ranges.tobytes() == open_log(log).scan(index).ranges.tobytes()
+
+
+# Several logs.
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Logs of 1 to 6 scans in two folders and an archive, and one that is broken."""
+    for k in range(1, 6):
+        (tmp_path / f"day{k % 2}").mkdir(exist_ok=True)
+        save_npz(tmp_path / f"day{k % 2}" / f"wall{k}.npz", walls(k))
+    save_npz(tmp_path / "wall6.npz", walls(6))
+    with zipfile.ZipFile(tmp_path / "more.zip", "w") as archive:
+        for name in ("a.npz", "b.npz"):
+            archive.write(tmp_path / "wall6.npz", name)
+    (tmp_path / "wall6.npz").write_bytes((tmp_path / "wall6.npz").read_bytes()[:500])
+    return tmp_path
+
+
+NAMES = ["day0/wall2.npz", "day0/wall4.npz", "day1/wall1.npz", "day1/wall3.npz", "day1/wall5.npz"]
+NAMES += ["more.zip/a.npz", "more.zip/b.npz", "wall6.npz"]
+
+
+def test_a_folder_is_a_list_of_logs_that_are_opened_when_asked_for(folder):
+    with Session(folder, {"pdbs": Extractor("pdbs")}) as session, served(session) as server:
+        assert session._open == {}
+        _, found = asked(server, "/api/logs")
+        assert found == {"name": f"{folder} (8 logs)", "logs": NAMES, "methods": ["pdbs"]}
+        for number, count in ((3, 3), (0, 2), (5, 6), (2, 1), (3, 3), (4, 5)):
+            session.log(number)
+            assert session.wait(30)
+            assert asked(server, f"/api/log?log={number}")[1]["scans"] == count
+        # Four are open; the one that nobody asked for the longest was closed.
+        assert list(session._open) == [5, 2, 3, 4]
+        closed = session.log(5)
+        assert asked(server, "/api/log?log=0")[0] == 200
+        assert list(session._open) == [3, 4, 5, 0]
+        status, found = asked(server, "/api/log?log=7")
+        assert status == 404
+        assert "wall6.npz: " in found["error"]
+        assert asked(server, "/api/log?log=8")[0] == 404
+    assert session._open == {}
+    with pytest.raises(IndexError):
+        closed.store.item(0)
+
+
+def test_a_session_takes_many_paths_and_one_bad_log_is_an_error(folder, tmp_path):
+    with Session([folder / "day0", folder / "wall6.npz"], {}) as session:
+        assert session.logs()["logs"] == ["day0/wall2.npz", "day0/wall4.npz", "wall6.npz"]
+    with pytest.raises(LogError, match=r"wall6\.npz: "):
+        Session(folder / "wall6.npz", {})
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(LogError, match="holds no log"):
+        Session(tmp_path / "empty", {})
+
+
+# Bad questions.
 
 
 @pytest.mark.parametrize(
     ("target", "status", "words"),
     [
-        ("/api/scan", 400, "parameter i is missing"),
-        ("/api/scan?i=0", 400, "parameter method is missing"),
-        ("/api/scan?i=x&method=pdbs", 400, "i is 'x', expected a whole number"),
-        ("/api/scan?i=-1&method=pdbs", 400, "i is '-1'"),
-        ("/api/scan?i=%EF%BC%91&method=pdbs", 400, "expected a whole number"),
-        (f"/api/scan?i={'9' * 5000}&method=pdbs", 400, "expected a whole number"),
-        ("/api/scan?i=9&method=pdbs", 404, "scan 9 is not there: 0 to 8 have been read"),
-        ("/api/scan?i=0&method=lui", 404, "method 'lui' is not there, expected one of: pdbs, "),
-        ("/api/scan?i=0&i=1&method=pdbs", 400, "a parameter is given twice"),
-        ("/api/scan?i=0&method=pdbs&x=1", 400, "parameter 'x' is unknown, expected i, method"),
-        ("/api/log?x=", 400, "parameter 'x' is unknown, expected none"),
-        ("/api/trace?i=0&method=pdbs&beam=31", 404, "beam is 31, expected a whole number from 0"),
-        ("/api/trace?i=9&method=pdbs&beam=0", 404, "scan 9 is not there"),
-        ("/api/stamps?first=0&count=0", 400, f"count is 0, expected 1 to {MOST_STAMPS}"),
-        ("/api/stamps?first=0&count=4097", 400, "count is 4097"),
+        ("/api/scan?log=0", 400, "parameter i is missing"),
+        ("/api/scan?log=0&i=0", 400, "parameter method is missing"),
+        ("/api/scan?log=0&i=x&method=pdbs", 400, "i is 'x', expected a whole number"),
+        ("/api/scan?log=0&i=-1&method=pdbs", 400, "i is '-1'"),
+        ("/api/scan?log=0&i=%EF%BC%91&method=pdbs", 400, "expected a whole number"),
+        (f"/api/scan?log=0&i={'9' * 5000}&method=pdbs", 400, "expected a whole number"),
+        ("/api/scan?log=0&i=9&method=pdbs", 404, "scan 9 is not there: 0 to 8 have been read"),
+        (
+            "/api/scan?log=0&i=0&method=lui",
+            404,
+            "method 'lui' is not there, expected one of: pdbs, ",
+        ),
+        ("/api/scan?log=0&i=0&i=1&method=pdbs", 400, "a parameter is given twice"),
+        (
+            "/api/scan?log=0&i=0&method=pdbs&x=1",
+            400,
+            "parameter 'x' is unknown, expected log, i, method",
+        ),
+        ("/api/logs?x=", 400, "parameter 'x' is unknown, expected none"),
+        (
+            "/api/trace?log=0&i=0&method=pdbs&beam=31",
+            404,
+            "beam is 31, expected a whole number from 0",
+        ),
+        ("/api/trace?log=0&i=9&method=pdbs&beam=0", 404, "scan 9 is not there"),
+        ("/api/stamps?log=0&first=0&count=0", 400, "count is 0, expected 1 to 4096"),
+        ("/api/poses?log=0&first=0&count=4097", 400, "count is 4097"),
+        ("/api/drive?log=0&first=0&step=1&count=33", 400, "count is 33, expected 1 to 32"),
+        ("/api/drive?log=0&first=0&step=0&count=1", 400, "step is 0, expected a whole number ≥ 1"),
+        ("/api/npz?log=0&i=9", 404, "scan 9 is not there: 0 to 8 have been read"),
+        ("/api/log?log=1", 404, "log 1 is not there, expected a whole number from 0 to 0"),
+        ("/api/log?log=wall.npz", 400, "log is 'wall.npz', expected a whole number"),
+        ("/api/log?path=wall.npz", 400, "parameter 'path' is unknown, expected log"),
         ("/api/scan?" + "&".join(f"a{k}=1" for k in range(99)), 400, "makes no sense"),
-        ("/api/", 404, "/api/ is not there"),
+        ("/api/", 404, "'/api/' is not there"),
         ("/style.css/../../secret", 404, "is not there"),
         ("/%2e%2e/store.py", 404, "is not there"),
         ("/static/index.html", 404, "is not there"),
@@ -234,13 +350,13 @@ def test_requests_by_another_name_are_refused(session, bound, host, status):
     with served(session, bound) as server:
         name = "localhost" if bound == "0.0.0.0" else bound
         assert server.address == f"http://{name}:{server.server_port}/"
-        for target in ("/api/log", "/"):
+        for target in ("/api/log?log=0", "/"):
             assert ask(server, target, Host=host)[0] == status
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "BREW"])
 def test_other_methods_are_refused_as_json(server, method):
-    status, headers, body = ask(server, "/api/log", method)
+    status, headers, body = ask(server, "/api/log?log=0", method)
     assert status == 501
     assert headers["Content-Type"].startswith("application/json")
     assert "Unsupported method" in json.loads(body)["error"]
@@ -261,7 +377,7 @@ def test_other_methods_are_refused_as_json(server, method):
 def test_garbage_and_broken_connections_leave_the_server_alive(server, raw, capfd):
     with socket.create_connection(("127.0.0.1", server.server_port), timeout=5) as line:
         line.sendall(raw)
-    assert asked(server, "/api/log")[0] == 200
+    assert asked(server, "/api/log?log=0")[0] == 200
     assert capfd.readouterr() == ("", "")
 
 
@@ -271,15 +387,15 @@ def test_a_scan_that_breaks_a_method_breaks_nothing_else(session, capfd):
 
     session.extractors["tight"] = broken
     with served(session) as server:
-        answered = asked(server, "/api/scan?i=0&method=tight")
+        answered = asked(server, "/api/scan?log=0&i=0&method=tight")
         assert answered == (500, {"error": "RuntimeError: no luck"})
-        assert asked(server, "/api/scan?i=0&method=pdbs")[0] == 200
+        assert asked(server, "/api/scan?log=0&i=0&method=pdbs")[0] == 200
     assert capfd.readouterr() == ("", "")
 
 
 def test_many_at_once_get_what_one_gets(server):
     targets = [
-        f"/api/scan?i={k % 9}&method={name}" for k in range(12) for name in ("pdbs", "tight")
+        f"/api/scan?log=0&i={k % 9}&method={name}" for k in range(12) for name in ("pdbs", "tight")
     ]
     alone = [asked(server, target) for target in targets]
     with ThreadPoolExecutor(len(targets)) as pool:
@@ -296,7 +412,7 @@ def test_a_port_that_is_taken_is_one_line(session):
 
 def assert_scans_equal(*scans):
     names = "ranges angles is_regular angle_min angle_increment range_min range_max stamp scan_time"
-    names = (*names.split(), "time_increment", "frame_id", "pose")
+    names = (*names.split(), "time_increment", "frame_id", "pose", "intensities")
     np.testing.assert_equal(*({name: getattr(scan, name) for name in names} for scan in scans))
 
 
@@ -306,15 +422,15 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(write):
     path = write("".join(lines), "broken.log")
     with Session(path, {"pdbs": Extractor("pdbs")}) as session:
         assert session.wait(30)
-        facts = session.facts()
+        facts = session.facts(0)
         assert facts["scans"] == 2
         assert "broken.log:3: " in facts["error"]
-        assert session.scan(1, "pdbs")["stamp"] == 2
+        assert session.scan(0, 1, "pdbs")["stamp"] == 2
     with Session(path, {"pdbs": Extractor("pdbs")}, keep_going=True) as session:
         assert session.wait(30)
-        facts = session.facts()
+        facts = session.facts(0)
         assert (facts["scans"], facts["error"], facts["skipped"]) == (3, "", 1)
-        assert session.scan(2, "pdbs")["stamp"] == 4
+        assert session.scan(0, 2, "pdbs")["stamp"] == 4
 
 
 def any_scans():
@@ -322,7 +438,7 @@ def any_scans():
     bearings = np.array([0.0, 0.1, 0.3])
     yield LaserScan([1.0, np.nan, 1 / 3], angles=bearings, range_min=0.1, pose=(1.0, 2.0, 0.1))
     yield LaserScan([], 0.0, 0.1, scan_time=0.1, time_increment=1e-5, stamp=1e9 + 1e-6)
-    yield LaserScan([5.0], 0.0, 0.0, frame_id="läser", range_max=np.inf)
+    yield LaserScan([5.0], 0.0, 0.0, frame_id="läser", range_max=np.inf, intensities=[1 / 3])
     yield LaserScan([1e300, -np.inf], angles=[0.0, 1e-9])
 
 
@@ -343,6 +459,10 @@ def test_a_store_gives_every_scan_whatever_room_there_is(capacity):
             with pytest.raises(IndexError):
                 kept.item(index)
         assert kept.stamps(2, 99) == [scan.stamp for scan in scans[2:]]
+        assert kept.posed == 3
+        poses = [scan.pose or (np.nan,) * 3 for scan in scans]
+        np.testing.assert_equal(kept.poses(1, 2), poses[1:3])
+        np.testing.assert_equal(kept.poses(2, 99), poses[2:])
 
 
 def test_a_full_disk_is_less_room_and_no_failure(monkeypatch):
@@ -423,8 +543,8 @@ def test_the_command_writes_its_address_and_ends_quietly(log):
     ) as process:
         line = process.stdout.readline()
         port = int(line.split("http://localhost:")[1].split("/")[0])
-        with urlopen(f"http://127.0.0.1:{port}/api/log", timeout=30) as reply:
-            assert json.load(reply)["name"] == "wall.npz"
+        with urlopen(f"http://127.0.0.1:{port}/api/log?log=0", timeout=30) as reply:
+            assert json.load(reply)["format"] == "npz"
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=30)
     assert process.returncode == 130

@@ -4,10 +4,12 @@ import shutil
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import image
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
@@ -34,6 +36,7 @@ pytestmark = [
     pytest.mark.slow,
 ]
 
+NARROW, WIDE = (400, 800), (1400, 800)
 METHODS = ("liu:scale_free", "pdbs")
 #: Pixel in the window of a point of the first panel.
 PLACE = """
@@ -63,24 +66,53 @@ def corners(count):
         yield LaserScan(ranges, bearings[0], np.radians(1), range_max=30.0, stamp=5 + 0.05 * k)
 
 
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    path = tmp_path_factory.mktemp("page") / "corner.npz"
-    save_npz(path, corners(25))
-    return path
+def drive(count):
+    """Scans with poses on the way through a room, x from -4 to 4 m and y from -2 to 3 m."""
+    bearings = np.radians(np.arange(-90, 90, 2))
+    for k in range(count):
+        x, y, theta = pose = (-2.0 + 0.1 * k, 0.5, 0.05 * k)
+        c, s = np.cos(bearings + theta), np.sin(bearings + theta)
+        with np.errstate(divide="ignore"):
+            ranges = np.fmin((np.copysign(4, c) - x) / c, (np.where(s > 0, 3, -2) - y) / s)
+        yield LaserScan(
+            ranges, bearings[0], np.radians(2), range_max=30.0, stamp=0.1 * k, pose=pose,
+            intensities=np.arange(90.0),
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def address(log):
-    extractors = {name: Extractor(name) for name in METHODS}
-    for extractor in extractors.values():  # The page must not wait for a compiler.
-        extractor.trace(open_log(log).scan(0))
-    with Session(log, extractors) as session, ViewServer(session) as server:
-        thread = threading.Thread(target=server.serve_forever)
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    save_npz(folder / "corner.npz", corners(25))
+    save_npz(folder / "drive.npz", drive(40))
+    (folder / "x.npz").write_bytes((folder / "drive.npz").read_bytes()[:900])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def log(folder):
+    return folder / "corner.npz"
+
+
+@contextmanager
+def served(path, methods):
+    extractors = {name: Extractor(name) for name in methods}
+    with Session(path, extractors) as session, ViewServer(session) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
-        yield server.address
-        server.shutdown()
-        thread.join()
+        try:
+            yield session, server.address
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.fixture(scope="module")
+def address(folder, log):
+    for name in METHODS:  # The page must not wait for a compiler.
+        Extractor(name).trace(open_log(log).scan(0))
+    with served(folder, METHODS) as (_, address):
+        yield address
 
 
 class Page:
@@ -111,6 +143,10 @@ class Page:
     def press(self, *keys: str) -> None:
         webdriver.ActionChains(self.driver).send_keys(*keys).perform()
 
+    def press_with_shift(self, key: str) -> None:
+        actions = webdriver.ActionChains(self.driver).key_down(Keys.SHIFT).send_keys(key)
+        actions.key_up(Keys.SHIFT).perform()
+
     def change(self, selector: str, value: object, event: str) -> None:
         """Give an element another value, as a user does."""
         script = "const e = document.querySelector(arguments[0]); e.value = arguments[1];"
@@ -119,36 +155,66 @@ class Page:
     def click(self, selector: str) -> None:
         self.run("document.querySelector(arguments[0]).click()", selector)
 
-    def resize(self, width: int, height: int, scheme: str = "light") -> None:
-        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    def resize(self, width: int, height: int, scheme: str = "light", touch: bool = False) -> None:
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": touch}
+        self.command("Emulation.setDeviceMetricsOverride", **metrics)
         features = [{"name": "prefers-color-scheme", "value": scheme}]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        self.command("Emulation.setEmulatedMedia", features=features)
+        self.command("Emulation.setTouchEmulationEnabled", enabled=touch)
+
+    def command(self, name: str, **parameters: Any) -> None:
+        self.driver.execute_cdp_cmd(name, parameters)
+
+    def touch(self, *fingers: tuple[float, float], kind: str = "touchMove") -> None:
+        points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(fingers)]
+        self.command("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    def open(self, address: str) -> None:
+        """Go to an address, and wait for the scan."""
+        self.driver.get("about:blank")
+        self.driver.get(address)
+        self.wait("document.body.dataset.scan && document.querySelector('#reading').hidden")
+
+    def seen(self, script: str) -> Any:
+        """Return what an expression of the page's `app` is."""
+        return self.run(f"return import('/main.js').then(({{ app }}) => {script})")
+
+    def until(self, script: str, expected: Any) -> None:
+        """Wait until an expression of `app` has a value."""
+        waiting = WebDriverWait(self.driver, 20, poll_frequency=0.02)
+        never = f"{script} never was {expected!r}"
+        waiting.until(lambda _: self.seen(script) == expected, never)
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+@contextmanager
+def new_browser(folder) -> Iterator[Page]:
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+    for flag in (*FLAGS, f"--user-data-dir={folder}"):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     # With the path of the driver, selenium does not look for one to download.
     driver = webdriver.Chrome(options, Service(DRIVER))
-    yield Page(driver)
-    driver.quit()
+    try:
+        yield Page(driver)
+    finally:
+        driver.quit()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with new_browser(tmp_path_factory.mktemp("profile")) as page:
+        yield page
 
 
 @pytest.fixture
 def page(browser: Page, address: str) -> Iterator[Page]:
     """The page, anew, with a scan on it; it must not have complained in the end."""
     browser.resize(1366, 768)
-    browser.driver.get("about:blank")
-    browser.driver.get(address)
-    browser.wait("document.body.dataset.scan === '0' && document.querySelector('#reading').hidden")
+    browser.open(address)
     yield browser
     assert browser.driver.get_log("browser") == []
-    assert browser.text("#problem") == ""
+    assert browser.run("return document.querySelector('#problem').hidden")
 
 
 def shown(page, index):
@@ -165,8 +231,8 @@ def found(log, index, method=METHODS[0]):
 
 def test_the_page_shows_the_log_and_its_first_scan(page, log):
     features = found(log, 0)
-    assert page.text("h1") == "corner.npz"
-    assert page.text("header p") == "ranges in npz, 25 scans"
+    assert page.text("#log option:checked") == "corner.npz"
+    assert page.text("header p") == "ranges in npz, 25 scans, no poses"
     assert f"{len(features.segments)} segments, 1 corner, 0 edges, 0 arcs" in caption(page)
     label = page.run("return document.querySelector('canvas').ariaLabel")
     assert label.startswith("Scan 0 by liu:scale_free: ")
@@ -182,14 +248,11 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
 
 def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     """A scan of a method that is being compiled."""
-    session = Session(log, {"pdbs": Extractor("pdbs")})
     state = progress.Compiling(14, 40, 9.0, 18.0, is_first=False, is_last=False)
     monkeypatch.setattr(progress._compiler, "now", state)
-    with session, ViewServer(session) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
+    with served(log, ["pdbs"]) as (session, address):
         with session._busy["pdbs"]:
-            page.driver.get(server.address)
+            page.driver.get(address)
             text = "document.querySelector('.panel span')?.textContent"
             page.wait(f"{text} === 'compiling kernels, once: 14 of 40, 18 s left'")
             monkeypatch.setattr(progress._compiler, "now", None)
@@ -197,15 +260,14 @@ def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
         shown(page, 0)
         time.sleep(1.5)  # what is asked every 0.7 s came for the last time
         assert "segments" in caption(page)
-        server.shutdown()
-        thread.join()
+        assert page.text("h1") == "corner.npz"  # of a single log no list
 
 
 def test_scrubbing_keys_and_playing_change_the_scan(page):
     page.change("#slider", 17, "input")
     shown(page, 17)
     page.wait("document.querySelector('#position').textContent === 'scan 17 / 24, 0.85 s'")
-    assert "scan=17" in page.run("return location.hash")
+    page.wait("location.hash.startsWith('#log=corner.npz&scan=17&method=')")
     keys = {Keys.ARROW_RIGHT: 18, Keys.ARROW_LEFT: 17, Keys.END: 24, Keys.HOME: 0}
     for key, index in keys.items():
         page.press(key)
@@ -270,7 +332,7 @@ def test_methods_are_switched_and_shown_side_by_side(page):
     page.click("#compare")
     page.wait("document.querySelectorAll('.panel').length === 2")
     page.wait("document.querySelector('.panel:nth-child(2) span').textContent.includes('1 corner')")
-    assert "with=liu" in page.run("return location.hash")
+    page.wait("location.hash.includes('with=liu')")
     page.click("#compare")
     page.wait("document.querySelectorAll('.panel').length === 1")
 
@@ -289,12 +351,320 @@ def test_wheel_and_drag_move_the_view(page):
     assert page.run(state) == pytest.approx([x - 40 / scale, y - 20 / scale, scale])
 
 
-def test_a_narrow_window_needs_no_scrolling_sideways(page):
-    page.resize(390, 844, "dark")
-    page.wait("document.documentElement.scrollWidth <= 390")
-    assert page.run("return document.querySelector('canvas').clientHeight") > 300
-    dark = "getComputedStyle(document.body).backgroundColor === 'rgb(13, 17, 23)'"
-    page.wait(dark)
+@pytest.mark.parametrize("size", [NARROW, WIDE])
+@pytest.mark.parametrize(
+    ("scheme", "color"), [("dark", "rgb(13, 17, 23)"), ("light", "rgb(255, 255, 255)")]
+)
+def test_the_first_picture_is_whole(page, address, size, scheme, color):
+    page.resize(*size, scheme, touch=size is NARROW)
+    page.open(address)
+    assert page.run("return getComputedStyle(document.body).backgroundColor") == color
+    width, height = page.run("return [document.documentElement.scrollWidth, innerHeight]")
+    assert width <= size[0]
+    left, top, right, bottom = page.run(
+        "const b = document.querySelector('canvas').getBoundingClientRect();"
+        "return [b.left, b.top, b.right, b.bottom]"
+    )
+    footer = page.run("return document.querySelector('footer').getBoundingClientRect().top")
+    assert bottom <= footer < height  # nothing hides the picture
+    assert right - left > 300
+    assert bottom - top > 300
+    # The scan fills it: 90 % of its height or width, and none of it lies outside.
+    places = [page.run(PLACE, point) for point in page.seen("app.panels[0].scan.points") if point]
+    (u0, v0), (u1, v1) = np.min(places, axis=0), np.max(places, axis=0)
+    assert left < u0 < u1 < right
+    assert top < v0 < v1 < bottom
+    share = max(
+        (u1 - min(u0, page.run(PLACE, [0, 0])[0])) / (right - left), (v1 - v0) / (bottom - top)
+    )
+    assert share == pytest.approx(0.9, abs=0.01)
+
+
+def test_fingers_move_zoom_and_ask(page, address):
+    page.resize(*NARROW, touch=True)
+    page.open(address)
+    small = page.run(
+        "return [...document.querySelectorAll('button, select, #layers label')]"
+        ".filter((e) => e.offsetParent).filter((e) => e.offsetHeight < 44 || e.offsetWidth < 44)"
+        ".map((e) => e.id || e.textContent)"
+    )
+    assert small == []
+    state = "[app.plane.x, app.plane.y, app.plane.scale]"
+    x, y, scale = page.seen(state)
+    middle, top = page.run(
+        "const b = document.querySelector('canvas').getBoundingClientRect();"
+        "return [b.left + b.width / 2, b.top]"
+    )
+    page.touch((150, top + 100), kind="touchStart")
+    page.touch((180, top + 90))
+    page.touch((190, top + 120))
+    page.touch(kind="touchEnd")
+    assert page.seen(state) == pytest.approx([x - 40 / scale, y + 20 / scale, scale])
+    page.click("#fit")
+    # Two fingers: apart to half as much again, and up by 30; between them the plane stays.
+    page.touch((middle - 50, top + 130), (middle + 50, top + 130), kind="touchStart")
+    page.touch((middle - 60, top + 115), (middle + 60, top + 115))
+    page.touch((middle - 75, top + 100), (middle + 75, top + 100))
+    page.touch(kind="touchEnd")
+    zoomed = page.seen(state)
+    assert zoomed[2] == pytest.approx(1.5 * scale, rel=1e-3)
+    half = page.run("return document.querySelector('canvas').clientHeight") / 2
+    under = y + (half - 130) / scale
+    assert zoomed[:2] == pytest.approx([x, under - (half - 100) / zoomed[2]], abs=2 / scale)
+    assert page.text("#pins-hint") != ""  # that was no tap
+    page.touch((100, top + 100), (200, top + 100), kind="touchStart")
+    page.touch(kind="touchEnd")  # neither was that
+    time.sleep(0.3)
+    assert page.text("#why h3") is None
+    page.click("#fit")
+    place = page.seen("app.panels[0].scan.points[30]")
+    u, v = page.run(PLACE, place)
+    page.touch((u, v), kind="touchStart")
+    page.touch(kind="touchEnd")
+    page.wait("document.querySelector('.card .why')?.offsetHeight > 0")
+    assert page.text(".card .why") == page.text("#why .summary")
+    assert page.text("#why h3").startswith("beam 30, ")
+
+
+KEYS = [
+    ("c", "app.panels.length", 2),
+    ("n", "app.panels[1].method", METHODS[0]),
+    ("N", "app.panels[1].method", METHODS[1]),
+    ("c", "app.panels.length", 1),
+    ("m", "app.panels[0].method", METHODS[1]),
+    ("M", "app.panels[0].method", METHODS[0]),
+    ("2", "app.layers.shown.clusters", False),
+    ("7", "app.layers.shown.corners", False),
+    ("7", "app.layers.shown.corners", True),
+    ("v", "app.sigmas", 15),
+    ("]", "app.logName", "drive.npz"),
+    ("w", "app.world", True),
+    ("1", "app.layers.shown.drive", False),
+    ("w", "app.world", False),
+    ("[", "app.logName", "corner.npz"),
+    (".", "app.timeline.speed.value", "2"),
+    (",", "app.timeline.speed.value", "1"),
+    (Keys.ARROW_RIGHT, "app.timeline.index", 1),
+    (Keys.ARROW_LEFT, "app.timeline.index", 0),
+    ("b", "document.activeElement.id", "beam"),
+    ("7" + Keys.ENTER, "app.asked?.beam", 7),
+    ("s", "document.querySelector('dialog[open]')?.id", "sharing"),
+    (Keys.ESCAPE, "document.querySelector('dialog[open]')", None),
+    ("?", "document.querySelector('dialog[open]')?.id", "keys"),
+    ("c", "document.querySelectorAll('#key-list dt').length > 20", True),
+    (Keys.ESCAPE, "document.querySelector('dialog[open]')", None),
+    ("v", "app.panels.length", 1),  # the c did nothing below the list of keys
+]
+
+
+def test_all_that_can_be_clicked_has_a_key(page):
+    for keys, script, expected in KEYS:
+        page.press(keys)
+        page.until(script, expected)
+        page.until("document.body.dataset.scan === String(app.timeline.index)", True)
+    page.press_with_shift(Keys.ARROW_RIGHT)
+    shown(page, 10)
+    page.press("f")
+    scale, x, y = page.seen("[app.plane.scale, app.plane.x, app.plane.y]")
+    page.press("+")
+    assert page.seen("app.plane.scale") == pytest.approx(1.3 * scale)
+    page.press("-hk")
+    place = [x - 80 / scale, y + 80 / scale]
+    assert page.seen("[app.plane.x, app.plane.y]") == pytest.approx(place)
+    page.press("ljf")
+    assert page.seen("app.plane.scale") == pytest.approx(scale)
+
+
+def test_another_log_is_chosen_and_a_broken_one_reported(page):
+    page.change("#log", "1", "change")
+    page.wait("document.querySelector('#facts').innerText === 'npz, 40 scans'")
+    page.wait("document.body.dataset.scan === '0'")
+    assert page.seen("app.panels[0].scan.beams") == 90
+    page.change("#log", "2", "change")
+    page.wait("!document.querySelector('#problem').hidden")
+    assert "x.npz: " in page.text("#problem")
+    assert caption(page) == ""
+    logged = page.driver.get_log("browser")
+    assert all("404" in line["message"] for line in logged)
+    page.change("#log", "0", "change")
+    page.wait("document.querySelector('.panel span').innerText.includes('1 corner')")
+    page.wait("document.querySelector('#problem').hidden")
+
+
+def test_the_world_frame_has_the_drive_behind_the_scan(page, address):
+    assert page.run("return document.querySelector('#world').disabled")
+    assert "has no poses" in page.run("return document.querySelector('#world').title")
+    page.open(f"{address}#log=drive.npz&scan=20")
+    page.click("#world")
+    page.wait("document.querySelector('#world').ariaPressed === 'true'")
+    page.until("app.drive.scans.length", 40)
+    # The room: the scan's own points, the points of the drive, and what is under the pointer.
+    beam = page.run(
+        "return import('/main.js').then(({ app }) => app.panels[0].frame.toPlane("
+        "app.panels[0].scan.points[45]))"
+    )
+    scan = list(drive(21))[20]
+    x, y, theta = scan.pose
+    ahead = x + scan.ranges[45] * np.cos(theta), y + scan.ranges[45] * np.sin(theta)
+    assert beam == pytest.approx(ahead)
+    there = "{ const { frame, size } = app.panels[0];"
+    there += "return frame.toMetres(frame.toPixels([1.5, -0.7], size), size); }"
+    assert page.seen(there) == pytest.approx([1.5, -0.7])
+    for name in ("clusters", "arcs", "segments", "breakpoints", "edges", "corners"):
+        page.click(f"#show-{name}")
+    ink = """{ const [u, v] = app.plane.toPixels(%s, app.panels[0].size).map(Math.round);
+        const ctx = Object.assign(document.createElement("canvas"), { width: 5, height: 5 })
+            .getContext("2d");
+        ctx.drawImage(app.panels[0].canvas, 2 - u, 2 - v);
+        const data = ctx.getImageData(0, 0, 5, 5).data;
+        return data.some((red, k) => k %% 4 === 0 && data[k + 3] > 100 && red < 200); }"""
+
+    def drawn(point):
+        return page.seen(ink % point.tolist())
+
+    time.sleep(0.3)
+    seen = list(drive(40))
+    behind, later = seen[0].points[5], seen[39].points[80]
+    c, s = np.cos(seen[39].pose[2]), np.sin(seen[39].pose[2])
+    later = seen[39].pose[:2] + np.array([[c, -s], [s, c]]) @ later
+    assert drawn(behind + seen[0].pose[:2])
+    assert not drawn(later)  # seen only from scan 39 on
+    page.change("#slider", 39, "input")
+    shown(page, 39)
+    time.sleep(0.3)
+    assert drawn(later)
+    page.click("#show-drive")
+    time.sleep(0.3)
+    assert not drawn(behind + seen[0].pose[:2])
+    # Near, the view goes with the sensor.
+    page.press(Keys.HOME)
+    shown(page, 0)
+    width, height = page.seen(
+        "{ const { size } = app.panels[0]; app.look(() => app.plane.look([-2, 0.5, 1], size));"
+        "return [size.width, size.height]; }"
+    )
+    assert page.seen("app.plane.scale") == pytest.approx(min(width, height))
+    assert width > height
+    page.press(Keys.END)
+    shown(page, 39)
+    assert page.seen("[app.plane.x, app.plane.y]") == pytest.approx(seen[39].pose[:2])
+
+
+SCENE = """
+const { Drawing, readTheme } = await import("/drawing.js");
+const { placeBeams } = await import("/geometry.js");
+const { Frame, Plane } = await import("/plane.js");
+const { LAYERS } = await import("/layers.js");
+const covariance = [[0.002, 0.001], [0.001, 0.004]], spread = { first_beam: 0, last_beam: 3 };
+const scan = {
+  beams: 6, angle_min: 0.2, angle_increment: 0.3, ranges: [3, 3.1, 3, 2.9, null, 2],
+  clusters: [0, 0, 0, 0, -1, -1],
+  arcs: [{ center: [2, 2], radius: 1.3, ...spread }],
+  segments: [{ start: [-3, 1], end: [-1, 2.5] }],
+  breakpoints: [{ position: [-2, -1] }],
+  corners: [{ kind: "corner", position: [1, -2], covariance },
+            { kind: "edge", position: [-3, -2], covariance }],
+};
+placeBeams(scan);
+const size = { width: 400, height: 400 }, plane = Object.assign(new Plane(), { scale: 45 });
+const canvas = Object.assign(document.createElement("canvas"), size), ctx = canvas.getContext("2d");
+const drawing = new Drawing(ctx, plane, new Frame(plane, arguments[0]), size, readTheme());
+for (const layer of LAYERS) layer.draw(true, drawing, { scan, sigmas: 6 });
+drawing.highlight({ kind: "arc", feature: scan.arcs[0] }, scan, 3);
+drawing.beam(scan, 4);
+return [...ctx.getImageData(0, 0, 400, 400).data].filter((_, k) => k % 4 === 3);
+"""
+
+
+def test_a_scan_is_drawn_the_same_at_any_pose(page):
+    """Turned by a quarter and moved, with all that there is to draw: the picture turned."""
+    script = f"return (async function () {{ {SCENE} }}).apply(null, arguments)"
+    pictures = [
+        np.reshape(page.run(script, pose), (400, 400))
+        for pose in ([0, 0, 0], [0, 0, np.pi / 2], [20 / 45, 30 / 45, 0])
+    ]
+    assert np.count_nonzero(pictures[0]) > 2000
+    off = abs(np.rot90(pictures[0]) - pictures[1].astype(int)) > 100
+    assert np.count_nonzero(off) < 20
+    moved = pictures[2][:-30, 20:].astype(int) - pictures[0][30:, :-20]
+    assert np.count_nonzero(abs(moved) > 100) < 300  # the end of the beam that goes out of it
+
+
+def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
+    page.open(f"{address}#log=drive.npz&scan=7")
+    page.press("cmw+lvv46")
+    page.press(Keys.ARROW_RIGHT * 5)
+    shown(page, 12)
+    page.run("document.querySelector('#beam').value = 33")
+    page.click("#ask button")
+    page.wait("location.hash.includes('beam=33')")
+    state = (
+        "[app.logName, app.timeline.index, app.panels.map((p) => p.method), app.layers.hidden,"
+        "app.sigmas, app.world, app.asked?.beam, app.drive.scans.length, document.title,"
+        "document.querySelector('#why').innerText, app.panels.map((p) => p.caption.innerText)]"
+    )
+    view = "[app.plane.x, app.plane.y, app.plane.scale]"
+    pixels = (
+        "const c = document.querySelector('canvas');"
+        "return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
+    )
+    with new_browser(tmp_path) as other:
+        other.resize(1366, 768)
+        other.open(page.driver.current_url)
+        other.wait("document.querySelector('#why .summary')")
+        for one in (page, other):
+            WebDriverWait(one.driver, 20).until(
+                lambda _, p=one: p.seen("app.drive.scans.length") == 40
+            )
+        time.sleep(0.5)
+        assert other.seen(state) == page.seen(state)
+        assert page.seen(state)[:7] == [
+            "drive.npz", 12, ["pdbs", "pdbs"], ["segments", "edges"], 60, True, 33,
+        ]  # fmt: skip
+        assert other.seen(view) == pytest.approx(page.seen(view), rel=1e-4, abs=1e-4)
+        first, second = (np.array(one.run(pixels), int) for one in (page, other))
+        assert first.shape == second.shape
+        assert np.mean(abs(first - second) > 64) < 0.002
+        assert other.driver.get_log("browser") == []
+
+
+@pytest.mark.parametrize("touch", [False, True])
+def test_what_is_shared_is_saved(page, address, folder, tmp_path, touch):
+    page.resize(*(NARROW if touch else WIDE), touch=touch)
+    page.command("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    granted = ["clipboardReadWrite", "clipboardSanitizedWrite"]
+    page.command("Browser.grantPermissions", permissions=granted, origin=address.rstrip("/"))
+    page.open(f"{address}#log=drive.npz&scan=17")
+    page.click("#share")
+    for button, name in (("npz", "drive.npz-scan-17.npz"), ("png", "drive.npz-scan-17.png")):
+        page.click(f"#save-{button}")
+        saved = tmp_path / name
+        WebDriverWait(page.driver, 20).until(lambda _, path=saved: path.exists())
+        page.wait(f"document.querySelector('#shared').innerText === 'Saved {name}'")
+    (scan,) = open_log(tmp_path / "drive.npz-scan-17.npz")
+    original = open_log(folder / "drive.npz").scan(17)
+    for name in ("ranges", "angles", "intensities", "pose", "stamp", "range_max"):
+        np.testing.assert_array_equal(getattr(scan, name), getattr(original, name))
+    # It is what the page shows, under a title.
+    size = page.run("const c = document.querySelector('canvas'); return [c.width, c.height]")
+    picture = image.imread(tmp_path / "drive.npz-scan-17.png")
+    assert picture.shape[1] == size[0]
+    assert 40 < picture.shape[0] - size[1] < 120
+    canvas = np.reshape(
+        page.run(
+            "const c = document.querySelector('canvas');"
+            "return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
+        ),
+        (size[1], size[0], 4),
+    )
+    on_page = canvas[..., 0] * (canvas[..., 3] / 255) + 255 - canvas[..., 3]
+    np.testing.assert_allclose(255 * picture[-size[1] :, :, 0], on_page, atol=2)
+    assert np.unique(picture[: picture.shape[0] - size[1], :, 0]).size > 5  # words
+    page.click("#copy")
+    page.wait("document.querySelector('#shared').innerText === 'Copied the link'")
+    copied = page.run("return navigator.clipboard.readText()")
+    assert copied == page.run("return document.querySelector('#link').value")
+    assert copied.startswith(f"{address}#log=drive.npz&scan=17&method=liu:scale_free&view=")
 
 
 def test_a_server_that_has_gone_is_reported(page):
@@ -302,4 +672,4 @@ def test_a_server_that_has_gone_is_reported(page):
     page.press(Keys.ARROW_RIGHT)
     page.wait("!document.querySelector('#problem').hidden")
     assert "The server has ended" in page.text("#problem")
-    page.run("document.querySelector('#problem').textContent = ''")
+    page.run("document.querySelector('#problem').hidden = true")

@@ -20,6 +20,10 @@ EXTRAS = {
 }
 
 
+#: Letters of what is wrong with a file: a damaged one can put in as many as it likes.
+_MOST = 1000
+
+
 def one_line(text: str) -> str:
     """Write what would break a line or steer a terminal as an escape, whatever a file holds."""
     if text.isprintable():
@@ -42,6 +46,8 @@ class LogError(LineamentError):
 
     def __init__(self, path: object, problem: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line is not None else f"{path}"
+        if len(problem) > _MOST:
+            problem = f"{problem[: _MOST - 2]} …"
         super().__init__(one_line(f"{where}: {problem}"))
         self.path, self.problem, self.line = str(path), problem, line
 

@@ -40,6 +40,8 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     with naming_errors(path):
         if target.is_dir():
             raise LineamentError(f"{path}: is a folder, expected the name of a file")
+        if target.exists() and not target.is_file():  # It would be replaced.
+            raise LineamentError(f"{path}: is a device or a pipe, expected the name of a file")
         if not target.parent.is_dir():
             raise LineamentError(f"{path}: the folder {target.parent} does not exist")
         # mkstemp would make the file private to its owner; this one follows the umask.
@@ -95,6 +97,30 @@ def made_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise LineamentError(f"{path}: cannot make this folder: {error.strerror}") from None
     return folder
+
+
+@contextmanager
+def alone_in(folder: str | os.PathLike[str]) -> Iterator[None]:
+    """Keep other runs out of a folder; a LineamentError if there is one in it.
+
+    The system forgets a run that was killed. Where it knows no locks of folders, nothing is kept.
+    """
+    try:
+        import fcntl
+
+        place = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        with suppress(OSError):  # Not all file systems know them.
+            try:
+                fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise LineamentError(f"{folder}: another run writes into this folder") from None
+        yield
+    finally:
+        os.close(place)
 
 
 @contextmanager

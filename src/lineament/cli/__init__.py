@@ -1,5 +1,7 @@
 """The command line: arguments only. Every command is one call of the library."""
 
+import errno
+import os
 import sys
 
 import click
@@ -7,9 +9,14 @@ import click
 from ..errors import LineamentError
 from ..progress import compiling_shown
 from .commands import COMMANDS
+from .options import complain
 from .progress import show_compiling
+from .terminating import Terminated, terminating
 
 __all__ = ["cli", "main"]
+
+#: What ends a write to the standard output; files are named by what writes them.
+_UNWRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EFBIG, errno.EDQUOT, errno.EBADF)
 
 
 @click.group(
@@ -17,22 +24,47 @@ __all__ = ["cli", "main"]
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="lineament", message="%(package)s %(version)s")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Lines, corners, arcs and clusters from 2-D LiDAR scans, each with its covariance."""
+    if context.invoked_subcommand != "live":  # It ends by signals, as it should.
+        context.with_resource(terminating())
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit with 0, 1 for an error (one line), 2 for wrong usage."""
+    """Run the command line; exit with 0, 1 for an error (one line), 2 for wrong usage.
+
+    130 or 143 if it is stopped, by SIGINT (Ctrl-C) or SIGTERM.
+    """
     sys.exit(run(arguments))
 
 
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
+    output = sys.stdout
     try:
         with compiling_shown(show_compiling):
-            cli.main(arguments, prog_name="lineament", standalone_mode=False)
+            return _run(arguments)
+    except (click.Abort, KeyboardInterrupt):
+        return _complain("lineament: stopped", 130)
+    except Terminated as stopped:
+        return _complain("lineament: stopped", 128 + stopped.number)
+    except OSError as error:
+        if error.filename is None and error.errno not in _UNWRITABLE:
+            raise
+        return _unwritten(error.filename, error.strerror)
+    except SystemExit:
+        if sys.stdout is output:
+            raise
+        # It ended in a pipe that nobody reads any more: click exits, with a wrapper around it.
+        return _unwritten(None, os.strerror(errno.EPIPE))
+
+
+def _run(arguments: list[str] | None) -> int:
+    try:
+        cli.main(arguments, prog_name="lineament", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message(), err=True)
+        complain(error.format_message())
         return 2
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "lineament"
@@ -41,15 +73,14 @@ def run(arguments: list[str] | None = None) -> int:
         return _complain(f"lineament: {error.format_message()}", 1)
     except LineamentError as error:
         return _complain(f"lineament: {error}", 1)
-    except (click.Abort, KeyboardInterrupt):
-        return _complain("lineament: stopped", 130)
-    except BrokenPipeError:
-        # The reader of our output has seen enough, as `head` does.
-        sys.stdout = None
-        return 0
     return 0
 
 
+def _unwritten(name: str | None, reason: str | None) -> int:
+    sys.stdout = None  # What is left in its buffer is not to be written at the exit.
+    return _complain(f"lineament: {name or 'standard output'}: {reason}", 1)
+
+
 def _complain(message: str, status: int) -> int:
-    click.echo(" ".join(message.split()), err=True)
+    complain(" ".join(message.split()))
     return status

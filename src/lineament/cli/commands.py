@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .experiments import bench, compare, reproduce, simulate
+from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
 from .mapping import map_command
@@ -51,7 +51,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
 @click.option("--dark", is_flag=True, help="Draw on black.")
 @reading
-@HUSH
+@QUIET
 def plot(
     log: Path | str,
     index: int,
@@ -61,6 +61,7 @@ def plot(
     noise: float | None,
     trace: bool,
     dark: bool,
+    quiet: bool,
     reading: dict[str, Any],
 ) -> None:
     """Draw a scan of LOG and what is found in it."""
@@ -82,10 +83,12 @@ def plot(
     else:
         found = {name: extractor(scan) for name, extractor in extractors.items()}
         plot_scan(scan, found, output, title=title, dark=dark)
+    if not quiet:
+        click.echo(f"{title} -> {output}")
 
 
 @click.command()
-@LOG
+@click.argument("logs", nargs=-1, required=True, type=LOG_PATH)
 @methods_option("A method to choose from; may be given again.  [default: all; with --set, optimal]")
 @SET
 @NOISE
@@ -97,7 +100,7 @@ def plot(
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
-    log: Path | str,
+    logs: tuple[Path | str, ...],
     methods: tuple[str, ...],
     settings: tuple[str, ...],
     noise: float | None,
@@ -106,13 +109,16 @@ def view(
     port: int,
     no_browser: bool,
 ) -> None:
-    """Look at LOG in the browser: scans, features, and why a segment is missing."""
+    """Look at LOGS in the browser: scans, features, and why a segment is missing.
+
+    LOGS are files, folders, patterns, archives or addresses; the page has a list of them.
+    """
     from ..methods import DEFAULT_METHOD, method_names
     from ..view import Session, serve
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
-    session = Session(log, extractors, **reading)
+    session = Session(logs, extractors, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 
 
@@ -137,23 +143,6 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
         seconds = warm_up(methods)
     if not quiet:
         click.echo(f"kernels ready after {seconds:.2f} s")
-
-
-@click.command()
-@click.argument("log", required=False, type=LOG_PATH)
-@click.option(
-    "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
-)
-@QUIET
-def demo(log: Path | str | None, output: Path, quiet: bool) -> None:
-    """Make a page of a simulated drive, or of LOG."""
-    from ..tasks.demo import run_demo
-    from .progress import tracker
-
-    facts = run_demo(output, log, track=tracker(quiet))
-    if not quiet:
-        width = max(len(name) for name, _ in facts)
-        click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
 _ALL = (

@@ -1,13 +1,43 @@
-"""The commands that compare, measure and simulate. Each imports what it calls when it runs."""
+"""The commands that show, compare and simulate. Each imports what it calls when it runs."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import KEEP_GOING, LOG, PATH, QUIET, SCAN, TOPIC, check_ending, wrong_usage
+from .options import (
+    KEEP_GOING,
+    LIMITS,
+    LOG,
+    LOG_PATH,
+    PATH,
+    QUIET,
+    SCAN,
+    TOPIC,
+    Place,
+    check_ending,
+    wrong_usage,
+)
 
 SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+
+
+@click.command()
+@click.argument("log", required=False, type=LOG_PATH)
+@LIMITS
+@click.option(
+    "-o", "--output", type=PATH, default="demo", show_default=True, help="Folder to write to."
+)
+@QUIET
+def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, quiet: bool) -> None:
+    """Make a page of a simulated drive, or of LOG."""
+    from ..tasks.demo import run_demo
+    from .progress import tracker
+
+    facts = run_demo(output, log, track=tracker(quiet), limits=limits)
+    if not quiet:
+        width = max(len(name) for name, _ in facts)
+        click.echo("\n".join(f"{name:<{width}}  {value}" for name, value in facts))
 
 
 @click.command()
@@ -17,6 +47,7 @@ SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_defaul
 @click.option("-o", "--output", required=True, type=PATH, help="A picture (.png …) or .html.")
 @TOPIC
 @KEEP_GOING
+@LIMITS
 @QUIET
 def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) -> None:
     """Put methods side by side on a scan of LOG."""
@@ -49,12 +80,12 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
 @click.option(
     "--data",
     envvar="LINEAMENT_DATA",
-    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    type=Place(path_type=Path, exists=True, file_okay=False),
     help="Folder of the recordings.  [default: LINEAMENT_DATA if set]",
 )
 @click.option(
     "--museum",
-    type=click.Path(path_type=Path, exists=True),
+    type=Place(path_type=Path, exists=True),
     help="A bag of the Deutsches Museum, by Cartographer.",
 )
 @QUIET
@@ -109,7 +140,7 @@ def ple(
 
 
 @click.command()
-@click.argument("world")
+@click.argument("world", default="building")
 @click.option("-o", "--output", required=True, type=PATH, help="Log to write: .npz, .log, .log.gz.")
 @click.option("--sensor", "name", default="utm30lx", show_default=True, help="Preset of a scanner.")
 @click.option("--scans", type=click.IntRange(min=1), help="[default: the whole drive, or 100]")
@@ -133,8 +164,8 @@ def simulate(
 ) -> None:
     """Record a simulated log, with true poses.
 
-    WORLD is "building", driven through from end to end; or a kind of random scene, seen from one
-    place: room, star, corridor, hall, grazing, layers.
+    WORLD is "building" (the default), driven through from end to end; or a kind of random scene,
+    seen from one place: room, star, corridor, hall, grazing, layers.
     """
     from ..simulation import sensor_like, simulate_log
     from .progress import tracker
@@ -142,3 +173,5 @@ def simulate(
     with wrong_usage():
         sensor = sensor_like(name, sigma=sigma, dropout=dropout, outlier=outlier)
         simulate_log(output, world, sensor, track=tracker(quiet), **settings)
+    if not quiet:
+        click.echo(f"{world}, seen by {name} -> {output}")

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import LineamentError
-from .options import LOG_PATH, METHOD, NOISE, QUIET, SET, check_ending, make_extractor, reading
+from .options import (
+    LOG_PATH,
+    METHOD,
+    NOISE,
+    QUIET,
+    SET,
+    TEXT_PATH,
+    check_ending,
+    make_extractor,
+    reading,
+)
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -28,6 +38,7 @@ _COUNT = click.IntRange(min=1)
     "-o",
     "--output",
     required=True,
+    type=TEXT_PATH,
     help="File to write, its format by its ending; or a folder, FOLDER/, for a file a log.",
 )
 @METHOD
@@ -92,7 +103,7 @@ def extract(
     from ..tasks.extract import extract_log
     from .progress import tracker
 
-    found = find_logs(logs)
+    found = find_logs(logs, reading["limits"])
     if len(found) > 1:
         raise LineamentError(f"{output}: is no folder, expected one for {len(found)} logs")
     extraction = extract_log(found[0], output, extractor, track=tracker(quiet), **reading)

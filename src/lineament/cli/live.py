@@ -10,13 +10,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import METHOD, NOISE, PATH, QUIET, SET, settings_of, wrong_usage
+from .options import (
+    LIMITS,
+    METHOD,
+    NOISE,
+    PATH,
+    QUIET,
+    SET,
+    TEXT_PATH,
+    complain,
+    settings_of,
+    wrong_usage,
+)
 
 if TYPE_CHECKING:
     from ..live import LiveConfig, Report
 
 _TYPES = click.Choice(["LaserScan", "MultiEchoLaserScan"])
 _ECHOES = click.Choice(["first", "last", "strongest"])
+_STAMPS = click.Choice(["first", "middle", "last"])
 _RELIABILITIES = click.Choice(["best-effort", "reliable"])
 _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 
@@ -28,6 +40,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--name", help="Name of the node.  [default: lineament]")
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
 @click.option("--echo", type=_ECHOES, help="Which echo.  [default: first]")
+@click.option("--stamp", type=_STAMPS, help="Beam of the header's time.  [default: first]")
 @click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
 @click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
 @click.option("--localhost", **_FLAG, help="Stay on this machine.")
@@ -44,14 +57,18 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
 )
 @click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
+@click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
-@click.option("--from", "log", metavar="LOG", help="Play a log in place of a topic.")
+@click.option(
+    "--from", "log", type=TEXT_PATH, metavar="LOG", help="Play a log in place of a topic."
+)
 @click.option("--log-topic", metavar="TOPIC", help="Topic of the scans in the log.")
 @click.option("--poses", metavar="TOPIC", help="Topic of the poses in the log.")
 @click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud in the log.")
 @click.option("--keep-going", **_FLAG, help="Skip what is faulty in the log.")
+@LIMITS
 @click.option("--rate", type=click.FloatRange(min=0), help="Factor on the speed; 0: no pauses.")
 @click.option("--loop", **_FLAG, help="Start the log again at its end.")
 @click.option(
@@ -85,18 +102,18 @@ def live(
 
         def write(line: str) -> None:
             if not quiet:
-                click.echo(beginning + line, err=True)
+                complain(beginning + line)
 
         def show(report: Report) -> None:
             if is_shown:
                 width = shutil.get_terminal_size().columns - 1
-                click.echo(beginning + str(report)[:width], nl=False, err=True)
+                complain(beginning + str(report)[:width], nl=False)
 
         try:
             with wrong_usage():
                 totals = run_live(configured, is_stopped, write=write, show=show).totals
         finally:
-            click.echo(beginning, nl=False, err=True)
+            complain(beginning, nl=False)
     if not quiet:
         click.echo(totals)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -17,16 +17,27 @@ if TYPE_CHECKING:
     from ..extractor import Extractor
 
 F = TypeVar("F", bound=Callable[..., Any])
-PATH = click.Path(path_type=Path)
 
 
-def _log_path(text: str) -> str | Path:
-    # As a path, the two slashes of an address would become one.
-    return text if "://" in text else Path(text)
+class Place(click.Path):
+    """A path; none is meant by an empty one, which is what a variable that is not set gives."""
+
+    def convert(self, value: Any, parameter: Any, context: Any) -> Any:  # noqa: D102
+        if not value:
+            self.fail("is empty, expected a path", parameter, context)
+        return super().convert(value, parameter, context)
 
 
-#: A log: a path, or an address such as s3://bucket/key.
-LOG_PATH = click.types.FuncParamType(_log_path)
+class _LogPlace(Place):
+    """A log: a path, or an address such as s3://bucket/key."""
+
+    def convert(self, value: Any, parameter: Any, context: Any) -> Any:
+        # As a path, the two slashes of an address would become one.
+        return value if "://" in value else super().convert(value, parameter, context)
+
+
+PATH, TEXT_PATH = Place(path_type=Path), Place(path_type=str)
+LOG_PATH = _LogPlace(path_type=Path)
 LOG = click.argument("log", type=LOG_PATH)
 SCAN = click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
 TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
@@ -42,6 +53,42 @@ _ECHO = click.option(
 )
 _RING = click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud to read.")
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
+
+
+def _limits(
+    context: click.Context,  # noqa: ARG001
+    parameter: click.Parameter,  # noqa: ARG001
+    given: tuple[str, ...],
+) -> dict[str, int] | None:
+    from ..limits import Limits
+
+    with wrong_usage():
+        found = {name: _whole(name, value) for name, value in map(_split, given)}
+        Limits.of(found)
+    return found or None
+
+
+def _whole(name: str, value: str) -> int:
+    try:
+        return int(value)
+    except ValueError:
+        raise ValueError(f"limit {name} is {value!r}, expected a whole number") from None
+
+
+LIMITS = click.option(
+    "--limit",
+    "limits",
+    metavar="NAME=VALUE",
+    multiple=True,
+    callback=_limits,
+    help="Another limit of what is read, such as beams=200000; may be given again.",
+)
+
+
+def complain(message: str, *, nl: bool = True) -> None:
+    """Write on standard error; nobody there to read it is no reason to end anything."""
+    with suppress(OSError, ValueError):
+        click.echo(message, nl=nl, err=True)
 
 
 def _hush(context: click.Context, parameter: click.Parameter, quiet: bool) -> bool:  # noqa: ARG001
@@ -62,10 +109,10 @@ def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Cal
 
         @wraps(command)
         def collecting(**given: Any) -> None:
-            names = ("topic", "keep_going", "echo", "ring", "pose_topic")
+            names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits")
             command(reading={name: given.pop(name) for name in names}, **given)
 
-        for option in (KEEP_GOING, poses, _RING, _ECHO, TOPIC):
+        for option in (LIMITS, KEEP_GOING, poses, _RING, _ECHO, TOPIC):
             collecting = option(collecting)
         return collecting
 
@@ -139,10 +186,15 @@ def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
     return dict(_setting(text) for text in settings)
 
 
-def _setting(text: str) -> tuple[str, Any]:
+def _split(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not name or not equals:
-        raise click.UsageError(f"--set {text!r}: expected NAME=VALUE")
+        raise click.UsageError(f"{text!r}: expected NAME=VALUE")
+    return name, value
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, value = _split(text)
     try:
         return name, ast.literal_eval(value)
     except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from ..progress import Compiling, Track, compiled_seconds, show_line, untracked
+from .options import complain
 
 T = TypeVar("T")
 
@@ -28,7 +29,7 @@ def show_compiling(state: Compiling) -> None:
     elif sys.stderr.isatty():
         show_line(state)
     elif state.is_first or state.is_last:
-        print(state, file=sys.stderr, flush=True)
+        complain(str(state))
 
 
 @contextmanager
@@ -79,7 +80,7 @@ def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
             last, rate = now, done / (now - started - compiled_seconds() + compiled)
             left = max(total - done, 0) / rate
             line = f"{about}: {done}/{total}, {_rate_text(rate)}, {left:.0f} s left"
-            print(line, file=sys.stderr, flush=True)
+            complain(line)
 
 
 def _rate_text(rate: float) -> str:
@@ -114,6 +115,6 @@ def _now_and_then(last: float) -> Callable[[str], None]:
         now = time.monotonic()
         if now - last >= _PATIENCE:
             last = now
-            print(about, file=sys.stderr, flush=True)
+            complain(about)
 
     return show

@@ -1,8 +1,13 @@
 """How good a method is: features found in a scan against the true ones, and against themselves.
 
 `evaluate` scores one scan; scores of many scans add up, so that precision, recall and F1 over
-five hundred scenes come from the sums:
+five hundred scenes come from the sums.
 
+Found and true features are matched one to one. What has fewer than `MIN_BEAMS` beams in the
+truth is too small to be demanded: to miss it or to find it is no mistake. Needs scipy.
+
+Examples
+--------
 >>> from lineament.evaluation import Scores, evaluate
 >>> import lineament as ln
 >>> scan = ln.LaserScan([2.0] * 9, angle_min=-0.04, angle_increment=0.01)
@@ -10,9 +15,6 @@ five hundred scenes come from the sums:
 >>> scores = evaluate(features, features) + evaluate(features, features)
 >>> scores.scans, scores.summary()["segment_f1"]
 (2, 1.0)
-
-Found and true features are matched one to one. What has fewer than `MIN_BEAMS` beams in the
-truth is too small to be demanded: to miss it or to find it is no mistake. Needs scipy.
 """
 
 from .beams import MIN_BEAMS

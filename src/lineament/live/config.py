@@ -12,11 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LineamentError
+from ..limits import LIMITS, Limits
 from ..scan import Pose
+from ..scan.laser_scan import STAMPS
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
     "echo": ("first", "last", "strongest"),
+    "stamp": STAMPS,
     "reliability": ("best-effort", "reliable"),
     "ros": (0, 1, 2),
 }
@@ -61,6 +64,8 @@ class LiveConfig:
         ``LaserScan`` or ``MultiEchoLaserScan``, of ``sensor_msgs``.
     echo : str
         Which echo of the latter: ``first``, ``last`` or ``strongest``.
+    stamp : str
+        Which beam of a scan is taken at the time of its header: ``first``, ``middle`` or ``last``.
     ros : int
         2, or 1 for ROS 1 (rospy); 0 for none, where a log is played for Foxglove alone.
     domain : int, optional
@@ -82,6 +87,8 @@ class LiveConfig:
         ``poses`` (of a log that is played), or a topic of ``nav_msgs/Odometry``.
     laser_pose : (x, y, theta)
         Pose of the scanner in the frame of the odometry's twist [m, m, rad].
+    upside_down : bool
+        Whether the scanner hangs upside down: then its frame is turned about its x axis.
     track : bool
         Whether features are recognised from scan to scan. Then, and where `deskew` is ``scans``,
         the motion by them is known too: ``TOPIC/odometry``.
@@ -100,6 +107,8 @@ class LiveConfig:
         Ring of a point cloud in the log that is the scan.
     keep_going : bool
         Whether to skip what is faulty in the log.
+    limits : dict
+        Limits that differ from those of `lineament.limits.Limits`, of messages and of the log.
     rate : float
         Factor on the speed of the log; 0 for as fast as scans are processed.
     loop : bool
@@ -125,6 +134,7 @@ class LiveConfig:
     name: str = "lineament"
     type: str = "LaserScan"
     echo: str = "first"
+    stamp: str = "first"
     ros: int = 2
     domain: int | None = None
     localhost: bool = False
@@ -135,6 +145,7 @@ class LiveConfig:
     noise: float | None = None
     deskew: str = "off"
     laser_pose: Pose = (0.0, 0.0, 0.0)
+    upside_down: bool = False
     track: bool = False
     dock: Point | None = None
     dock_track: int | None = None
@@ -143,6 +154,7 @@ class LiveConfig:
     poses: str | None = None
     ring: int | None = None
     keep_going: bool = False
+    limits: Mapping[str, Any] = field(default_factory=dict)
     rate: float = 1.0
     loop: bool = False
     foxglove: int | None = None
@@ -151,6 +163,7 @@ class LiveConfig:
     def __post_init__(self) -> None:
         for known in fields(self):
             _check(known.name, str(known.type), getattr(self, known.name))
+        Limits.of(self.limits)
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
         for name, values, n, many in (
@@ -202,12 +215,13 @@ def resolved(topic: str, namespace: str) -> str:
 
 
 def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read parameters of a `LiveConfig` from a TOML file: a flat table, and ``[parameters]``.
+    r"""Read a `LiveConfig` from a TOML file: a flat table, ``[parameters]`` and ``[limits]``.
 
     Raises
     ------
     LineamentError
-        If the file cannot be read, is not TOML, or has an unknown key.
+        If the file cannot be read, is not TOML, is longer than a line of a log may be, or has an
+        unknown key.
 
     Examples
     --------
@@ -218,7 +232,11 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
     {'topic': '/front/scan', 'parameters': {'evidence': 12}}
     """
     try:
-        found = tomllib.loads(Path(path).read_bytes().decode())
+        with Path(path).open("rb") as file:
+            data = file.read(LIMITS.line + 1)
+        if len(data) > LIMITS.line:
+            raise ValueError(f"it has more than {LIMITS.line} bytes")
+        found = tomllib.loads(data.decode())
     except OSError as error:
         raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, RecursionError) as error:

@@ -8,6 +8,7 @@ from cyclonedds.core import InstanceState, ReadCondition, WaitSet
 from cyclonedds.qos import Policy, Qos
 
 from ..errors import one_line
+from ..limits import Limits
 from ..output.scene import Message
 from .config import LiveConfig
 from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
@@ -39,7 +40,8 @@ class DdsSource:
     def __init__(self, participant: Participant, config: LiveConfig, depth: int = 64) -> None:
         subscribe = partial(_Subscription, participant, reliability=config.reliability, depth=depth)
         kind = f"sensor_msgs/{config.type}"
-        scan = partial(received_scan, encoding="cdr", kind=kind, echo=config.echo)
+        limits = Limits.of(config.limits)
+        scan = partial(received_scan, encoding="cdr", kind=kind, echo=config.echo, limits=limits)
         self._scans = subscribe(config.scan_topic, f"sensor_msgs/msg/{config.type}", scan)
         self._topics = [self._scans]
         if config.odometry_topic is not None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from ..errors import one_line
 from ..scan import LaserScan
 from .counters import Counters, Report
-from .pipeline import Pipeline, check_beams
+from .pipeline import Pipeline
 from .received import Received, Source
 from .sinks import Sink
 
@@ -102,9 +102,8 @@ class Node:
             if not isinstance(message, LaserScan):
                 self._pipeline.hear(message)
                 return
-            check_beams(message)
             # What can be read may still make no sense: a robot that turns a million times a sweep.
-            frame = self._pipeline(received.publisher, message, received.time)
+            frame = self._pipeline(received.publisher, message)
         except ValueError as error:
             counters.malformed += 1
             self._write_fault(received, error)

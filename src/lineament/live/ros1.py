@@ -9,6 +9,7 @@ from http.client import HTTPConnection, HTTPException
 from typing import Any
 
 from ..errors import LineamentError, one_line
+from ..limits import Limits
 from ..output.scene import Message
 from .config import LiveConfig
 from .received import Inbox, Received, received_odometry, received_scan
@@ -79,7 +80,7 @@ class Ros1Source:
     """Scans, and odometry where it is wanted, from topics of ROS 1."""
 
     def __init__(self, node: Ros1Node, config: LiveConfig) -> None:
-        self._node, self._echo = node, config.echo
+        self._node, self._options = node, (config.echo, Limits.of(config.limits))
         self._inbox = Inbox(config.depth)
         self._numbers: dict[str, int] = {}
         topic, kind = config.scan_topic, f"sensor_msgs/{config.type}"
@@ -129,7 +130,7 @@ class Ros1Source:
 
     def _put_scan(self, message: Any, kind: str) -> None:
         publisher = _publisher(message)
-        scan = received_scan(publisher, message.raw, "ros1", kind, self._echo)
+        scan = received_scan(publisher, message.raw, "ros1", kind, *self._options)
         self._inbox.put(scan, self._missing(publisher, message.raw))
 
     def _put_odometry(self, message: Any, _: str) -> None:

@@ -96,6 +96,7 @@ def _ends(
             echo=config.echo,
             ring=config.ring,
             keep_going=config.keep_going,
+            limits=config.limits,
         )
         stack.enter_context(closing(source))
     if config.ros == 1:

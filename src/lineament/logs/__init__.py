@@ -1,6 +1,6 @@
-"""Logs of laser scans: one reader a format behind :func:`open_log`, streaming, imported lazily.
+"""Logs of laser scans: one reader a format behind `open_log`, streaming, imported lazily.
 
-A reader is a class derived from :class:`Log` in a file of this folder, and a line in
+A reader is a class derived from `Log` in a file of this folder, and a line in
 ``opening.READERS``; one of text lines derives from ``linelog.LineLog``. What each format holds,
 and what is made of it: ``docs/logs.md``.
 """

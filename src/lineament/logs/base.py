@@ -12,10 +12,14 @@ from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
 
 from .._lazy import Pictured
 from ..errors import LogError
+from ..limits import LIMITS, Limits
 from ..scan import LaserScan
+from ..scan.laser_scan import STAMPS
 
 T = TypeVar("T")
 
+#: What is wrong with a file whose end is not where it was.
+SHRUNK = "has become shorter while it was read"
 #: How many messages about faults are kept.
 MAX_FAULTS = 10
 #: Which return of a beam that has several can be asked for.
@@ -24,17 +28,21 @@ ECHOES = ("first", "last", "strongest")
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How ROS messages become scans, as `open_log` takes it; ValueError if a value is wrong."""
+    """How logs are read, as `open_log` takes it; ValueError if a value is wrong."""
 
     echo: str = "first"
     ring: int | None = None
     pose_topic: str | None = None
+    limits: Limits = LIMITS
+    stamp: str = "first"
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
             raise ValueError(f"echo is {self.echo!r}, expected {' or '.join(ECHOES)}")
         if self.ring is not None and (type(self.ring) is not int or self.ring < 0):
             raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
+        if self.stamp not in STAMPS:
+            raise ValueError(f"stamp is {self.stamp!r}, expected {' or '.join(STAMPS)}")
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -67,7 +75,7 @@ class Head:
 
 
 class Log(Pictured, ABC):
-    """An iterable of :class:`~lineament.LaserScan`; each iteration reads from the start.
+    """An iterable of `lineament.LaserScan`; each iteration reads from the start.
 
     ``log[i]`` is a scan, ``log[i:j]`` a list of them; in a notebook a log is a picture.
 
@@ -81,7 +89,7 @@ class Log(Pictured, ABC):
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
     options : ReadOptions
-        How to make scans of messages that hold more than one.
+        How to make scans of messages that hold more than one, and the limits of what is read.
 
     Attributes
     ----------
@@ -101,6 +109,8 @@ class Log(Pictured, ABC):
     endings: ClassVar[tuple[str, ...]]
     #: Whether the reader seeks in the file, which must then not be compressed as a whole.
     needs_seek: ClassVar[bool] = False
+    #: Whether all of it is in memory, whatever becomes of the file.
+    is_held: ClassVar[bool] = False
     #: The one topic of a format whose scans are all of a kind.
     only_topic: ClassVar[str] = "scan"
 
@@ -117,10 +127,12 @@ class Log(Pictured, ABC):
         self.name = str(path)
         self.topic = topic
         self.keep_going = keep_going
-        self.options = options
+        self.options, self.limits = options, options.limits
         self.skipped = 0
         self.faults: list[str] = []
+        self._size = 0
         self._open()
+        self._check_size()
 
     def _open(self) -> None:
         """Read as much of the file as shows that it is a log, and has the topic."""
@@ -150,7 +162,29 @@ class Log(Pictured, ABC):
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
-        yield from self._items()
+        self._check_size()
+        scans, beams, stamp = self.limits.scans, self.limits.beams, self.options.stamp
+        for count, (topic, scan) in enumerate(self._items(), 1):
+            n = len(scan.ranges)
+            if n <= beams and count <= scans:
+                yield topic, scan if stamp == "first" else scan.stamped(stamp)
+                continue
+            try:
+                self.limits.check("scans", count)
+                self.limits.check("beams", n)  # Most readers checked it before it was made.
+            except ValueError as error:
+                self._fault(LogError(self.name, f"scan {count - 1}: {error}"))
+            if count > scans:
+                return
+
+    def _check_size(self) -> None:
+        """Report that the file has become shorter than it was when the log was last read."""
+        try:
+            before, self._size = self._size, self.path.stat().st_size
+        except OSError:
+            return  # What reads it reports that.
+        if self._size < before and not self.is_held and self.path.is_file():
+            self._fault(LogError(self.name, SHRUNK))
 
     def __iter__(self) -> Iterator[LaserScan]:
         return map(itemgetter(1), self.items())

@@ -82,7 +82,7 @@ def robotlaser(line: bytes, corrected: Pose | None = None) -> LaserScan:
     return LaserScan(
         ranges,
         snap(read["start"]),
-        snap(read["step"]),
+        snap(read["step"]) or read["step"],
         range_max=read["limit"] if read["limit"] > 0 else SICK_RANGE_MAX,
         stamp=read["stamp"],
         frame_id="laser",

@@ -29,7 +29,7 @@ class CsmLog(Log):
 
     def _open(self) -> None:
         self._check_topic()
-        first = next(json_objects(self.source), None)
+        first = next(json_objects(self.source, self.limits), None)
         if isinstance(first, LogError):
             self._fault(first)
         elif first is None or "readings" not in first:
@@ -45,10 +45,10 @@ class CsmLog(Log):
 
     @cached_property
     def _count(self) -> int:
-        return sum(isinstance(found, dict) for found in json_objects(self.source))
+        return sum(isinstance(found, dict) for found in json_objects(self.source, self.limits))
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        for i, found in enumerate(json_objects(self.source)):
+        for i, found in enumerate(json_objects(self.source, self.limits)):
             if isinstance(found, LogError):
                 self._fault(found)
             else:

@@ -15,9 +15,6 @@ from .bearings import bearing_fields, by_bearing
 from .linelog import LineLog, Parser, number_parser, numbers, scalar
 from .lines import numbered_lines
 
-#: Most rows of one scan.
-MAX_BEAMS = 1 << 20
-
 # A row a scan.
 _BEARINGS = ("angle_min", "angle_increment")
 _SCALARS = (*_BEARINGS, "stamp", "range_min", "range_max", "scan_time", "time_increment")
@@ -51,7 +48,7 @@ class _Csv(Log):
         return cls._fits(*_columns(head.data.split(b"\n"))[1:])
 
     def _open(self) -> None:
-        rows = (line for _, line in numbered_lines(self.source))
+        rows = (line for _, line in numbered_lines(self.source, self.limits))
         self._delimiter, self._names, width = _columns(rows)
         if not self._fits(self._names, width):
             raise LogError(
@@ -63,7 +60,8 @@ class _Csv(Log):
 
     def _lines(self) -> Iterator[tuple[int, bytes]]:
         """Yield each row below the header with the number of its line."""
-        rows = ((number, line) for number, line in numbered_lines(self.source) if _is_row(line))
+        lines = numbered_lines(self.source, self.limits)
+        rows = ((number, line) for number, line in lines if _is_row(line))
         return islice(rows, 1 if self._names else 0, None)
 
 
@@ -140,10 +138,10 @@ class CsvBeamsLog(_Csv):
         return 1
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        yield from self._made(self.only_topic, "", self._scan, [*self._beams()])
+        yield from self._made(self.only_topic, "", self._scan, self._beams())
 
-    def _scan(self, rows: list[Iterable[float]]) -> LaserScan:
-        beams = np.array(rows, np.float64).reshape(-1, 3)
+    def _scan(self, rows: Iterable[Iterable[float]]) -> LaserScan:
+        beams = np.array([*rows], np.float64).reshape(-1, 3)
         degrees = _DEGREES[self._names[_beam_places(self._names)[0]]] if self._names else None
         order, angles = by_bearing(beams[:, 0], degrees=degrees)
         ranges, intensities = beams[order, 1], beams[order, 2]
@@ -151,22 +149,19 @@ class CsvBeamsLog(_Csv):
         return LaserScan(ranges, **bearing_fields(angles), intensities=known)
 
     def _beams(self) -> Iterator[Iterable[float]]:
-        """Yield bearing, range and intensity of each row."""
+        """Yield bearing, range and intensity of each row; ValueError if there are too many."""
         places = _beam_places(self._names)
         expected = max(places) + 1
         for count, (number, row) in enumerate(self._until_broken(self._lines())):
+            self.limits.check("beams", count + 1)
             cells = _cells(row, self._delimiter)
             try:
-                if count >= MAX_BEAMS:
-                    raise ValueError(f"more than {MAX_BEAMS} beams")
                 if len(cells) < expected:
                     raise ValueError(f"has {len(cells)} columns, expected {expected}")
                 words = [b"nan" if i < 0 else cells[i] or b"nan" for i in places]
                 yield numbers("angle, range, intensity: value", words)
             except ValueError as error:
                 self._fault(LogError(self.name, str(error), line=number))
-                if count >= MAX_BEAMS:
-                    return
 
 
 def _beam_places(names: list[str]) -> list[int]:

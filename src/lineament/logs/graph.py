@@ -47,6 +47,7 @@ class GraphLog(LineLog):
                 return robotlaser(line, vertex)
             if not by_order:
                 del vertices[:]
+            self.limits.check("scans", len(vertices) // 3 + 1)
             vertices.extend(_UNKNOWN)  # Its place is kept even if it cannot be read.
             read = _VERTICES[kind].read(line)
             vertices[-3:] = array("d", (read["x"], read["y"], read["theta"]))

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..errors import LogError
+from ..limits import LIMITS, Limits
 from .lines import chunks
 
-#: Longest object that is read [characters].
-MAX_OBJECT = 1 << 22
 #: What is broken may be read several times, up to so many characters beside 16 times the whole.
 SPARE = 1 << 24
 _SPARE_RATIO = 16
@@ -21,16 +20,19 @@ _LEAST_WASTE = 1000
 _decode = json.JSONDecoder().raw_decode
 _SPACE = re.compile(r"[\s\ufeff]*")
 _NEXT = re.compile(r"\n(?=\{)")
+_NESTING = re.compile(r'"(?:[^"\\]|\\.)*+"|[][{}]')
 
 
-def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogError]:
+def json_objects(
+    path: str | os.PathLike[str], limits: Limits = LIMITS
+) -> Iterator[dict[str, Any] | LogError]:
     """Yield each JSON object of a file, plain or gzip, or what is wrong with it.
 
     After an object that is broken, reading goes on at the next line that begins with a brace; in a
     file that is broken all over, where that would take much longer than to read it, it ends. A
     fault has the line on which what is broken begins; LogError if the file cannot be opened.
     """
-    text = _Text(path)
+    text = _Text(path, limits)
     while text.skip_space():
         line = text.line
         try:
@@ -50,8 +52,8 @@ def json_objects(path: str | os.PathLike[str]) -> Iterator[dict[str, Any] | LogE
 class _Text:
     """A text that is read as far as it is needed, and how far that is."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._path, self._pieces = path, chunks(path)
+    def __init__(self, path: str | os.PathLike[str], limits: Limits) -> None:
+        self._path, self._limits, self._pieces = path, limits, chunks(path, limits)
         self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
         self._text, self._at = "", 0
         self._passed = self._wasted = 0
@@ -73,26 +75,36 @@ class _Text:
     def read_value(self) -> Any:
         """Return the value that begins here, and go behind it; ValueError if it is broken."""
         while True:
+            problem, found = "", None
             try:
                 found, end = _decode(self._text, self._at)
             except RecursionError:
-                self._waste(len(self._text) - self._at)
-                raise ValueError("JSON is nested too deep, expected a scan") from None
+                problem, end = "nested too deep for this Python", len(self._text)
             except ValueError as error:
-                is_long = len(self._text) - self._at >= MAX_OBJECT
-                if not is_long and self._grow():
+                if len(self._text) - self._at <= self._limits.line and self._grow():
                     continue
                 # Of a number with too many digits there is no place.
-                where = error.pos if isinstance(error, json.JSONDecodeError) else len(self._text)
-                self._waste(where - self._at)
-                if is_long:
-                    limit = f"{MAX_OBJECT >> 20} MiB"
-                    raise ValueError(f"JSON object is broken or longer than {limit}") from None
-                reason = error.msg if isinstance(error, json.JSONDecodeError) else error
-                raise ValueError(f"JSON is broken: {reason}") from None
-            else:
-                self._go(end)
-                return found
+                problem = getattr(error, "msg", str(error))
+                end = getattr(error, "pos", len(self._text))
+            try:
+                self._check(end)
+                if problem:
+                    raise ValueError(f"JSON is broken: {problem}")
+            except ValueError:
+                self._waste(end - self._at)
+                raise
+            self._go(end)
+            return found
+
+    def _check(self, end: int) -> None:
+        """Check the length and depth of what begins here; ValueError if it is beyond a limit."""
+        text, begin, depth = self._text, self._at, 0
+        self._limits.check("line", end - begin)
+        # Brackets in strings count here, so that most objects need no other look.
+        if text.count("[", begin, end) + text.count("{", begin, end) > self._limits.depth:
+            for token in _NESTING.finditer(text, begin, end):
+                depth += {"[": 1, "{": 1, "]": -1, "}": -1}.get(token[0], 0)
+                self._limits.check("depth", depth)
 
     def skip_to_object(self) -> None:
         """Go to the next line that begins with a brace, or to the end."""

@@ -60,7 +60,7 @@ class LineLog(Log):
         return self._known.get(words[0], "") if words else ""
 
     def _lines(self) -> Iterator[tuple[int, bytes]]:
-        return numbered_lines(self.source)
+        return numbered_lines(self.source, self.limits)
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         parse = self._parser()

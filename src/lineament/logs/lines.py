@@ -4,17 +4,17 @@ import os
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from ..errors import LogError
+from ..limits import LIMITS, Limits
+from .base import SHRUNK
 
 #: How a gzip file begins.
 GZIP = b"\x1f\x8b"
 #: Mark that some programs put before the first line.
 BOM = b"\xef\xbb\xbf"
-#: Length of a line above which a file is no text [bytes].
-MAX_LINE = 1 << 24
-
 _PROBLEMS: dict[type[OSError], str] = {
     FileNotFoundError: "there is no such file, expected a log",
     PermissionError: "no permission to read it",
@@ -36,18 +36,21 @@ def reading(path: object) -> Iterator[None]:
         raise LogError(path, f"is no path of a file: {error}") from None
 
 
-def chunks(path: str | os.PathLike[str]) -> Iterator[bytes]:
+def chunks(path: str | os.PathLike[str], limits: Limits = LIMITS) -> Iterator[bytes]:
     """Yield the content of a file, decompressed where it is gzip, in pieces of up to 1 MiB.
 
     LogError if it is broken or ends early: after all that could be decompressed.
     """
     with opened(path) as read:
-        yield from decompressed(path, read, read(_COMPRESSED))
+        yield from decompressed(path, read, read(_COMPRESSED), limits)
 
 
 @contextmanager
 def opened(path: str | os.PathLike[str]) -> Iterator[Callable[[int], bytes]]:
-    """Give what reads pieces of a file, as long as it is now: what is appended is left."""
+    """Give what reads pieces of a file, as long as it is now: what is appended is left.
+
+    LogError if it becomes shorter meanwhile.
+    """
     # Only what the file does is guarded: what is done with its content is not.
     with reading(path):
         binary = Path(path).open("rb")  # noqa: SIM115
@@ -58,25 +61,32 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Callable[[int], bytes]]:
             nonlocal left
             with reading(path):
                 data = file.read(min(size, left))
+            if left and not data:
+                raise LogError(path, SHRUNK)
             left -= len(data)
             return data
 
         yield read
 
 
-def decompressed(path: object, read: Callable[[int], bytes], first: bytes) -> Iterator[bytes]:
+def decompressed(
+    path: object, read: Callable[[int], bytes], first: bytes, limits: Limits = LIMITS
+) -> Iterator[bytes]:
     """Yield a first piece and what is read behind it, decompressed; LogError as from `chunks`."""
     if first.startswith(GZIP):
-        yield from _gunzip(path, read, first)
+        yield from _gunzip(path, read, first, limits)
         return
     while first:
         yield first
         first = read(_PLAIN)
 
 
-def _gunzip(path: object, read: Callable[[int], bytes], data: bytes) -> Iterator[bytes]:
+def _gunzip(
+    path: object, read: Callable[[int], bytes], data: bytes, limits: Limits
+) -> Iterator[bytes]:
     """Decompress member after member, as gzip does; zeros may pad the end."""
     stream = zlib.decompressobj(wbits=31)
+    packed = size = 0
     while True:
         if not data:
             data = read(_COMPRESSED)
@@ -95,9 +105,11 @@ def _gunzip(path: object, read: Callable[[int], bytes], data: bytes) -> Iterator
             yield _up_to_fault(before, data)
             reason = str(error).rpartition(": ")[2]
             raise LogError(path, f"gzip data is broken: {reason}") from None
+        left = stream.unused_data if stream.eof else stream.unconsumed_tail
+        packed, size, data = packed + len(data) - len(left), size + len(plain), left
+        limits.check_growth(size, packed, partial(LogError, path))
         if plain:
             yield plain
-        data = stream.unused_data if stream.eof else stream.unconsumed_tail
     if not stream.eof:
         raise LogError(path, "gzip data ends early, expected its end mark: the file is cut off")
 
@@ -113,22 +125,24 @@ def _up_to_fault(stream: "zlib._Decompress", data: bytes) -> bytes:
     return bytes(plain)
 
 
-def numbered_lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, bytes]]:
-    """Yield each line of a file with its number, from 1; LogErrors have the number too.
+def numbered_lines(
+    path: str | os.PathLike[str], limits: Limits = LIMITS
+) -> Iterator[tuple[int, bytes]]:
+    """Yield each line of a file that is not empty, with its number, from 1, as LogErrors have.
 
     A last line without an end is delivered, unless the stream broke within it.
     """
     number, rest = 1, b""
     try:
-        for chunk in chunks(path):
+        for chunk in chunks(path, limits):
             lines = (rest + chunk).split(b"\n")
             if number == 1:
                 lines[0] = lines[0].removeprefix(BOM)
             rest = lines.pop()
-            yield from enumerate(lines, number)
+            # A file may be full of empty lines: these cost next to nothing.
+            yield from ((at, line) for at, line in enumerate(lines, number) if line)
             number += len(lines)
-            if len(rest) > MAX_LINE:
-                raise LogError(path, f"line longer than {MAX_LINE >> 20} MiB, expected text")
+            limits.check("line", len(rest), partial(LogError, path))
     except LogError as error:
         raise LogError(path, error.problem, line=number) from None
     if rest:

@@ -17,10 +17,11 @@ from mcap.opcode import Opcode
 from mcap.records import Statistics
 
 from ..errors import LogError
+from ..limits import Limits
 from ..rosmsg.wire import Buffer
 from .base import Head
 from .ros import RosLog
-from .ros_bag import Bag, Connection, RecordBag, RecordReader, decompress
+from .ros_bag import Bag, Connection, RecordBag, RecordReader
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # Code and length of a record.
@@ -46,7 +47,7 @@ class McapLog(RosLog):
     endings = (".mcap",)
 
     def _open_bags(self) -> list[Bag]:
-        return [RecordBag(self.source, McapReader)]
+        return [RecordBag(self.source, McapReader, self.limits)]
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
@@ -73,12 +74,12 @@ class McapReader(RecordReader):
             yield head, data
             return
         size, checksum = struct.unpack_from("<QI", data, _CHUNK_TIMES_SIZE)
-        codec, at = _text(data, _CHUNK_TIMES_SIZE + 12)
+        codec, at = _text(data, _CHUNK_TIMES_SIZE + 12, self.limits)
         (length,) = struct.unpack_from("<Q", data, at)
         packed = memoryview(data)[at + 8 :]
         if length != len(packed):
             raise ValueError(f"chunk of {length} bytes in a record with {len(packed)} left for it")
-        plain = memoryview(decompress(codec, packed, size))
+        plain = memoryview(self.unpack(codec, packed, size))
         if checksum and zlib.crc32(plain) != checksum:
             raise ValueError("chunk has another checksum than it says: its data is broken")
         at = 0
@@ -99,14 +100,15 @@ class McapReader(RecordReader):
         # Only the names are read: what else these records hold may be broken.
         if head == _SCHEMA:
             (number,) = _NUMBER.unpack_from(data)
-            self._types[number], _ = _text(data, 2)
+            self._types[number], _ = _text(data, 2, self.limits)
         elif head == _CHANNEL:
             number, schema = struct.unpack_from("<HH", data)
-            topic, at = _text(data, 4)
-            encoding, _ = _text(data, at)
+            topic, at = _text(data, 4, self.limits)
+            encoding, _ = _text(data, at, self.limits)
             if schema not in self._types:
                 raise ValueError(f"channel of schema {schema}, which is not described before it")
-            self.note(number, Connection.named(topic, self._types[schema], encoding))
+            names = topic, self._types[schema], encoding
+            self.note(number, Connection.named(self.limits, *names))
         return None
 
     def indexed_counts(self) -> Counter[Connection]:
@@ -148,10 +150,11 @@ class McapReader(RecordReader):
                 self.skip(length, what)
 
 
-def _text(data: Buffer, at: int) -> tuple[str, int]:
+def _text(data: Buffer, at: int, limits: Limits) -> tuple[str, int]:
     """Read a string with its length before it, and where it ends."""
     (length,) = struct.unpack_from("<I", data, at)
     end = at + 4 + length
     if end > len(data):
         raise ValueError(f"text of {length} bytes in a record with {len(data) - at - 4} left")
+    limits.check("name", length)
     return str(data[at + 4 : end], "utf-8", "replace"), end

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LogError
+from ..limits import Limits
 from ..scan import LaserScan
 from .base import Head, Log
 from .lines import reading
-from .sources import ZIP, check_growth
+from .sources import ZIP
 
 #: One number for the log, or one for each scan.
 SCALARS = ("range_min", "range_max", "scan_time", "time_increment")
@@ -24,9 +26,10 @@ SHAPES = {
     "angle_increment": ("",),
     "angles": ("m",),
     "stamps": ("n",),
+    "stamps_ns": ("n",),
     "poses": ("n3",),
     "intensities": ("nm",),
-    **dict.fromkeys((*SCALARS, "frame_id"), ("", "n")),
+    **dict.fromkeys((*SCALARS, "stamp_beam", "frame_id"), ("", "n")),
 }
 
 
@@ -36,19 +39,21 @@ class NpzLog(Log):
     Keys: ``ranges`` (N, M) m, NaN where nothing returned; ``angle_min`` and
     ``angle_increment`` rad, or ``angles`` (M,); optional ``range_min``, ``range_max`` m,
     ``scan_time``, ``time_increment`` s, ``frame_id`` (one, or N of them), ``stamps`` (N,) s,
+    ``stamps_ns`` (N,) ns where seconds do not hold them, ``stamp_beam`` (see `LaserScan`),
     ``poses`` (N, 3) m, m, rad (not finite where unknown), ``intensities`` (N, M). Other keys
     are left alone. Arrays stay as stored; rows become float64 as they are read.
     """
 
     format = "npz"
     description = "npz (ranges, angle_min, angle_increment)"
+    is_held = True
     endings = (".npz",)
     needs_seek = True
     only_topic = "ranges"
 
     def _open(self) -> None:
         self._check_topic()
-        self._arrays = _load(self.source)
+        self._arrays = _load(self.source, self.limits)
         self._n = len(self._arrays["ranges"])
 
     @classmethod
@@ -80,32 +85,50 @@ class NpzLog(Log):
             fields["intensities"] = arrays["intensities"][i]
         if "poses" in arrays and np.isfinite(arrays["poses"][i]).all():
             fields["pose"] = tuple(arrays["poses"][i].tolist())
-        return LaserScan(arrays["ranges"][i], **fields)
+        scan = LaserScan(arrays["ranges"][i], **fields)
+        beam = float(_at(arrays["stamp_beam"], i)) if "stamp_beam" in arrays else 0.0
+        ns = int(arrays["stamps_ns"][i]) if "stamps_ns" in arrays else None
+        return scan.stamped(beam, ns) if beam or ns is not None else scan
 
 
 def _at(values: NDArray[Any], i: int) -> Any:
     return values[i] if values.ndim else values[()]
 
 
-def _load(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _load(path: str | os.PathLike[str], limits: Limits) -> dict[str, NDArray[Any]]:
+    error = partial(LogError, path)
     with reading(path), Path(path).open("rb") as file:
         try:
             with np.load(file, allow_pickle=False) as archive:
                 found = list(archive.files)
                 size = sum(member.file_size for member in archive.zip.infolist())
-                check_growth(path, size, Path(path).stat().st_size)
+                limits.check_growth(size, Path(path).stat().st_size, error)
+                if "ranges" in found:
+                    for limit, n in zip(("scans", "beams"), _shape(archive), strict=False):
+                        limits.check(limit, n, error)
                 arrays = {key: np.asarray(archive[key]) for key in SHAPES if key in found}
         except LogError:
             raise
         # A damaged archive fails in a dozen ways, in zipfile, zlib, struct and numpy's parser.
-        except Exception as error:
-            problem = f"is no whole npz archive: {type(error).__name__}: {error}"
+        except Exception as broken:
+            problem = f"is no whole npz archive: {type(broken).__name__}: {broken}"
             raise LogError(path, problem.replace("\n", " ")) from None
     try:
         _check(arrays, found)
-    except ValueError as error:
-        raise LogError(path, str(error)) from None
+    except ValueError as wrong:
+        raise error(str(wrong)) from None
     return arrays
+
+
+def _shape(archive: Any) -> tuple[int, ...]:
+    """Return the shape of the ranges, before memory is taken for them."""
+    with archive.zip.open("ranges.npy") as member:
+        if not member.peek(6).startswith(np.lib.format.MAGIC_PREFIX):
+            return ()
+        version = np.lib.format.read_magic(member)
+        read = getattr(np.lib.format, f"read_array_header_{version[0]}_0")
+        shape: tuple[int, ...] = read(member)[0]
+    return shape
 
 
 def _check(arrays: dict[str, NDArray[Any]], found: list[str]) -> None:

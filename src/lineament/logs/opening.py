@@ -2,12 +2,13 @@
 
 import glob
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
 from ..errors import LogError
+from ..limits import Limits
 from . import sources
 from .base import Head, Log, ReadOptions
 
@@ -55,6 +56,8 @@ def open_log(
     echo: str = "first",
     ring: int | None = None,
     pose_topic: str | None = None,
+    limits: Mapping[str, int] | None = None,
+    stamp: str = "first",
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -66,9 +69,9 @@ def open_log(
     path : path-like
         The file, compressed by gzip or not; the folder of a ROS 2 bag; a zip archive of one log; a
         path behind an archive, ``logs.zip/day/a.log``; or an address that fsspec knows, such as
-        ``s3://bucket/a.bag``. For folders and patterns see :func:`find_logs`.
+        ``s3://bucket/a.bag``. For folders and patterns see `find_logs`.
     topic : str, optional
-        Which scans to read where a log has several kinds; see :attr:`Log.topics`.
+        Which scans to read where a log has several kinds; see `Log.topics`.
     keep_going : bool
         Skip and count what is faulty instead of raising an error at it.
     echo : str
@@ -77,19 +80,24 @@ def open_log(
         Which ring of a point cloud is the scan (ROS logs).
     pose_topic : str, optional
         Which topic gives the poses (ROS logs).
+    limits : mapping, optional
+        Limits of :class:`~lineament.limits.Limits` that are to be others, by name.
+    stamp : str
+        Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
 
     Returns
     -------
     Log
-        An iterable of :class:`~lineament.LaserScan` with a length.
+        An iterable of `lineament.LaserScan` with a length.
 
     Raises
     ------
     ValueError
-        If `echo`, `ring` or `pose_topic` is not a value that it can have.
+        If `echo`, `ring`, `pose_topic`, `stamp` or a limit is not a value that it can have.
     LogError
-        If the file cannot be read, has no format that is known, holds no scans, or has no such
-        topic. While the log is iterated: if a scan in it is faulty, unless `keep_going`.
+        If the file cannot be read, has no format that is known, holds no scans, has no such topic,
+        or is beyond a limit. While the log is iterated: if a scan in it is faulty, unless
+        `keep_going`.
 
     Examples
     --------
@@ -100,12 +108,12 @@ def open_log(
     >>> log.format, len(log), [scan.stamp for scan in log]
     ('carmen', 1, [7.5])
     """
-    options = ReadOptions(echo, ring, pose_topic)
-    source = _located(path)
+    options = ReadOptions(echo, ring, pose_topic, Limits.of(limits), stamp)
+    source = _located(path, options.limits)
     head = sources.read_head(source)
     reader = _recognised(head)
     if reader is None:
-        source = _only_log(source, head)
+        source = _only_log(source, head, options.limits)
         head = sources.read_head(source)
         # A damaged or unusual beginning: its ending shows which reader's error helps most.
         reader = _recognised(head) or _by_ending(str(source))
@@ -113,29 +121,32 @@ def open_log(
         known = " or ".join(reader.description for reader in readers())
         raise LogError(source, f"is no log that lineament knows: expected {known}")
     if head.is_gzip and reader.needs_seek:
-        source = sources.unzip(source, keep_going=keep_going)
+        source = sources.unzip(source, options.limits, keep_going=keep_going)
     return reader(source, topic, keep_going=keep_going, options=options)
 
 
-def _located(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
+def _located(path: str | os.PathLike[str], limits: Limits) -> str | os.PathLike[str]:
     """Return what can be opened as a file: the path itself, or a copy of what is behind it."""
     if sources.is_address(path):
-        return sources.fetched(str(path))
+        return sources.fetched(str(path), limits)
     try:
         archive = next((above for above in Path(path).parents if above.is_file()), None)
     except (TypeError, ValueError, OSError):
         return path  # Reading it reports what is wrong.
     if archive is None:
         return path
-    return sources.unzipped_member(archive, Path(path).relative_to(archive).as_posix())
+    return sources.unzipped_member(archive, Path(path).relative_to(archive).as_posix(), limits)
 
 
-def _only_log(path: str | os.PathLike[str], head: Head) -> str | os.PathLike[str]:
+def _only_log(path: str | os.PathLike[str], head: Head, limits: Limits) -> str | os.PathLike[str]:
     """Return a copy of the only log in a zip archive; the path itself for other files."""
-    inside = _logs_in_folder(Path(path)) if head.is_directory else _logs_in_archive(path, head)
+    if head.is_directory:
+        inside = _logs_in_folder(Path(path), limits)
+    else:
+        inside = _logs_in_archive(path, head, limits)
     first = list(islice(inside, 4))
     if len(first) == 1 and not head.is_directory:
-        return sources.unzipped_member(path, first[0].removeprefix(f"{path}/"))
+        return sources.unzipped_member(path, first[0].removeprefix(f"{path}/"), limits)
     if first or head.is_directory:
         some = f": {', '.join(first[:3])}{', …' if len(first) > 3 else ''}" if first else ""
         what = "is a directory" if head.is_directory else "holds several logs"
@@ -143,7 +154,10 @@ def _only_log(path: str | os.PathLike[str], head: Head) -> str | os.PathLike[str
     return path
 
 
-def find_logs(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:
+def find_logs(
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    limits: Mapping[str, int] | None = None,
+) -> list[str]:
     """Expand folders, patterns, and archives of several logs into the logs that they hold.
 
     Parameters
@@ -153,6 +167,8 @@ def find_logs(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) 
         ``day*/**/*.bag``; zip archives; addresses of any of these but archives. Of folders,
         patterns and archives what is no log is left out: files are recognised by what they hold,
         or by an ending that only logs have; those at addresses by their ending alone.
+    limits : mapping, optional
+        As for :func:`open_log`: ``members`` bounds archives.
 
     Returns
     -------
@@ -175,30 +191,31 @@ def find_logs(paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) 
     ['a.csv', 'b.csv']
     """
     paths = [paths] if isinstance(paths, (str, os.PathLike)) else paths
-    return list(dict.fromkeys(log for path in paths for log in _expanded(path)))
+    most = Limits.of(limits)
+    return list(dict.fromkeys(log for path in paths for log in _expanded(path, most)))
 
 
-def _expanded(path: str | os.PathLike[str]) -> list[str]:
+def _expanded(path: str | os.PathLike[str], limits: Limits) -> list[str]:
     if sources.is_address(path):
         names = sources.listed(str(path))
         logs = names if names == [path] else [name for name in names if _has_ending(name)]
     elif Path(path).is_dir():
-        logs = list(_logs_in_folder(Path(path)))
+        logs = list(_logs_in_folder(Path(path), limits))
     elif not os.path.lexists(path) and glob.has_magic(str(path)):
         matches = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207
-        logs = [log for match in matches for log in _logs_at(Path(match))]
+        logs = [log for match in matches for log in _logs_at(Path(match), limits)]
     else:
-        return _logs_in_file(path, is_named=True)
+        return _logs_in_file(path, limits, is_named=True)
     if not logs:
         raise LogError(path, "holds no log")
     return logs
 
 
-def _logs_at(path: Path) -> Iterable[str]:
-    return _logs_in_folder(path) if path.is_dir() else _logs_in_file(path)
+def _logs_at(path: Path, limits: Limits) -> Iterable[str]:
+    return _logs_in_folder(path, limits) if path.is_dir() else _logs_in_file(path, limits)
 
 
-def _logs_in_folder(folder: Path) -> Iterator[str]:
+def _logs_in_folder(folder: Path, limits: Limits) -> Iterator[str]:
     """Yield the logs in a folder and those in it; one that is a log itself is not looked into."""
     if _recognised(Head(folder, b"", is_directory=True)):
         yield str(folder)
@@ -210,10 +227,12 @@ def _logs_in_folder(folder: Path) -> Iterator[str]:
     for path in inside:
         # Links to folders may lead round in circles.
         if not path.name.startswith(".") and not (path.is_dir() and path.is_symlink()):
-            yield from _logs_at(path)
+            yield from _logs_at(path, limits)
 
 
-def _logs_in_file(path: str | os.PathLike[str], *, is_named: bool = False) -> list[str]:
+def _logs_in_file(
+    path: str | os.PathLike[str], limits: Limits, *, is_named: bool = False
+) -> list[str]:
     """Return the logs in an archive of several, else the file itself if it is a log or named."""
     file = Path(path)
     name = file.name.lower().removesuffix(".gz")
@@ -221,7 +240,7 @@ def _logs_in_file(path: str | os.PathLike[str], *, is_named: bool = False) -> li
     inside: list[str] = []
     try:
         head = sources.read_head(path)
-        inside = list(_logs_in_archive(path, head))
+        inside = list(_logs_in_archive(path, head, limits))
         is_log = is_log or bool(inside) or _recognised(head) is not None
     except LogError:
         # Opening a log that is broken or must not be read reports that.
@@ -235,9 +254,9 @@ def _has_ending(name: str) -> bool:
     return _by_ending(name) is not None or name.lower().endswith(".zip")
 
 
-def _logs_in_archive(path: str | os.PathLike[str], head: Head) -> Iterator[str]:
+def _logs_in_archive(path: str | os.PathLike[str], head: Head, limits: Limits) -> Iterator[str]:
     """Yield the logs in a zip archive, as paths behind that of the archive; none of other files."""
     if head.data.startswith(sources.ZIP) and not head.is_gzip and _recognised(head) is None:
-        for name, member in sources.member_heads(path):
+        for name, member in sources.member_heads(path, limits):
             if _recognised(member):
                 yield f"{path}/{name}"

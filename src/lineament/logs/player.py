@@ -46,7 +46,7 @@ class PlayerLog(LineLog):
             return LaserScan(
                 read["ranges"],
                 read["first"],
-                snap(read["step"]),
+                snap(read["step"]) or read["step"],
                 range_max=read["limit"] or float("inf"),
                 stamp=float(line.split(None, 1)[0]),
                 frame_id=f"laser:{read['index']:g}",

@@ -29,7 +29,7 @@ class RosLog(Log):
     needs_seek = True
 
     def _open(self) -> None:
-        self._decoders = decoders(self.options.echo, self.options.ring)
+        self._decoders = decoders(self.options.echo, self.options.ring, self.limits)
         self._bags = self._open_bags()
         self._counts: Counter[Connection] = Counter()
         for bag in self._bags:
@@ -102,7 +102,7 @@ class RosLog(Log):
         if self.options.pose_topic is None:
             return None
         try:
-            finder = PoseFinder(self.options.pose_topic)
+            finder = PoseFinder(self.options.pose_topic, self.limits)
         except ValueError as error:
             raise LogError(self.name, str(error)) from None
         if finder.topic not in self._topics_of(finder.types):

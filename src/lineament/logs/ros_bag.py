@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from ..errors import LogError
+from ..limits import LIMITS, Limits
 from ..rosmsg.wire import Buffer
 from .lines import reading
-
-#: Largest chunk, record or message that is held in memory [bytes].
-MAX_PIECE = 1 << 28
 
 #: Compressions of chunks.
 _CODECS = ("bz2", "lz4", "zstd")
@@ -32,20 +30,24 @@ class Connection(NamedTuple):
     publisher: str = ""
 
     @classmethod
-    def named(cls, topic: str, kind: str, encoding: str, publisher: str = "") -> Self:
+    def named(
+        cls, limits: Limits, topic: str, kind: str, encoding: str, publisher: str = ""
+    ) -> Self:
         """Make a connection from the names in a bag; ``sensor_msgs/msg/LaserScan`` of ROS 2 too.
 
-        Letters that cannot be printed come from damage, and go: errors are one line.
+        Letters that cannot be printed come from damage, and go: errors are one line. ValueError if
+        a name is longer than the limit.
         """
         names = topic, kind.replace("/msg/", "/"), encoding, publisher
+        limits.check("name", max(map(len, names)))
         return cls(*("".join(filter(str.isprintable, name)) for name in names))
 
 
 class Bag(ABC):
     """One file of messages; its ``str`` is what errors call it."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = path
+    def __init__(self, path: str | os.PathLike[str], limits: Limits = LIMITS) -> None:
+        self.path, self.limits = path, limits
 
     @abstractmethod
     def messages(
@@ -64,8 +66,14 @@ class Bag(ABC):
 class RecordReader(ABC):
     """Reads a file of records once, those on `topics` or all; it has reached byte `at`."""
 
-    def __init__(self, path: str | os.PathLike[str], topics: Collection[str] | None = None) -> None:
-        self.path, self.at, self._topics = path, 0, topics
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        topics: Collection[str] | None = None,
+        limits: Limits = LIMITS,
+    ) -> None:
+        self.path, self.at, self._topics, self.limits = path, 0, topics, limits
+        self._unpacked = 0
         self._connections: dict[int, Connection | None] = {}
         with reading(path):
             self._file = Path(path).open("rb")  # noqa: SIM115 (closed by __exit__)
@@ -124,8 +132,7 @@ class RecordReader(ABC):
     def take(self, n: int, what: str) -> bytes:
         """Read the next `n` bytes; LogError if they are not all there, or too many."""
         self._check(n, what)
-        if n > MAX_PIECE:
-            raise self.wrong(f"{what} has {n} bytes, expected at most {MAX_PIECE >> 20} MiB")
+        self.limits.check("piece", n, self.wrong)
         try:
             data = self._file.read(n)
         except OSError as error:
@@ -150,6 +157,12 @@ class RecordReader(ABC):
         """Make an error that says where in the file it is."""
         return LogError(self.path, f"byte {self.at}: {problem}")
 
+    def unpack(self, codec: str, data: Buffer, size: int) -> Buffer:
+        """Decompress a chunk, see `decompress`; all of them may grow by so much, and no more."""
+        self.limits.check_growth(self._unpacked + size, self.at)
+        self._unpacked += size
+        return decompress(codec, data, size, self.limits)
+
     def _check(self, n: int, what: str) -> None:
         if n > self.left:
             raise self.wrong(f"is cut off: {what} has {n} bytes, {self.left} are left")
@@ -158,15 +171,17 @@ class RecordReader(ABC):
 class RecordBag(Bag):
     """A bag that is a chain of records, some of them chunks; its index is used for counts alone."""
 
-    def __init__(self, path: str | os.PathLike[str], reader: type[RecordReader]) -> None:
-        super().__init__(path)
+    def __init__(
+        self, path: str | os.PathLike[str], reader: type[RecordReader], limits: Limits = LIMITS
+    ) -> None:
+        super().__init__(path, limits)
         self._reader = reader
 
     def messages(
         self, topics: Collection[str] | None, fault: Fault
     ) -> Iterator[tuple[Connection, Buffer]]:
         """Read the messages in the order of the file; see `Bag`."""
-        with self._reader(self.path, topics) as reader:
+        with self._reader(self.path, topics, self.limits) as reader:
             try:
                 for at, head, data in reader.records():
                     try:
@@ -182,7 +197,10 @@ class RecordBag(Bag):
 
     def counts(self) -> Counter[Connection]:
         """Count the messages of each connection: by the index where there is one; see `Bag`."""
-        with self._reader(self.path) as reader, suppress(LogError, ValueError, struct.error):
+        with (
+            self._reader(self.path, None, self.limits) as reader,
+            suppress(LogError, ValueError, struct.error),
+        ):
             counts = reader.indexed_counts()
             if counts:
                 return counts
@@ -195,19 +213,18 @@ class RecordBag(Bag):
         return counted
 
 
-def decompress(codec: str, data: Buffer, size: int) -> Buffer:
+def decompress(codec: str, data: Buffer, size: int, limits: Limits = LIMITS) -> Buffer:
     """Decompress a chunk that says how large it becomes [bytes], and never more than that.
 
     ValueError if the codec is not known, the data is broken, or its size is another or too large.
     """
-    if size > MAX_PIECE:
-        raise ValueError(f"chunk of {size} bytes, expected at most {MAX_PIECE >> 20} MiB")
+    limits.check("piece", size)
     if codec in ("", "none"):
         plain = data
     elif codec in _CODECS:
         try:
             # One byte more than expected is asked for, so that a chunk that is longer shows.
-            plain = _decompressed(codec, data, size + 1)
+            plain = _decompressed(codec, data, size + 1, limits)
         # The libraries have their own errors: RuntimeError, OSError, ZstdError, EOFError.
         except Exception as error:
             raise ValueError(f"{codec} data is broken: {error}") from None
@@ -218,7 +235,7 @@ def decompress(codec: str, data: Buffer, size: int) -> Buffer:
     return plain
 
 
-def _decompressed(codec: str, data: Buffer, most: int) -> bytes:
+def _decompressed(codec: str, data: Buffer, most: int, limits: Limits) -> bytes:
     if codec == "bz2":
         from bz2 import BZ2Decompressor
 
@@ -230,4 +247,4 @@ def _decompressed(codec: str, data: Buffer, most: int) -> bytes:
     from zstandard import ZstdDecompressor
 
     # Its one-shot function trusts the size in the frame's own header; a stream does not.
-    return ZstdDecompressor(max_window_size=MAX_PIECE).stream_reader(data).read(most)
+    return ZstdDecompressor(max_window_size=limits.piece).stream_reader(data).read(most)

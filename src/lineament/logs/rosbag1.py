@@ -5,10 +5,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from ..errors import LogError
+from ..limits import Limits
 from ..rosmsg.wire import Buffer
 from .base import Head
 from .ros import RosLog
-from .ros_bag import Bag, Connection, RecordBag, RecordReader, decompress
+from .ros_bag import Bag, Connection, RecordBag, RecordReader
 
 _MAGICS = (b"#ROSBAG V2.0\n", b"#ROSRECORD V1.2\n", b"#ROSRECORD V1.1\n")
 _WORD = struct.Struct("<I")
@@ -29,7 +30,7 @@ class Rosbag1Log(RosLog):
     endings = (".bag", ".bag.active", ".bag.orig.active")
 
     def _open_bags(self) -> list[Bag]:
-        return [RecordBag(self.source, _Reader)]
+        return [RecordBag(self.source, _Reader, self.limits)]
 
     @classmethod
     def recognises(cls, head: Head) -> bool:
@@ -47,6 +48,9 @@ class _Reader(RecordReader):
             at = self.at
             header, data = self._record()
             has_index = has_index or _code(header) in (_CONNECTION, _CHUNK_INFO)
+            # That of an empty bag is empty, too.
+            end = struct.pack("<Q", self.at)
+            has_index = has_index or (_code(header) == _BAG and header.get(b"index_pos") == end)
             yield at, header, data
         if not has_index:
             raise self.wrong("ends without an index: it is cut off, or still recorded")
@@ -56,12 +60,12 @@ class _Reader(RecordReader):
             yield head, data
             return
         size = _word(head, b"size")
-        plain = memoryview(decompress(_text(head, b"compression"), data, size))
+        plain = memoryview(self.unpack(_text(head, b"compression"), data, size))
         at = 0
         while at < size:
             fields, at = _piece(plain, at)
             message, at = _piece(plain, at)
-            inner = _fields(fields)
+            inner = _fields(fields, self.limits)
             if _code(inner) not in (_MESSAGE, _CONNECTION):
                 raise ValueError(f"chunk has a record of code {_code(inner)} in it")
             yield inner, message
@@ -74,12 +78,12 @@ class _Reader(RecordReader):
                 connection = self.sender(number)
             else:  # Version 1: each message says all about itself.
                 names = _text(head, b"topic"), _text(head, b"type"), "ros1"
-                connection = self.wanted(Connection.named(*names))
+                connection = self.wanted(Connection.named(self.limits, *names))
             return connection and (connection, data)
         if code == _CONNECTION:
-            fields = {b"callerid": b""} | _fields(data)
+            fields = {b"callerid": b""} | _fields(data, self.limits)
             names = _text(head, b"topic"), _text(fields, b"type"), "ros1"
-            connection = Connection.named(*names, _text(fields, b"callerid"))
+            connection = Connection.named(self.limits, *names, _text(fields, b"callerid"))
             self.note(_word(head, b"conn"), connection)
         return None
 
@@ -112,7 +116,7 @@ class _Reader(RecordReader):
         """Read one record; without its data where that is of no interest."""
         (size,) = _WORD.unpack(self.take(4, "length of a header"))
         try:
-            header = _fields(self.take(size, "header of a record"))
+            header = _fields(self.take(size, "header of a record"), self.limits)
             code = _code(header)
         except ValueError as error:
             raise self.wrong(str(error)) from None
@@ -129,8 +133,9 @@ class _Reader(RecordReader):
         return header, b""
 
 
-def _fields(data: Buffer) -> _Header:
+def _fields(data: Buffer, limits: Limits) -> _Header:
     """Split the header of a record into its fields ``name=value``."""
+    limits.check("line", len(data))
     fields: _Header = {}
     raw, at = bytes(data), 0
     while at < len(raw):

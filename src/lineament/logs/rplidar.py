@@ -14,7 +14,7 @@ from ..errors import LogError
 from ..scan import LaserScan, Pose
 from .base import Head, Log
 from .bearings import by_bearing
-from .json_stream import MAX_OBJECT, json_objects
+from .json_stream import json_objects
 
 _NUMBER = rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _BEGINNING = re.compile(
@@ -29,10 +29,11 @@ class RplidarLog(Log):
 
     format = "rplidar"
     description = "RPLIDAR JSON ([range, angle] or [x, y] of units)"
+    is_held = True
     endings = (".json",)
 
     def _open(self) -> None:
-        found = next(json_objects(self.source), None)
+        found = next(json_objects(self.source, self.limits), None)
         if isinstance(found, LogError):
             raise found.fresh()
         # A name is shown in messages, of one line each.
@@ -59,7 +60,7 @@ class RplidarLog(Log):
         return len(self._wanted)
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
-        transforms = _read_transforms(self.path.parent / _TRANSFORMS)
+        transforms = _read_transforms(self.path.parent / _TRANSFORMS, self.limits.line)
         for unit in self._wanted:
             yield from self._made(unit, f"unit {unit}: ", self._scan, unit, transforms)
 
@@ -94,13 +95,13 @@ def _polar(pairs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     return np.hypot(first, second), np.arctan2(second, first)
 
 
-def _read_transforms(path: Path) -> dict[str, Any]:
+def _read_transforms(path: Path, most: int) -> dict[str, Any]:
     """Read the matrices beside the scans; none where there is no such file, or another one."""
     if not path.is_file():
         return {}
     try:
         with path.open("rb") as file:
-            found = json.loads(file.read(MAX_OBJECT))
+            found = json.loads(file.read(most))
     except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 from ..errors import LogError, needs
+from ..limits import LIMITS, Limits
 from .base import Head
 from .lines import BOM, GZIP, chunks, decompressed, opened, reading
 
@@ -23,13 +24,6 @@ from .lines import BOM, GZIP, chunks, decompressed, opened, reading
 ZIP = b"PK\x03\x04"
 #: How much of a file is looked at to find its format [bytes].
 HEAD_SIZE = 1 << 16
-#: Members of an archive that are looked at.
-MAX_MEMBERS = 10_000
-#: Largest temporary copy [bytes].
-MAX_COPY = 1 << 34
-#: What grows by more than so, and beyond `SMALL_COPY` bytes, when it is unpacked is no log.
-MAX_RATIO = 300
-SMALL_COPY = 1 << 28
 
 _PIECE = 1 << 20
 
@@ -71,10 +65,10 @@ def _head_of(where: Path, name: object, read: Callable[[int], bytes]) -> Head:
 class LocalCopy(os.PathLike[str]):
     """A temporary file under the name that a person knows it by; it goes when this object does.
 
-    ``str`` gives the name, ``os.fspath`` the path. `packed` is the size before it was unpacked.
+    ``str`` gives the name, ``os.fspath`` the path.
     """
 
-    def __init__(self, name: str, pieces: Iterable[bytes], packed: int | None = None) -> None:
+    def __init__(self, name: str, pieces: Iterable[bytes], limits: Limits = LIMITS) -> None:
         # In a separate folder: what a reader looks for beside its log is not there.
         folder = tempfile.mkdtemp(prefix="lineament-")
         self.remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
@@ -84,10 +78,7 @@ class LocalCopy(os.PathLike[str]):
             with Path(self._path).open("wb") as file:
                 for piece in pieces:
                     size += len(piece)
-                    if size > MAX_COPY:
-                        raise LogError(name, f"is larger than {MAX_COPY >> 30} GiB unpacked")
-                    if packed is not None:
-                        check_growth(name, size, packed)
+                    limits.check("copy", size, partial(LogError, name))
                     try:
                         file.write(piece)
                     except OSError as error:
@@ -104,39 +95,30 @@ class LocalCopy(os.PathLike[str]):
         return self._name
 
 
-def check_growth(name: object, size: int, packed: int) -> None:
-    """Refuse with a LogError what is no log but a bomb, by its size after and before."""
-    if size > max(SMALL_COPY, MAX_RATIO * packed):
-        raise LogError(name, f"unpacks to more than {MAX_RATIO} times its size, expected a log")
-
-
-def unzip(path: str | os.PathLike[str], *, keep_going: bool = False) -> LocalCopy:
+def unzip(path: str | os.PathLike[str], limits: Limits, *, keep_going: bool = False) -> LocalCopy:
     """Copy what a gzip file holds: up to a break in it, if asked to keep going, else LogError."""
 
     def pieces() -> Iterator[bytes]:
         try:
-            yield from chunks(path)
+            yield from chunks(path, limits)
         except LogError:
             if not keep_going:  # Else the reader of the copy reports that it ends early.
                 raise
 
-    with reading(path):
-        packed = Path(path).stat().st_size
-    return LocalCopy(str(path), pieces(), packed)
+    return LocalCopy(str(path), pieces(), limits)
 
 
 # Zip archives
 
 
-def member_heads(path: str | os.PathLike[str]) -> Iterator[tuple[str, Head]]:
+def member_heads(path: str | os.PathLike[str], limits: Limits) -> Iterator[tuple[str, Head]]:
     """Yield the name and the beginning of each file in an archive, sorted by name.
 
     Files that systems hide there are left out, as are those that cannot be read.
     """
     with _archive(path) as archive:
         names = sorted(info.filename for info in archive.infolist() if not info.is_dir())
-        if len(names) > MAX_MEMBERS:
-            raise LogError(path, f"holds {len(names)} files, expected at most {MAX_MEMBERS}")
+        limits.check("members", len(names), partial(LogError, path))
         for name in filter(_is_shown, names):
             try:
                 with archive.open(name) as file:
@@ -154,7 +136,7 @@ def _is_shown(name: str) -> bool:
     )
 
 
-def unzipped_member(path: str | os.PathLike[str], member: str) -> LocalCopy:
+def unzipped_member(path: str | os.PathLike[str], member: str, limits: Limits) -> LocalCopy:
     """Copy a member of a zip archive; LogError if it is missing, broken or encrypted."""
     name = f"{path}/{member}"
     with _archive(path) as archive:
@@ -162,8 +144,10 @@ def unzipped_member(path: str | os.PathLike[str], member: str) -> LocalCopy:
             info = archive.getinfo(member)
         except KeyError:
             raise LogError(name, "there is no such file in the archive") from None
+        # No more is unpacked than it says.
+        limits.check_growth(info.file_size, info.compress_size, partial(LogError, name))
         with archive.open(info) as file:
-            return LocalCopy(name, iter(partial(file.read, _PIECE), b""), info.compress_size)
+            return LocalCopy(name, iter(partial(file.read, _PIECE), b""), limits)
 
 
 @contextmanager
@@ -189,10 +173,10 @@ def is_address(path: str | os.PathLike[str]) -> bool:
     return isinstance(path, str) and "://" in path
 
 
-def fetched(address: str) -> LocalCopy:
+def fetched(address: str, limits: Limits) -> LocalCopy:
     """Copy what is at an address; LogError if it, fsspec or a driver of fsspec is missing."""
     with _fsspec(address) as fsspec, fsspec.open(address, "rb") as file:
-        return LocalCopy(address, iter(partial(file.read, _PIECE), b""))
+        return LocalCopy(address, iter(partial(file.read, _PIECE), b""), limits)
 
 
 def listed(address: str) -> list[str]:

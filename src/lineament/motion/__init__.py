@@ -1,14 +1,16 @@
 """How the sensor moves: scans without its motion, features followed from scan to scan.
 
+The world is taken to stand still, and corners of kind "edge" are ignored. The velocity of the
+sensor, `Tracker.twist`, is what `lineament.deskew` needs for the next scan.
+
+Examples
+--------
 >>> import lineament as ln
 >>> from lineament.motion import Tracker
 >>> tracker = Tracker()
 >>> features = ln.extract(ln.LaserScan([2.0] * 5, angle_min=-0.02, angle_increment=0.01))
 >>> tracker(features).segments.tolist(), tracker(features).segments.tolist()
 ([0], [0])
-
-The world is taken to stand still, and corners of kind "edge" are ignored. The velocity of the
-sensor, `Tracker.twist`, is what :func:`lineament.deskew` needs for the next scan.
 """
 
 from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_between

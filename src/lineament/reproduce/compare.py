@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import matplotlib.figure
 import numpy as np
@@ -108,15 +109,15 @@ def compare_log(
     index: int = 0,
     methods: Iterable[str] = (),
     *,
-    topic: str | None = None,
-    keep_going: bool = False,
     track: Track = untracked,
+    **reading: Any,
 ) -> Comparison:
     """Compare methods, all by default, on a scan of a log, with times over its first 50 scans.
 
-    Raises LogError if the log cannot be read or has no such scan, ValueError for an unknown method.
+    `reading` is as for `open_log`. Raises LogError if the log cannot be read or has no such scan,
+    ValueError for an unknown method.
     """
-    log = open_log(path, topic=topic, keep_going=keep_going)
+    log = open_log(path, **reading)
     extractors = {name: Extractor(name) for name in methods or METHODS}
     scan, timed = log.scan(index), list(islice(log, _TIMED))
     return compare_scan(scan, extractors, timed, f"{Path(path).name}, scan {index}", track)

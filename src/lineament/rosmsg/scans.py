@@ -8,56 +8,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits import LIMITS, Limits
 from ..scan import LaserScan
+from ..scan.fields import counter_clockwise
 from .wire import Buffer, WireReader
 
 CLOUD = "sensor_msgs/PointCloud2"
 #: Types of ``PointField``: those of numpy, by their number from 1.
 POINT_TYPES = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 _POINT_FIELDS = ("x", "y", "ring", "intensity")
+#: Most fields of a point: a broken message may say that there are billions.
+_MOST_FIELDS = 1000
 
 Array = NDArray[Any]
 Decoder = Callable[[Buffer, str], LaserScan]
 
 
-def decoders(echo: str, ring: int | None) -> dict[str, Decoder]:
+def decoders(echo: str, ring: int | None, limits: Limits = LIMITS) -> dict[str, Decoder]:
     """Return how to decode each type that carries scans; clouds only if `ring` is given."""
     known: dict[str, Decoder] = {
-        "sensor_msgs/LaserScan": laser_scan,
-        "sensor_msgs/MultiEchoLaserScan": partial(multi_echo_scan, echo=echo),
+        "sensor_msgs/LaserScan": partial(laser_scan, limits=limits),
+        "sensor_msgs/MultiEchoLaserScan": partial(multi_echo_scan, echo=echo, limits=limits),
     }
-    return known if ring is None else {**known, CLOUD: partial(ring_scan, ring=ring)}
+    cloud = partial(ring_scan, ring=ring or 0, limits=limits)
+    return known if ring is None else {**known, CLOUD: cloud}
 
 
-def laser_scan(data: Buffer, encoding: str) -> LaserScan:
+def laser_scan(data: Buffer, encoding: str, limits: Limits = LIMITS) -> LaserScan:
     """Decode a ``sensor_msgs/LaserScan``.
 
     The beams of a scanner that turns clockwise (a negative increment) are reversed, so that
-    bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
-    `time_increment`. ValueError if the message is malformed, has no beams, or its fields make no
-    sense together.
+    bearings increase: see `LaserScan.from_message`. ValueError if the message is malformed, has no
+    beams, is beyond a limit, or its fields make no sense together.
     """
-    reader = WireReader(data, encoding)
+    reader = WireReader(data, encoding, limits)
     stamp, frame_id = reader.header()
     *geometry, n = reader.numbers("7fI")
     ranges = reader.floats(n)
+    if n > limits.beams:
+        limits.check("beams", n)
     intensities = reader.floats(reader.count())
     reader.end()
     return _scan(stamp, frame_id, geometry, ranges, intensities if len(intensities) else None)
 
 
-def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserScan:
+def multi_echo_scan(
+    data: Buffer, encoding: str, echo: str = "first", limits: Limits = LIMITS
+) -> LaserScan:
     """Decode one echo of each beam of a ``sensor_msgs/MultiEchoLaserScan``.
 
     The echo is the ``first``, which is the nearest, the ``last``, or the ``strongest``, which has
     the greatest intensity, and is the first where there are no intensities. A beam without echo is
     NaN. ValueError as for `laser_scan`, or if ranges and intensities have different echoes.
     """
-    reader = WireReader(data, encoding)
+    reader = WireReader(data, encoding, limits)
     stamp, frame_id = reader.header()
     *geometry, n = reader.numbers("7fI")
-    echoes, starts, counts = _echoes(reader, n)
-    strengths, _, strength_counts = _echoes(reader, reader.count())
+    echoes, starts, counts = _echoes(reader, n, limits)
+    strengths, _, strength_counts = _echoes(reader, reader.count(), limits)
     reader.end()
     has_strengths = len(strength_counts) > 0
     if has_strengths and not np.array_equal(counts, strength_counts):
@@ -79,7 +87,7 @@ def multi_echo_scan(data: Buffer, encoding: str, echo: str = "first") -> LaserSc
 
 # Clouds may hold anything: infinities are left out below, and a signalling NaN is a NaN.
 @np.errstate(over="ignore", invalid="ignore")
-def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
+def ring_scan(data: Buffer, encoding: str, ring: int, limits: Limits = LIMITS) -> LaserScan:
     """Decode one ring of a ``sensor_msgs/PointCloud2`` as a scan with irregular bearings.
 
     The ring is the points whose field `ring` has that number or, in an organised cloud without
@@ -88,9 +96,9 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     bearing the nearest stays; points that are not finite are left out. ValueError if the message is
     malformed, has no fields x and y, no rings, or no such ring.
     """
-    reader = WireReader(data, encoding)
+    reader = WireReader(data, encoding, limits)
     stamp, frame_id = reader.header()
-    points = _points(reader)
+    points = _points(reader, limits)
     names = points.dtype.names or ()
     numbers = points["ring"] if "ring" in names else None
     if numbers is not None:
@@ -99,6 +107,7 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
         points = points[ring : ring + 1].ravel()
     else:
         raise ValueError("has no field ring and a single row, expected a cloud with rings")
+    limits.check("beams", len(points))
     x, y = (points[name].astype(np.float64) for name in ("x", "y"))
     angles, ranges = np.arctan2(y, x), np.hypot(x, y)
     order = np.lexsort((ranges, angles))
@@ -110,14 +119,13 @@ def ring_scan(data: Buffer, encoding: str, ring: int) -> LaserScan:
     return LaserScan(
         ranges[order],
         angles=angles[order],
-        stamp=stamp,
         frame_id=frame_id,
         intensities=points["intensity"][order] if "intensity" in names else None,
-    )
+    ).stamped(0, stamp)
 
 
 def _scan(
-    stamp: float,
+    stamp: int,
     frame_id: str,
     geometry: Sequence[float],
     ranges: Array,
@@ -125,39 +133,29 @@ def _scan(
 ) -> LaserScan:
     """Make a scan of the fields of LaserScan, whose seven numbers are `geometry`."""
     angle_min, _, increment, time_increment, scan_time, range_min, range_max = geometry
-    n = len(ranges)
-    if n == 0:
+    if len(ranges) == 0:
         raise ValueError("ranges is empty, expected at least one beam")
-    if increment < 0 and n > 1:
-        ranges = ranges[::-1]
-        intensities = None if intensities is None else intensities[::-1]
-        angle_min, increment = angle_min + (n - 1) * increment, -increment
-        stamp, time_increment = stamp + (n - 1) * time_increment, -time_increment
-    return LaserScan(
-        ranges,
-        angle_min,
-        increment,
-        range_min=range_min,
-        range_max=range_max,
-        stamp=stamp,
-        scan_time=scan_time,
-        time_increment=time_increment,
-        frame_id=frame_id,
-        intensities=intensities,
-    )
+    times = {"scan_time": scan_time, "time_increment": time_increment}
+    fields, first = counter_clockwise(ranges, intensities, angle_min, increment, **times)
+    scan = LaserScan(**fields, range_min=range_min, range_max=range_max, frame_id=frame_id)
+    return scan.stamped(first, stamp)
 
 
-def _echoes(reader: WireReader, n: int) -> tuple[Array, Array, Array]:
+def _echoes(reader: WireReader, n: int, limits: Limits) -> tuple[Array, Array, Array]:
     """Take `n` of ``LaserEcho``: all words, where each beam's begin, and how many."""
     # Each beam is the number of its echoes and then they: a chain to be walked.
-    words = reader.words().tolist()
-    if n > len(words):
-        raise ValueError(f"ends early: {n} beams expected in {4 * len(words)} bytes")
+    every = reader.words()
+    words = every[: limits.points].tolist()
+    if n > len(every):
+        raise ValueError(f"ends early: {n} beams expected in {4 * len(every)} bytes")
+    limits.check("beams", n)
     starts: list[int] = []
     counts: list[int] = []
     at = 0
     for _ in range(n):
         if at >= len(words) or at + words[at] >= len(words):
+            if at < len(words) < len(every) > at + words[at]:
+                limits.check("points", at + words[at])
             raise ValueError(f"ends early: beam {len(counts)} of {n} reaches past its end")
         counts.append(words[at])
         starts.append(at + 1)
@@ -165,11 +163,14 @@ def _echoes(reader: WireReader, n: int) -> tuple[Array, Array, Array]:
     return reader.floats(at), np.array(starts, np.int64), np.array(counts, np.int64)
 
 
-def _points(reader: WireReader) -> NDArray[np.void]:
+def _points(reader: WireReader, limits: Limits) -> NDArray[np.void]:
     """Take the rest of a ``PointCloud2``: the fields that matter here, shape (height, width)."""
     height, width = reader.numbers("II")
     fields: dict[str, tuple[int, int]] = {}
-    for _ in range(reader.count()):
+    n_fields = reader.count()
+    if n_fields > _MOST_FIELDS:
+        raise ValueError(f"has {n_fields} fields, expected at most {_MOST_FIELDS}")
+    for _ in range(n_fields):
         name = reader.text()
         offset, (kind,) = reader.count(), reader.numbers("B")
         reader.count()
@@ -187,6 +188,7 @@ def _points(reader: WireReader) -> NDArray[np.void]:
             f"has {len(data)} bytes in {height} rows of {row_step}, expected {width} points of "
             f"{point_step} in each"
         )
+    limits.check("points", height * width)
     formats = []
     for name, (offset, kind) in fields.items():
         if not 1 <= kind <= len(POINT_TYPES):

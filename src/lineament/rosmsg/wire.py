@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits import LIMITS, Limits
+
 Buffer = bytes | memoryview
 
 #: CDR pads the end of a message to full words.
@@ -48,13 +50,14 @@ class WireReader:
     The encoding is ``ros1``, packed and little-endian, or ``cdr`` (XCDR1), whose first four bytes
     say the byte order, and whose numbers are aligned to their size, counted from behind these.
 
-    ValueError if the encoding is another one or, from the methods, if the message ends too early.
+    ValueError if the encoding is another one or, from the methods, if the message ends too early,
+    or a text is longer than the limit of names.
     """
 
-    __slots__ = ("_at", "_data", "_form", "_size")
+    __slots__ = ("_at", "_data", "_form", "_limits", "_size")
 
-    def __init__(self, data: Buffer, encoding: str) -> None:
-        self._data, self._size = data, len(data)
+    def __init__(self, data: Buffer, encoding: str, limits: Limits = LIMITS) -> None:
+        self._data, self._size, self._limits = data, len(data), limits
         if encoding == "ros1":
             self._at, self._form = 0, _ROS1
         elif encoding == "cdr":
@@ -66,10 +69,10 @@ class WireReader:
         else:
             raise _unknown(encoding)
 
-    def header(self) -> tuple[float, str]:
-        """Take a ``std_msgs/Header``: its stamp [s] and its frame."""
+    def header(self) -> tuple[int, str]:
+        """Take a ``std_msgs/Header``: its stamp [ns] and its frame."""
         seconds, nanoseconds, length = self.numbers("header")
-        return seconds + 1e-9 * nanoseconds, self._string(length)
+        return seconds * 1_000_000_000 + nanoseconds, self._string(length)
 
     def numbers(self, code: str) -> tuple[Any, ...]:
         """Take numbers of one size, by the letters of `struct`: B, iI, 7d; or "header"."""
@@ -120,6 +123,8 @@ class WireReader:
 
     def _string(self, length: int) -> str:
         raw = self.raw(length)
+        if length > self._limits.name:
+            self._limits.check("name", length)
         # CDR ends a string with a null byte, and counts it.
         return str(raw[:-1] if self._form.is_cdr else raw, "utf-8", "replace")
 

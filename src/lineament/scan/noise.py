@@ -68,7 +68,9 @@ class RangeNoise:
 
     def range_variance(self, distance: Distance) -> Distance:
         """Variance [m²] of a range of `distance` [m], or of each of an array of them."""
-        return self.sigma**2 + (self.proportional * distance) ** 2 + self.quantum**2 / 12
+        # Products: a power of numbers that are too large raises an error.
+        slope = self.proportional * distance
+        return self.sigma * self.sigma + slope * slope + self.quantum * self.quantum / 12
 
 
 #: A noise, or its sigma [m].

@@ -1,7 +1,7 @@
 """Simulated scans: worlds of walls and columns, ray casting, noisy sensors, drives.
 
 Every random draw comes from a seed that is given, so that a simulated log can be made again.
-The features of a scan that a perfect method would find are those of :func:`truth`.
+The features of a scan that a perfect method would find are those of `truth`.
 
 Examples
 --------

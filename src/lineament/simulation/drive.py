@@ -64,7 +64,7 @@ def drive(
     ----------
     world : World
     waypoints, speed, turn_rate
-        As for :func:`drive_poses`.
+        As for `drive_poses`.
     sensor : Sensor
     seed : int
         Seed of all noise, not negative. Scan i depends on the seed and i alone.
@@ -76,12 +76,12 @@ def drive(
     Returns
     -------
     iterator of LaserScan
-        One scan for each pose of :func:`drive_poses`, with its stamp and its true pose.
+        One scan for each pose of `drive_poses`, with its stamp and its true pose.
 
     Raises
     ------
     ValueError
-        As :func:`drive_poses`, or if the seed is negative; before the first scan.
+        As `drive_poses`, or if the seed is negative; before the first scan.
 
     Examples
     --------

@@ -135,7 +135,7 @@ class Sensor:
         stamp : float
             Time of the first beam [s].
         twist : (v_x, v_y, omega)
-            Velocity of the sensor in its own frame [m/s, m/s, rad/s]; see :meth:`sweep`.
+            Velocity of the sensor in its own frame [m/s, m/s, rad/s]; see `sweep`.
 
         Returns
         -------

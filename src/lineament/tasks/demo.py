@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,12 +34,14 @@ def run_demo(
     folder: str | os.PathLike[str],
     log: str | os.PathLike[str] | None = None,
     *,
+    limits: Mapping[str, int] | None = None,
     track: Track = untracked,
 ) -> list[tuple[str, str]]:
     """Simulate a drive (or take a log), extract its features, and make a page of pictures.
 
     Returns names and values: files and figures. The page is ``index.html``, the table
-    ``features.parquet``. ``track(items, about, total)`` yields the items and shows the progress.
+    ``features.parquet``. ``track(items, about, total)`` yields the items and shows the progress;
+    `limits` are as for `lineament.open_log`.
 
     Raises
     ------
@@ -54,12 +56,12 @@ def run_demo(
         log = target / "drive.npz"
         simulate_log(log, "building", SENSORS["utm30lx"], rate=4.0, seed=1, track=track)
     extractor = Extractor(DEMO_METHODS[0])
-    summary = extract_log(log, target / "features.parquet", extractor, track=track)
+    summary = extract_log(log, target / "features.parquet", extractor, track=track, limits=limits)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
     for name in _PICTURES:  # of another log
         (target / f"{name}.png").unlink(missing_ok=True)
-    pictures = list(track(_draw(target, log, extractor, summary.scans), "drawing", 5))
+    pictures = list(track(_draw(target, log, extractor, summary.scans, limits), "drawing", 5))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
         ("log", str(log)),
@@ -80,7 +82,11 @@ def run_demo(
 
 
 def _draw(
-    target: Path, log: str | os.PathLike[str], extractor: Extractor, total: int
+    target: Path,
+    log: str | os.PathLike[str],
+    extractor: Extractor,
+    total: int,
+    limits: Mapping[str, int] | None,
 ) -> Iterator[tuple[str, Path, bytes]]:
     """Draw one scan, a corner of it, how they were found, other methods, and the drive.
 
@@ -89,7 +95,7 @@ def _draw(
     from ..output import figures
     from ..output.stages import trace_figure
 
-    posed, moments, (index, scan, features) = _drive(log, extractor, total)
+    posed, moments, (index, scan, features) = _drive(log, extractor, total, limits)
     method, drive = extractor.method.name, Path(log).name
     title = figures.scan_title(log, index, scan)
 
@@ -139,7 +145,10 @@ def _draw(
 
 
 def _drive(
-    log: str | os.PathLike[str], extractor: Extractor, total: int
+    log: str | os.PathLike[str],
+    extractor: Extractor,
+    total: int,
+    limits: Mapping[str, int] | None,
 ) -> tuple[
     list[tuple[Pose, Features]], list[tuple[str, LaserScan, Features]], tuple[int, LaserScan, Any]
 ]:
@@ -149,7 +158,7 @@ def _drive(
     """
     posed, moments, most = [], [], -1.0
     kept = set(np.linspace(0, total - 1, _MOMENTS).round().astype(int).tolist())
-    for index, scan in enumerate(open_log(log)):
+    for index, scan in enumerate(open_log(log, limits=limits)):
         features = extractor(scan)
         corners, explained = features.corners, features.segments["n_points"].sum()
         quality = float(np.nansum(corners["quality"][corners["kind"] != "edge"] ** 2))

@@ -85,7 +85,8 @@ def extract_log(
     track : callable
         ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
-        As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``.
+        As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
+        ``limits``.
 
     Raises
     ------

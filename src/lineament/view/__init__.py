@@ -1,4 +1,4 @@
-"""A log in the browser: a local server, its JSON answers, and the page that asks for them."""
+"""Logs in the browser: a local server, its JSON answers, and the page that asks for them."""
 
 from .server import ViewServer, serve
 from .session import Session

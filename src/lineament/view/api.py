@@ -2,19 +2,24 @@
 
 from urllib.parse import parse_qsl
 
+from ..errors import LineamentError
 from ..files import strict_json
 from .session import Session
 
-#: Most stamps in one answer.
-MOST_STAMPS = 4096
+#: Largest values of the parameters that bound an answer, by route.
+MOST = {"/api/stamps": 4096, "/api/poses": 4096, "/api/drive": 32}
 #: No whole number in a request has more digits.
 _MOST_DIGITS = 12
 #: By path: who answers, and the parameters, all of which are needed.
 _ROUTES = {
-    "/api/log": (Session.facts, ()),
-    "/api/stamps": (Session.stamps, ("first", "count")),
-    "/api/scan": (Session.scan, ("i", "method")),
-    "/api/trace": (Session.trace, ("i", "method", "beam")),
+    "/api/logs": (Session.logs, ()),
+    "/api/log": (Session.facts, ("log",)),
+    "/api/stamps": (Session.stamps, ("log", "first", "count")),
+    "/api/poses": (Session.poses, ("log", "first", "count")),
+    "/api/drive": (Session.drive, ("log", "first", "step", "count")),
+    "/api/scan": (Session.scan, ("log", "i", "method")),
+    "/api/trace": (Session.trace, ("log", "i", "method", "beam")),
+    "/api/npz": (Session.npz, ("log", "i")),
 }
 
 
@@ -29,29 +34,39 @@ class RequestError(Exception):
 def answer(session: Session, target: str) -> bytes:
     """Answer a request for ``/api/...``; RequestError if it makes no sense or nothing is there.
 
-    - ``/api/log``: what the log is, and how much of it has been read.
-    - ``/api/stamps?first=&count=``: stamps of some scans.
-    - ``/api/scan?i=&method=``: a scan and what a method finds in it.
-    - ``/api/trace?i=&method=&beam=``: what became of a beam.
+    Answers are JSON, but for that of ``/api/npz``. Logs are named by number, never by path.
+
+    - ``/api/logs``: the names of logs and methods.
+    - ``/api/log?log=``: what a log is, and how much of it has been read.
+    - ``/api/stamps?log=&first=&count=``, ``/api/poses?...``: stamps, poses of some scans.
+    - ``/api/drive?log=&first=&step=&count=``: poses and points of every so many scans.
+    - ``/api/scan?log=&i=&method=``: a scan and what a method finds in it.
+    - ``/api/trace?log=&i=&method=&beam=``: what became of a beam.
+    - ``/api/npz?log=&i=``: a scan as a log.
     """
     path, query = _split(target)
     if path not in _ROUTES:
-        raise RequestError(404, f"{path[:80]} is not there, expected {', '.join(_ROUTES)}")
+        raise RequestError(404, f"{path[:80]!r} is not there, expected {', '.join(_ROUTES)}")
     reply, names = _ROUTES[path]
     for name in query:
         if name not in names:
             expected = ", ".join(names) or "none"
             raise RequestError(400, f"parameter {name[:40]!r} is unknown, expected {expected}")
     values = {name: _value(session, name, query) for name in names}
+    if path in MOST and not 1 <= values["count"] <= MOST[path]:  # type: ignore[operator]
+        raise RequestError(400, f"count is {values['count']}, expected 1 to {MOST[path]}")
+    if values.get("step") == 0:
+        raise RequestError(400, "step is 0, expected a whole number ≥ 1")
     try:
         found = reply(session, *values.values())  # type: ignore[operator]
     except IndexError:
-        n = session.facts()["scans"]
+        n = session.facts(values["log"])["scans"]  # type: ignore[arg-type]
         read = f"0 to {n - 1} have been read" if n else "none has been read"
-        raise RequestError(404, f"scan {values['i']} is not there: {read}") from None
-    except ValueError as error:
+        problem = f"scan {values.get('i', 'wanted')} is not there: {read}"
+        raise RequestError(404, problem) from None
+    except (LineamentError, ValueError) as error:
         raise RequestError(404, str(error)) from None
-    return strict_json(found).encode()
+    return found if isinstance(found, bytes) else strict_json(found).encode()
 
 
 def _split(target: str) -> tuple[str, dict[str, str]]:
@@ -78,6 +93,4 @@ def _value(session: Session, name: str, query: dict[str, str]) -> int | str:
         return text
     if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
         raise RequestError(400, f"{name} is {text[:40]!r}, expected a whole number ≥ 0")
-    if name == "count" and not 1 <= int(text) <= MOST_STAMPS:
-        raise RequestError(400, f"count is {text}, expected 1 to {MOST_STAMPS}")
     return int(text)

@@ -25,7 +25,7 @@ _TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-_JSON = "application/json; charset=utf-8"
+_JSON, _BYTES = "application/json; charset=utf-8", "application/octet-stream"
 _HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
@@ -120,7 +120,8 @@ class _Handler(BaseHTTPRequestHandler):
         if path in self.server.page:
             ending = path[path.rindex(".") :] if path != "/" else ".html"
             return _TYPES[ending], self.server.page[path]
-        return _JSON, answer(self.server.session, self.path)
+        kind = _BYTES if path == "/api/npz" else _JSON
+        return kind, answer(self.server.session, self.path)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Send what is wrong as JSON."""
@@ -158,7 +159,7 @@ def serve(
     with session, ViewServer(session, host, port) as server:
         address = _address(host)
         if host != "localhost" and not (address and address.is_loopback):
-            warning = f"{host} is not loopback: anybody who can reach it can look at this log"
+            warning = f"{host} is not loopback: anybody who can reach it can look at these logs"
             print(f"lineament: {warning}", file=sys.stderr, flush=True)
         write(f"{session.name}: look at {server.address} (Ctrl-C ends it)")
         if browser:

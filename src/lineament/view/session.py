@@ -1,99 +1,123 @@
-"""What the page asks for: a log, its scans, and what methods find in them."""
+"""What the page asks for: logs, their scans, and what methods find in them."""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import LineamentError
 from ..explain.explain import explain
 from ..extractor import Extractor
-from ..logs import open_log
+from ..logs import find_logs
 from ..progress import compiling_now
 from ..scan import LaserScan
-from .store import ScanStore
+from .shown import ShownLog
+
+#: Logs that are kept open; of more, the one that was asked for least recently is closed.
+KEPT = 4
+#: Room for the scans of all open logs in temporary files [bytes].
+ROOM = 1 << 30
 
 
 class Session:
-    """A log that is looked at, with one extractor for each method.
+    """The logs that are looked at, with one extractor for each method.
 
-    The page shows the extractors by their names, the first of them first. The log is read as by
-    `lineament.open_log`; a LogError if it cannot be read up to its first scan.
+    The logs are those that `lineament.logs.find_logs` finds when the session is made, named by
+    their number from 0 on; each is opened when it is first asked for, the first at once where
+    there is no other. The page shows the extractors by their names, the first of them first.
+
+    Raises a LogError if no log is found, or the only one cannot be read up to its first scan.
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], extractors: Mapping[str, Extractor], **reading: Any
+        self,
+        paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+        extractors: Mapping[str, Extractor],
+        **reading: Any,
     ) -> None:
+        paths = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
         self.extractors = dict(extractors)
         self._busy = {name: threading.Lock() for name in self.extractors}
-        self._log = open_log(path, **reading)
-        self._log.scan(0)
-        self.name = self._log.name
-        self._total: int | None = None
-        self._error = ""
-        # Another log, as each iteration counts its faults anew.
-        self._store = ScanStore(lambda: open_log(path, **reading).items())
-        self._reader = threading.Thread(target=self._fill, name="reader of the log", daemon=True)
+        self._paths, self._reading = find_logs(paths), reading
+        self.name = ", ".join(map(str, paths))
+        self._open: dict[int, ShownLog] = {}  # the one that was asked for last is the last
+        self._opening = threading.Lock()
+        if len(self._paths) == 1:
+            self.log(0)
+        else:
+            self.name += f" ({len(self._paths)} logs)"
 
     def __enter__(self) -> Session:
-        self._reader.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._store.close()
+        with self._opening:
+            while self._open:
+                self._open.popitem()[1].close()
+
+    def log(self, number: int) -> ShownLog:
+        """Return a log, opened if it is not; ValueError if there is none of that number."""
+        if number >= len(self._paths):
+            last = len(self._paths) - 1
+            raise ValueError(f"log {number} is not there, expected a whole number from 0 to {last}")
+        with self._opening:
+            shown = self._open.pop(number, None)
+            if shown is None:
+                room = ROOM // min(len(self._paths), KEPT)
+                shown = ShownLog(self._paths[number], room, self._reading)
+            self._open[number] = shown
+            if len(self._open) > KEPT:
+                self._open.pop(next(iter(self._open))).close()
+            return shown
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Wait until the log is read; return whether it is."""
-        self._reader.join(seconds)
-        return not self._reader.is_alive()
+        """Wait until the logs that are open are read; return whether they are."""
+        return all(shown.wait(seconds) for shown in list(self._open.values()))
 
-    def facts(self) -> dict[str, Any]:
-        """Return what is known of the log, and how far it has been read."""
-        return {
-            "name": Path(self.name).name,
-            "format": self._log.format,
-            "methods": list(self.extractors),
-            "scans": len(self._store),
-            "total": self._total,
-            "complete": not self._reader.is_alive(),
-            "error": self._error,
-            "skipped": self._log.skipped,
-            "faults": list(self._log.faults),
-            "compiling": compiling_now(),
-        }
+    def logs(self) -> dict[str, Any]:
+        """Return the names of all logs, without the folder that they share, and of the methods."""
+        shared = os.path.commonprefix(self._paths)  # noqa: RUF071  # cut at a folder below
+        start = max(shared.rfind(sign) for sign in ("/", os.sep)) + 1
+        names = [path[start:] for path in self._paths]
+        return {"name": self.name, "logs": names, "methods": list(self.extractors)}
 
-    def stamps(self, first: int, count: int) -> dict[str, Any]:
+    def facts(self, log: int) -> dict[str, Any]:
+        """Return what is known of a log, and how far it has been read."""
+        return self.log(log).facts() | {"compiling": compiling_now()}
+
+    def stamps(self, log: int, first: int, count: int) -> dict[str, Any]:
         """Return the stamps of some scans [s]."""
-        return {"first": first, "stamps": self._store.stamps(first, count)}
+        return {"first": first, "stamps": self.log(log).store.stamps(first, count)}
 
-    def scan(self, index: int, method: str) -> dict[str, Any]:
+    def poses(self, log: int, first: int, count: int) -> dict[str, Any]:
+        """Return the poses of some scans (m, m, rad); NaN where there is none."""
+        return {"first": first, "poses": self.log(log).store.poses(first, count)}
+
+    def drive(self, log: int, first: int, step: int, count: int) -> dict[str, Any]:
+        """Return poses and points of every `step`-th scan; see `ShownLog.drive`."""
+        return self.log(log).drive(first, step, count)
+
+    def npz(self, log: int, index: int) -> bytes:
+        """Return a scan as an npz log; see `ShownLog.npz`."""
+        return self.log(log).npz(index)
+
+    def scan(self, log: int, index: int, method: str) -> dict[str, Any]:
         """Return a scan and what a method finds in it; IndexError if it was not read."""
-        topic, scan = self._store.item(index)
+        topic, scan = self.log(log).store.item(index)
         with self._busy[method]:
             features = self.extractors[method](scan).to_dict()
         return {"index": index, "method": method, "topic": topic} | _beams(scan) | features
 
-    def trace(self, index: int, method: str, beam: int) -> dict[str, Any]:
+    def trace(self, log: int, index: int, method: str, beam: int) -> dict[str, Any]:
         """Return what became of a beam; ValueError if it is not there, IndexError for the scan."""
-        _, scan = self._store.item(index)
+        _, scan = self.log(log).store.item(index)
         with self._busy[method]:
             trace = self.extractors[method].trace(scan)
         return {"index": index, "method": method, **asdict(explain(trace, beam))}
-
-    def _fill(self) -> None:
-        try:
-            self._total = len(self._log)
-            self._store.fill(self._log.items())
-        except LineamentError as error:
-            self._error = str(error)
-        except Exception as error:  # Nobody else could report it: the page does.
-            self._error = f"reading ended: {type(error).__name__}: {error}"
 
 
 def _beams(scan: LaserScan) -> dict[str, Any]:

@@ -17,7 +17,8 @@ from ..scan import LaserScan
 Item = tuple[str, LaserScan]
 
 _NOT_KEPT = -1
-#: What is kept of a scan besides ranges and bearings; intensities are not.
+_NO_POSE = (float("nan"),) * 3
+#: What is kept of a scan besides ranges, intensities and bearings.
 _FIELDS = ("range_min", "range_max", "stamp", "scan_time", "time_increment", "frame_id", "pose")
 
 
@@ -25,7 +26,7 @@ class ScanStore:
     """The scans of a log with their topics, by index, while they are still being read.
 
     `fill` takes the items of a log, once. They go to a temporary file without a name, at most
-    `capacity` bytes of it; 16 bytes a scan stay in memory. Scans for which there is no room are
+    `capacity` bytes of it; 40 bytes a scan stay in memory. Scans for which there is no room are
     read from the log again, which is quick forwards, and from the start of the log otherwise.
     """
 
@@ -35,6 +36,8 @@ class ScanStore:
         self._read_again, self._capacity = read_again, capacity
         self._file = tempfile.TemporaryFile()  # noqa: SIM115  # open until `close`
         self._starts, self._stamps, self._end = array("q"), array("d"), 0
+        self._poses = array("d")  # three numbers a scan
+        self.posed = 0  # how many scans have one
         self._closed = False
         self._lock, self._rereading = threading.Lock(), threading.Lock()
         self._ahead: Iterator[Item] = iter(())
@@ -52,6 +55,8 @@ class ScanStore:
                 if self._closed:
                     return
                 self._stamps.append(scan.stamp)
+                self._poses.extend(scan.pose or _NO_POSE)
+                self.posed += scan.pose is not None
                 self._starts.append(self._write(record))
 
     def item(self, index: int) -> Item:
@@ -61,13 +66,18 @@ class ScanStore:
                 raise IndexError(f"scan {index} is not there")
             if self._starts[index] != _NOT_KEPT:
                 self._file.seek(self._starts[index])
-                topic, fields = pickle.load(self._file)
-                return topic, LaserScan(**fields)
+                topic, fields, stamped = pickle.load(self._file)
+                return topic, LaserScan(**fields).stamped(*stamped)
         return self._found_again(index)
 
     def stamps(self, first: int, count: int) -> list[float]:
         """Return the stamps [s] of scans that were read, at most `count` from `first` on."""
         return self._stamps[first : first + count].tolist()
+
+    def poses(self, first: int, count: int) -> list[list[float]]:
+        """Return the poses of scans that were read, NaN without one, as `stamps` does."""
+        poses = self._poses[3 * first : 3 * (first + count)].tolist()
+        return [poses[k : k + 3] for k in range(0, len(poses), 3)]
 
     def close(self) -> None:
         """End `fill`, and remove what was kept."""
@@ -101,13 +111,16 @@ class ScanStore:
 
 
 def _pack(topic: str, scan: LaserScan) -> bytes:
-    """Serialise a scan and its topic, without intensities; nothing of the rest is lost."""
+    """Serialise a scan and its topic; of what a log may hold, the pose's covariance is lost."""
     fields = {name: getattr(scan, name) for name in _FIELDS}
-    # Most sensors report single precision.
-    with np.errstate(over="ignore"):
-        single = scan.ranges.astype(np.float32)
-    is_single = np.array_equal(single, scan.ranges, equal_nan=True)
-    fields["ranges"] = single if is_single else scan.ranges
+    for name in ("ranges", "intensities"):
+        values = getattr(scan, name)
+        if values is not None:
+            # Most sensors report single precision.
+            with np.errstate(over="ignore"):
+                single = values.astype(np.float32)
+            is_single = np.array_equal(single, values, equal_nan=True)
+            fields[name] = single if is_single else values
     names = ("angle_min", "angle_increment") if scan.is_regular else ("angles",)
     fields.update((name, getattr(scan, name)) for name in names)
-    return pickle.dumps((topic, fields))
+    return pickle.dumps((topic, fields, (scan.stamp_beam, scan.stamp_ns)))

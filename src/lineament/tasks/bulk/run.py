@@ -16,7 +16,8 @@ from typing import Any, cast
 from ..._version import __version__
 from ...extractor import Extractor, load_kernels
 from ...features import COUNTED
-from ...files import made_folder
+from ...files import alone_in, made_folder
+from ...limits import Limits
 from ...logs import find_logs, open_log
 from ...logs.base import ReadOptions
 from ...logs.sources import is_address
@@ -84,7 +85,7 @@ def extract_logs(
     logs : path-like, or iterable of them
         As for `find_logs`: files, folders, patterns, archives, addresses.
     folder : path-like
-        The data set; created if missing. One run at a time may write to it.
+        The data set; created if missing. One run at a time writes to it.
     extractor : Extractor
         Method and noise; each worker makes an extractor from them.
     executor : concurrent.futures.Executor, optional
@@ -100,12 +101,14 @@ def extract_logs(
     show : callable
         ``show(text)`` is called twice a second with the progress.
     **reading
-        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``.
+        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
+        ``limits``.
 
     Raises
     ------
     LineamentError
-        If no logs are found, or the folder or its manifest cannot be written.
+        If no logs are found, the folder or its manifest cannot be written, or another run writes
+        into it.
     ValueError
         If `reading` makes no sense.
 
@@ -127,27 +130,28 @@ def extract_logs(
     if executor is None or isinstance(executor, Threads):  # once here, not in each process
         load_kernels([extractor])
     started = time.perf_counter()
-    found = [full_path(log) for log in find_logs(logs)]
-    manifest = Manifest(made_folder(folder))
-    names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
-    configuration = _configuration(extractor, settings) | ({"world": True} if world else {})
-    rows = [
-        Row(
-            log=log,
-            name=name,
-            output=part_path(name, ending),
-            version=__version__,
-            configuration=configuration,
-        )
-        for log, name in names.items()
-    ]
-    todo = _unfinished(rows, manifest) if resume else rows
-    home = os.path.abspath(folder)  # noqa: PTH100
-    method, noise = extractor.method, extractor.noise
-    tasks = [Task(row, home, method, noise, settings, world) for row in todo]
-    manifest.rows |= {row.log: row for row in todo}
-    with Threads() if executor is None else nullcontext(executor) as workers:
-        _run(tasks, workers, manifest, show)
+    found = [full_path(log) for log in find_logs(logs, settings["limits"])]
+    with alone_in(made_folder(folder)):
+        manifest = Manifest(folder)
+        names = names_of(found, {row.log: row.name for row in manifest.rows.values()})
+        configuration = _configuration(extractor, settings) | ({"world": True} if world else {})
+        rows = [
+            Row(
+                log=log,
+                name=name,
+                output=part_path(name, ending),
+                version=__version__,
+                configuration=configuration,
+            )
+            for log, name in names.items()
+        ]
+        todo = _unfinished(rows, manifest) if resume else rows
+        home = os.path.abspath(folder)  # noqa: PTH100
+        method, noise = extractor.method, extractor.noise
+        tasks = [Task(row, home, method, noise, settings, world) for row in todo]
+        manifest.rows |= {row.log: row for row in todo}
+        with Threads() if executor is None else nullcontext(executor) as workers:
+            _run(tasks, workers, manifest, show)
     done = [manifest.rows[row.log] for row in todo]
     return Bulk(
         folder=str(folder),
@@ -255,7 +259,8 @@ def _settings(reading: dict[str, Any]) -> dict[str, Any]:
         if name not in defaults:
             raise ValueError(f"{name!r} is unknown, expected one of: {', '.join(defaults)}")
     settings = defaults | reading
-    ReadOptions(settings["echo"], settings["ring"], settings["pose_topic"])  # checks them
+    limits = Limits.of(settings["limits"])
+    ReadOptions(settings["echo"], settings["ring"], settings["pose_topic"], limits)  # checks them
     return settings
 
 

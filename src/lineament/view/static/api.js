@@ -1,7 +1,7 @@
 // Questions to the server.
 
-/** Ask for `path` with parameters; an Error with the server's own message where that fails. */
-export async function ask(path, parameters = {}) {
+/** The server's response; an Error with the server's own message where that fails. */
+export async function fetched(path, parameters = {}) {
   const query = new URLSearchParams(parameters).toString();
   let response;
   try {
@@ -9,10 +9,12 @@ export async function ask(path, parameters = {}) {
   } catch {
     throw new Error("The server has ended: start `lineament view` again.");
   }
-  const answer = await response.json();
-  if (!response.ok) throw new Error(answer.error);
-  return answer;
+  if (!response.ok) throw new Error((await response.json()).error);
+  return response;
 }
+
+/** Ask for `path` with parameters. */
+export const ask = async (path, parameters) => (await fetched(path, parameters)).json();
 
 /** Runs one job at a time; of those that wait, only the last is run. */
 export class Latest {

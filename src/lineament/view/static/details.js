@@ -1,6 +1,6 @@
 // Features in numbers: the card at the pointer, the pinned table, the answer to "why?".
 
-import { ellipseOf, isKnown } from "./drawing.js";
+import { ellipseOf, isKnown } from "./geometry.js";
 
 const degrees = (radians) => (radians * 180) / Math.PI;
 const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits) : "–");

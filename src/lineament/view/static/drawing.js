@@ -1,8 +1,9 @@
 // A scan and its features on a canvas.
 
+import { ellipseOf, isKnown, layerOf, seenOf } from "./geometry.js";
 import { roundLength } from "./plane.js";
 
-const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "accent", "corner", "edge", "break", "arc"];
+const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "drive", "accent", "corner", "edge", "break", "arc"];
 
 /** The colours of the page, light or dark. */
 export function readTheme() {
@@ -11,80 +12,66 @@ export function readTheme() {
   return { ...Object.fromEntries(NAMES.map((n) => [n, read(n)])), clusters: read("clusters").split(/\s+/) };
 }
 
-/** Bearings and points of a scan as it comes from the server; null where a beam is invalid. */
-export function placeBeams(scan) {
-  const bearing = (i) => scan.angles?.[i] ?? scan.angle_min + i * scan.angle_increment;
-  scan.bearings = Array.from({ length: scan.beams }, (_, i) => bearing(i));
-  scan.points = scan.bearings.map((a, i) => {
-    const r = scan.ranges[i];
-    return r === null ? null : [r * Math.cos(a), r * Math.sin(a)];
-  });
-  scan.reach = Math.max(0, ...scan.ranges); // of the farthest measurement [m]
-}
-
-/** Whether all numbers of a position or a covariance are known. */
-export const isKnown = (numbers) => numbers.flat().every(Number.isFinite);
-
-/** The layer in which a row of the corners is shown. */
-export const layerOf = (corner) => (corner.kind === "edge" ? "edges" : "corners");
-
-/** Beams of a feature in order, over the seam where the first is larger than the last. */
-export function beamsOf(feature, scan) {
-  const count = (feature.last_beam - feature.first_beam + scan.beams) % scan.beams + 1;
-  const beams = Array.from({ length: count }, (_, k) => (feature.first_beam + k) % scan.beams);
-  return beams.filter((i) => scan.points[i]);
-}
-
-/** Standard deviations along the axes of an ellipse, and the direction of the longer one [rad]. */
-export function ellipseOf([[xx, xy], [, yy]]) {
-  const middle = (xx + yy) / 2, half = Math.hypot((xx - yy) / 2, xy);
-  return {
-    major: Math.sqrt(Math.max(middle + half, 0)),
-    minor: Math.sqrt(Math.max(middle - half, 0)),
-    direction: Math.atan2(2 * xy, xx - yy) / 2,
-  };
-}
-
-/** First and last direction [rad] from the centre of an arc to its measurements. */
-function seenOf(arc, scan) {
-  const [cx, cy] = arc.center;
-  const turns = beamsOf(arc, scan).map((i) => {
-    const [x, y] = scan.points[i];
-    return Math.atan2(y - cy, x - cx);
-  });
-  const first = turns[0] ?? 0;
-  const around = turns.map((t) => Math.atan2(Math.sin(t - first), Math.cos(t - first)));
-  return [first + Math.min(0, ...around), first + Math.max(0, ...around)];
-}
-
+/** Draws on a canvas: the world by a plane, a scan and its features by their frame in it. */
 export class Drawing {
-  constructor(ctx, plane, size, theme) {
-    Object.assign(this, { ctx, plane, size, theme });
+  constructor(ctx, plane, frame, size, theme) {
+    Object.assign(this, { ctx, plane, frame, size, theme });
   }
 
   at(point) {
-    return this.plane.toPixels(point, this.size);
+    return this.frame.toPixels(point, this.size);
   }
 
-  scan(scan, shown) {
+  measurements(scan, inClusters) {
+    const { ctx, theme, plane } = this, half = Math.min(Math.max(plane.scale / 40, 1.9), 3.2);
     this.#invalid(scan);
-    const half = Math.min(Math.max(this.plane.scale / 40, 1.9), 3.2);
     scan.points.forEach((point, i) => {
       if (!point) return;
       const cluster = scan.clusters[i];
       if (cluster < 0) return this.#cross(point, half + 0.8);
-      this.ctx.fillStyle = shown.clusters ? this.theme.clusters[cluster % this.theme.clusters.length] : this.theme.soft;
+      ctx.fillStyle = inClusters ? theme.clusters[cluster % theme.clusters.length] : theme.soft;
       this.#round(point, half);
-      this.ctx.fill();
+      ctx.fill();
     });
     this.#sensor();
   }
 
-  features(scan, shown, sigmas) {
-    if (shown.arcs) scan.arcs.forEach((arc) => this.#arc(arc, scan));
-    if (shown.segments) scan.segments.forEach((segment) => this.#segment(segment));
-    if (shown.breakpoints) scan.breakpoints.forEach((b) => this.#breakpoint(b));
-    for (const c of scan.corners) if (shown[layerOf(c)]) this.#corner(c, sigmas, scan.reach);
+  arcs(scan) {
+    scan.arcs.forEach((arc) => this.#arc(arc, scan));
+  }
+
+  segments(scan) {
+    scan.segments.forEach((segment) => this.#segment(segment));
+  }
+
+  breakpoints(scan) {
+    scan.breakpoints.forEach((breakpoint) => this.#breakpoint(breakpoint));
+  }
+
+  /** The corners that are shown in a layer, with their ellipses. */
+  corners(scan, layer, sigmas) {
+    for (const c of scan.corners) if (layerOf(c) === layer) this.#corner(c, sigmas, scan.reach);
+  }
+
+  /** Points of the scans up to one, the path up to it, and lighter the rest of the path. */
+  drive(drive, backdrop, last) {
+    const { ctx, theme, size, plane } = this;
+    backdrop.draw(ctx, drive, plane, size, theme.drive, last);
+    for (const [first, end, alpha] of [[last, drive.poses.length, 0.3], [0, last + 1, 0.8]]) {
+      let before = null;
+      ctx.beginPath();
+      for (const [x, y] of drive.poses.slice(first, end)) {
+        const pixel = x === null ? null : plane.toPixels([x, y], size);
+        // Steps that are too short to be seen are left out.
+        if (pixel && before && Math.abs(pixel[0] - before[0]) + Math.abs(pixel[1] - before[1]) < 1.5) continue;
+        if (pixel) ctx[before ? "lineTo" : "moveTo"](...pixel);
+        before = pixel;
+      }
+      ctx.globalAlpha = alpha;
+      this.#pen(theme.accent, 1.2);
+      ctx.stroke();
+      ctx.globalAlpha = 1;
+    }
   }
 
   grid() {
@@ -92,12 +79,12 @@ export class Drawing {
     const [left, top] = plane.toMetres([0, 0], size);
     const [right, bottom] = plane.toMetres([size.width, size.height], size);
     for (let k = Math.ceil(left / step); k * step <= right; k++) {
-      const u = Math.round(this.at([k * step, 0])[0]) + 0.5;
+      const u = Math.round(plane.toPixels([k * step, 0], size)[0]) + 0.5;
       this.#pen(k === 0 ? theme.axis : theme.grid);
       this.#path([[u, 0], [u, size.height]]);
     }
     for (let k = Math.ceil(bottom / step); k * step <= top; k++) {
-      const v = Math.round(this.at([0, k * step])[1]) + 0.5;
+      const v = Math.round(plane.toPixels([0, k * step], size)[1]) + 0.5;
       this.#pen(k === 0 ? theme.axis : theme.grid);
       this.#path([[0, v], [size.width, v]]);
     }
@@ -135,8 +122,8 @@ export class Drawing {
 
   /** The beam that is asked about: a line from the sensor, and a ring where it ends. */
   beam(scan, i) {
-    const { ctx, theme, size, plane } = this;
-    const far = (size.width + size.height) / plane.scale + Math.hypot(plane.x, plane.y);
+    const { ctx, theme, size, plane, frame } = this;
+    const far = (size.width + size.height) / plane.scale + Math.hypot(plane.x - frame.x, plane.y - frame.y);
     const a = scan.bearings[i];
     ctx.save();
     this.#pen(theme.accent);
@@ -150,9 +137,9 @@ export class Drawing {
     ctx.restore();
   }
 
-  /** Where the pointer is in the other panel. */
+  /** Where the pointer is in the other panel, in the plane. */
   cursor(point) {
-    const [u, v] = this.at(point);
+    const [u, v] = this.plane.toPixels(point, this.size);
     this.#pen(this.theme.accent);
     this.#path([[u - 7, v], [u + 7, v]]);
     this.#path([[u, v - 7], [u, v + 7]]);
@@ -164,7 +151,7 @@ export class Drawing {
     this.#pen(this.theme.faint);
     scan.points.forEach((point, i) => {
       if (point) return;
-      const c = Math.cos(scan.bearings[i]), s = -Math.sin(scan.bearings[i]);
+      const a = scan.bearings[i] + this.frame.turn, c = Math.cos(a), s = -Math.sin(a);
       this.#path([[u + 16 * c, v + 16 * s], [u + 22 * c, v + 22 * s]]);
     });
   }
@@ -210,7 +197,7 @@ export class Drawing {
     // Hidden by the marker, or no knowledge at all: then the numbers say so.
     if (a < 3 || 3 * major > reach) return;
     ctx.beginPath();
-    ctx.ellipse(u, v, a, b, -direction, 0, 2 * Math.PI);
+    ctx.ellipse(u, v, a, b, -direction - this.frame.turn, 0, 2 * Math.PI);
     ctx.lineWidth = 1;
     ctx.stroke();
     ctx.globalAlpha = 0.15;
@@ -233,8 +220,9 @@ export class Drawing {
   }
 
   #circle({ center, radius }, first, last) {
+    const { turn } = this.frame;
     this.ctx.beginPath();
-    this.ctx.arc(...this.at(center), radius * this.plane.scale, -last, -first);
+    this.ctx.arc(...this.at(center), radius * this.plane.scale, -last - turn, -first - turn);
     this.ctx.stroke();
   }
 
@@ -250,8 +238,9 @@ export class Drawing {
 
   // A triangle at the origin that looks along the x axis.
   #sensor() {
-    const [u, v] = this.at([0, 0]);
-    this.#area([[u + 9, v], [u - 6, v - 6], [u - 6, v + 6]], this.theme.ink);
+    const [u, v] = this.at([0, 0]), { cos, sin } = this.frame;
+    const shape = [[9, 0], [-6, 6], [-6, -6]].map(([x, y]) => [u + cos * x - sin * y, v - sin * x - cos * y]);
+    this.#area(shape, this.theme.ink);
   }
 
   #round(point, radius) {

@@ -1,68 +1,117 @@
 // The page: its state, and what happens when something changes.
 
+import { addressOf, readAddress } from "./address.js";
 import { Latest, ask } from "./api.js";
-import { Pins, showWhy } from "./details.js";
-import { placeBeams, readTheme } from "./drawing.js";
+import { Pins, element, showWhy } from "./details.js";
+import { readTheme } from "./drawing.js";
+import { Drive } from "./drive.js";
+import { placeBeams } from "./geometry.js";
+import { listenToKeys } from "./keys.js";
+import { Layers } from "./layers.js";
 import { Panel } from "./panel.js";
 import { Plane } from "./plane.js";
+import { Share } from "./share.js";
 import { Timeline } from "./timeline.js";
 
 const $ = (id) => document.getElementById(id);
-const LAYERS = ["clusters", "segments", "corners", "edges", "arcs", "breakpoints"];
-const NARROW = "(max-width: 60rem)"; // where the answers stand below the panels
 const PATIENCE = 700; // milliseconds after which the page says what it waits for
 const WAITING = "working …";
+const POLL = 300; // milliseconds between two looks at how far the log is read
+const REST = 300; // milliseconds without a change after which the address is written
 
 class App {
   plane = new Plane();
   panels = [];
-  asked = null; // { panel, beam } that "why?" is about
+  number = 0; // of the log
+  drive = null; // of the log
+  world = false; // the frame that is shown
+  asked = null; // { panel, beam, index } that "why?" is about
   cursor = null; // { panel, point } of the pointer
   #loader = new Latest();
   #frame = 0;
-  #fitted = false;
+  #writing = 0;
+  #wanted = {}; // of a link, until it is shown
+  #fits = true; // nobody has moved the view since it was fitted
 
   async start() {
     this.theme = readTheme();
-    const log = await ask("log");
-    const hash = new URLSearchParams(location.hash.slice(1));
-    this.methods = log.methods;
-    document.title = `${log.name} – lineament`;
-    $("name").textContent = log.name;
-    $("facts").textContent = ` in ${log.format}`;
+    Object.assign(this, await ask("logs"));
+    const wanted = readAddress();
+    $("log").append(...this.logs.map((name, k) => new Option(name, k)));
+    $("log").hidden = this.logs.length < 2;
+    $("name").hidden = !$("log").hidden;
     this.timeline = new Timeline(
       { slider: $("slider"), position: $("position"), play: $("play"), speed: $("speed") },
       (index) => this.load(index),
     );
     this.pins = new Pins($("pins"), $("unpin"), $("pins-hint"));
-    const known = (name) => (this.methods.includes(name) ? name : null);
-    this.addPanel(known(hash.get("method")) ?? this.methods[0]);
-    if (known(hash.get("with"))) this.addPanel(hash.get("with"));
+    this.layers = new Layers($("layers"), () => this.redraw());
+    this.layers.hide(wanted.hidden);
+    $("sigmas").value = wanted.sigmas ?? "3";
+    if (!$("sigmas").value) $("sigmas").value = "3";
+    const methods = wanted.methods.filter((name) => this.methods.includes(name));
+    for (const name of methods.length ? methods : [this.methods[0]]) this.addPanel(name);
+    this.share = new Share(this, $("sharing"), fail);
     this.#listen();
-    await this.follow(Number(hash.get("scan")) || 0);
+    const number = wanted.log === undefined ? 0 : this.logs.indexOf(wanted.log);
+    await this.open(Math.max(number, 0), number < 0 ? {} : wanted);
+    if (number < 0) fail(new Error(`There is no log ${wanted.log} here.`));
+  }
+
+  get logName() {
+    return this.logs[this.number];
+  }
+
+  /** Show a log, as a link wants it. */
+  async open(number, wanted = {}) {
+    const drive = new Drive(number), isWorld = wanted.world ?? this.world;
+    this.drive?.close();
+    this.#setWorld(false);
+    Object.assign(this, { number, drive, asked: null });
+    this.#wanted = { ...wanted, view: wanted.view ?? null };
+    this.#fits = true;
+    delete document.body.dataset.scan;
+    $("log").value = number;
+    $("name").textContent = this.logName;
+    document.title = `${this.logName} – lineament`;
+    for (const id of ["topic", "facts"]) $(id).textContent = "";
+    for (const id of ["problem", "reading"]) $(id).hidden = true;
+    this.timeline.open(number);
+    for (const panel of this.panels) panel.clear();
+    this.#offerWorld({ posed: 0, complete: false });
+    this.redraw();
+    try {
+      await this.follow(wanted.scan ?? 0, isWorld);
+    } catch (error) {
+      if (drive === this.drive) throw error; // no other log was opened meanwhile
+    }
   }
 
   /** Follow how far the log is read; show the first scan, or that of the address, once it is. */
-  async follow(wanted) {
+  async follow(scan, isWorld) {
+    const { drive } = this;
     for (let shown = false; ;) {
-      const log = await ask("log");
+      const log = await ask("log", { log: drive.log });
+      if (drive !== this.drive) return; // another log was opened
       this.timeline.grow(log.scans);
-      if (!shown && log.scans > 0 && (wanted < log.scans || log.complete)) {
+      this.#offerWorld(log);
+      if (!shown && log.scans > 0 && (scan < log.scans || log.complete)) {
         shown = true;
-        this.timeline.go(wanted).catch(fail);
+        if (isWorld && log.posed) this.#setWorld(true);
+        this.timeline.go(scan).catch(fail);
       }
       $("reading").hidden = log.complete;
       $("progress").max = log.total || 1;
       $("progress").value = log.scans;
       $("read").textContent = `reading: ${log.scans} of ${log.total ?? "…"} scans`;
       if (log.complete) return this.#complete(log);
-      await new Promise((next) => setTimeout(next, 300));
+      await new Promise((next) => setTimeout(next, POLL));
     }
   }
 
   #complete(log) {
     const skipped = log.skipped ? `; ${log.skipped} faults left out, the first: ${log.faults[0]}` : "";
-    $("facts").textContent += `, ${log.scans} scans${skipped}`;
+    $("facts").textContent = `${log.format}, ${log.scans} scans${skipped}`;
     if (log.error) fail(new Error(`The log was read up to scan ${log.scans - 1}: ${log.error}`));
   }
 
@@ -92,18 +141,21 @@ class App {
   /** Load a scan into all panels; of several that are asked for at once, the last. */
   load(index) {
     return this.#loader.run(async () => {
-      const panels = [...this.panels];
+      const panels = [...this.panels], { number } = this;
       let loaded = false;
       const waiting = setInterval(async () => {
-        const { compiling } = await ask("log").catch(() => ({}));
+        const { compiling } = await ask("log", { log: number }).catch(() => ({}));
         if (loaded) return;
         for (const panel of panels) panel.caption.textContent = compiling || WAITING;
       }, PATIENCE);
       try {
-        const asked = panels.map((panel) => ask("scan", { i: index, method: panel.method }));
-        (await Promise.all(asked)).forEach((scan, k) => {
+        const scans = await Promise.all(
+          panels.map((panel) => ask("scan", { log: number, i: index, method: panel.method })));
+        if (number !== this.number) return;
+        scans.forEach((scan, k) => {
           placeBeams(scan);
           panels[k].show(scan);
+          panels[k].place(this.world);
         });
         this.#loaded(index);
       } finally {
@@ -114,38 +166,68 @@ class App {
   }
 
   #loaded(index) {
+    const { scan, frame, size } = this.panels[0], { view, beam } = this.#wanted;
     $("problem").hidden = true;
-    $("topic").textContent = this.panels[0].scan.topic;
+    $("topic").textContent = `${scan.topic} in `;
     if (this.asked && this.asked.index !== index) this.asked = null;
-    if (!this.#fitted) this.fit();
-    this.redraw();
-    const names = this.panels.map((panel) => panel.method);
-    const hash = new URLSearchParams({ scan: index, method: names[0] });
-    if (names[1]) hash.set("with", names[1]);
-    history.replaceState(null, "", `#${hash}`);
     document.body.dataset.scan = index;
+    if (view) this.look(() => this.plane.look(view, size));
+    else if (view === null) this.fit();
+    else if (frame && !this.#fits && this.world && !this.panels[0].isSensorInside) {
+      Object.assign(this.plane, { x: frame.x, y: frame.y }); // the view moves on with the sensor
+    }
+    this.#wanted = {};
+    if (beam < scan.beams) this.explain(this.panels[0], beam);
+    this.redraw();
   }
 
+  /** Show the whole scan; in the world, the whole drive. */
   fit() {
-    const [panel] = this.panels;
-    if (!panel.scan || !panel.size.width) return;
-    this.#fitted = true;
-    // Lone measurements may lie anywhere.
-    const { points, clusters } = panel.scan;
-    const clustered = points.filter((point, i) => point && clusters[i] >= 0);
-    this.plane.fit(clustered.length ? clustered : points.filter(Boolean), panel.size);
+    const [{ scan, outline, size }] = this.panels;
+    if (!scan || !size.width) return;
+    this.#fits = true;
+    const points = [...outline, ...(this.world ? this.drive.outline : [])];
+    this.plane.fit(points.length ? points : [[0, 0]], size);
+    this.redraw();
+  }
+
+  /** Change what the panels show of the plane. */
+  look(change) {
+    change();
+    this.#fits = false;
     this.redraw();
   }
 
   zoom(factor) {
-    const { width, height } = this.panels[0].size;
-    this.plane.zoom(factor, [width / 2, height / 2], { width, height });
-    this.redraw();
+    const { size } = this.panels[0];
+    this.look(() => this.plane.zoom(factor, [size.width / 2, size.height / 2], size));
+  }
+
+  move(du, dv) {
+    this.look(() => this.plane.move(du, dv));
   }
 
   resized() {
-    if (this.#fitted) this.redraw();
-    else this.fit();
+    if (this.#fits) this.fit();
+    else this.redraw();
+  }
+
+  #offerWorld({ posed, complete }) {
+    const button = $("world");
+    button.disabled = !posed;
+    button.title = posed ? "The scan in the world frame, with the drive behind it (w)"
+      : complete ? "This log has no poses (those of a ROS log may be in a topic: --poses TOPIC)"
+        : "No poses have been read so far";
+    $("no-poses").hidden = !complete || posed > 0;
+  }
+
+  #setWorld(isWorld) {
+    this.world = isWorld;
+    $("world").setAttribute("aria-pressed", isWorld);
+    this.layers.allowDrive(isWorld);
+    for (const panel of this.panels) panel.place(isWorld);
+    const { drive } = this;
+    if (isWorld) drive.load(() => this.resized()).catch((error) => drive === this.drive && fail(error));
   }
 
   redraw() {
@@ -153,73 +235,85 @@ class App {
       this.#frame = 0;
       for (const panel of this.panels) panel.draw();
     });
+    // Browsers refuse to change the address many times a second.
+    clearTimeout(this.#writing);
+    this.#writing = setTimeout(() => {
+      if (document.body.dataset.scan) history.replaceState(null, "", this.address);
+    }, REST);
   }
 
-  async explain(panel, beam) {
-    const { index, method } = panel.scan;
-    try {
-      const answer = await ask("trace", { i: index, method, beam });
-      if (panel.scan.index !== index || panel.scan.method !== method) return;
-      this.asked = { panel, beam, index };
-      this.redraw();
-      $("problem").hidden = true;
-      showWhy($("why"), answer);
-      if (matchMedia(NARROW).matches) $("why").scrollIntoView({ block: "nearest" });
-    } catch (error) {
-      fail(error);
-    }
-  }
-
-  #listen() {
-    for (const id of [...LAYERS.map((name) => `show-${name}`), "sigmas"]) {
-      $(id).addEventListener("change", () => this.redraw());
-    }
-    $("ask").addEventListener("submit", (event) => {
-      event.preventDefault();
-      if (this.panels[0].scan) this.explain(this.panels[0], $("beam").valueAsNumber);
+  /** The address of what is seen. */
+  get address() {
+    const { asked, plane, panels, logs } = this;
+    return addressOf({
+      log: logs.length > 1 ? this.logName : undefined,
+      scan: this.timeline.index,
+      methods: panels.map((panel) => panel.method),
+      hidden: this.layers.hidden,
+      sigmas: $("sigmas").value,
+      world: this.world,
+      view: [plane.x, plane.y, plane.span(panels[0].size)],
+      beam: asked?.panel === panels[0] ? asked.beam : undefined,
     });
-    const clicks = {
-      compare: () => this.compare(),
-      fit: () => this.fit(),
-      "zoom-in": () => this.zoom(1.3),
-      "zoom-out": () => this.zoom(1 / 1.3),
-    };
-    for (const [id, click] of Object.entries(clicks)) $(id).addEventListener("click", click);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.theme = readTheme();
-      this.redraw();
-    });
-    document.addEventListener("keydown", (event) => this.#key(event));
   }
 
-  get shown() {
-    return Object.fromEntries(LAYERS.map((name) => [name, $(`show-${name}`).checked]));
+  /** What is seen, in words. */
+  get title() {
+    return `${this.logName} · ${$("position").textContent}${this.world ? " · world frame" : ""}`;
   }
 
   get sigmas() {
     return Number($("sigmas").value);
   }
 
-  #key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    // What takes keys itself keeps them; buttons and boxes take the space bar only.
-    if (event.target.closest("select, input[type=number]")) return;
-    if (event.key === " " && event.target.closest("button, summary, input[type=checkbox]")) return;
-    const { timeline } = this, step = event.shiftKey ? 10 : 1;
-    const keys = {
-      " ": () => timeline.toggle(),
-      ArrowLeft: () => timeline.go(timeline.index - step),
-      ArrowRight: () => timeline.go(timeline.index + step),
-      Home: () => timeline.go(0),
-      End: () => timeline.go(timeline.count - 1),
-      "+": () => this.zoom(1.3),
-      "=": () => this.zoom(1.3),
-      "-": () => this.zoom(1 / 1.3),
-      f: () => this.fit(),
+  async explain(panel, beam) {
+    const { index, method } = panel.scan, { number } = this;
+    try {
+      const answer = await ask("trace", { log: number, i: index, method, beam });
+      if (number !== this.number || panel.scan?.index !== index || panel.scan.method !== method) return;
+      this.asked = { panel, beam, index };
+      this.redraw();
+      $("problem").hidden = true;
+      showWhy($("why"), answer);
+      panel.card.querySelector(".why")?.remove();
+      panel.card.append(element("p", answer.summary, "why"));
+    } catch (error) {
+      fail(error);
+    }
+  }
+
+  #listen() {
+    $("sigmas").addEventListener("change", () => this.redraw());
+    $("log").addEventListener("change", () => this.open(Number($("log").value)).catch(fail));
+    $("ask").addEventListener("submit", (event) => {
+      event.preventDefault();
+      if (this.panels[0].scan) this.explain(this.panels[0], $("beam").valueAsNumber);
+      $("beam").blur();
+    });
+    const clicks = {
+      compare: () => this.compare(),
+      world: () => {
+        this.#setWorld(!this.world);
+        this.fit();
+      },
+      fit: () => this.fit(),
+      "zoom-in": () => this.zoom(1.3),
+      "zoom-out": () => this.zoom(1 / 1.3),
+      share: () => this.panels[0].scan && this.share.open(),
+      help: () => $("keys").showModal(),
     };
-    if (!keys[event.key]) return;
-    event.preventDefault();
-    keys[event.key]();
+    for (const [id, click] of Object.entries(clicks)) $(id).addEventListener("click", click);
+    for (const dialog of document.querySelectorAll("dialog")) {
+      dialog.querySelector(".close").addEventListener("click", () => dialog.close());
+      // A click beside it closes it, too.
+      dialog.addEventListener("click", (event) => event.target === dialog && dialog.close());
+    }
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.theme = readTheme();
+      this.redraw();
+    });
+    addEventListener("hashchange", () => location.reload());
+    listenToKeys(this, $("key-list"));
   }
 }
 

@@ -10,12 +10,16 @@ const USUAL = 0.1;
 class Stamps {
   #blocks = new Map();
 
+  constructor(log) {
+    this.log = log;
+  }
+
   async at(index, count) {
     const first = Math.floor(index / BLOCK) * BLOCK;
     let block = this.#blocks.get(first);
     // A block that was asked for while the log was being read may have grown.
     if (!block || (index - first >= block.length && index < count)) {
-      block = (await ask("stamps", { first, count: BLOCK })).stamps;
+      block = (await ask("stamps", { log: this.log, first, count: BLOCK })).stamps;
       if (this.#blocks.size > 64) this.#blocks.clear();
       this.#blocks.set(first, block);
     }
@@ -33,13 +37,22 @@ export class Timeline {
   index = 0;
   count = 1;
   playing = false;
-  #stamps = new Stamps();
+  #stamps = null;
 
   /** `show(index)` shows a scan, and is done when it is there. */
   constructor({ slider, position, play, speed }, show) {
     Object.assign(this, { slider, position, button: play, speed, show });
     slider.addEventListener("input", () => this.go(slider.valueAsNumber));
     play.addEventListener("click", () => this.toggle());
+  }
+
+  /** Begin another log. */
+  open(log) {
+    if (this.playing) this.toggle();
+    this.#stamps = new Stamps(log);
+    this.index = this.slider.value = 0;
+    this.position.textContent = "";
+    this.count = 1;
   }
 
   /** The log has so many scans, as far as it was read. */
@@ -57,15 +70,15 @@ export class Timeline {
   }
 
   async #label() {
-    const { index, count } = this;
+    const { index, count } = this, stamps = this.#stamps;
     let text = `scan ${index} / ${count - 1}`;
     try {
-      const time = (await this.#stamps.at(index, count)) - (await this.#stamps.at(0, count));
+      const time = (await stamps.at(index, count)) - (await stamps.at(0, count));
       if (Number.isFinite(time)) text += `, ${time.toFixed(2)} s`;
     } catch {
       // Showing the scan reports what is wrong.
     }
-    if (index !== this.index) return;
+    if (index !== this.index || stamps !== this.#stamps) return;
     this.position.textContent = text;
     this.slider.setAttribute("aria-valuetext", text);
   }

@@ -1,0 +1,102 @@
+# %% [markdown]
+# # lineament in five minutes
+#
+# lineament finds lines, corners, arcs and clusters in the scans of a 2-D LiDAR,
+# each with its covariance. It reads the logs that robots write, runs in real time
+# beside a scanner, and needs neither ROS nor a compiler.
+#
+# ## Install
+#
+# With Python 3.11 or newer, from a checkout or from a wheel:
+#
+# ```sh
+# pip install .            # or: pip install lineament-*.whl
+# lineament --help
+# ```
+#
+# ## A scan
+#
+# Ranges and the geometry of the scanner are all that is needed. Here they come
+# from a simulated scanner, a Hokuyo UTM-30LX in a hall with round columns:
+
+# %%
+import lineament as ln
+import numpy as np
+from lineament.simulation import SENSORS, scene
+
+world, pose = scene("hall", seed=5)
+ranges = SENSORS["utm30lx"].scan(world, pose, np.random.default_rng(1)).ranges
+
+features = ln.extract(
+    ranges, angle_min=-2.356, angle_increment=0.004363, range_max=30.0
+)
+features
+
+# %% [markdown]
+# That is what a notebook shows. The first call compiles the kernels, once for
+# each installation; from then on a scan takes well below a millisecond. Each kind
+# is an array with named
+# [fields](reference/lineament.features.md#lineament.features.CORNER), here the
+# corners with a [quality](optimal.md) above 0.9:
+
+# %%
+corners = features.corners[features.corners["quality"] > 0.9]
+for corner in corners[:4]:
+    x, y = corner["position"]
+    sx, sy = 1000 * np.sqrt(np.diag(corner["covariance"]))
+    print(f"{corner['kind']:6} at ({x:6.3f}, {y:6.3f}) m, ±({sx:.1f}, {sy:.1f}) mm")
+
+# %% [markdown]
+# ## A picture
+#
+# On axes of your own with `ax=`; [formats](formats.md#pictures-of-plot-and-demo)
+# explains the marks.
+
+# %% alt="The scan with its walls, corners and columns"
+axes = features.plot()
+
+# %% [markdown]
+# ## Your own log
+#
+# Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](logs.md) are
+# opened alike. Put yours in place of this one, which is made on the spot:
+
+# %%
+from lineament.simulation import simulate_log
+
+simulate_log(
+    "drive.npz", "building", SENSORS["utm30lx"], scans=200
+)  # in place of drive.bag
+log = ln.open_log("drive.npz")
+log
+
+# %% [markdown]
+# The same from the shell, and the pages that help to look at it:
+#
+# ```sh
+# lineament info drive.bag             # topics, scans, rates, what is invalid
+# lineament view drive.bag             # in the browser: play, compare, ask why
+# lineament plot drive.bag --scan 40 -o scan.png
+# ```
+#
+# ## A table
+#
+# `lineament extract drive.bag -o features.parquet` writes a row for each feature;
+# a folder in place of a file takes [many logs](scale.md) at once. In Python:
+
+# %%
+import pyarrow as pa
+
+extract = ln.Extractor()  # keeps its buffers from scan to scan
+tables = [extract(scan).to_arrow(scan=i) for i, scan in enumerate(log)]
+corners = pa.concat_tables(tables).to_pandas().query("kind == 'corner'")
+corners[["scan", "stamp", "x", "y", "quality", "corner"]].head()
+
+# %% [markdown]
+# ## Go on
+#
+# - The tutorials: [a bag to a data frame](tutorials/frame.md), [corners in the
+#   world](tutorials/world.md), [a docking pose](tutorials/dock.md), [live on a
+#   robot](tutorials/live.md), [many logs on Dask](tutorials/dask.md).
+# - What it finds in [real scans](gallery.md), and [how good that is](results.md).
+# - [The methods](methods.md), and all names [from Python](python.md).

@@ -1,0 +1,22 @@
+// Browsers start no workers for pages that are opened from the disk: the search runs in a frame.
+if (location.protocol === "file:") {
+  window.Worker = class extends EventTarget {
+    constructor(url) {
+      super();
+      const frame = document.createElement("iframe");
+      frame.hidden = true;
+      document.body.append(frame);
+      this.inner = frame.contentWindow;
+      this.inner.postMessage = (data) =>
+        this.dispatchEvent(new MessageEvent("message", { data }));
+      const script = frame.contentDocument.createElement("script");
+      script.src = url;
+      this.loaded = new Promise((resolve) => (script.onload = resolve));
+      frame.contentDocument.body.append(script);
+    }
+    async postMessage(data) {
+      await this.loaded;
+      this.inner.dispatchEvent(new MessageEvent("message", { data }));
+    }
+  };
+}

@@ -1,0 +1,119 @@
+# %% [markdown]
+# # Corners in the world
+#
+# Features are found in the frame of the scanner. Where a log has poses, lineament
+# moves them into the world, covariances turned with them. This tutorial makes a
+# map of corners from a drive, and asks how well one corner is known after it has
+# been seen many times. The log is a drive through an office building in Freiburg,
+# with the poses of a SLAM system, or a simulated one where that is not at hand.
+
+# %%
+import os
+from pathlib import Path
+
+import lineament as ln
+from lineament.simulation import SENSORS, simulate_log
+from lineament.tasks.extract import extract_log
+
+path = Path(os.environ.get("LINEAMENT_DATA", "."), "truth/fr079_graph.npz")
+if not path.exists():
+    path = Path("building.npz")
+    simulate_log(path, "building", SENSORS["utm30lx"])
+
+done = extract_log(path, "world.parquet", ln.Extractor(), world=True)
+print(done.scans, "scans,", done.features["corners"], "corners")
+
+# %% [markdown]
+# From the shell that is
+#
+# ```sh
+# lineament extract LOG -o world.parquet --world
+# lineament extract LOG.bag -o world.parquet --world \
+#     --poses '/tf:map->odom->base_link->laser'
+# ```
+#
+# the second for a bag, where a topic has to say [which
+# poses](../logs.md#ros-logs). Each row has the pose of its scan beside the
+# feature. Standard deviations are the roots of the variances, here in mm:
+
+# %%
+import pandas as pd
+
+frame = pd.read_parquet("world.parquet")
+corners = frame.query("kind == 'corner' and corner == 'corner' and quality > 0.9")
+corners = corners.assign(
+    sd_x=1000 * corners.cov_00**0.5, sd_y=1000 * corners.cov_11**0.5
+)
+columns = ["scan", "pose_x", "pose_y", "pose_theta", "x", "y", "sd_x", "sd_y"]
+corners[columns].head().round(3)
+
+# %% [markdown]
+# Walls and corners, all in one frame, are a map:
+
+# %% alt="Walls of the whole drive, its corners, and the way of the scanner"
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.collections import LineCollection
+
+walls = frame.query("kind == 'segment' and length > 0.3")
+ends = walls[["start_x", "start_y", "end_x", "end_y"]].to_numpy().reshape(-1, 2, 2)
+figure, axes = plt.subplots(figsize=(8, 6))
+axes.add_collection(LineCollection(list(ends), colors="#1b1f24", lw=0.6, alpha=0.2))
+axes.plot(corners.x, corners.y, ".", color="#cc3311", ms=3, mew=0)
+axes.plot(frame.pose_x, frame.pose_y, color="#0077bb")
+_ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+
+# %% [markdown]
+# ## One corner, seen many times
+#
+# Take the corner with the most neighbours within 10 cm, and draw each of its
+# sightings with the ellipse that should hold 95 % of its errors. The ellipses
+# point in different directions: a wall seen at a grazing angle says little about
+# where along it the corner is, and that direction has been turned into the world
+# with the rest.
+
+# %% alt="The sightings of one corner, with their 95 % ellipses"
+from matplotlib.patches import Ellipse
+
+xy = corners[["x", "y"]].to_numpy()
+near = np.array([(np.hypot(*(xy - p).T) < 0.1).sum() for p in xy])
+place = np.hypot(*(xy - xy[near.argmax()]).T) < 0.1
+covariances = corners[["cov_00", "cov_01", "cov_01", "cov_11"]].to_numpy()
+covariances = covariances.reshape(-1, 2, 2)
+
+figure, axes = plt.subplots(figsize=(6, 5))
+for p, covariance in zip(xy[place], covariances[place]):
+    sizes, axis = np.linalg.eigh(covariance)
+    turn = np.degrees(np.arctan2(*axis[::-1, 0]))
+    size = 2 * np.sqrt(5.99 * sizes)
+    axes.add_patch(
+        Ellipse(p, *size, angle=turn, fill=False, ec="#cc3311", alpha=0.5)
+    )
+axes.plot(*xy[place].T, ".", color="#1b1f24", ms=3)
+_ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+
+# %% [markdown]
+# ## What the ellipses leave out
+#
+# The ellipses are those of the noise of the scanner. Weighted by them, the
+# sightings have a mean, and what they are off it should be χ² with two degrees of
+# freedom, with a median of 1.39. In a simulation it is. On a real drive it is far
+# more: the poses are off by centimetres, and that, not the noise of the scanner,
+# is what limits the map.
+
+# %%
+weights = np.linalg.inv(covariances[place])
+weighted = np.einsum("nij,nj->i", weights, xy[place])
+mean = np.linalg.solve(weights.sum(axis=0), weighted)
+off = xy[place] - mean
+chi2 = np.median(np.einsum("ni,nij,nj->n", off, weights, off))
+print(f"{place.sum()} sightings of ({mean[0]:.3f}, {mean[1]:.3f}) m")
+print(f"scatter {1000 * off.std():.1f} mm, median of χ² {chi2:.1f}, expected 1.4")
+
+# %% [markdown]
+# Bags say how well their poses are known, as `PoseWithCovarianceStamped` or
+# `Odometry`. `--world` then adds that to the covariance of each feature, and in
+# Python `features.transform(*scan.pose, scan.pose_covariance)` does. It is the
+# same error for all features of a scan:
+# [formats](../formats.md#in-the-world-world) has the formula, and what a mean
+# over many scans does not take away.

@@ -1,0 +1,96 @@
+"""One log that is looked at: read in the background, any scan of it at once."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LineamentError
+from ..logs import open_log, save_npz
+from ..scan import LaserScan
+from .store import ScanStore
+
+#: Most points of a scan that is shown behind others.
+MOST_POINTS = 360
+
+
+class ShownLog:
+    """A log as `lineament.open_log` gives it, and what has been read of it so far.
+
+    Reading starts at once, in a thread, and ends with the log or when it is closed. A LogError if
+    the log cannot be read up to its first scan.
+    """
+
+    def __init__(self, path: str, capacity: int, reading: dict[str, Any]) -> None:
+        log = open_log(path, **reading)
+        log.scan(0)
+        self._about: dict[str, Any] = {"format": log.format, "total": None}
+        self._faults = {"error": "", "skipped": 0, "faults": log.faults}
+        # Another log, as each iteration counts its faults anew.
+        again = lambda: open_log(path, **reading).items()  # noqa: E731
+        self.store = ScanStore(again, capacity=capacity)
+        # The thread alone holds the log, and a temporary copy that it may have, while it reads.
+        self._reader = threading.Thread(
+            target=self._fill, args=(log,), name="reader of the log", daemon=True
+        )
+        self._reader.start()
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until the log is read; return whether it is."""
+        self._reader.join(seconds)
+        return not self._reader.is_alive()
+
+    def close(self) -> None:
+        """End reading, and remove what was kept."""
+        self.store.close()
+
+    def facts(self) -> dict[str, Any]:
+        """Return what is known of the log, and how far it has been read."""
+        complete = not self._reader.is_alive()  # before the number of scans, which may still grow
+        read = {"scans": len(self.store), "posed": self.store.posed, "complete": complete}
+        return self._about | read | self._faults
+
+    def drive(self, first: int, step: int, count: int) -> dict[str, Any]:
+        """Return poses and points of every `step`-th scan, for a picture of the whole drive.
+
+        The points [m] are in the world frame, x and y in turn, at most `MOST_POINTS` of a scan.
+        Scans without a pose, and those that have not been read, are left out.
+        """
+        scans = []
+        for index in range(first, min(first + step * count, len(self.store)), step):
+            _, scan = self.store.item(index)
+            if scan.pose is not None:
+                points = _in_world(scan, *scan.pose).round(3).ravel().tolist()
+                scans.append({"index": index, "pose": scan.pose, "points": points})
+        return {"scans": scans}
+
+    def npz(self, index: int) -> bytes:
+        """Return a scan as an npz log; ValueError if it has no beams, IndexError if not read."""
+        _, scan = self.store.item(index)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "scan.npz")
+            save_npz(path, [scan])
+            return path.read_bytes()
+
+    def _fill(self, log: Any) -> None:
+        try:
+            self._about["total"] = len(log)
+            self.store.fill(log.items())
+        except LineamentError as error:
+            self._faults["error"] = str(error)
+        except Exception as error:  # Nobody else could report it: the page does.
+            self._faults["error"] = f"reading ended: {type(error).__name__}: {error}"
+        self._faults |= {"skipped": log.skipped, "faults": list(log.faults)}
+
+
+def _in_world(scan: LaserScan, x: float, y: float, theta: float) -> NDArray[np.float64]:
+    """Return some points of a scan at a pose, in the world frame, shape (n, 2)."""
+    seen = scan.valid.nonzero()[0]
+    px, py = scan.points[seen[:: -(-len(seen) // MOST_POINTS) or 1]].T
+    c, s = np.cos(theta), np.sin(theta)
+    return np.column_stack([x + c * px - s * py, y + s * px + c * py])

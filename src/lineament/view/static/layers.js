@@ -1,0 +1,56 @@
+// What is drawn of a scan and about it, one layer over another; each can be left out.
+
+import { element } from "./details.js";
+
+/**
+ * From the lowest to the highest. `draw(drawing, scene, isShown)` draws a layer of a scene: the
+ * scan (null where it has no place), the drive, how large covariances are.
+ */
+export const LAYERS = [
+  { name: "drive", draw: (on, d, s) => on && s.drive && d.drive(s.drive, s.backdrop, s.index) },
+  { name: "clusters", draw: (on, d, s) => s.scan && d.measurements(s.scan, on) },
+  { name: "arcs", key: "arc", draw: (on, d, s) => on && s.scan && d.arcs(s.scan) },
+  { name: "segments", key: "segment", draw: (on, d, s) => on && s.scan && d.segments(s.scan) },
+  { name: "breakpoints", key: "break", draw: (on, d, s) => on && s.scan && d.breakpoints(s.scan) },
+  { name: "edges", key: "edge", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "edges", s.sigmas) },
+  { name: "corners", key: "corner", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "corners", s.sigmas) },
+];
+
+/** The boxes that switch them. */
+export class Layers {
+  #boxes = {};
+
+  constructor(place, changed) {
+    const chips = LAYERS.map(({ name, key }, k) => {
+      const box = Object.assign(element("input"), { type: "checkbox", id: `show-${name}`, checked: true });
+      const chip = element("label");
+      chip.title = `Show or hide (${k + 1})`;
+      chip.append(box, ...(key ? [element("i", "", `key ${key}`)] : []), name);
+      box.addEventListener("change", changed);
+      this.#boxes[name] = box;
+      return chip;
+    });
+    place.prepend(...chips);
+  }
+
+  get shown() {
+    return Object.fromEntries(Object.entries(this.#boxes).map(([name, box]) => [name, box.checked]));
+  }
+
+  get hidden() {
+    return LAYERS.map(({ name }) => name).filter((name) => !this.#boxes[name].checked);
+  }
+
+  hide(names) {
+    for (const name of names) if (this.#boxes[name]) this.#boxes[name].checked = false;
+  }
+
+  toggle(k) {
+    this.#boxes[LAYERS[k].name].click();
+  }
+
+  /** The drive is there in the world frame alone. */
+  allowDrive(isWorld) {
+    this.#boxes.drive.disabled = !isWorld;
+  }
+}
