@@ -42,7 +42,7 @@ _FAST = 1.2
 _ROUNDS = 4
 #: With at least this share of the beams explained, less contradicted, a place is taken at once;
 #: more where the deviation of what is expected is larger than that [m].
-_SURE, _SURER, _NARROW = 0.75, 0.88, 0.1
+_SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
 #: Poses are tried by so many beams; so many of them are refined.
 _BEAMS, _FEW, _TRIED = 120, 40, 32
 #: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
