@@ -89,6 +89,11 @@ def liu(scan, method, filtered, noise=None):
             after = pieces[k + 1] if k + 1 < len(pieces) else pieces[0] if found.closed else None
             core = fitted(method, own, first in strong, after is not None and after[0] in strong)
             line = fit_line(points[core], scan.angles[core], measured[core], noise, method.fit)
+            # Without the points next to its corners it may lead the other way.
+            way = points[own[-1]] - points[own[0]]
+            if way @ [math.cos(line["angle"]), math.sin(line["angle"])] < 0:
+                line["angle"] = math.remainder(line["angle"] + math.pi, 2 * math.pi)
+                line["covariance"] = line["covariance"] * [[1, -1], [-1, 1]]
             line |= {"first_beam": own[0], "last_beam": own[-1], "cluster": label}
             line |= {"start": along(line, points[own[0]]), "end": along(line, points[own[-1]])}
             line["n_points"] = len(own)
