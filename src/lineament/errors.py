@@ -15,7 +15,7 @@ EXTRAS = {
     "pandas": "pandas",
     "polars": "polars",
     "rerun": "rerun",
-    "scipy": "mapping",
+    "scipy": "evaluation",
     "shapely": "evaluation",
 }
 
