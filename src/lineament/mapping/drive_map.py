@@ -191,7 +191,9 @@ class Drive:
             motion = Motion(x, y, theta, np.diag((0.05, 0.05, 0.02)) ** 2)
         found = evidence_of(both, query.beams, self._index, _TIGHT)
         explained, contradicted = found[found[:, 1].argmax(), (1, 3)]
-        return motion, bool(explained - PASSED * contradicted < _LOST)
+        if explained - PASSED * contradicted < _LOST:
+            return Motion(*prior, spread), True  # what is expected is better than a guess
+        return motion, False
 
     def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
