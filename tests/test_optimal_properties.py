@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from worlds import BOX, NOISE, degenerate_scans, full_circle, random_scan, room, scan_of
 
 from lineament import Extractor, LaserScan, LogError, RangeNoise
+from lineament.kernels import LARGEST
 from lineament.logs import find_logs, open_log
 from lineament.simulation import SCENES, SENSORS, scene
 
@@ -114,34 +115,41 @@ def assert_straight(scan, segment):
 
 
 def assert_drawn_on_its_rays(scan, segment):
-    """Its ends are on the rays of its first and its last measurement, or beside these."""
-    beams = beams_of(scan, segment)
-    for place, nearest in (("start", beams[0]), ("end", beams[-1])):
-        others = scan.angles[scan.valid & (np.arange(len(scan)) != nearest)] - scan.angles[nearest]
-        turn = math.atan2(*segment[place][::-1]) - scan.angles[nearest]
-        beside = np.abs(np.arctan2(np.sin(others), np.cos(others)))
-        assert abs(math.remainder(turn, 2 * math.pi)) <= np.sort(beside)[:2].max() + 1e-9
+    """Its ends are on the rays of its first and its last measurement, or between the next ones."""
+    usable = np.flatnonzero(scan.valid & (scan.ranges >= 1 / LARGEST) & (scan.ranges < LARGEST))
+    for name, beam in (("start", "first_beam"), ("end", "last_beam")):
+        at = int(np.searchsorted(usable, segment[beam]))
+        low, ray, high = scan.angles[usable[[at - 1, at, (at + 1) % len(usable)]]]
+        turn = math.remainder(math.atan2(*segment[name][::-1]) - ray, 2 * math.pi)
+        assert -((ray - low) % (2 * math.pi)) - 1e-9 <= turn <= (high - ray) % (2 * math.pi) + 1e-9
 
 
 def assert_drawn_where_it_was_measured(scan, features, segment, evidence):
-    """Its ends are near its own measurements, or at a corner.
+    """Its ends are abreast of its first and last measurement, and near its own, or at a corner.
 
-    A measurement is on a line unless that costs half the evidence, in squares of its deviation.
+    A line costs a measurement its squared deviations, at most half of the evidence. Where that
+    allows more than the 3 deviations within which the fit counts it, as no preset does, nothing
+    keeps the line near those that it does not count.
     """
-    start, end, beams = segment["start"], segment["end"], beams_of(scan, segment)
+    beams, along = beams_of(scan, segment), direction_of(segment)
     own = scan.points[beams]
     spacing = np.hypot(*np.diff(own, axis=0).T)
     step = abs(math.sin(scan.angles[beams[1]] - scan.angles[beams[0]]))
-    assert np.hypot(*(end - start)) >= step * scan.ranges[beams].min()
-    sharp = features.corners[features.corners["kind"] == "corner"]["position"].tolist()
-    for place, nearest, step in ((start, own[0], spacing[0]), (end, own[-1], spacing[-1])):
-        off = deviation(features, scan.ranges[beams].max())
-        error = 3 * off
-        if place.tolist() in sharp:
-            assert np.hypot(*(place - nearest)) <= max(REACH, step + error)
-        else:
-            error = max(3.0, math.sqrt(evidence / 2)) * off
-            assert np.hypot(*(own - place).T).min() <= step + error
+    assert np.hypot(*(segment["end"] - segment["start"])) >= step * scan.ranges[beams].min()
+    places = {kind: [] for kind in ("corner", "slit", "edge")}
+    for corner in features.corners:
+        places[corner["kind"]].append(corner["position"].tolist())
+    error = 3 * deviation(features, scan.ranges[beams].max())
+    for name, k in (("start", 0), ("end", -1)):
+        place, nearest = segment[name], own[k]
+        if place.tolist() in places["corner"]:
+            assert np.hypot(*(place - nearest)) <= max(REACH, spacing[k] + error)
+            continue
+        # An edge is half a spacing beyond, which is a uniform error of at most so much.
+        beyond = MOST * math.sqrt(12) / 2 if place.tolist() in places["edge"] else 0.0
+        assert abs((place - nearest) @ along) <= beyond + 1e-9 * scan.ranges[beams].max()
+        if evidence / 2 <= 3**2:
+            assert np.hypot(*(own - place).T).min() <= spacing[k] + error
 
 
 def assert_joined(corner, segments):
