@@ -266,11 +266,18 @@ def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):
 
 @pytest.mark.parametrize("turn", [1, -1])
 def test_a_line_along_its_beams_is_no_segment(turn):
-    """Whose first and last measurement are at one place along it; the next ones are numbered on."""
-    ranges = np.r_[2.0, 1.0, 2.0, np.full(3, np.nan), 4.0 / np.cos(0.01 * np.arange(-10, 11))]
-    scan = LaserScan(ranges[::turn], -0.01, 0.01)
-    features = Extractor("iepf:paper", clusters="fixed", distance=1.5)(scan)
-    (wall,) = features.segments
-    assert wall["n_points"] == 21
-    (label,) = set(features.clusters[ranges[::turn] > 3.9].tolist())
-    assert wall["cluster"] == label
+    """Whose first and last measurement are at one place along it; the others are numbered on."""
+    bearings = 0.01 * np.arange(60)
+    walls = 4.0 * np.minimum(1.0 / np.cos(bearings), math.tan(0.3) / np.sin(bearings + 1e-9))
+    ranges = np.r_[2.0, 1.0, 2.0, np.full(3, np.nan), walls][::turn]
+    extractor = Extractor("iepf:paper", clusters="fixed", distance=1.5)
+    features = extractor(LaserScan(ranges, -0.3, 0.01))
+    assert features.segments["n_points"].tolist() == [31, 30][::turn]
+    (label,) = set(features.clusters[ranges > 2.0].tolist())
+    assert features.segments["cluster"].tolist() == [label, label]
+    (corner,) = features.corners
+    assert corner["segments"].tolist() == [0, 1]
+    assert ranges[corner["beam"]] == np.nanmax(ranges)
+    alone = extractor(LaserScan(np.where(ranges > 2.0, ranges, np.nan), -0.3, 0.01))
+    for name in ("covariance", "response"):
+        np.testing.assert_array_equal(features.corners[name], alone.corners[name])
