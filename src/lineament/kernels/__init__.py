@@ -39,8 +39,8 @@ LARGEST = 1e60
 #: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
 NEAREST, FARTHEST = 1e-6, 1e3
 
-#: Errors are correlated by no more than this: rounded, their covariances stay positive definite.
-_MOST_ALIKE = 1.0 - 1e-9
+#: Square of the largest correlation of errors: rounded, covariances stay positive definite.
+_MOST_ALIKE = 1.0 - 2e-9
 
 
 @helper
@@ -52,5 +52,7 @@ def usable(r, range_min, range_max):
 @helper
 def as_covariance(value, first, second):
     """Bound a covariance by the variances: it is theirs where one error outweighs all others."""
-    most = _MOST_ALIKE * math.sqrt(first) * math.sqrt(second)
-    return min(max(value, -most), most)
+    most = _MOST_ALIKE * first * second
+    if value * value > most:
+        return math.copysign(math.sqrt(most), value)
+    return value

@@ -19,6 +19,10 @@ from .writing import (
 )
 
 
+#: Ends that are no farther apart, over what they are from the sensor, are one place.
+_ROUNDING = 1e-12
+
+
 class Options(NamedTuple):
     """How features are measured."""
 
@@ -65,12 +69,10 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
         line = fit_line(x, y, rho, a, b, noise, how.fit)
         count = last - first + 1
         misfit = _misfit(line, rho[(first + last) // 2], count, noise)
-        has_length = write_segment(
-            places, beam, first, last, count, line, misfit, segments, segment_ints, n
-        )
+        write_segment(places, beam, first, last, count, line, misfit, segments, segment_ints, n)
         segment_ints[n, col.S_CLUSTER] = work.marks[at.LABEL, first]
-        number[k] = kept if has_length else -1
-        kept += has_length
+        number[k] = kept if _has_length(segments[n]) else -1
+        kept += number[k] >= 0
     if kept < pieces:
         _keep_numbered(cut, work.response, number, pieces)
         pieces = counts[at.PIECES] = kept
@@ -103,6 +105,14 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
         places, beam, first, last, clusters, circular, how.gap, bearings.shape[1], breaks,
         offsets[row, 3],
     )  # fmt: skip
+
+
+@helper
+def _has_length(row):
+    """Whether a segment's ends are apart: of measurements along their beams, they may not be."""
+    x1, y1, x2, y2 = row[col.S_START], row[col.S_START + 1], row[col.S_END], row[col.S_END + 1]
+    along = math.cos(row[col.S_ANGLE]) * (x2 - x1) + math.sin(row[col.S_ANGLE]) * (y2 - y1)
+    return along > _ROUNDING * (abs(x1) + abs(y1) + abs(x2) + abs(y2))
 
 
 @helper

@@ -11,8 +11,6 @@ from ..features import records as at
 _SPREAD, _FALL = 0.78, 2.4
 #: The same of an edge at a jump, by its prominence, and how fast that rises.
 _PROMINENCE, _RISE = 130.0, 0.38
-#: Ends that are no farther apart, over what they are from the sensor, are one place.
-_ROUNDING = 1e-12
 
 
 @helper
@@ -20,7 +18,6 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
     """Write the segment of a line from the measurement `first` to `last`, `count` of them on it.
 
     `places` are x and y by measurement, `beam` is their beam; `line` is as of `line_fit.fit_line`.
-    Returns whether its ends are apart: those of measurements that lie along their beams may not be.
     """
     x, y = places[0], places[1]
     cx, cy, c, s, var_offset, covariance, var_angle, rms = line
@@ -36,8 +33,6 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
     row[at.S_COVARIANCE + 2], row[at.S_COVARIANCE + 3] = covariance, var_angle
     row[at.S_RMS], row[at.S_MISFIT] = rms, misfit
     ints[k, at.S_FIRST], ints[k, at.S_LAST], ints[k, at.S_POINTS] = beam[first], beam[last], count
-    x1, y1, x2, y2 = row[at.S_START], row[at.S_START + 1], row[at.S_END], row[at.S_END + 1]
-    return c * (x2 - x1) + s * (y2 - y1) > _ROUNDING * (abs(x1) + abs(y1) + abs(x2) + abs(y2))
 
 
 @helper
