@@ -1,6 +1,7 @@
 """Maps of drives: the graph, the joint adjustment, and a small storey from end to end."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -191,6 +192,8 @@ def test_the_command_writes_map_and_poses(tmp_path, ending):
     last = relative(scans[0].pose, scans[-1].pose)
     np.testing.assert_allclose(rows[-1, 1:3], last[:2], atol=0.05)
     assert target.stat().st_size > 500
+    if ending == "svg":
+        assert re.search(r"> *\d+ walls? and \d+ corners?(, .*)? *<", target.read_text("utf-8"))
     if ending == "parquet":
         assert len(LineMap.read(target).walls) >= 4
 
