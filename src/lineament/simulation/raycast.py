@@ -1,4 +1,6 @@
-"""Where beams meet a world: exact, every beam against every surface."""
+"""Where beams meet a world, exactly."""
+
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +13,8 @@ _TOUCHING = 1e-9
 #: Pairs of a beam and a surface that are worked on at a time: their arrays stay in the cache and
 #: in memory that the process already has, whatever the size of the world.
 _BLOCK = 12_000
+#: Bearings of surfaces are widened by this on both sides [rad].
+_SLACK = 1e-9
 
 
 def cast_rays(
@@ -68,6 +72,8 @@ def cast_rays(
     ranges, surface = np.full(n, np.inf), np.full(n, -1, dtype=np.int32)
     if world.n_surfaces == 0:
         return ranges, surface
+    if len(poses) == 1 and n * world.n_surfaces > _BLOCK:
+        return _cast_where_they_may_meet(world, poses[:, :2], direction)
     at_a_time = max(16, _BLOCK // world.n_surfaces)
     for first in range(0, n, at_a_time):
         block = slice(first, first + at_a_time)
@@ -81,14 +87,75 @@ def cast_rays(
     return ranges, surface
 
 
+def _cast_where_they_may_meet(
+    world: World, origin: Array, direction: Array
+) -> tuple[Array, NDArray[np.int32]]:
+    """As `cast_rays` from one pose, each beam with the surfaces alone that lie at its bearing."""
+    n = direction.shape[1]
+    first, width = _bearings(world, origin[0])
+    headings = np.mod(np.arctan2(direction[1], direction[0]), 2 * math.pi)
+    order = np.argsort(headings, kind="stable")
+    twice = np.concatenate((headings[order], headings[order] + 2 * math.pi))
+    low, high = np.searchsorted(twice, first), np.searchsorted(twice, first + width, "right")
+    counts = np.minimum(high - low, n)
+    surface = np.repeat(np.arange(world.n_surfaces), counts)
+    places = np.arange(len(surface)) + np.repeat(low - (np.cumsum(counts) - counts), counts)
+    beam = np.concatenate((order, order))[places]
+    is_wall = surface < len(world.segments)
+    distance = np.concatenate(
+        [
+            of_kind(table[surface[which] - skipped], origin, direction[:, beam[which]])
+            for of_kind, table, which, skipped in (
+                (_along_walls, world.segments, is_wall, 0),
+                (_along_circles, world.circles, ~is_wall, len(world.segments)),
+            )
+        ]
+    )
+    beam = np.concatenate((beam[is_wall], beam[~is_wall]))
+    surface = np.concatenate((surface[is_wall], surface[~is_wall]))
+    ranges, nearest = np.full(n, np.inf), np.full(n, world.n_surfaces, dtype=np.int32)
+    np.minimum.at(ranges, beam, distance)
+    met = np.isfinite(distance) & (distance == ranges[beam])
+    np.minimum.at(nearest, beam[met], surface[met].astype(np.int32))
+    nearest[np.isinf(ranges)] = -1
+    return ranges, nearest
+
+
+def _bearings(world: World, origin: Array) -> tuple[Array, Array]:
+    """First bearing at which each surface may be met, in [0, 2π), and how wide it is [rad]."""
+    ends = world.segments.reshape(-1, 2, 2) - origin
+    angles = np.arctan2(ends[:, :, 1], ends[:, :, 0])
+    turn = np.mod(angles[:, 1] - angles[:, 0] + math.pi, 2 * math.pi) - math.pi
+    arms = world.circles[:, :2] - origin
+    away = np.hypot(*arms.T)
+    half = np.arcsin(np.minimum(world.circles[:, 2] / np.maximum(away, 1e-12), 1.0))
+    half[away <= world.circles[:, 2]] = math.pi
+    first = np.concatenate(
+        (np.where(turn < 0, angles[:, 1], angles[:, 0]), np.arctan2(arms[:, 1], arms[:, 0]) - half)
+    )
+    # Rounding may not lose a beam, nor a wall that the sensor stands at: its ends are opposite.
+    width = np.concatenate((abs(turn), 2 * half)) + 2 * _SLACK
+    beside = np.concatenate((abs(turn) > math.pi - 1e-6, np.zeros(len(half), dtype=bool)))
+    return np.mod(first - _SLACK, 2 * math.pi), np.where(beside, 2 * math.pi, width)
+
+
 def _to_walls(world: World, origin: Array, direction: Array) -> Array:
     """Distance along every ray to every wall, shape (n, S); inf where they do not meet.
 
     There is one origin, shape (1, 2), or one for each ray, (n, 2).
     """
-    ux, uy = direction[:, :, np.newaxis]
-    ox, oy = origin.T[:, :, np.newaxis]
-    px, py, qx, qy = world.segments.T
+    return _along_walls(world.segments, origin[:, np.newaxis], direction[:, :, np.newaxis])
+
+
+def _to_circles(world: World, origin: Array, direction: Array) -> Array:
+    """Distance along every ray to every circle, shape (n, C); inf where they do not meet."""
+    return _along_circles(world.circles, origin[:, np.newaxis], direction[:, :, np.newaxis])
+
+
+def _along_walls(walls: Array, origin: Array, direction: Array) -> Array:
+    """Distance of walls (…, 4) along rays, of any shapes that go together; inf if not met."""
+    (ux, uy), (ox, oy) = direction, np.moveaxis(origin, -1, 0)
+    px, py, qx, qy = walls.T
     px, py, qx, qy = px - ox, py - oy, qx - ox, qy - oy
     side_p = ux * py - uy * px
     side_q = ux * qy - uy * qx
@@ -103,13 +170,12 @@ def _to_walls(world: World, origin: Array, direction: Array) -> Array:
     return distance
 
 
-def _to_circles(world: World, origin: Array, direction: Array) -> Array:
-    """Distance along every ray to every circle, shape (n, C); inf where they do not meet."""
-    ux, uy = direction[:, :, np.newaxis]
-    ox, oy = origin.T[:, :, np.newaxis]
-    cx, cy = world.circles[:, 0] - ox, world.circles[:, 1] - oy
+def _along_circles(circles: Array, origin: Array, direction: Array) -> Array:
+    """Distance of circles (…, 3) along rays; inf if not met."""
+    (ux, uy), (ox, oy) = direction, np.moveaxis(origin, -1, 0)
+    cx, cy = circles[:, 0] - ox, circles[:, 1] - oy
     along, across = ux * cx + uy * cy, ux * cy - uy * cx
-    square = world.circles[:, 2] ** 2 - across**2
+    square = circles[:, 2] ** 2 - across**2
     half_chord = np.sqrt(np.maximum(square, 0.0))
     near, far = along - half_chord, along + half_chord
     # From within a circle its far side is met.

@@ -1,0 +1,209 @@
+"""The tables of docs/locate.md: ``python benchmarks/locating.py --queries 20000 --seed 100``.
+
+Simulated storeys with furniture and people that the plan does not have; a local map of up to 5 m
+of way is looked for on its plan, on that plan with walls moved by 0.3 m, mirrored, and on that of
+another storey. Then the scans of the real arena, each by itself, where they were recorded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import pickle
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+import lineament as ln
+from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
+from lineament.mapping.evidence import evidence_of
+from lineament.mapping.refine import COARSE, refined
+from lineament.simulation import SENSORS
+from lineament.simulation.buildings import Building, office
+from lineament.simulation.wheels import Wheels
+
+PLANS = ("own", "moved", "mirrored", "other")
+#: A pose is right within [m, rad].
+RIGHT = 0.2, math.radians(1)
+WAYS = (2.0, 3.5, 5.0)
+SIZES = ((60.0, 40.0), (40.0, 24.0))
+SPEED, RATE, STEP = 1.0, 5.0, 1.3
+
+
+@dataclass
+class Place:
+    """A local map, where it is, and whether nothing else on the plan looks like it."""
+
+    query: Query
+    truth: tuple[float, float, float]
+    way: float
+    unique: bool
+
+
+def storey(seed: int) -> Building:
+    """Return the storey of a seed: half, all or none of the rows are identical rooms."""
+    return office(seed, SIZES[seed % 2], identical=(0.5, 1.0, 0.0)[seed % 3])
+
+
+def plan_of(world: object) -> LineMap:
+    return LineMap.from_lines(world.segments, side=1)  # type: ignore[attr-defined]
+
+
+def plans(seed: int) -> dict[str, LineMap]:
+    own, other = storey(seed), storey(seed + 6000)
+    worlds = own.plan, own.moved(seed).plan, own.mirrored(), other.plan
+    return dict(zip(PLANS, map(plan_of, worlds), strict=True))
+
+
+def places(seed: int, most: int | None = None) -> list[Place]:
+    """Drive through the storey of a seed; a local map each few metres."""
+    building, plan = storey(seed), plan_of(storey(seed).plan)
+    scans, truth = building.drive(
+        SENSORS["utm30lx"],
+        seed=seed,
+        speed=SPEED,
+        rate=RATE,
+        people=8,
+        wheels=Wheels() if seed % 4 < 2 else None,
+    )
+    tracker, extract = ln.Tracker(roughness=0.0), ln.Extractor()
+    maps = [LocalMap(way) for way in WAYS]
+    found: list[Place] = []
+    since = 0.0
+    for k, (scan, pose) in enumerate(zip(scans, truth, strict=True)):
+        features = extract(scan)
+        tracks = tracker(features, scan.pose)
+        for local in maps:
+            local.add(features, tracks, scan.pose)
+        since += math.dist(pose[:2], truth[k - 1][:2]) if k else -WAYS[-1] / 2
+        if since < STEP:
+            continue
+        since = 0.0
+        query = maps[len(found) % 3].query()
+        unique = is_unique(query, pose, plan, building)
+        found.append(Place(query, pose, WAYS[len(found) % 3], unique))
+        if len(found) == most:
+            break
+    return found
+
+
+def is_unique(query: Query, pose: tuple[float, ...], plan: LineMap, building: Building) -> bool:
+    """Whether no other pose on the plan explains what the right one does of the plan.
+
+    Tried are poses to which a room, turned by quarters, is moved onto another, and slides along
+    both axes. Beams that do not end on the plan are left out, as are all limits of `locate`.
+    """
+    right = np.array([pose])
+    beams = [b for b in query.beams if evidence_of(right, b[None], plan.index, 0.03)[0, 1] > 0]
+    if len(beams) < 10:
+        return False
+    tried = [(x, y, 0.0) for x in SLIDES for y in SLIDES if (x == 0) != (y == 0)]
+    tried = [np.add(pose, shift) for shift in tried]
+    centers = np.array([(r.low[0] + r.high[0], r.low[1] + r.high[1]) for r in building.rooms]) / 2
+    own = centers[np.hypot(*(centers - pose[:2]).T).argsort()[:2]]
+    for center in own:
+        for turn in range(4):
+            c, s = round(math.cos(turn * math.pi / 2)), round(math.sin(turn * math.pi / 2))
+            moved = centers + np.array([[c, -s], [s, c]]) @ (np.array(pose[:2]) - center)
+            tried += [np.array([x, y, pose[2] + turn * math.pi / 2]) for x, y in moved]
+    poses, _, _ = refined(np.array(tried), query, plan.index, COARSE)
+    off = poses - pose
+    turned = np.abs(np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi)
+    distinct = poses[(np.hypot(off[:, 0], off[:, 1]) > RIGHT[0]) | (turned > RIGHT[1])]
+    shares = evidence_of(distinct, np.array(beams), plan.index, 0.03)
+    return not ((shares[:, 1] > 0.9) & (shares[:, 3] < 0.05)).any()
+
+
+SLIDES = (-3.0, -2.0, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 2.0, 3.0)
+
+
+def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
+    """Return rows of (plan, verdict, right, unique, error, turn, NEES, time, explained, ...)."""
+    file = None if kept is None else kept / f"{seed}.pickle"
+    if file is not None and file.exists():
+        found = pickle.loads(file.read_bytes())
+    else:
+        found = places(seed, most)
+        if file is not None:
+            file.write_bytes(pickle.dumps(found))
+    rows = []
+    for number, plan in enumerate(plans(seed).values()):
+        if len(found):
+            locate(found[0].query, plan)
+        for place in found[:most]:
+            started = time.process_time()
+            where = locate(place.query, plan)
+            spent = time.process_time() - started
+            off = np.subtract(where.pose, place.truth)
+            off[2] = math.remainder(off[2], 2 * math.pi)
+            way = math.hypot(off[0], off[1])
+            right = way < RIGHT[0] and abs(off[2]) < RIGHT[1] and number < 2
+            nees = off @ np.linalg.solve(where.covariance, off) / 3
+            evidence = where.evidence
+            second = where.alternatives[0][1].log_odds if where.alternatives else -99.0
+            rows.append((
+                number, VERDICTS.index(where.verdict), right, place.unique, way, abs(off[2]), nees,
+                spent, evidence.log_odds, second, evidence.explained, evidence.contradicted,
+                place.way, seed, len(plan),
+            ))  # fmt: skip
+    return np.array(rows)
+
+
+def table(rows: np.ndarray) -> None:
+    """Print verdicts by plan, and what is to be reached."""
+    number, verdict, right, unique = rows[:, 0], rows[:, 1], rows[:, 2] > 0, rows[:, 3] > 0
+    print(f"| plan | queries | {' | '.join(VERDICTS)} | false located |")
+    print("|---|--:|--:|--:|--:|--:|--:|")
+    for k, name in enumerate((*PLANS, "all")):
+        of = number == k if k < len(PLANS) else number >= 0
+        shares = " | ".join(f"{100 * (verdict[of] == v).mean():.1f} %" for v in range(4))
+        false = (verdict[of] == 0) & ~right[of]
+        print(f"| {name} | {of.sum()} | {shares} | {false.sum()} ({100 * false.mean():.2f} %) |")
+    own = number == 0
+    good = own & unique & (verdict == 0) & right
+    print(f"recall where unique: {100 * good.sum() / max((own & unique).sum(), 1):.1f} % "
+          f"of {(own & unique).sum()}; unique: {100 * unique[own].mean():.0f} %")
+    located = own & (verdict == 0) & right
+    print(f"own plan, located: median error {1000 * np.median(rows[located, 4]):.1f} mm, "
+          f"{math.degrees(np.median(rows[located, 5])):.3f}°; NEES {rows[located, 6].mean():.2f}, "
+          f"median of χ²/3 {np.median(rows[located, 6]):.2f} (0.79)")
+    print(f"time a query: median {1000 * np.median(rows[:, 7]):.1f} ms, 95 % "
+          f"{1000 * np.quantile(rows[:, 7], 0.95):.1f} ms, on {np.median(rows[:, 14]):.0f} features")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--queries", type=int, default=20_000)
+    parser.add_argument("--seed", type=int, default=100)
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=Path, help="folder where the local maps are kept")
+    parser.add_argument("--most", type=int, help="local maps of a storey")
+    options = parser.parse_args()
+    done: list[np.ndarray] = []
+    seed, running = options.seed, set()
+    with ProcessPoolExecutor(options.workers) as pool:
+        while sum(map(len, done)) < options.queries:
+            while len(running) < options.workers:
+                running.add(pool.submit(judge, seed, options.most, options.keep))
+                seed += 1
+            ready = next(as_completed(running))
+            running.remove(ready)
+            done.append(ready.result())
+            print(f"{sum(map(len, done))} of {options.queries} queries", file=sys.stderr)
+        for waiting in running:
+            waiting.cancel()
+    rows = np.concatenate(done)
+    if options.keep is not None:
+        np.save(options.keep / "rows.npy", rows)
+    table(rows)
+
+
+if __name__ == "__main__":
+    main()

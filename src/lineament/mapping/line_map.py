@@ -1,0 +1,247 @@
+"""`LineMap`: walls, corners and columns in one frame, each with its covariance."""
+
+import math
+import os
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import LineamentError
+from ..features import ARC, CORNER, SEGMENT, Features, make_records
+from ..kernels.mapping import WALL_COLUMNS, list_walls
+from ..output import open_writer
+from ..scan import Array, LaserScan, Pose
+from .hypotheses import anchors, meetings
+from .plans import read_plan
+from .walls import COLUMN, Merger, walls_of
+
+#: Longer walls are in no building: the plan is in other units [m].
+LONGEST = 2000.0
+#: Size of the cells by which walls are found [m], how far around a wall they reach, most cells.
+_CELL, _AROUND, _MOST_CELLS = 0.5, 0.3, 4_000_000
+#: Walls of which a round column is made to meet beams.
+_SIDES = 12
+
+
+class Index(NamedTuple):
+    """The walls as the kernels take them, and which of them lie near a place."""
+
+    walls: Array
+    grid: Array
+    begins: NDArray[np.int64]
+    members: NDArray[np.int64]
+
+
+class LineMap:
+    """A plan: walls, corners and columns in one frame [m, rad].
+
+    Parameters
+    ----------
+    walls : structured array of `WALL`
+        Walls without length or with numbers that are not finite are left out.
+    columns : structured array of `COLUMN`, optional
+    sigma : float
+        How far the drawn walls are from where they stand [m], beside their covariances.
+
+    Raises
+    ------
+    LineamentError
+        If no wall is left, or the plan is larger than a building can be.
+
+    Examples
+    --------
+    >>> plan = LineMap.from_lines([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]])
+    >>> plan
+    LineMap(4 walls, 4 corners, 0 columns, 4.0 m x 3.0 m)
+    """
+
+    def __init__(
+        self,
+        walls: NDArray[np.void],
+        columns: NDArray[np.void] | None = None,
+        *,
+        sigma: float = 0.0,
+    ) -> None:
+        ends = np.concatenate((walls["start"], walls["end"]), axis=1)
+        lengths = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
+        good = np.isfinite(ends).all(axis=1) & (lengths > 1e-6)
+        good &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
+        if not good.any():
+            raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")
+        extent = max(np.ptp(ends[good].reshape(-1, 2), axis=0))
+        if extent > LONGEST:
+            raise LineamentError(
+                f"the plan is {extent:.0f} m wide, expected a building: is it drawn in metres?"
+            )
+        self.walls = walls[good]
+        self.columns = np.zeros(0, COLUMN) if columns is None else columns
+        self.sigma = sigma
+        self.walls.flags.writeable = self.columns.flags.writeable = False
+
+    def __repr__(self) -> str:
+        wide, deep = np.ptp(self.ends.reshape(-1, 2), axis=0)
+        return (
+            f"LineMap({len(self.walls)} walls, {len(self.corners)} corners, "
+            f"{len(self.columns)} columns, {wide:.1f} m x {deep:.1f} m)"
+        )
+
+    def __len__(self) -> int:
+        return len(self.walls) + len(self.corners) + len(self.columns)
+
+    @property
+    def ends(self) -> Array:
+        """Both ends of each wall, shape (n, 2, 2) [m]."""
+        return np.stack((self.walls["start"], self.walls["end"]), axis=1)
+
+    @cached_property
+    def corners(self) -> NDArray[np.void]:
+        """Where two walls end together: records of `hypotheses.MEETING`."""
+        return meetings(self.walls)
+
+    @cached_property
+    def anchors(self) -> Array:
+        """What votes for poses: corners and ends of walls, see `hypotheses.anchors`."""
+        return anchors(self.walls, self.corners)
+
+    @cached_property
+    def index(self) -> Index:
+        """What the kernels need."""
+        return make_index(self.walls, self.columns, self.sigma)
+
+    @classmethod
+    def from_lines(
+        cls, ends: ArrayLike, columns: ArrayLike = (), *, sigma: float = 0.0, side: int = 0
+    ) -> Self:
+        """Make a plan of lines ``x1 y1 x2 y2`` (n, 4) and columns ``x y r`` (m, 3), known exactly.
+
+        `side` is 1 for lines that are seen from their left alone.
+        """
+        lines = np.array(ends, np.float64).reshape(-1, 2, 2)
+        round_ones = np.array(columns, np.float64).reshape(-1, 3)
+        found = np.zeros(len(round_ones), COLUMN)
+        found["center"], found["radius"] = round_ones[:, :2], round_ones[:, 2]
+        return cls(walls_of(lines, side=side), found, sigma=sigma)
+
+    @classmethod
+    def from_features(
+        cls,
+        features: Iterable[Features],
+        poses: Iterable[Pose] | None = None,
+        pose_covariances: Iterable[ArrayLike] | None = None,
+        *,
+        min_views: int = 1,
+        sigma: float = 0.0,
+    ) -> Self:
+        """Merge the features of scans, each seen from its pose.
+
+        Segments join a wall if they lie along it, or no more than a door apart, and the χ² of their
+        common line is within its 99 % quantile; misfits of the surfaces count as errors.
+
+        Parameters
+        ----------
+        features : iterable of Features
+            Of each scan, in the frame of its sensor, or of the map where `poses` is None.
+        poses : iterable of (x, y, theta), optional
+            Of the sensor in the frame of the map.
+        pose_covariances : iterable of array_like, shape (3, 3), optional
+            Of the poses [m, m, rad].
+        min_views : int
+            Walls and columns that were seen less often are left out.
+        sigma : float
+            As for the map.
+        """
+        merger = Merger()
+        spreads = None if pose_covariances is None else iter(pose_covariances)
+        places = None if poses is None else iter(poses)
+        for found in features:
+            if places is not None:
+                spread = None if spreads is None else next(spreads)
+                found = found.transform(*next(places), spread)
+            merger.add(found)
+        return cls(*merger.result(min_views), sigma=sigma)
+
+    @classmethod
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        layers: Sequence[str] | None = None,
+        *,
+        sigma: float = 0.0,
+    ) -> Self:
+        """Read a plan: DXF, or a table of features in the frame of the world (Parquet).
+
+        Parameters
+        ----------
+        path : path-like
+            A ``.dxf`` of any program, or a ``.parquet`` of ``lineament extract --world``.
+        layers : sequence of str, optional
+            The layers of a DXF that hold walls, ``*`` stands for anything; by default those with
+            "wall" in their name, or all if there are none.
+        sigma : float
+            How far the drawn walls are from where they stand [m].
+
+        Raises
+        ------
+        LineamentError
+            If the file cannot be read or has no walls.
+        """
+        return cls(*read_plan(path, layers), sigma=sigma)
+
+    def to_features(self) -> Features:
+        """Return walls, corners and columns as the features of one scan in the map's frame."""
+        walls, corners, columns = self.walls, self.corners, self.columns
+        segments = np.zeros(len(walls), SEGMENT)
+        for name in ("start", "end", "centroid", "angle", "covariance"):
+            segments[name] = walls[name]
+        segments["n_points"] = walls["views"]
+        segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+        points = np.zeros(len(corners), CORNER)
+        for name in ("position", "covariance", "opening"):
+            points[name] = corners[name]
+        points["convex"] = corners["solid"] == 1
+        points["segments"], points["kind"] = corners["walls"], "corner"
+        arcs = np.zeros(len(columns), ARC)
+        for name in ("center", "radius", "covariance"):
+            arcs[name] = columns[name]
+        arcs["n_points"] = columns["views"]
+        none = make_records("breakpoints", [])
+        return Features(segments, points, arcs, np.empty(0, np.int32), none, frame_id="map")
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""
+        with open_writer(path) as writer:
+            writer.write(self.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
+
+
+def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float) -> Index:
+    """List the walls by cells, with round columns as short walls behind them."""
+    turns = np.linspace(0, 2 * math.pi, _SIDES + 1)
+    ring = np.stack((np.cos(turns), np.sin(turns)), axis=1)[::-1]  # seen from outside: its left
+    rings = columns["center"][:, None] + columns["radius"][:, None, None] * ring
+    sides = np.stack((rings[:, :-1], rings[:, 1:]), axis=2).reshape(-1, 2, 2)
+    ends = np.concatenate((np.stack((walls["start"], walls["end"]), axis=1), sides))
+    along = ends[:, 1] - ends[:, 0]
+    lengths = np.linalg.norm(along, axis=1)
+    table = np.zeros((len(ends), WALL_COLUMNS))
+    table[:, :2], table[:, 2:4], table[:, 4] = ends[:, 0], along / lengths[:, None], lengths
+    n = len(walls)
+    table[:n, 5], table[n:, 5] = walls["side"], 1
+    # The covariance is moved along the wall to the middle between its ends.
+    lever = ((ends[:n].mean(axis=1) - walls["centroid"]) * table[:n, 2:4]).sum(axis=1)
+    (v00, v01), (_, v11) = walls["covariance"].transpose(1, 2, 0)
+    table[:n, 6] = v00 + 2 * lever * v01 + lever**2 * v11
+    table[:n, 7], table[:n, 8] = v01 + lever * v11, v11
+    table[:, 6] += sigma**2
+    low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0
+    cell = max(_CELL, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
+    counts = np.ceil((high - low) / cell)
+    grid = np.array([*low, cell, *counts])
+    begins = np.zeros(int(np.prod(counts)) + 1, np.int64)
+    list_walls(table, grid, _AROUND, begins[:-1], np.empty(0, np.int64))
+    begins = np.concatenate(([0], np.cumsum(begins[:-1])))
+    members = np.empty(begins[-1], np.int64)
+    list_walls(table, grid, _AROUND, begins[:-1].copy(), members)
+    return Index(table, grid, begins, members)

@@ -1,0 +1,229 @@
+"""`LocalMap`: what was seen on the last metres of the way, in one frame."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..features import Features
+from ..kernels.mapping import BEAM_COLUMNS, LOCAL_COLUMNS
+from ..motion.odometry import compose_jacobians
+from ..motion.tracker import Tracks
+from ..scan import Array, LaserScan, Pose
+from ..scan.poses import compose, inverse, relative
+from .adjust import adjust
+from .hypotheses import meetings
+from .walls import SHORTEST
+
+#: A scan is kept after so much way, or so much turn [m, rad].
+SPACING, TURN = 0.3, 0.26
+#: Deviations of a motion by odometry and by features, least and by way or turn [m, m, rad]. What
+#: the features say is known by the walls already; the rest, of directions that are not observed,
+#: is the tracker's guess.
+ODOMETRY = (0.005, 0.1), (0.005, 0.1), (0.005, 0.1)
+UNSURE = (0.05, 1.0), (0.05, 1.0), (0.02, 0.2)
+#: One beam is kept for each square of so much [m] in which beams end, and at most so many.
+_SQUARE, MOST_BEAMS = 0.25, 160
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """What is looked for: walls and beams in one frame, the sensor's now.
+
+    Attributes
+    ----------
+    walls : structured array of `WALL`
+    covariance : ndarray, shape (2n, 2n)
+        Of (offset, angle) of all walls [m, rad].
+    beams : ndarray, shape (b, 10)
+        Origin [m], direction, range [m], its variance [m²], weight, covariance of the end [m²].
+    """
+
+    walls: NDArray[np.void]
+    covariance: Array
+    beams: Array
+
+    @property
+    def table(self) -> Array:
+        """The walls as the kernels take them, shape (n, LOCAL_COLUMNS)."""
+        walls = self.walls
+        table = np.empty((len(walls), LOCAL_COLUMNS))
+        table[:, :2], table[:, 2] = walls["centroid"], walls["angle"]
+        table[:, 3] = np.linalg.norm(walls["start"] - walls["centroid"], axis=1)
+        table[:, 4] = np.linalg.norm(walls["end"] - walls["centroid"], axis=1)
+        table[:, 5:7], table[:, 7] = walls["covariance"][:, 0], walls["covariance"][:, 1, 1]
+        return table
+
+    def mirrored(self) -> "Query":
+        """Return its mirror image, which is as rich but belongs nowhere on a plan."""
+        walls, beams = self.walls.copy(), self.beams * (1, -1, 1, -1, 1, 1, 1, 1, -1, 1)
+        for name, of in (("start", "end"), ("end", "start"), ("centroid", "centroid")):
+            walls[name] = self.walls[of] * (1, -1)
+        walls["angle"] = np.remainder(2 * math.pi - self.walls["angle"], 2 * math.pi) - math.pi
+        walls["covariance"] *= [[1, -1], [-1, 1]]
+        signs = np.tile([1.0, -1.0], len(walls))
+        return Query(walls, self.covariance * np.outer(signs, signs), beams)
+
+    @property
+    def corners(self) -> NDArray[np.void]:
+        """Where walls end together, records of `hypotheses.MEETING`."""
+        return meetings(self.walls)
+
+
+class LocalMap:
+    """Walls and beams of the last metres of the way, built scan by scan from a tracker's motions.
+
+    Parameters
+    ----------
+    way : float
+        What was seen before the last so many metres is forgotten [m].
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, drive, room
+    >>> tracker, local, extract = ln.Tracker(), LocalMap(), ln.Extractor()
+    >>> for scan in drive(room(), [(-2, 0), (-1, 0)], SENSORS["utm30lx"], speed=1, rate=10):
+    ...     features = extract(scan)
+    ...     local.add(features, tracker(features))
+    >>> local
+    LocalMap(6 scans, 1.0 m)
+    """
+
+    def __init__(self, way: float = 5.0) -> None:
+        if not way >= 0:
+            raise ValueError(f"way is {way}, expected a length ≥ 0")
+        self.way = way
+        self._kept: deque[_Sight] = deque()
+        self._last: _Sight | None = None
+
+    def __repr__(self) -> str:
+        return f"LocalMap({len(self._sights)} scans, {self._way:.1f} m)"
+
+    @property
+    def _sights(self) -> list["_Sight"]:
+        return [*self._kept, *([self._last] if self._last else [])]
+
+    @property
+    def _way(self) -> float:
+        return sum(sight.way for sight in self._sights[1:])
+
+    def add(
+        self,
+        features: Features,
+        tracks: Tracks,
+        odometry: Pose | None = None,
+        scan: LaserScan | None = None,
+    ) -> None:
+        """Add a scan: its features, and what the tracker says of them.
+
+        `odometry` is the pose by odometry that the tracker had: along a bare corridor the walls do
+        not show the motion, and people who walk there feign one. `scan` is needed where the
+        features do not have it themselves: those of a batch.
+        """
+        scan = features.scan if scan is None else scan
+        if scan is None:
+            raise ValueError("the features have no scan, expected it as the third argument")
+        before, motion = self._last, tracks.motion
+        long = features.segments["length"] >= SHORTEST
+        seen = features.segments[long], tracks.segments[long], beams_of(features, scan), odometry
+        if before is None or motion is None:
+            self._kept.clear()
+            self._last = _Sight(*seen)
+            return
+        if not self._kept or before.way > SPACING or before.turn > TURN:
+            self._kept.append(before)
+            before = _Sight(*seen[:3], before.odometry)
+        moved, sure = motion.pose, UNSURE
+        if odometry is not None and before.odometry is not None:
+            moved, sure = relative(before.odometry, odometry), ODOMETRY
+        way, turn = math.hypot(*moved[:2]), abs(moved[2])
+        deviations = [a + b * c for (a, b), c in zip(sure, (way, way, turn), strict=True)]
+        of_pose, of_motion = compose_jacobians(before.motion, moved)
+        of_motion *= deviations
+        self._last = _Sight(
+            *seen,
+            compose(before.motion, moved),
+            of_pose @ before.covariance @ of_pose.T + of_motion @ of_motion.T,
+            before.way + way,
+            before.turn + turn,
+        )
+        while self._kept and self._way > self.way:
+            self._kept.popleft()
+
+    def query(self) -> Query:
+        """Return walls and beams in the frame of the last scan; ValueError before there is one."""
+        if self._last is None:
+            raise ValueError("the local map is empty, expected a scan")
+        sights = self._sights
+        poses: list[Pose] = [(0.0, 0.0, 0.0)]
+        for sight in sights[:0:-1]:
+            poses.append(compose(poses[-1], inverse(sight.motion)))
+        motions = [(sight.motion, sight.covariance) for sight in sights[1:]]
+        seen = [(sight.segments, sight.numbers) for sight in sights]
+        placed, spreads, walls, covariance = adjust(poses[::-1], motions, seen)
+        beams = [
+            moved_beams(sight.beams, pose, spread)
+            for sight, pose, spread in zip(sights, placed, spreads, strict=True)
+        ]
+        return Query(walls, covariance, thinned(np.concatenate(beams[::-1])))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    """What a scan shows, the numbers of its segments, and the motion since the one kept before."""
+
+    segments: NDArray[np.void]
+    numbers: NDArray[np.int64]
+    beams: Array
+    odometry: Pose | None = None
+    motion: Pose = (0.0, 0.0, 0.0)
+    covariance: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    way: float = 0.0
+    turn: float = 0.0
+
+
+def query_of_scan(features: Features, scan: LaserScan | None = None) -> Query:
+    """Return walls and beams of one scan."""
+    scan = features.scan if scan is None else scan
+    segments = features.segments[features.segments["length"] >= SHORTEST]
+    beams = np.zeros((0, BEAM_COLUMNS)) if scan is None else beams_of(features, scan)
+    _, _, walls, covariance = adjust([(0.0, 0.0, 0.0)], [], [(segments, np.arange(len(segments)))])
+    return Query(walls, covariance, thinned(beams))
+
+
+def thinned(beams: Array) -> Array:
+    """Return one beam for each square in which beams end, the first."""
+    ends = np.floor((beams[:, :2] + beams[:, 4:5] * beams[:, 2:4]) / _SQUARE).astype(np.int64)
+    _, first = np.unique(ends[:, 0] * 1_000_003 + ends[:, 1], return_index=True)
+    first = np.sort(first)
+    if len(first) > MOST_BEAMS:
+        first = first[np.linspace(0, len(first) - 1, MOST_BEAMS).astype(np.intp)]
+    return np.ascontiguousarray(beams[first])
+
+
+def beams_of(features: Features, scan: LaserScan) -> Array:
+    """Return the valid beams of a scan, shape (n, BEAM_COLUMNS)."""
+    valid, noise = scan.valid, features.noise
+    r, bearings = scan.ranges[valid], scan.angles[valid]
+    beams = np.zeros((len(r), BEAM_COLUMNS))
+    beams[:, 2], beams[:, 3], beams[:, 4] = np.cos(bearings), np.sin(bearings), r
+    sigma = 0.02 if noise is None else np.hypot(noise.sigma, noise.proportional * r)
+    beams[:, 5], beams[:, 6] = np.square(sigma), 1.0
+    return beams
+
+
+def moved_beams(beams: Array, pose: Pose, covariance: Array) -> Array:
+    """Return beams as they are seen from another frame, with the covariance of their ends."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    moved = beams.copy()
+    moved[:, :2] = pose[:2]
+    moved[:, 2:4] = beams[:, 2:4] @ np.array([[c, s], [-s, c]])
+    jacobian = np.zeros((len(beams), 2, 3))
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+    jacobian[:, :, 2] = moved[:, 4:5] * moved[:, 3:1:-1] * (-1, 1)
+    spread = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+    moved[:, 7:9], moved[:, 9] = spread[:, 0], spread[:, 1, 1]
+    return moved

@@ -1,0 +1,268 @@
+"""`locate`: where a local map lies on a plan, how sure that is, and whether it is lost."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..features import Features
+from ..kernels.mapping import choose
+from ..scan import Array, LaserScan, Pose
+from .evidence import Evidence, evidence_of
+from .hypotheses import anchors, directions, hypotheses
+from .line_map import LineMap
+from .local_map import LocalMap, Query, query_of_scan
+from .refine import COARSE, FINE, adjusted, refined
+
+#: What `Location.verdict` may be.
+LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
+    "located",
+    "ambiguous",
+    "direction unobserved",
+    "not on this map",
+)
+
+#: Poses that are tried by few beams, refined, and judged by all beams.
+TRIED, SIFTED, REFINED, JUDGED = 400, 100, 32, 12
+_FEWEST_BEAMS, _FEW_BEAMS = 16, 40
+#: Poses nearer to each other are one, before and after they are refined [m, rad].
+_NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
+#: The best pose is more likely than the next by so much (nats), and than chance.
+SURE, NO_CHANCE = math.log(1000), 5.0
+#: Shares of the beams: fewer explained, or more contradicted, are not of this map.
+LEAST_EXPLAINED, MOST_CONTRADICTED = 0.4, 0.12
+#: A direction in which the pose is known no better is unobserved [m].
+UNSURE = 0.15
+#: Errors of beams and walls beside their covariances [m]: where poses are tried, and judged.
+_WIDE, _TIGHT = 0.12, 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Location:
+    """Where the sensor is on a plan.
+
+    Attributes
+    ----------
+    verdict : str
+        One of `VERDICTS`. Only a pose that is "located" is to be relied upon.
+    pose : (x, y, theta)
+        The best pose of the sensor in the frame of the plan [m, m, rad].
+    covariance : ndarray, shape (3, 3)
+        Of the pose [m, m, rad]; large in the direction that is unobserved.
+    evidence : Evidence
+        What the beams say of the pose.
+    unobserved : (x, y) or None
+        Unit vector in the plan's frame, along which the pose is not known.
+    alternatives : list of (pose, Evidence)
+        Other poses that explain what was seen nearly as well, the best first.
+    """
+
+    verdict: str
+    pose: Pose
+    covariance: Array
+    evidence: Evidence
+    unobserved: tuple[float, float] | None = None
+    alternatives: list[tuple[Pose, Evidence]] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return self.verdict == LOCATED
+
+    def __repr__(self) -> str:
+        x, y, theta = self.pose
+        of_x, of_y, of_theta = np.sqrt(np.diag(self.covariance))
+        others = f", {len(self.alternatives)} alternatives" if self.alternatives else ""
+        return (
+            f"Location({self.verdict}: {x:.3f} ± {of_x:.3f} m, {y:.3f} ± {of_y:.3f} m, "
+            f"{math.degrees(theta):.2f} ± {math.degrees(of_theta):.2f}°, "
+            f"{100 * self.evidence.explained:.0f} % explained{others})"
+        )
+
+
+def locate(
+    query: Features | LocalMap | Query,
+    plan: LineMap,
+    guess: Pose | None = None,
+    covariance: ArrayLike | None = None,
+    *,
+    scan: LaserScan | None = None,
+) -> Location:
+    """Find where features, or a local map, lie on a plan, with or without a first guess.
+
+    Corners of both that are alike vote for poses; those are refined by weighted least squares of
+    walls on walls, and judged by the beams: explained, short, or passing through a wall.
+
+    Parameters
+    ----------
+    query : Features, LocalMap or Query
+        What was seen. Features of one scan need the scan, which they have from `extract`; a local
+        map of several metres says much more.
+    plan : LineMap
+    guess : (x, y, theta), optional
+        Pose of the sensor in the frame of the plan, as it is known before [m, m, rad].
+    covariance : array_like, shape (3, 3), optional
+        Of the guess; by default that of 0.5 m and 10°.
+    scan : LaserScan, optional
+        The scan of the features, where they do not have it themselves.
+
+    Returns
+    -------
+    Location
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, room
+    >>> plan = LineMap.from_lines(room().segments)
+    >>> seen = SENSORS["utm30lx"].scan(room(), (-1.0, 0.5, 0.7), np.random.default_rng(0))
+    >>> where = locate(ln.extract(seen), plan)
+    >>> where.verdict, [round(value, 2) for value in where.pose]
+    ('located', [-1.0, 0.5, 0.7])
+    """
+    if isinstance(query, LocalMap):
+        query = query.query()
+    elif isinstance(query, Features):
+        query = query_of_scan(query, scan)
+    tried = _tried(query, plan)
+    if guess is not None:
+        tried = _near_guess(tried, guess, covariance)
+    poses, found = _searched(tried, query, plan)
+    if not len(poses):
+        return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
+    control = -math.inf
+    if guess is None:
+        image = query.mirrored()
+        _, odds = _searched(_tried(image, plan), image, plan)
+        control = float(odds[:, 0].max(initial=-math.inf))
+    return _judged(poses, found, query, plan, len(tried), control)
+
+
+_NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
+
+
+def _tried(query: Query, plan: LineMap) -> Array:
+    """Poses of a local map for which its corners and ends of walls vote."""
+    local = anchors(query.walls, query.corners)
+    return hypotheses(local, plan.anchors, directions(query.walls, plan.walls), TRIED)
+
+
+def _near_guess(tried: Array, guess: Pose, covariance: ArrayLike | None) -> Array:
+    """Return the guess, poses around it, and those tried that are within its covariance."""
+    spread = np.diag((0.25, 0.25, 0.03)) if covariance is None else np.asarray(covariance)
+    off = tried - guess
+    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+    near = np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) < 16.0
+    deviations = np.sqrt(np.diag(spread))
+    steps = [np.linspace(-d, d, 2 * math.ceil(d / s) + 1) if d > s else np.zeros(1)
+             for d, s in zip(deviations, (0.25, 0.25, 0.08), strict=True)]  # fmt: skip
+    around = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)[:TRIED]
+    return np.concatenate((np.add(guess, around), tried[near]))
+
+
+def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
+    """Try poses by few beams, refine the best, and judge them by all; the best come first."""
+    if not len(tried):
+        return tried, np.zeros((0, 4))
+    for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
+        found = evidence_of(tried, _few(query.beams, count), plan.index, _WIDE)
+        tried = tried[_distinct(tried, found[:, 0], _NEAR, most)]
+    poses, _, _ = refined(tried, query, plan.index, COARSE)
+    poses, _, _ = refined(poses, query, plan.index, FINE)
+    found = evidence_of(poses, query.beams, plan.index, _TIGHT)
+    best = found[:, 0].argmax()
+    slid = _slid(poses[best : best + 1], query, plan)
+    poses = np.concatenate((poses, slid))
+    found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
+    kept = _distinct(poses, found[:, 0], _SAME, JUDGED)
+    return poses[kept], found[kept]
+
+
+def _few(beams: Array, count: int) -> Array:
+    """Return about so many of the beams, evenly spread."""
+    if len(beams) <= count:
+        return beams
+    return beams[np.linspace(0, len(beams) - 1, count).astype(np.intp)]
+
+
+def _slid(poses: Array, query: Query, plan: LineMap) -> Array:
+    """Return poses some way off along both axes of the local map, refined where that is alike."""
+    turn = _main_direction(query) + poses[0, 2]
+    axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    steps = np.array([-1.0, -0.6, -0.3, 0.3, 0.6, 1.0])
+    moved = np.repeat(poses, 2 * len(steps), axis=0)
+    moved[:, :2] += (axes[:, None] * steps[:, None]).reshape(-1, 2)
+    return refined(moved, query, plan.index, FINE)[0]
+
+
+def _main_direction(query: Query) -> float:
+    """Direction of most walls, to quarters of a turn [rad]."""
+    lengths = np.linalg.norm(query.walls["end"] - query.walls["start"], axis=1)
+    return float(np.angle((lengths * np.exp(4j * query.walls["angle"])).sum()) / 4)
+
+
+def _distinct(
+    poses: Array, scores: Array, apart: tuple[float, float], most: int
+) -> NDArray[np.int64]:
+    """Return the best poses, each farther from all better ones than `apart`."""
+    chosen = np.empty(most, np.int64)
+    order = np.argsort(-scores, kind="stable")
+    return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
+
+
+def _judged(
+    poses: Array, found: Array, query: Query, plan: LineMap, tries: int, control: float
+) -> Location:
+    """Give the verdict on the best of some poses."""
+    _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
+    best, information = adjusted(poses[0], pairs[0], query, plan.index)
+    covariance = np.asarray(np.linalg.inv(information + np.diag((1e-2, 1e-2, 1e-2))), np.float64)
+    chance = math.log(max(tries, 1))
+    n = len(query.beams)
+    evidences = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
+    first = evidences[0]
+    others = [
+        (_pose(pose), other)
+        for pose, other in zip(poses[1:], evidences[1:], strict=True)
+        if first.log_odds - other.log_odds < SURE
+    ]
+    values, vectors = np.linalg.eigh(covariance[:2, :2])
+    x, y = vectors[:, 1].tolist()
+    unobserved = None
+    if (
+        first.log_odds < NO_CHANCE
+        or first.explained < LEAST_EXPLAINED
+        or first.contradicted > MOST_CONTRADICTED
+        or control > found[0, 0] + SURE
+    ):
+        verdict = LOST
+    elif values[1] > UNSURE**2:
+        verdict, unobserved = UNOBSERVED, (x, y)
+    elif others:
+        verdict = AMBIGUOUS
+        line = np.array([pose[:2] for pose, _ in others]) - poses[0, :2]
+        direction = _common_line(line, np.array([pose[2] for pose, _ in others]) - poses[0, 2])
+        if direction is not None:
+            verdict, unobserved = UNOBSERVED, direction
+    elif control > found[0, 0] - SURE:
+        verdict = AMBIGUOUS
+    else:
+        verdict = LOCATED
+    return Location(verdict, _pose(best), covariance, first, unobserved, others)
+
+
+def _common_line(away: Array, turns: Array) -> tuple[float, float] | None:
+    """Return the direction in which poses lie on a line through the best, if they are near it."""
+    if (np.abs(np.remainder(turns + math.pi, 2 * math.pi) - math.pi) > 0.1).any():
+        return None
+    if len(away) < 2 or np.hypot(*away.T).max() > 3.0:
+        return None
+    values, vectors = np.linalg.eigh(away.T @ away)
+    if values[0] > 0.02 * values[1]:
+        return None
+    x, y = vectors[:, 1].tolist()
+    return x, y
+
+
+def _pose(row: Array) -> Pose:
+    x, y, theta = row.tolist()
+    return x, y, math.remainder(theta, 2 * math.pi)
