@@ -29,7 +29,7 @@ from lineament.simulation import SENSORS
 from lineament.simulation.buildings import Building, office
 from lineament.simulation.wheels import Wheels
 
-PLANS = ("own", "moved", "mirrored", "other")
+PLANS = ("own", "moved", "moved", "mirrored", "other", "other")
 #: A pose is right within [m, rad].
 RIGHT = 0.2, math.radians(1)
 WAYS = (2.0, 3.5, 5.0)
@@ -45,6 +45,7 @@ class Place:
     truth: tuple[float, float, float]
     way: float
     unique: bool
+    mirrored: bool
 
 
 def storey(seed: int) -> Building:
@@ -56,10 +57,10 @@ def plan_of(world: object) -> LineMap:
     return LineMap.from_lines(world.segments, side=1)  # type: ignore[attr-defined]
 
 
-def plans(seed: int) -> dict[str, LineMap]:
-    own, other = storey(seed), storey(seed + 6000)
-    worlds = own.plan, own.moved(seed).plan, own.mirrored(), other.plan
-    return dict(zip(PLANS, map(plan_of, worlds), strict=True))
+def plans(seed: int) -> list[LineMap]:
+    own, moved = storey(seed), [storey(seed).moved(k).plan for k in range(2)]
+    others = [storey(seed + 6000 + k).plan for k in range(2)]
+    return [plan_of(world) for world in (own.plan, *moved, own.mirrored(), *others)]
 
 
 def places(seed: int, most: int | None = None) -> list[Place]:
@@ -87,38 +88,59 @@ def places(seed: int, most: int | None = None) -> list[Place]:
             continue
         since = 0.0
         query = maps[len(found) % 3].query()
-        unique = is_unique(query, pose, plan, building)
-        found.append(Place(query, pose, WAYS[len(found) % 3], unique))
+        unique, mirrored = likenesses(query, pose, plan, building)
+        found.append(Place(query, pose, WAYS[len(found) % 3], unique, mirrored))
         if len(found) == most:
             break
     return found
 
 
-def is_unique(query: Query, pose: tuple[float, ...], plan: LineMap, building: Building) -> bool:
-    """Whether no other pose on the plan explains what the right one does of the plan.
+def likenesses(
+    query: Query, pose: tuple[float, ...], plan: LineMap, building: Building
+) -> tuple[bool, bool]:
+    """Whether no other pose explains what the right one does of the plan; whether a mirrored does.
 
     Tried are poses to which a room, turned by quarters, is moved onto another, and slides along
     both axes. Beams that do not end on the plan are left out, as are all limits of `locate`.
     """
     right = np.array([pose])
-    beams = [b for b in query.beams if evidence_of(right, b[None], plan.index, 0.03)[0, 1] > 0]
-    if len(beams) < 10:
-        return False
-    tried = [(x, y, 0.0) for x in SLIDES for y in SLIDES if (x == 0) != (y == 0)]
-    tried = [np.add(pose, shift) for shift in tried]
+    of_plan = [evidence_of(right, b[None], plan.index, 0.03)[0, 1] > 0 for b in query.beams]
+    if sum(of_plan) < 10:
+        return False, False
+    query = Query(query.walls, query.covariance, query.beams[of_plan])
+    slides = [np.add(pose, (x, y, 0)) for x in SLIDES for y in SLIDES if (x == 0) != (y == 0)]
     centers = np.array([(r.low[0] + r.high[0], r.low[1] + r.high[1]) for r in building.rooms]) / 2
     own = centers[np.hypot(*(centers - pose[:2]).T).argsort()[:2]]
+    poses = moved_onto(query, slides + onto(pose, own, centers), plan)
+    off = poses - pose
+    turned = np.abs(np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi)
+    distinct = poses[(np.hypot(off[:, 0], off[:, 1]) > RIGHT[0]) | (turned > RIGHT[1])]
+    # The mirror image of the local map has the pose of the mirror image of the plan.
+    image, wide = query.mirrored(), building.size[0]
+    turned_over = (wide - pose[0], pose[1], math.pi - pose[2])
+    own = np.column_stack((wide - own[:, 0], own[:, 1]))
+    others = moved_onto(image, onto(turned_over, own, centers), plan)
+    return not explained(query, distinct, plan), explained(image, others, plan)
+
+
+def onto(pose: tuple[float, ...], own: np.ndarray, centers: np.ndarray) -> list[np.ndarray]:
+    """Return the poses that are to the centers as a pose is to its own, turned by quarters."""
+    poses = []
     for center in own:
         for turn in range(4):
             c, s = round(math.cos(turn * math.pi / 2)), round(math.sin(turn * math.pi / 2))
             moved = centers + np.array([[c, -s], [s, c]]) @ (np.array(pose[:2]) - center)
-            tried += [np.array([x, y, pose[2] + turn * math.pi / 2]) for x, y in moved]
-    poses, _, _ = refined(np.array(tried), query, plan.index, COARSE)
-    off = poses - pose
-    turned = np.abs(np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi)
-    distinct = poses[(np.hypot(off[:, 0], off[:, 1]) > RIGHT[0]) | (turned > RIGHT[1])]
-    shares = evidence_of(distinct, np.array(beams), plan.index, 0.03)
-    return not ((shares[:, 1] > 0.9) & (shares[:, 3] < 0.05)).any()
+            poses += [np.array([x, y, pose[2] + turn * math.pi / 2]) for x, y in moved]
+    return poses
+
+
+def moved_onto(query: Query, poses: list[np.ndarray], plan: LineMap) -> np.ndarray:
+    return refined(np.array(poses), query, plan.index, COARSE)[0]
+
+
+def explained(query: Query, poses: np.ndarray, plan: LineMap) -> bool:
+    shares = evidence_of(poses, query.beams, plan.index, 0.03)
+    return bool(((shares[:, 1] > 0.9) & (shares[:, 3] < 0.05)).any())
 
 
 SLIDES = (-3.0, -2.0, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 2.0, 3.0)
@@ -134,7 +156,7 @@ def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
         if file is not None:
             file.write_bytes(pickle.dumps(found))
     rows = []
-    for number, plan in enumerate(plans(seed).values()):
+    for number, plan in enumerate(plans(seed)):
         if len(found):
             locate(found[0].query, plan)
         for place in found[:most]:
@@ -144,14 +166,12 @@ def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
             off = np.subtract(where.pose, place.truth)
             off[2] = math.remainder(off[2], 2 * math.pi)
             way = math.hypot(off[0], off[1])
-            right = way < RIGHT[0] and abs(off[2]) < RIGHT[1] and number < 2
+            right = way < RIGHT[0] and abs(off[2]) < RIGHT[1] and number < 3
             nees = off @ np.linalg.solve(where.covariance, off) / 3
-            evidence = where.evidence
-            second = where.alternatives[0][1].log_odds if where.alternatives else -99.0
             rows.append((
                 number, VERDICTS.index(where.verdict), right, place.unique, way, abs(off[2]), nees,
-                spent, evidence.log_odds, second, evidence.explained, evidence.contradicted,
-                place.way, seed, len(plan),
+                spent, where.evidence.log_odds, len(where.alternatives), where.evidence.explained,
+                where.evidence.contradicted, place.way, seed, len(plan), place.mirrored,
             ))  # fmt: skip
     return np.array(rows)
 
@@ -159,23 +179,36 @@ def judge(seed: int, most: int | None, kept: Path | None) -> np.ndarray:
 def table(rows: np.ndarray) -> None:
     """Print verdicts by plan, and what is to be reached."""
     number, verdict, right, unique = rows[:, 0], rows[:, 1], rows[:, 2] > 0, rows[:, 3] > 0
+    names = np.array(PLANS)[number.astype(int)]
     print(f"| plan | queries | {' | '.join(VERDICTS)} | false located |")
     print("|---|--:|--:|--:|--:|--:|--:|")
-    for k, name in enumerate((*PLANS, "all")):
-        of = number == k if k < len(PLANS) else number >= 0
+    for name in (*dict.fromkeys(PLANS), "all"):
+        of = (names == name) | (name == "all")
         shares = " | ".join(f"{100 * (verdict[of] == v).mean():.1f} %" for v in range(4))
         false = (verdict[of] == 0) & ~right[of]
         print(f"| {name} | {of.sum()} | {shares} | {false.sum()} ({100 * false.mean():.2f} %) |")
-    own = number == 0
-    good = own & unique & (verdict == 0) & right
-    print(f"recall where unique: {100 * good.sum() / max((own & unique).sum(), 1):.1f} % "
-          f"of {(own & unique).sum()}; unique: {100 * unique[own].mean():.0f} %")
+    own, wheels, mirrored = number == 0, rows[:, 13] % 4 < 2, rows[:, 15] > 0
     located = own & (verdict == 0) & right
-    print(f"own plan, located: median error {1000 * np.median(rows[located, 4]):.1f} mm, "
-          f"{math.degrees(np.median(rows[located, 5])):.3f}°; NEES {rows[located, 6].mean():.2f}, "
-          f"median of χ²/3 {np.median(rows[located, 6]):.2f} (0.79)")
-    print(f"time a query: median {1000 * np.median(rows[:, 7]):.1f} ms, 95 % "
-          f"{1000 * np.quantile(rows[:, 7], 0.95):.1f} ms, on {np.median(rows[:, 14]):.0f} features")
+    print("\n| own plan | places | located, right |\n|---|--:|--:|")
+    for name, of in (
+        ("unique", unique),
+        ("unique, nor is its mirror image there", unique & ~mirrored),
+        ("the same, with odometry", unique & ~mirrored & wheels),
+        ("the same, without", unique & ~mirrored & ~wheels),
+        ("not unique", ~unique),
+    ):
+        share = located[own & of].sum() / max((own & of).sum(), 1)
+        print(f"| {name} | {(own & of).sum()} | {100 * share:.1f} % |")
+    print(
+        f"\nlocated on the own plan: median error {1000 * np.median(rows[located, 4]):.1f} mm, "
+        f"{math.degrees(np.median(rows[located, 5])):.3f}°; NEES {rows[located, 6].mean():.2f} "
+        f"(by three degrees of freedom), median {np.median(rows[located, 6]):.2f} (0.79)"
+    )
+    print(
+        f"time a query: median {1000 * np.median(rows[:, 7]):.1f} ms, 95 % "
+        f"{1000 * np.quantile(rows[:, 7], 0.95):.1f} ms of processor time, on "
+        f"{np.median(rows[:, 14]):.0f} features"
+    )
 
 
 def main() -> None:
@@ -196,12 +229,12 @@ def main() -> None:
             ready = next(as_completed(running))
             running.remove(ready)
             done.append(ready.result())
+            if options.keep is not None:
+                np.save(options.keep / "rows.npy", np.concatenate(done))
             print(f"{sum(map(len, done))} of {options.queries} queries", file=sys.stderr)
         for waiting in running:
             waiting.cancel()
     rows = np.concatenate(done)
-    if options.keep is not None:
-        np.save(options.keep / "rows.npy", rows)
     table(rows)
 
 

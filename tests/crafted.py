@@ -66,8 +66,9 @@ def mcap(
     kind: str = "LaserScan",
     topic: bytes = b"/scan",
     packed: bool = True,
+    chunks: int = 1,
 ) -> None:
-    """Write a message many times, in one chunk packed by zstd or as it is; without an end."""
+    """Write a message many times, in chunks packed by zstd or as it is; without an end."""
     schema = struct.pack("<H", 1) + _text(_TYPES[kind]) + _text(b"ros2msg") + _text(b"")
     channel = struct.pack("<HH", 1, 1) + _text(topic) + _text(b"cdr") + _text(b"")
     begin = _mcap_record(3, schema) + _mcap_record(4, channel)
@@ -81,7 +82,7 @@ def mcap(
         data = b"".join(map(packer.compress, (begin, *repeat(record, many)))) + packer.flush()
         size = len(begin) + len(record) * many
         head = struct.pack("<QQQI", 0, 0, size, 0) + _text(b"zstd") + struct.pack("<Q", len(data))
-        file.write(_mcap_record(6, head + data))
+        file.write(_mcap_record(6, head + data) * chunks)
 
 
 def _field(name: bytes, value: bytes) -> bytes:
@@ -123,9 +124,9 @@ def database(path: Path, rows: int = 40, size: int = 1000, message: bytes | None
     connection.close()
 
 
-def looping_database(path: Path, levels: int = 16) -> None:
+def looping_database(path: Path, levels: int = 16, beams: int = 1000) -> None:
     """A database whose inner pages all lead to the next one, many times over."""
-    database(path)
+    database(path, size=beams)
     connection = sqlite3.connect(path)
     (root,) = connection.execute(
         "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
@@ -212,6 +213,7 @@ def _sparse(path: Path) -> None:
 CRAFTED: dict[str, tuple[str, Callable[[Path], None], dict[str, object]]] = {
     "scan.mcap": ("ratio", lambda path: mcap(path, laser_scan(MANY)), {}),
     "scans.mcap": ("ratio", lambda path: mcap(path, laser_scan(3), 1_000_000), {}),
+    "chunks.mcap": ("ratio", lambda path: mcap(path, laser_scan(1 << 16), 40, chunks=3), {}),
     "beams.mcap": ("beams", lambda path: mcap(path, laser_scan(1 << 24), packed=False), {}),
     "echoes.mcap": (
         "points",
@@ -233,6 +235,7 @@ CRAFTED: dict[str, tuple[str, Callable[[Path], None], dict[str, object]]] = {
     "array.bag": ("", lambda path: rosbag1(path, laser_scan(2**32 - 1, 3, ros=1)), {}),
     "sparse.bag": ("piece", _sparse, {}),
     "loop.db3": ("", looping_database, {}),
+    "again.db3": ("", lambda path: looping_database(path, 1, 25_000), {}),
     "rows.db3": ("rows", lambda path: database(path, 1000, 3), {"limits": {"rows": 999}}),
     "message.db3": (
         "ratio",

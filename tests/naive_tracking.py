@@ -188,8 +188,7 @@ def estimate_motion(matches, prior=(0.0, 0.0, 0.0), covariance=None, *, roughnes
 class NaiveTracker(Tracker):
     """A tracker that looks for pairs three times, and numbers features one by one."""
 
-    def _follow(self, features, prior, spread):
-        motion = Motion(*prior, spread)
+    def _follow(self, features, motion, prior, spread):
         for _ in range(3):
             matches = associate(
                 self._seen, features, motion.pose, motion.covariance,
@@ -197,6 +196,23 @@ class NaiveTracker(Tracker):
             )  # fmt: skip
             motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
         return motion, matches
+
+    def _doubles(self, k, older, features):
+        """Whether a corner that was seen in the last frame alone is one with an older number."""
+        number, seen = self._tracks["corners"][k], self._seen.corners[k]
+        if number < self._young:
+            return False
+        for now, other in older.items():
+            corner = features.corners[now]
+            if other < number and corner["convex"] == seen["convex"]:
+                off = corner["position"] - seen["position"]
+                spread = corner["covariance"] + seen["covariance"]
+                spread = spread + 2 * self.roughness**2 * np.eye(2)
+                if not np.isfinite(spread).all():
+                    continue
+                if off @ np.linalg.inv(spread) @ off < chi2.ppf(self.gate, 2):
+                    return True
+        return False
 
     def _renew(self, features, matches, motion):
         if motion is not None:
@@ -206,13 +222,18 @@ class NaiveTracker(Tracker):
             seen, mine = getattr(self._seen, kind), {}
             tracks, missed, waiting = self._tracks[kind], self._missed[kind], []
             found = dict(getattr(matches, kind).tolist())
+            older = {now: tracks[k] for k, now in found.items()}
             for k in range(len(seen)):
                 if k in found:
                     mine[found[k]] = tracks[k]
+                elif kind == "corners" and missed[k] == 0 and self._doubles(k, older, features):
+                    ended.append(tracks[k])
                 elif missed[k] < self.max_missed:
                     waiting.append(k)
                 else:
                     ended.append(tracks[k])
+            if kind == "corners":
+                self._young = self._next
             for k in range(len(getattr(features, kind))):
                 if k not in mine:
                     mine[k] = self._next

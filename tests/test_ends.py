@@ -16,6 +16,7 @@ import pytest
 from mutations import own_samples
 from test_cli import benchmark, npz  # noqa: F401 (fixtures)
 from test_output import SCAN, files_up_to, random_features, write
+from text_logs import FLASER
 
 import lineament as ln
 from lineament import LogError, files
@@ -370,6 +371,17 @@ def test_a_log_that_changes_while_it_is_read(samples, tmp_path, change, first):
         assert problem or len(scans) == len(whole) or (change is grow and first == 0), sample.kind
         assert problem.isprintable()
         assert problem.startswith(str(tmp_path)) or not problem
+
+
+def test_a_long_text_that_becomes_shorter(tmp_path):
+    """It is not taken for the end that no more can be read."""
+    path = tmp_path / "a.log"
+    path.write_bytes(FLASER + (b"#" * 1023 + b"\n") * 4096 + FLASER)
+    scans = iter(open_log(path))
+    assert next(scans).stamp == 7.5
+    halve([path])
+    with pytest.raises(LogError, match=r"a\.log:\d+: has become shorter while it was read"):
+        next(scans)
 
 
 def test_every_reader_is_among_them(samples):

@@ -62,7 +62,7 @@ def test_a_crafted_file_ends_in_one_line(name, tmp_path):
     assert re.match(rf"{re.escape(str(path))}.*({expected})", strict[2])
     assert strict[2].isprintable()
     # What is skipped is reported likewise; a bag that is copied breaks off where it was too much.
-    assert kept[0] <= 1
+    assert kept[0] < 100
     assert kept[2] == strict[2] or name == "bag.gz"
 
 

@@ -72,7 +72,7 @@ def test_scan(participant, peer):
     scan = came.read()
     np.testing.assert_array_equal(scan.ranges, ranges)
     assert (scan.stamp, scan.frame_id) == (7.500000001, "laser")
-    assert came.time == (7, 500_000_001)
+    assert scan.stamp_ns == 7_500_000_001
     assert (scan.angle_min, scan.angle_increment, scan.scan_time) == (-0.75, 0.5, 0.125)
     assert not came.is_odometry
     assert (source.publishers, source.lost, source.ended, source.problems()) == (1, 0, False, [])
@@ -123,7 +123,7 @@ def test_a_publisher_that_is_killed_and_comes_again_beside_another(
     source = source_of(participant)
     connected(remote, source, "/scan", "LaserScan")
     remote.write("/scan", scan_message(1))
-    assert [m.time[0] for m in received(source)] == [1]
+    assert [int(m.read().stamp) for m in received(source)] == [1]
     remote.close()
     eventually(lambda: source.publishers == 0)  # when its lease has ended
     assert source.receive(0.0) == []  # its end is no message
@@ -131,7 +131,7 @@ def test_a_publisher_that_is_killed_and_comes_again_beside_another(
         for stamp, publisher in enumerate((peer, again)):
             connected(publisher, source, "/scan", "LaserScan")
             publisher.write("/scan", scan_message(stamp))
-        names = {m.time[0]: m.publisher for m in received(source, 2)}
+        names = {int(m.read().stamp): m.publisher for m in received(source, 2)}
     assert set(names) == {0, 1}
     assert names[0] != names[1]
 
@@ -143,17 +143,17 @@ def test_a_burst_is_accounted_for(participant, remote, reliability):
     remote.write_scans("/scan", n, 1e4, scan_message(0, [2.0] * 10))
     if reliability == "best-effort":  # drops the newest, and counts them
         eventually(lambda: source.lost == n - 8)
-        assert [m.time[0] for m in received(source)] == list(range(8))
+        assert [int(m.read().stamp) for m in received(source)] == list(range(8))
         assert source.receive(0.0) == []
     else:  # forgets the oldest
-        stamps = [m.time[0] for m in received(source)]
+        stamps = [int(m.read().stamp) for m in received(source)]
         while stamps[-1] != n - 1:
-            stamps += [m.time[0] for m in received(source)]
+            stamps += [int(m.read().stamp) for m in received(source)]
         assert stamps == sorted(set(stamps))
 
 
 def test_a_flood_of_a_million_beams_is_bounded(participant, peer):
-    source = source_of(participant, depth=2, reliability="reliable")
+    source = source_of(participant, depth=2, reliability="reliable", limits={"beams": 1_000_000})
     peer.garble("/scan", "LaserScan")
     eventually(lambda: peer.listeners("/scan") == source.publishers == 1)
     for _ in range(5):

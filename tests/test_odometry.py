@@ -1,6 +1,8 @@
 """Odometry by scans: exact without noise, with covariances that hold, and its derivatives."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,3 +97,24 @@ def test_a_drive_ends_within_its_covariance():
         errors.append(off @ np.linalg.solve(travel.covariance, off))
     assert np.mean(errors) < 3 + 4 * math.sqrt(6 / len(errors))
     assert 2 < np.mean(of_twists) < 4
+
+
+@pytest.mark.parametrize("sweep", [0.1, math.inf])
+def test_the_skew_of_a_sweep_adds_up_and_is_in_the_covariance(sweep):
+    """Turning to and fro: what is lost to the left is not won back to the right."""
+    sensor, extract = replace(SENSORS["rplidar"], rate=10.0), ln.Extractor()
+    walk = [(-1, 0), (0.5, 0), (0.5, 0.7), (-0.5, 0.7), (-0.5, 0), (1, 0), (1, 0.8), (0, 0.8)]
+    tracker, (plain, honest) = Tracker(roughness=0.0), (Odometer(), Odometer())
+    scans = list(drive(room(), [*walk, *walk[::-1]], sensor, speed=1.0, moving=True, seed=2))
+    for scan in scans:
+        tracks = tracker(extract(scan))
+        known, travel = plain(tracks, scan.stamp), honest(tracks, scan.stamp, sweep)
+    off = np.subtract(travel.pose, relative(scans[0].pose, scan.pose))[2]
+    off = abs(math.remainder(off, 2 * math.pi))
+    turns = [math.remainder(b.pose[2] - a.pose[2], 2 * math.pi) for a, b in pairwise(scans)]
+    lost = sum(turn**2 for turn in turns) / (2 * math.pi)
+    assert off == pytest.approx(lost, rel=0.3)
+    deviation, honestly = (math.sqrt(of.covariance[2, 2]) for of in (known, travel))
+    assert off > 4 * deviation
+    assert honestly == pytest.approx(math.hypot(deviation, lost), rel=0.2)
+    assert travel.pose == known.pose

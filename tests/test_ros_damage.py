@@ -2,6 +2,7 @@
 
 import bz2
 import gzip
+import os
 import random
 import re
 import sqlite3
@@ -379,6 +380,16 @@ def test_a_cut_off_bag_that_grows_while_it_is_read(bags, altered, kind):
         stamps.append(scan.stamp)
     assert stamps == STAMPS[:expected]
     assert log.skipped == 1
+
+
+def test_a_database_that_becomes_shorter_within_a_page(altered):
+    """Sqlite would go on, and read what is missing as zeros."""
+    path = altered("sqlite3", bytes)
+    scans = iter(open_log(path))
+    assert next(scans).stamp == 0.0
+    os.truncate(path, path.stat().st_size - 1)
+    with pytest.raises(LogError, match=r"\.db3: has become shorter while it was read"):
+        list(scans)
 
 
 @pytest.mark.parametrize("journal", ["WAL", "MEMORY"])

@@ -311,9 +311,9 @@ def test_all_that_is_published_is_read_by_rosbags(make):
     sink, pipeline = RosSink(publisher, make, config), Pipeline(config)
     walk = [(-2, 0), (-1.9, 0)]
     for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=20):
-        sink.publish(pipeline("a", scan, MOMENT[:2]))
-    irregular = LaserScan(scan.ranges, angles=scan.angles)
-    sink.publish(pipeline("a", irregular, MOMENT[:2]))
+        sink.publish(pipeline("a", scan.stamped("first", MOMENT.time)))
+    irregular = LaserScan(scan.ranges, angles=scan.angles).stamped("first", MOMENT.time)
+    sink.publish(pipeline("a", irregular))
     sink.diagnose(Report(1.0, Counts(), Counts(3, 2, 1), (0, 0), 0, {}, 0), MOMENT[:2])
     assert set(publisher.sent) == set(publisher.opened)
     for topic, message in publisher.sent.items():

@@ -99,6 +99,35 @@ def test_a_static_link_holds_at_all_times(tmp_path):
     assert found == [(2.0, 0.0, 0.0)] * 3
 
 
+def test_a_scanner_that_hangs_upside_down(tmp_path):
+    """Its frame is turned about x, on a mast that is turned by 0.5 rad, on a robot that moves."""
+    yaw = 0.5
+
+    def make(messages):
+        header = messages.header(0.0, "base")
+        turned = (0.2, 0.1, 1.0), (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0)
+        link = messages.new("geometry_msgs/TransformStamped", header, "laser", turned)
+        yield "/tf_static", 0.0, messages.transforms(link)
+        at = messages.transform(0.0, "map", "base", 3.0, 4.0, math.pi / 2)
+        yield "/tf", 0.0, messages.transforms(at)
+        yield "/scan", 0.1, messages.scan(0.1, [1.0, 2.0], [7.0, 8.0], time_increment=0.25)
+
+    path = write(tmp_path, "mcap", make)
+    (plain,) = open_log(path)
+    (scan,) = open_log(path, pose_topic="/tf:map->base->laser")
+    assert scan.pose == pytest.approx((2.9, 4.2, math.pi / 2 + yaw))
+    x, y, theta = scan.pose
+    c, s = math.cos(theta), math.sin(theta)
+    mirrored = plain.points * (1, -1)
+    np.testing.assert_allclose(
+        scan.points @ [[c, s], [-s, c]] + (x, y), (mirrored @ [[c, s], [-s, c]] + (x, y))[::-1]
+    )
+    assert scan.intensities.tolist() == [8.0, 7.0]
+    # The first beam is still that of the stamp.
+    assert (scan.stamp_beam, scan.time_increment) == (1, -0.25)
+    assert open_log(path, pose_topic="/tf:map->base").scan(0).intensities.tolist() == [7.0, 8.0]
+
+
 def test_a_scan_with_the_stamp_of_a_pose_does_not_wait(tmp_path, monkeypatch):
     learned = []
 

@@ -44,6 +44,7 @@ def naive_rows(scans: list[Features], first_scan: int) -> list[dict]:
             for index, record in enumerate(features.to_dict()[name]):
                 row = dict.fromkeys(SCHEMA.names)
                 row |= {"scan": i, "stamp": features.stamp, "kind": name[:-1], "index": index}
+                row["stamp_ns"] = round(1e9 * features.stamp)
                 for key, value in record.items():
                     if key == "kind":
                         row[name[:-1]] = value
@@ -72,6 +73,7 @@ def naive_clusters(scan: int, features: Features) -> list[dict]:
         last = -1 if is_open else int(holes.argmax())
         ends = {"first_beam": int(beams[last + 1]), "last_beam": int(beams[last])}
         row = {"scan": scan, "stamp": features.stamp, "kind": "cluster", "index": label}
+        row["stamp_ns"] = round(1e9 * features.stamp)
         rows.append(dict.fromkeys(SCHEMA.names) | row | ends | {"n_points": len(beams)})
     return rows
 

@@ -217,6 +217,21 @@ def test_births_deaths_and_occlusion_of_a_few_frames():
     assert tracks.born.tolist() == [4, 5]
 
 
+@pytest.mark.parametrize("convex", [False, True])
+def test_a_corner_seen_wrongly_once_does_not_share_its_sights_with_another_track(convex):
+    tracker, numbers, ended = Tracker(roughness=0.02), [], []
+    for x in (2.0, 2.15, 2.06, 2.11, 2.06):
+        found = corner(x, 1, segments=(0, 1))
+        found["convex"] = convex
+        tracks = tracker(replace(FRAME, corners=np.array([found])))
+        numbers += tracks.corners.tolist()
+        ended.append(tracks.ended.tolist())
+    first, wrong = numbers[:2]
+    assert first != wrong
+    assert numbers == [first, wrong, first, first, first]
+    assert ended == [[], [], [wrong], [], []]
+
+
 def test_edges_are_ignored():
     # The silhouette of a column goes with the sensor; everything else stays.
     plain, tracker, pose = Tracker(), Tracker(), (0.0, 0.0, 0.0)

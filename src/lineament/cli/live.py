@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _TYPES = click.Choice(["LaserScan", "MultiEchoLaserScan"])
 _ECHOES = click.Choice(["first", "last", "strongest"])
+_STAMPS = click.Choice(["first", "middle", "last"])
 _RELIABILITIES = click.Choice(["best-effort", "reliable"])
 _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 
@@ -39,6 +40,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--name", help="Name of the node.  [default: lineament]")
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
 @click.option("--echo", type=_ECHOES, help="Which echo.  [default: first]")
+@click.option("--stamp", type=_STAMPS, help="Beam of the header's time.  [default: first]")
 @click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
 @click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
 @click.option("--localhost", **_FLAG, help="Stay on this machine.")
@@ -55,6 +57,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
 )
 @click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
+@click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._lazy import Pictured
 from ..errors import needed_by
 from ..scan import LaserScan, NoiseLike, RangeNoise
-from ..scan.fields import covariance_of_pose
+from ..scan.fields import covariance_of_pose, nanoseconds
 from .records import TABLES
 
 if TYPE_CHECKING:
@@ -97,6 +97,14 @@ class Features(Tabled, Pictured):
     frame_id: str = ""
     noise: RangeNoise | None = None
     scan: LaserScan | None = None
+
+    @property
+    def stamp_ns(self) -> int:
+        """The stamp in nanoseconds [ns], exactly as the scan has it."""
+        scan = self.scan
+        if scan is not None and scan.stamp == self.stamp:
+            return scan.stamp_ns
+        return nanoseconds(self.stamp)
 
     def __len__(self) -> int:
         return sum(len(getattr(self, name)) for name in TABLES)
@@ -211,6 +219,7 @@ class Features(Tabled, Pictured):
         """
         return {
             "stamp": self.stamp,
+            "stamp_ns": self.stamp_ns,
             "frame_id": self.frame_id,
             "noise": None if self.noise is None else asdict(self.noise),
             **{name: _records(getattr(self, name)) for name in TABLES},

@@ -12,6 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from .._version import __version__
+from ..scan.fields import nanoseconds
 from .records import COLUMNS, FIELDS, KINDS, SHARED_COLUMNS, TABLES, Field, kind_codes, numbers
 
 if TYPE_CHECKING:
@@ -30,13 +31,14 @@ def _schema() -> pa.Schema:
     """List the columns, with units and meanings; those of fields without a place come last."""
     text = pa.dictionary(pa.int32(), pa.string())
     forms = {"kind": text, "scan": pa.int64(), "stamp": pa.float64(), "index": pa.int32()}
-    about = dict(SHARED_COLUMNS)
+    about = {**SHARED_COLUMNS, "stamp_ns": ("ns", "stamp of the scan, exactly")}
     for field in FIELDS:
         base = TABLES[field.table][field.name].base
         for column in field.columns.split():
             forms[column] = text if base.kind == "U" else pa.from_numpy_dtype(base)
             meaning = ": ".join(filter(None, (field.table[:-1], field.about)))
             about.setdefault(column, (field.unit, meaning))
+    forms["stamp_ns"] = pa.int64()
     fields = []
     for name in dict.fromkeys((*COLUMNS.split(), *forms)):
         unit, meaning = about[name]
@@ -67,7 +69,7 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     }
     labels = _joined((f.clusters for f in scans), np.dtype(np.int32))
     beams = np.array([len(f.clusters) for f in scans], dtype=np.int64)
-    stamps = np.array([f.stamp for f in scans], dtype=np.float64)
+    stamps = np.array([f.stamp for f in scans], dtype=np.float64), [f.stamp_ns for f in scans]
     frames = list(dict.fromkeys(f.frame_id for f in scans))
     return _table(parts, labels, beams, stamps, first_scan, frames)
 
@@ -77,7 +79,8 @@ def batch_table(batch: FeatureBatch, first_scan: int = 0) -> pa.Table:
     parts = {name: (getattr(batch, name), np.diff(batch.offsets[name])) for name in TABLES}
     m, n = batch.clusters.shape
     frames = [batch.frame_id] if m else []
-    return _table(parts, batch.clusters.ravel(), np.full(m, n), batch.stamps, first_scan, frames)
+    stamps = batch.stamps, [nanoseconds(stamp) for stamp in batch.stamps.tolist()]
+    return _table(parts, batch.clusters.ravel(), np.full(m, n), stamps, first_scan, frames)
 
 
 def _joined(arrays: Iterable[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -89,7 +92,7 @@ def _table(
     parts: dict[str, tuple[NDArray[np.void], NDArray[np.int64]]],
     labels: NDArray[np.int32],
     beams: NDArray[np.int64],
-    stamps: NDArray[np.float64],
+    stamps: tuple[NDArray[np.float64], list[int]],
     first_scan: int,
     frames: list[str],
 ) -> pa.Table:
@@ -115,17 +118,21 @@ def _table(
         index[rows[k]] = columns[k].get("index", within)  # a cluster's index is its label
     scan = np.repeat(np.arange(len(counts)), counts.sum(axis=1))
 
+    # What 64 bits do not hold is no time.
+    exact = pa.array([ns if abs(ns) < 2**63 else None for ns in stamps[1]], pa.int64())
     arrays = {
         "kind": pa.DictionaryArray.from_arrays(kind, _ROWS),
         "scan": pa.array(scan + first_scan),
-        "stamp": pa.array(stamps[scan]),
+        "stamp": pa.array(stamps[0][scan]),
+        "stamp_ns": exact.take(pa.array(scan)),
         "index": pa.array(index),
     }
     for field in SCHEMA:
         if field.name not in arrays:
             arrays[field.name] = _scatter(field, columns, rows, kind)
     metadata = {**SCHEMA.metadata, b"lineament.frame_ids": json.dumps(frames)}
-    return pa.table(list(arrays.values()), schema=SCHEMA.with_metadata(metadata))
+    columns_of = [arrays[field.name] for field in SCHEMA]
+    return pa.table(columns_of, schema=SCHEMA.with_metadata(metadata))
 
 
 def _scatter(

@@ -14,10 +14,12 @@ from typing import Any
 from ..errors import LineamentError
 from ..limits import LIMITS, Limits
 from ..scan import Pose
+from ..scan.laser_scan import STAMPS
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
     "echo": ("first", "last", "strongest"),
+    "stamp": STAMPS,
     "reliability": ("best-effort", "reliable"),
     "ros": (0, 1, 2),
 }
@@ -62,6 +64,8 @@ class LiveConfig:
         ``LaserScan`` or ``MultiEchoLaserScan``, of ``sensor_msgs``.
     echo : str
         Which echo of the latter: ``first``, ``last`` or ``strongest``.
+    stamp : str
+        Which beam of a scan is taken at the time of its header: ``first``, ``middle`` or ``last``.
     ros : int
         2, or 1 for ROS 1 (rospy); 0 for none, where a log is played for Foxglove alone.
     domain : int, optional
@@ -83,6 +87,8 @@ class LiveConfig:
         ``poses`` (of a log that is played), or a topic of ``nav_msgs/Odometry``.
     laser_pose : (x, y, theta)
         Pose of the scanner in the frame of the odometry's twist [m, m, rad].
+    upside_down : bool
+        Whether the scanner hangs upside down: then its frame is turned about its x axis.
     track : bool
         Whether features are recognised from scan to scan. Then, and where `deskew` is ``scans``,
         the motion by them is known too: ``TOPIC/odometry``.
@@ -128,6 +134,7 @@ class LiveConfig:
     name: str = "lineament"
     type: str = "LaserScan"
     echo: str = "first"
+    stamp: str = "first"
     ros: int = 2
     domain: int | None = None
     localhost: bool = False
@@ -138,6 +145,7 @@ class LiveConfig:
     noise: float | None = None
     deskew: str = "off"
     laser_pose: Pose = (0.0, 0.0, 0.0)
+    upside_down: bool = False
     track: bool = False
     dock: Point | None = None
     dock_track: int | None = None

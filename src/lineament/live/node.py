@@ -103,7 +103,7 @@ class Node:
                 self._pipeline.hear(message)
                 return
             # What can be read may still make no sense: a robot that turns a million times a sweep.
-            frame = self._pipeline(received.publisher, message, received.time)
+            frame = self._pipeline(received.publisher, message)
         except ValueError as error:
             counters.malformed += 1
             self._write_fault(received, error)

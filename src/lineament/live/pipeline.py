@@ -14,15 +14,12 @@ from ..motion.deskew import deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
 from ..scan import LaserScan, Pose
+from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
-from .received import Time
 
-NANO = 1_000_000_000
-#: The seconds of a stamp in ROS 2 have 31 bits.
-_LAST = 2.0**31 - 1
-#: The last stamp that a message holds; those of ROS 1 go on for longer.
-_LATEST: Time = (2**31 - 1, NANO - 1)
+#: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
+_LATEST = 2**31 * NANO - 1
 #: Publishers whose buffers and tracks are kept; the oldest are forgotten.
 _MOST_PUBLISHERS = 8
 #: Odometry farther from a scan in time says nothing of it [s].
@@ -31,10 +28,9 @@ _OLDEST = 0.5
 _LONGEST = 1.0
 
 
-def time_of(stamp: float) -> Time:
-    """Seconds and nanoseconds of a stamp, clipped to what a message can hold."""
-    seconds, nanoseconds = divmod(round(min(max(stamp, 0.0), _LAST) * NANO), NANO)
-    return seconds, nanoseconds
+def time_of(scan: LaserScan) -> tuple[int, int]:
+    """Seconds and nanoseconds of the stamp of a scan, clipped to what a message can hold."""
+    return divmod(min(max(scan.stamp_ns, 0), _LATEST), NANO)
 
 
 class Frame(NamedTuple):
@@ -49,8 +45,6 @@ class Frame(NamedTuple):
     features : Features
     tracks : Tracks or None
         None unless tracking is on.
-    time : (int, int)
-        Stamp of its message, exactly: seconds and nanoseconds.
     travel : Travel or None
         Where the sensor has come to; None unless features are tracked, for whatever purpose.
     dock : CornerPose or None
@@ -61,7 +55,6 @@ class Frame(NamedTuple):
     straight: LaserScan
     features: Features
     tracks: Tracks | None
-    time: Time
     travel: Travel | None = None
     dock: CornerPose | None = None
 
@@ -94,8 +87,8 @@ class Pipeline:
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
-    def __call__(self, publisher: str, scan: LaserScan, time: Time | None = None) -> Frame:
-        """Find the features of a scan of a publisher; `time` is its stamp, exactly.
+    def __call__(self, publisher: str, scan: LaserScan) -> Frame:
+        """Find the features of a scan of a publisher.
 
         ValueError for a scan without beams, or with more than the limit.
         """
@@ -103,19 +96,27 @@ class Pipeline:
             raise ValueError("has no beams")
         self._limits.check("beams", len(scan))
         kept = self._publisher(publisher)
+        if self._config.stamp != "first":
+            scan = scan.stamped(self._config.stamp)
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
         features = kept.extractor(straight)
         tracks, travel, dock = None, None, None
         if kept.tracker is not None:
             tracks = kept.tracker(features)
-            travel = kept.odometer(tracks, scan.stamp)
+            # A circle of a time that is not known takes as long as from scan to scan.
+            sweep = abs(scan.scan_time) or math.inf
+            travel = kept.odometer(tracks, scan.stamp, sweep if straight is scan else 0.0)
+            if self._config.deskew == "scans" and twist is None:
+                straight = deskew(scan, kept.tracker.twist)
+                if straight is not scan:
+                    features = kept.extractor(straight)
+                    tracks = kept.tracker.again(features)
             if kept.dock is not None:
                 dock = kept.dock(features, tracks, travel.pose)
         if not self._config.track:
             tracks = None
-        time = time_of(scan.stamp) if time is None else min(max(time, (0, 0)), _LATEST)
-        return Frame(scan, straight, features, tracks, time, travel, dock)
+        return Frame(scan, straight, features, tracks, travel, dock)
 
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
@@ -140,7 +141,8 @@ class Pipeline:
             return twist_between(last.pose, scan.pose, seconds) if is_near else None
         if odometry is None or abs(scan.stamp - odometry.stamp) > _OLDEST:
             return None
-        return twist_of_laser(odometry.twist, self._config.laser_pose)
+        twist = twist_of_laser(odometry.twist, self._config.laser_pose)
+        return turned_over(twist) if self._config.upside_down else twist
 
     def _publisher(self, name: str) -> _Publisher:
         if name not in self._publishers:
@@ -172,3 +174,9 @@ def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:
     vx, vy = forward - turn_rate * y, left + turn_rate * x
     c, s = math.cos(theta), math.sin(theta)
     return c * vx + s * vy, c * vy - s * vx, turn_rate
+
+
+def turned_over(twist: Twist) -> Twist:
+    """Twist of a scanner that is mounted upside down: turned about its x axis."""
+    forward, left, turn_rate = twist
+    return forward, -left, -turn_rate

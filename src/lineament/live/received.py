@@ -10,11 +10,9 @@ from typing import NamedTuple, Protocol
 from ..limits import LIMITS, Limits
 from ..rosmsg.poses import Odometry, odometry
 from ..rosmsg.scans import Decoder, decoders
-from ..rosmsg.wire import Buffer, WireReader
+from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 
-#: Seconds and nanoseconds of a stamp, exactly as a message has them.
-Time = tuple[int, int]
 #: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
 _MOST_PUBLISHERS = 64
 
@@ -32,15 +30,12 @@ class Received(NamedTuple):
         When it was taken, by the clock `time.monotonic` [s].
     is_odometry : bool
         Whether it is an odometry rather than a scan.
-    time : (int, int), optional
-        Its stamp, exactly. None where only `LaserScan.stamp` is known.
     """
 
     publisher: str
     read: Callable[[], LaserScan | Odometry]
     arrived: float
     is_odometry: bool = False
-    time: Time | None = None
 
 
 class Source(Protocol):
@@ -113,7 +108,7 @@ def received_scan(
 ) -> Received:
     """Return what a source gives of a serialised scan, of type `kind`, that has just arrived."""
     read = partial(_decoder(kind, echo, limits), data, encoding)
-    return Received(publisher, read, time.monotonic(), time=_stamp(data, encoding))
+    return Received(publisher, read, time.monotonic())
 
 
 @cache
@@ -127,12 +122,3 @@ def _decoder(kind: str, echo: str, limits: Limits) -> Decoder:
 def received_odometry(publisher: str, data: Buffer, encoding: str) -> Received:
     """Return what a source gives of a serialised ``nav_msgs/Odometry`` that has just arrived."""
     return Received(publisher, partial(odometry, data, encoding), time.monotonic(), True)
-
-
-def _stamp(data: Buffer, encoding: str) -> Time | None:
-    """Stamp in the header of a message, exactly; None if there is no header."""
-    try:
-        seconds, nanoseconds, _ = WireReader(data, encoding).numbers("header")
-    except ValueError:
-        return None
-    return seconds, nanoseconds

@@ -11,8 +11,7 @@ from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
 from .config import LiveConfig
 from .counters import Report
-from .pipeline import Frame
-from .received import Time
+from .pipeline import Frame, time_of
 
 if TYPE_CHECKING:
     from ..output.foxglove import FoxgloveMessages
@@ -62,7 +61,7 @@ class Sink(Protocol):
     def publish(self, frame: Frame) -> None:
         """Publish what was found in a scan."""
 
-    def diagnose(self, report: Report, time: Time) -> None:
+    def diagnose(self, report: Report, time: tuple[int, int]) -> None:
         """Publish how the node is doing."""
 
 
@@ -135,7 +134,7 @@ class RosSink:
             if self._publisher.listeners(name):
                 self._publisher.publish(message(name))
 
-    def diagnose(self, report: Report, time: Time) -> None:
+    def diagnose(self, report: Report, time: tuple[int, int]) -> None:
         """Publish the report on ``/diagnostics``."""
         message = self._make.diagnostics(
             DIAGNOSTICS,
@@ -190,10 +189,10 @@ class FoxgloveSink:
         for message in self._messages.messages(self._topic, moment, scan, layers):
             self._publisher.publish(message)
 
-    def diagnose(self, report: Report, time: Time) -> None:
+    def diagnose(self, report: Report, time: tuple[int, int]) -> None:
         """Do nothing: Foxglove shows scans as they come."""
 
 
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
-    return Moment(*frame.time, name, "world" if name == WORLD_FRAME else WORLD_FRAME)
+    return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)

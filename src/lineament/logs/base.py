@@ -14,6 +14,7 @@ from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
 from ..scan import LaserScan
+from ..scan.laser_scan import STAMPS
 
 T = TypeVar("T")
 
@@ -33,12 +34,15 @@ class ReadOptions:
     ring: int | None = None
     pose_topic: str | None = None
     limits: Limits = LIMITS
+    stamp: str = "first"
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
             raise ValueError(f"echo is {self.echo!r}, expected {' or '.join(ECHOES)}")
         if self.ring is not None and (type(self.ring) is not int or self.ring < 0):
             raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
+        if self.stamp not in STAMPS:
+            raise ValueError(f"stamp is {self.stamp!r}, expected {' or '.join(STAMPS)}")
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -159,11 +163,11 @@ class Log(Pictured, ABC):
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
         self.skipped, self.faults = 0, []
         self._check_size()
-        scans, beams = self.limits.scans, self.limits.beams
-        for count, item in enumerate(self._items(), 1):
-            n = len(item[1].ranges)
+        scans, beams, stamp = self.limits.scans, self.limits.beams, self.options.stamp
+        for count, (topic, scan) in enumerate(self._items(), 1):
+            n = len(scan.ranges)
             if n <= beams and count <= scans:
-                yield item
+                yield topic, scan if stamp == "first" else scan.stamped(stamp)
                 continue
             try:
                 self.limits.check("scans", count)

@@ -26,9 +26,10 @@ SHAPES = {
     "angle_increment": ("",),
     "angles": ("m",),
     "stamps": ("n",),
+    "stamps_ns": ("n",),
     "poses": ("n3",),
     "intensities": ("nm",),
-    **dict.fromkeys((*SCALARS, "frame_id"), ("", "n")),
+    **dict.fromkeys((*SCALARS, "stamp_beam", "frame_id"), ("", "n")),
 }
 
 
@@ -38,6 +39,7 @@ class NpzLog(Log):
     Keys: ``ranges`` (N, M) m, NaN where nothing returned; ``angle_min`` and
     ``angle_increment`` rad, or ``angles`` (M,); optional ``range_min``, ``range_max`` m,
     ``scan_time``, ``time_increment`` s, ``frame_id`` (one, or N of them), ``stamps`` (N,) s,
+    ``stamps_ns`` (N,) ns where seconds do not hold them, ``stamp_beam`` (see `LaserScan`),
     ``poses`` (N, 3) m, m, rad (not finite where unknown), ``intensities`` (N, M). Other keys
     are left alone. Arrays stay as stored; rows become float64 as they are read.
     """
@@ -83,7 +85,10 @@ class NpzLog(Log):
             fields["intensities"] = arrays["intensities"][i]
         if "poses" in arrays and np.isfinite(arrays["poses"][i]).all():
             fields["pose"] = tuple(arrays["poses"][i].tolist())
-        return LaserScan(arrays["ranges"][i], **fields)
+        scan = LaserScan(arrays["ranges"][i], **fields)
+        beam = float(_at(arrays["stamp_beam"], i)) if "stamp_beam" in arrays else 0.0
+        ns = int(arrays["stamps_ns"][i]) if "stamps_ns" in arrays else None
+        return scan.stamped(beam, ns) if beam or ns is not None else scan
 
 
 def _at(values: NDArray[Any], i: int) -> Any:

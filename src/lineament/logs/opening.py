@@ -57,6 +57,7 @@ def open_log(
     ring: int | None = None,
     pose_topic: str | None = None,
     limits: Mapping[str, int] | None = None,
+    stamp: str = "first",
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -81,6 +82,8 @@ def open_log(
         Which topic gives the poses (ROS logs).
     limits : mapping, optional
         Limits of :class:`~lineament.limits.Limits` that are to be others, by name.
+    stamp : str
+        Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring`, `pose_topic` or a limit is not a value that it can have.
+        If `echo`, `ring`, `pose_topic`, `stamp` or a limit is not a value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, has no such topic,
         or is beyond a limit. While the log is iterated: if a scan in it is faulty, unless
@@ -105,7 +108,7 @@ def open_log(
     >>> log.format, len(log), [scan.stamp for scan in log]
     ('carmen', 1, [7.5])
     """
-    options = ReadOptions(echo, ring, pose_topic, Limits.of(limits))
+    options = ReadOptions(echo, ring, pose_topic, Limits.of(limits), stamp)
     source = _located(path, options.limits)
     head = sources.read_head(source)
     reader = _recognised(head)

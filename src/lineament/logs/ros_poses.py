@@ -32,6 +32,8 @@ class PoseFinder:
     What is `wanted` is a topic, ``/odom``, or one of transforms with two frames or more:
     ``/tf:map->odom->base_link`` is the pose of base_link in map, each link of the chain at the
     stamp of the scan. Links that are on the topic with ``_static`` at its end hold at all times.
+    The scans of a frame that is upside down are turned over: their pose is that of a frame with the
+    same x axis, whose z axis points up.
     """
 
     def __init__(self, wanted: str, limits: Limits = LIMITS) -> None:
@@ -56,6 +58,7 @@ class PoseFinder:
             if edge in self._tracks:
                 stamp = -math.inf if is_static else found.stamp
                 self._tracks[edge].add(stamp, found.pose, found.covariance)
+                self._tracks[edge].is_upside_down = found.is_upside_down
         return self._release(MAX_WAITING)
 
     def wait(self, topic: str, scan: LaserScan) -> list[tuple[str, LaserScan]]:
@@ -75,17 +78,21 @@ class PoseFinder:
             if len(self._waiting) <= most and not is_covered:
                 break
             self._waiting.popleft()
+            if sum(track.is_upside_down for track in self._tracks.values()) % 2:
+                scan = scan.turned_over()
             ready.append((topic, scan.with_pose(*self._pose(scan.stamp))))
         return ready
 
     def _pose(self, stamp: float) -> tuple[Pose | None, Array | None]:
-        pose, covariance = (0.0, 0.0, 0.0), None
+        pose, covariance, side = (0.0, 0.0, 0.0), None, 1
         for track in self._tracks.values():
             link = track.at(stamp)
             if link is None:
                 return None, None
             # Only messages that are no links have a covariance.
-            pose, covariance = compose(pose, link[0]), link[1]
+            (x, y, theta), covariance = link
+            pose = compose(pose, (x, side * y, side * theta))
+            side = -side if track.is_upside_down else side
         return pose, covariance
 
 
@@ -96,6 +103,8 @@ class _Track:
         self._stamps: list[float] = []
         self._poses: list[tuple[Pose, Array | None]] = []
         self._is_static = False
+        #: Whether z of the frame points down in the one that it is in: a mounting, which stays.
+        self.is_upside_down = False
 
     def add(self, stamp: float, pose: Pose, covariance: Array | None) -> None:
         if not all(abs(value) < FARTHEST for value in pose):

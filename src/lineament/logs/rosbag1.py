@@ -42,13 +42,15 @@ class _Reader(RecordReader):
     """Reads a bag; version 1 has neither chunks nor connections."""
 
     def records(self) -> Iterator[tuple[int, _Header, Buffer]]:
-        # Only the index of version 2 consists of separate records; of an empty bag, of none.
+        # Only the index of version 2 consists of separate records.
         has_index = self._magic() != _MAGICS[0]
         while self.left:
             at = self.at
             header, data = self._record()
             has_index = has_index or _code(header) in (_CONNECTION, _CHUNK_INFO)
-            has_index = has_index or (_code(header) == _BAG and _is_empty(header, self.at))
+            # That of an empty bag is empty, too.
+            end = struct.pack("<Q", self.at)
+            has_index = has_index or (_code(header) == _BAG and header.get(b"index_pos") == end)
             yield at, header, data
         if not has_index:
             raise self.wrong("ends without an index: it is cut off, or still recorded")
@@ -153,12 +155,6 @@ def _field(header: _Header, name: bytes, size: int | None = None) -> bytes:
     if value is None or size not in (None, len(value)):
         raise ValueError(f"record without a right field {name.decode()}")
     return value
-
-
-def _is_empty(header: _Header, end: int) -> bool:
-    """Whether a bag says that it was closed with nothing behind its own record."""
-    closed = header.get(b"index_pos") == struct.pack("<Q", end)
-    return closed and header.get(b"conn_count") == bytes(4)
 
 
 def _code(header: _Header) -> int:

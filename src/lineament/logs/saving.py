@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan
+from ..scan.fields import nanoseconds
 from .npz import SCALARS, SHAPES
 
 _CARMEN_HEADER = """\
@@ -100,9 +101,9 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
 
 
 def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
-    if not scans:
+    first = next(iter(scans), None)
+    if first is None:
         raise ValueError("there are no scans to write")
-    first = scans[0]
     if not len(first):
         raise ValueError("scan 0 has no beams, expected at least one")
     for i, scan in enumerate(scans):
@@ -111,18 +112,16 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
         if (scan.intensities is None) != (first.intensities is None):
             raise ValueError(f"scan {i} and scan 0: only one of them has intensities")
     arrays = {"ranges": _lossless(np.stack([scan.ranges for scan in scans]))}
-    if first.is_regular:
-        arrays["angle_min"] = np.array(first.angle_min)
-        arrays["angle_increment"] = np.array(first.angle_increment)
-    else:
-        arrays["angles"] = first.angles
+    bearings = ("angle_min", "angle_increment") if first.is_regular else ("angles",)
+    arrays |= {name: np.asarray(getattr(first, name)) for name in bearings}
     arrays["stamps"] = np.array([scan.stamp for scan in scans])
-    for key in (*SCALARS, "frame_id"):
+    if any(scan.stamp_ns != nanoseconds(scan.stamp) for scan in scans):
+        arrays["stamps_ns"] = np.array([scan.stamp_ns for scan in scans])
+    for key in (*SCALARS, "stamp_beam", "frame_id"):
         values = np.array([getattr(scan, key) for scan in scans])
         arrays[key] = values[0] if (values == values[0]).all() else values
-    intensities = [scan.intensities for scan in scans if scan.intensities is not None]
-    if intensities:
-        arrays["intensities"] = _lossless(np.stack(intensities))
+    if first.intensities is not None:
+        arrays["intensities"] = _lossless(np.array([scan.intensities for scan in scans]))
     if any(scan.pose is not None for scan in scans):
         unknown = (np.nan, np.nan, np.nan)
         arrays["poses"] = np.array([scan.pose or unknown for scan in scans])

@@ -67,7 +67,7 @@ def adjust(
         np.add.at(normal, (at[:, :, None], at[:, None, :]), blocks)
         np.add.at(right, at, (weighted.transpose(0, 2, 1) @ error[:, :, None])[:, :, 0])
         _add_motions(normal, right, state, motions, size)
-        inverse = np.linalg.inv(normal[:size, :size])
+        inverse = np.asarray(np.linalg.inv(normal[:size, :size]), np.float64)
         change = -inverse @ right[:size]
         state[:-1] += change[:n_free].reshape(-1, 3)
         shift, turn = change[n_free:].reshape(-1, 2).T
@@ -78,8 +78,11 @@ def adjust(
         spreads[k] = inverse[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
     covariance = inverse[n_free:, n_free:].copy()
     walls = _walls(state, centers, angles, segments, scans, number)
+    # A part of a wall that bows lies beside the whole, and is turned.
     misfit = np.bincount(number, segments["misfit"] ** 2) / walls["views"]
-    covariance[np.arange(0, len(covariance), 2), np.arange(0, len(covariance), 2)] += misfit
+    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+    both = np.stack((misfit, 4 * misfit / lengths**2), axis=1).ravel()
+    covariance[np.diag_indices_from(covariance)] += both
     for k in range(len(walls)):
         walls["covariance"][k] = covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
     return [(x, y, theta) for x, y, theta in state.tolist()], spreads, walls, covariance

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernels.mapping import judge
+from ..kernels.mapping.beams import judge
 from ..scan import Array
 from .line_map import Index
 

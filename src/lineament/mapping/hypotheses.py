@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.mapping import vote
+from ..kernels.mapping.votes import vote
 from ..scan import Array
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
@@ -160,23 +160,22 @@ def hypotheses(local: Array, plan: Array, by_turn: Array, most: int) -> Array:
     low, high = plan[:, :2].min(axis=0) - reach, plan[:, :2].max(axis=0) + reach
     columns, rows = np.ceil((high - low) / BOX).astype(int) + 1
     settings = (*low.tolist(), BOX, int(rows), ALIKE, LEAST_TURN, OF_ENDS)
-    found = []
-    degrees = np.flatnonzero(by_turn >= LEAST_TURN)
-    for shift in (0.0, 0.5):
-        # Only turns that walls agree with have boxes.
-        spread = (degrees[:, None] + np.array([-0.5, 0.5])) / 360 * n_turns + shift
-        used = np.unique(np.floor(spread).astype(np.int64) % n_turns)
-        slots = np.full(n_turns, -1)
-        slots[used] = np.arange(len(used))
-        boxes = np.zeros((columns * rows * len(used), 4))
-        voters = np.zeros(len(boxes), np.int32)
-        touched = np.empty(len(boxes), np.int64)
-        count = vote(local, plan, (by_turn, slots, len(used)), settings, shift, boxes, voters, touched)
-        best = boxes[touched[:count]]
-        best = best[np.argsort(-best[:, 0], kind="stable")[:most]]
-        found.append(best)
-    votes = np.concatenate(found)
-    return np.asarray(votes[np.argsort(-votes[:, 0], kind="stable")[:most], 1:])
+    # Only turns that walls agree with have boxes.
+    degrees = np.flatnonzero(by_turn >= LEAST_TURN)[:, None] + np.array([-0.5, 0.5])
+    slots = np.full((2, n_turns), -1)
+    for k in range(2):
+        used = np.unique(np.floor(degrees / 360 * n_turns + 0.5 * k).astype(np.int64) % n_turns)
+        slots[k, used] = np.arange(len(used))
+    n_slots = int(slots.max(initial=-1)) + 1
+    boxes = np.zeros((2, columns * rows * n_slots, 4))
+    voters = np.zeros(boxes.shape[:2], np.int32)
+    touched = np.empty(boxes.shape[:2], np.int64)
+    counts = vote(local, plan, (by_turn, slots, n_slots), settings, boxes, voters, touched)
+    found = np.concatenate([boxes[k, touched[k, :count]] for k, count in enumerate(counts)])
+    if len(found) > most:
+        least = np.partition(found[:, 0], -most)[-most]
+        found = found[found[:, 0] >= least]
+    return np.asarray(found[np.argsort(-found[:, 0], kind="stable")[:most], 1:])
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LineamentError
 from ..features import ARC, CORNER, SEGMENT, Features, make_records
-from ..kernels.mapping import WALL_COLUMNS, list_walls
+from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
@@ -21,7 +21,7 @@ from .walls import COLUMN, Merger, walls_of
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
 #: Size of the cells by which walls are found [m], how far around a wall they reach, most cells.
-_CELL, _AROUND, _MOST_CELLS = 0.5, 0.3, 4_000_000
+_CELL, _AROUND, _MOST_CELLS = 0.75, 0.3, 4_000_000
 #: Walls of which a round column is made to meet beams.
 _SIDES = 12
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..kernels.mapping import BEAM_COLUMNS, LOCAL_COLUMNS
+from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
@@ -24,6 +24,8 @@ SPACING, TURN = 0.3, 0.26
 #: is the tracker's guess.
 ODOMETRY = (0.005, 0.1), (0.005, 0.1), (0.005, 0.1)
 UNSURE = (0.05, 1.0), (0.05, 1.0), (0.02, 0.2)
+#: How far a sensor may go between scans in a direction that is not observed [m].
+FASTEST = 0.5
 #: One beam is kept for each square of so much [m] in which beams end, and at most so many.
 _SQUARE, MOST_BEAMS = 0.25, 160
 
@@ -89,7 +91,7 @@ class LocalMap:
     ...     features = extract(scan)
     ...     local.add(features, tracker(features))
     >>> local
-    LocalMap(6 scans, 1.0 m)
+    LocalMap(4 scans, 1.0 m)
     """
 
     def __init__(self, way: float = 5.0) -> None:
@@ -141,12 +143,14 @@ class LocalMap:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
         way, turn = math.hypot(*moved[:2]), abs(moved[2])
         deviations = [a + b * c for (a, b), c in zip(sure, (way, way, turn), strict=True)]
+        spread = np.diag(np.square(deviations))
+        if sure is UNSURE:
+            spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
         of_pose, of_motion = compose_jacobians(before.motion, moved)
-        of_motion *= deviations
         self._last = _Sight(
             *seen,
             compose(before.motion, moved),
-            of_pose @ before.covariance @ of_pose.T + of_motion @ of_motion.T,
+            of_pose @ before.covariance @ of_pose.T + of_motion @ spread @ of_motion.T,
             before.way + way,
             before.turn + turn,
         )

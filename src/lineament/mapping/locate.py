@@ -1,16 +1,17 @@
 """`locate`: where a local map lies on a plan, how sure that is, and whether it is lost."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
-from ..kernels.mapping import choose
+from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
+from ..scan.fields import covariance_of_pose
 from .evidence import Evidence, evidence_of
-from .hypotheses import anchors, directions, hypotheses
+from .hypotheses import BOX, TURN, anchors, directions, hypotheses
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan
 from .refine import COARSE, FINE, adjusted, refined
@@ -24,14 +25,16 @@ LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
 )
 
 #: Poses that are tried by few beams, refined, and judged by all beams.
-TRIED, SIFTED, REFINED, JUDGED = 400, 100, 32, 12
-_FEWEST_BEAMS, _FEW_BEAMS = 16, 40
+TRIED, SIFTED, REFINED, JUDGED = 800, 60, 24, 12
+_FEWEST_BEAMS, _FEW_BEAMS = 12, 40
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
 _NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance.
-SURE, NO_CHANCE = math.log(1000), 5.0
+SURE, NO_CHANCE = math.log(1000), 8.5
+#: The same over the best pose of the mirror image.
+NOT_MIRRORED = 3.0
 #: Shares of the beams: fewer explained, or more contradicted, are not of this map.
-LEAST_EXPLAINED, MOST_CONTRADICTED = 0.4, 0.12
+LEAST_EXPLAINED, MOST_CONTRADICTED = 0.35, 0.05
 #: A direction in which the pose is known no better is unobserved [m].
 UNSURE = 0.15
 #: Errors of beams and walls beside their covariances [m]: where poses are tried, and judged.
@@ -123,20 +126,23 @@ def locate(
         query = query.query()
     elif isinstance(query, Features):
         query = query_of_scan(query, scan)
-    tried = _tried(query, plan)
-    if guess is not None:
-        tried = _near_guess(tried, guess, covariance)
+    tried = _tried(query, plan) if guess is None else _near(guess, covariance, query, plan)
     poses, found = _searched(tried, query, plan)
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
-    control = -math.inf
-    if guess is None:
+    where, odds = _judged(poses, found, query, plan, len(tried)), found[0, 0]
+    if where.verdict == LOCATED and guess is None:
+        # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
         image = query.mirrored()
-        _, odds = _searched(_tried(image, plan), image, plan)
-        control = float(odds[:, 0].max(initial=-math.inf))
-    return _judged(poses, found, query, plan, len(tried), control)
+        _, feigned = _searched(_tried(image, plan), image, plan)
+        control = feigned[:, 0].max(initial=-math.inf)
+        if control > odds - NOT_MIRRORED:
+            where = replace(where, verdict=LOST if control > odds + SURE else AMBIGUOUS)
+    return where
 
 
+#: Covariance of a guess for which none is given.
+_GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 
 
@@ -146,17 +152,19 @@ def _tried(query: Query, plan: LineMap) -> Array:
     return hypotheses(local, plan.anchors, directions(query.walls, plan.walls), TRIED)
 
 
-def _near_guess(tried: Array, guess: Pose, covariance: ArrayLike | None) -> Array:
-    """Return the guess, poses around it, and those tried that are within its covariance."""
-    spread = np.diag((0.25, 0.25, 0.03)) if covariance is None else np.asarray(covariance)
+def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap) -> Array:
+    """Poses around a guess, or where those are too many, the guess and those that have votes."""
+    spread = _GUESS if covariance is None else covariance_of_pose(covariance)
+    deviations = np.sqrt(np.diag(spread))
+    counts = 2 * np.ceil(deviations / (*[BOX / 2] * 2, TURN / 2)).astype(np.int64) + 1
+    if np.prod(counts.astype(float)) <= TRIED:
+        steps = [np.linspace(-d, d, n) for d, n in zip(deviations, counts, strict=True)]
+        return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
+    tried = _tried(query, plan)
     off = tried - guess
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
     near = np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) < 16.0
-    deviations = np.sqrt(np.diag(spread))
-    steps = [np.linspace(-d, d, 2 * math.ceil(d / s) + 1) if d > s else np.zeros(1)
-             for d, s in zip(deviations, (0.25, 0.25, 0.08), strict=True)]  # fmt: skip
-    around = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)[:TRIED]
-    return np.concatenate((np.add(guess, around), tried[near]))
+    return np.vstack((guess, tried[near]))
 
 
 def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
@@ -209,9 +217,7 @@ def _distinct(
     return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
 
 
-def _judged(
-    poses: Array, found: Array, query: Query, plan: LineMap, tries: int, control: float
-) -> Location:
+def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int) -> Location:
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
@@ -232,35 +238,15 @@ def _judged(
         first.log_odds < NO_CHANCE
         or first.explained < LEAST_EXPLAINED
         or first.contradicted > MOST_CONTRADICTED
-        or control > found[0, 0] + SURE
     ):
         verdict = LOST
     elif values[1] > UNSURE**2:
         verdict, unobserved = UNOBSERVED, (x, y)
     elif others:
         verdict = AMBIGUOUS
-        line = np.array([pose[:2] for pose, _ in others]) - poses[0, :2]
-        direction = _common_line(line, np.array([pose[2] for pose, _ in others]) - poses[0, 2])
-        if direction is not None:
-            verdict, unobserved = UNOBSERVED, direction
-    elif control > found[0, 0] - SURE:
-        verdict = AMBIGUOUS
     else:
         verdict = LOCATED
     return Location(verdict, _pose(best), covariance, first, unobserved, others)
-
-
-def _common_line(away: Array, turns: Array) -> tuple[float, float] | None:
-    """Return the direction in which poses lie on a line through the best, if they are near it."""
-    if (np.abs(np.remainder(turns + math.pi, 2 * math.pi) - math.pi) > 0.1).any():
-        return None
-    if len(away) < 2 or np.hypot(*away.T).max() > 3.0:
-        return None
-    values, vectors = np.linalg.eigh(away.T @ away)
-    if values[0] > 0.02 * values[1]:
-        return None
-    x, y = vectors[:, 1].tolist()
-    return x, y
 
 
 def _pose(row: Array) -> Pose:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.mapping import refine as kernel
+from ..kernels.mapping.refining import refine as kernel
 from ..motion.association import chi_square
 from ..scan import Array
 from .line_map import Index

@@ -123,15 +123,13 @@ class Merger:
 
         The misfit of a wall is part of its covariance.
         """
-        while True:
-            old, misfits = self._walls[: self._n], self._misfit[: self._n]
+        before = -1
+        while before != self._n:
+            before, old, misfits = self._n, self._walls[: self._n], self._misfit[: self._n]
             lengths = np.linalg.norm(old["end"] - old["start"], axis=1)
-            order = np.argsort(-lengths, kind="stable")
-            self.__init__()  # type: ignore[misc]
-            for k in order:
+            self._walls, self._misfit, self._n = np.zeros(64, WALL), np.zeros(64), 0
+            for k in np.argsort(-lengths, kind="stable"):
                 self._join(old[k], float(misfits[k]))
-            if self._n == len(old):
-                break
         walls = self._walls[: self._n].copy()
         misfits = self._misfit[: self._n]
         lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)

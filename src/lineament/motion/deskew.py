@@ -1,4 +1,4 @@
-"""`deskew`: a scan as if all of its beams had been taken at once, from where its first one was."""
+"""`deskew`: a scan as if all of its beams had been taken at once, at its stamp."""
 
 import math
 
@@ -18,7 +18,8 @@ def beam_times(scan: LaserScan) -> Array | None:
     """Time of each beam after the scan's stamp [s], shape (n,); None where it is not known.
 
     Beams follow each other by `time_increment`. Where that is 0, the mirror goes once around in
-    `scan_time`: a beam whose bearing is ψ past the first is taken ψ/2π of it later.
+    `scan_time`: a beam whose bearing is ψ past another is taken ψ/2π of it later. The time of the
+    beam `stamp_beam` is 0. Of a clockwise scanner both are negative.
 
     Examples
     --------
@@ -29,9 +30,9 @@ def beam_times(scan: LaserScan) -> Array | None:
     True
     """
     if scan.time_increment != 0:
-        return scan.time_increment * np.arange(len(scan), dtype=np.float64)
+        return scan.time_increment * (np.arange(len(scan), dtype=np.float64) - scan.stamp_beam)
     if scan.scan_time != 0:
-        return scan.scan_time * (scan.angles - scan.angle_min) / (2 * math.pi)
+        return scan.scan_time * (scan.angles - _bearing(scan, scan.stamp_beam)) / (2 * math.pi)
     return None
 
 
@@ -93,7 +94,7 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
         order = np.argsort(bearings, kind="stable")
     # Bearings that are the same are set apart.
     apart = _APART * np.arange(len(scan))
-    return LaserScan(
+    still = LaserScan(
         ranges[order],
         angles=np.maximum.accumulate(bearings[order] - apart) + apart,
         range_min=scan.range_min,
@@ -101,7 +102,15 @@ def deskew(scan: LaserScan, twist: Twist | None) -> LaserScan:
         stamp=scan.stamp,
         frame_id=scan.frame_id,
         intensities=None if scan.intensities is None else scan.intensities[order],
-    ).with_pose(scan.pose, scan.pose_covariance)
+    )
+    return still.stamped(0, scan.stamp_ns).with_pose(scan.pose, scan.pose_covariance)
+
+
+def _bearing(scan: LaserScan, beam: float) -> float:
+    """Bearing at an index, which may lie between beams or outside [rad]."""
+    if scan.is_regular or not 0 <= beam <= len(scan) - 1:
+        return scan.angle_min + beam * scan.angle_increment
+    return float(np.interp(beam, np.arange(len(scan)), scan.angles))
 
 
 def _seen_from_the_stamp(scan: LaserScan, poses: Array) -> tuple[Array, Array]:

@@ -39,6 +39,10 @@ class Odometer:
     share the scan between them, whose errors they have with opposite signs: taken as independent,
     as they are here, they give more than the error of the pose, not less.
 
+    Where a sensor turns at ω while it sweeps a circle in T, and scans are not deskewed, all motions
+    are off by their ωT/2π, always to the side to which the mirror turns. This adds up, a turn to
+    the left and one to the right alike, and is a part of the covariance.
+
     Examples
     --------
     >>> import lineament as ln
@@ -53,10 +57,16 @@ class Odometer:
     def __init__(self) -> None:
         self._pose: Pose = (0.0, 0.0, 0.0)
         self._covariance = np.zeros((3, 3))
+        #: What the pose is off by if scans are not deskewed, and the mirror turns to the left.
+        self._skew = np.zeros(3)
         self._stamp = math.nan
 
-    def __call__(self, tracks: Tracks, stamp: float) -> Travel:
-        """Go on by the motion to the next scan, which was taken at `stamp` [s]."""
+    def __call__(self, tracks: Tracks, stamp: float, sweep: float = 0.0) -> Travel:
+        """Go on by the motion to the next scan, which was taken at `stamp` [s].
+
+        `sweep` is how long the mirror takes for a circle, of a scan that is not deskewed [s]: inf
+        where that is not known, and is taken to be the time from scan to scan; 0 if it is deskewed.
+        """
         motion, duration, self._stamp = tracks.motion, stamp - self._stamp, stamp
         twist, twist_covariance = (0.0, 0.0, 0.0), np.eye(3) * FASTEST**2
         if motion is not None:
@@ -64,12 +74,17 @@ class Odometer:
             self._covariance = (
                 of_pose @ self._covariance @ of_pose.T + of_motion @ motion.covariance @ of_motion.T
             )
+            turns = min(sweep / duration, 1.0) / (2 * math.pi) if duration > 0 else 0.0
+            skew = np.array(motion.pose) * motion.theta * turns
+            self._skew = of_pose @ self._skew + of_motion @ skew
             self._pose = compose(self._pose, motion.pose)
             if duration > 0:
                 found = motion.twist(duration)
                 if all(abs(speed) <= FASTEST for speed in found):
                     twist, twist_covariance = found, _twist_covariance(motion, duration)
-        return Travel(self._pose, self._covariance, twist, twist_covariance)
+                    twist_covariance += np.outer(skew, skew) / duration**2
+        covariance = self._covariance + np.outer(self._skew, self._skew)
+        return Travel(self._pose, covariance, twist, twist_covariance)
 
 
 def compose_jacobians(pose: Pose, motion: Pose) -> tuple[Array, Array]:

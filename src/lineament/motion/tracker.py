@@ -14,6 +14,7 @@ from ..scan import Array, Pose
 from ..scan.poses import Twist, inverse, poses_along, relative
 from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
 from .estimate import Motion, estimate_motion
+from .relocation import is_contradicted, relocated
 
 Numbers = NDArray[np.int64]
 
@@ -21,6 +22,12 @@ Numbers = NDArray[np.int64]
 _ODOMETRY = (0.03, 0.01), (0.1, 0.1)
 #: The same of the motion that goes on as it was, or of none: no way is known to grow with.
 _CONTINUED = (0.1, 0.1), (0.5, 0.5)
+#: A motion goes on for so long [s]; then the sensor may stand, or go like this [m/s, rad/s].
+_GOES_ON, _MAY_GO = 1.0, (0.5, 0.5)
+#: Where a motion is known worse than this, another corner may be where one is expected [m, rad].
+_UNIQUE = 0.6, 0.35
+#: Deviations of a motion of which nothing is known [m, m, rad].
+_ANYWHERE = np.array((3.0, 3.0, math.pi))
 #: A motion that would be faster is one whose stamps are wrong [m/s, rad/s].
 FASTEST = 50.0
 #: How often pairs are looked for: with the expected motion, then with the estimated one.
@@ -66,6 +73,11 @@ class Tracker:
     world is taken to stand still: what moves by more than its gate from frame to frame gets a new
     number. Corners of kind "edge" are ignored: they may be silhouettes, which move with the sensor.
 
+    After a pause of more than a second or so, a jump of the clock, or where hardly any wall is near
+    one of before, the sensor may be anywhere: it is looked for by its walls. If there is more than
+    one place where it may be, as in a room that is the same from both ends, no direction of the
+    motion is observed, and all tracks end.
+
     Parameters
     ----------
     max_missed : int
@@ -103,8 +115,11 @@ class Tracker:
         self._missed = {kind: np.empty(0, np.int64) for kind in KINDS}
         self._stamp: float | None = None
         self._odometry: Pose | None = None
+        self._step = 0.0
         self._twists: deque[Twist] = deque(maxlen=2)
         self._next = 0
+        #: The first number that a corner of the last frame was given anew.
+        self._young = 0
 
     def __repr__(self) -> str:
         given = f"{self.max_missed}, gate={self.gate}, roughness={self.roughness}"
@@ -155,6 +170,17 @@ class Tracker:
         numbers[kept] = tracks.corners
         return replace(tracks, corners=numbers)
 
+    def again(self, features: Features) -> Tracks:
+        """Take the last scan in again, deskewed by the twist that it gave.
+
+        The next motion would else be that between a scan that is skewed and one that is not. The
+        twist stays, and the motion is that by which the two differ.
+        """
+        twists, step = self._twists.copy(), self._step
+        tracks = self(features)
+        self._twists, self._step = twists, step
+        return tracks
+
     def _take(self, features: Features, odometry: Pose | None) -> Tracks:
         """Take in a frame without edges."""
         motion = None
@@ -162,18 +188,53 @@ class Tracker:
             matches = associate(self._seen, features)
         else:
             duration = features.stamp - self._stamp
-            motion, matches = self._follow(features, *self._expected(odometry, duration))
+            motion, matches = self._moved(features, odometry, duration)
             twist = motion.twist(duration) if duration > 0 else (math.inf,) * 3
             if all(abs(speed) <= FASTEST for speed in twist):
                 self._twists.append(twist)
+                self._step = duration
             else:
                 self._twists.clear()
         self._stamp, self._odometry = features.stamp, odometry
         return self._renew(features, matches, motion)
 
-    def _follow(self, features: Features, prior: Pose, spread: Array) -> tuple[Motion, Matches]:
+    def _moved(
+        self, features: Features, odometry: Pose | None, duration: float
+    ) -> tuple[Motion, Matches]:
         """Find the tracks again, and the motion by them."""
-        motion, matches = Motion(*prior, spread), None
+        prior, deviations = self._expected(odometry, duration)
+        fresh = self._seen.segments[self._missed["segments"] == 0]
+        expected = [(prior, deviations)]
+        if (deviations[[0, 2]] <= _UNIQUE).all():
+            spread = np.diag(deviations) ** 2
+            motion, matches = self._follow(features, Motion(*prior, spread), prior, spread)
+            is_sure = motion.observable or odometry is None
+            if not (is_sure and is_contradicted(motion.pose, fresh, features.segments)):
+                return motion, matches
+            deviations = _ANYWHERE
+            expected.insert(0, (prior, deviations))
+        (least_way, least_turn), _ = _CONTINUED
+        near = np.array((least_way, least_way, least_turn))
+        # It stood, or goes on after a jump of its clock.
+        steps = poses_along(self.twist or (0.0, 0.0, 0.0), [0.0, self._step])
+        expected += [((x, y, theta), near) for x, y, theta in steps.tolist()]
+        spread, start = np.diag(deviations) ** 2, relocated(fresh, features.segments, expected)
+        if start is not None:
+            begun = Motion(*start, np.diag(near) ** 2)
+            motion, matches = self._follow(features, begun, prior, spread)
+            if not is_contradicted(motion.pose, fresh, features.segments):
+                return motion, matches
+        for kind in KINDS:
+            self._missed[kind][:] = self.max_missed
+        nothing = np.empty((0, 2), np.intp)
+        lost = Matches(self._seen, features, nothing, nothing, nothing)
+        return Motion(*prior, spread, np.eye(3)), lost
+
+    def _follow(
+        self, features: Features, motion: Motion, prior: Pose, spread: Array
+    ) -> tuple[Motion, Matches]:
+        """Find the tracks again near a motion, and the motion by them."""
+        matches = None
         for _ in range(_ROUNDS):
             gates = {"gate": self.gate, "roughness": self.roughness}
             found = associate(self._seen, features, motion.pose, motion.covariance, **gates)
@@ -185,20 +246,21 @@ class Tracker:
         return motion, matches
 
     def _expected(self, odometry: Pose | None, duration: float) -> tuple[Pose, Array]:
-        """Motion since the last frame as it is expected, and its covariance."""
+        """Motion since the last frame as it is expected, and its deviations."""
+        pause = 0.0
         if odometry is not None and self._odometry is not None:
             (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
             pose = relative(self._odometry, odometry)
         else:
             (least_way, least_turn), (by_way, by_turn) = _CONTINUED
-            pose = (0.0, 0.0, 0.0)
+            pose, pause = (0.0, 0.0, 0.0), max(abs(duration) - _GOES_ON, 0.0)
             twist = self.twist
             if twist is not None and duration > 0:
-                x, y, theta = poses_along(twist, [duration])[0].tolist()
+                x, y, theta = poses_along(twist, [min(duration, _GOES_ON)])[0].tolist()
                 pose = (x, y, theta)
-        way = least_way + by_way * math.hypot(pose[0], pose[1])
-        turn = least_turn + by_turn * abs(pose[2])
-        return pose, np.diag((way, way, turn)) ** 2
+        way = least_way + by_way * math.hypot(pose[0], pose[1]) + _MAY_GO[0] * pause
+        turn = least_turn + by_turn * abs(pose[2]) + _MAY_GO[1] * pause
+        return pose, np.array((way, way, min(turn, math.pi)))
 
     def _fresh(self, matches: Matches) -> Matches:
         """Keep the pairs whose track was seen in the very last frame."""
@@ -219,7 +281,13 @@ class Tracker:
             self._next += len(born[-1])
             missed[before] = 0
             kept = (missed > 0) & (missed <= self.max_missed)
-            ended.append(tracks[missed > self.max_missed])
+            if kind == "corners":
+                young = kept & (missed == 1) & (tracks >= self._young)
+                self._young = int(born[-1][0]) if len(born[-1]) else self._next
+                for k in np.flatnonzero(young):
+                    same = features.corners[mine < tracks[k]]
+                    kept[k] = not self._is_double(self._seen.corners[k], same, motion)
+            ended.append(tracks[(missed > 0) & ~kept])
             numbers[kind], rest[kind] = mine, kept
             self._tracks[kind] = np.concatenate((mine, tracks[kept]))
             self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
@@ -227,6 +295,20 @@ class Tracker:
         return Tracks(
             **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
         )
+
+    def _is_double(self, before: np.void, corners: NDArray[np.void], motion: Motion | None) -> bool:
+        """Whether a corner that was seen once is one of others, which was seen wrongly then."""
+        x, y, theta = (0.0, 0.0, 0.0) if motion is None else motion.pose
+        c, s = math.cos(theta), math.sin(theta)
+        turn = np.array([[c, -s], [s, c]])
+        corners = corners[corners["convex"] == before["convex"]]
+        off = corners["position"] @ turn.T + (x, y) - before["position"]
+        rough = 2.0 * self.roughness**2 * np.eye(2)
+        spread = turn @ corners["covariance"] @ turn.T + before["covariance"] + rough
+        known = np.isfinite(spread).all(axis=(1, 2))
+        off, spread = off[known], spread[known]
+        squares = (off[:, None] @ np.linalg.pinv(spread) @ off[:, :, None]).ravel()
+        return bool((squares < chi_square(self.gate, 2)).any())
 
 
 def _together(

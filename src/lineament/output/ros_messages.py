@@ -81,17 +81,18 @@ class RosMessages(SceneMessages):
         return self._message(topic, "geometry_msgs/PoseWithCovarianceStamped", writer)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
-        """``sensor_msgs/LaserScan``."""
-        geometry = (
-            scan.angle_min,
-            scan.angle_min + (len(scan) - 1) * scan.angle_increment,
-            *(scan.angle_increment, scan.time_increment, scan.scan_time),
-            *(scan.range_min, scan.range_max),
-        )
+        """``sensor_msgs/LaserScan``; its first beam is at the stamp, or it is the one nearer to."""
+        last = scan.angle_min + (len(scan) - 1) * scan.angle_increment
+        steps = np.array((scan.angle_increment, scan.time_increment, scan.scan_time))
+        bearings, order = (scan.angle_min, last), 1
+        if 2 * scan.stamp_beam > len(scan) - 1:
+            bearings, order = (last, scan.angle_min), -1
+        limits = scan.range_min, scan.range_max
+        intensities = np.zeros(0) if scan.intensities is None else scan.intensities
         writer = self._begin(moment)
-        writer.array(single(np.array(geometry)))
-        writer.sequence(single(scan.ranges))
-        writer.sequence(single(np.zeros(0) if scan.intensities is None else scan.intensities))
+        writer.array(single(np.array((*bearings, *(order * steps), *limits))))
+        writer.sequence(single(scan.ranges[::order]))
+        writer.sequence(single(intensities[::order]))
         return self._message(topic, "sensor_msgs/LaserScan", writer)
 
     def points(self, topic: str, moment: Moment, scan: LaserScan) -> Message:

@@ -78,7 +78,7 @@ class RerunWriter(Writer):
         assert scan is not None  # `needs_scan`
         recording, place = self._recording, f"world/{(topic or 'scan').strip('/')}"
         recording.set_time(SCAN, sequence=index)
-        recording.set_time(STAMP, duration=scan.stamp)
+        recording.set_time(STAMP, duration=np.timedelta64(scan.stamp_ns, "ns"))
         if scan.pose is not None:
             x, y, theta = scan.pose
             turn = rr.RotationAxisAngle(axis=[0.0, 0.0, 1.0], radians=theta)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Array, LaserScan, Pose
+from ..scan.fields import NANO
 from .markers import Markers
 
-NANO = 1_000_000_000
 #: The seconds of a stamp in ROS 2 have 31 bits.
 LAST_STAMP = 2**31 - 1
 #: Frames of logs that name none; poses are in the first.
@@ -71,8 +71,7 @@ class Message(NamedTuple):
 class Moment(NamedTuple):
     """When and where a scan was taken: its stamp in two parts, its frame, the frame of its pose.
 
-    Seconds and nanoseconds are apart, as in the messages: one float holds a stamp of today to
-    0.2 µs only.
+    Seconds and nanoseconds are apart, as in the messages.
     """
 
     seconds: int
@@ -93,7 +92,7 @@ class Moment(NamedTuple):
             )
         frame = scan.frame_id or LASER_FRAME
         world = "world" if frame == WORLD_FRAME else WORLD_FRAME
-        return cls(*divmod(round(scan.stamp * NANO), NANO), frame, world)
+        return cls(*divmod(scan.stamp_ns, NANO), frame, world)
 
     @property
     def time(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..limits import LIMITS, Limits
 from ..scan import Array, Pose
-from ..scan.fields import covariance_of_pose
+from ..scan.fields import NANO, covariance_of_pose
 from ..scan.poses import Twist
 from .wire import Buffer, WireReader
 
@@ -32,7 +32,8 @@ _COVARIANCE_SIZE = 36 * 8
 class StampedPose(NamedTuple):
     """The pose of a frame, or of what the message is about (""), in another at a time [s].
 
-    Its covariance, (3, 3) of x, y, theta, is None where the message does not give a valid one.
+    Its covariance, (3, 3) of x, y, theta, is None where the message does not give a valid one. The
+    frame is upside down, turned about its x axis, where its z axis points down.
     """
 
     stamp: float
@@ -40,6 +41,7 @@ class StampedPose(NamedTuple):
     child_frame: str
     pose: Pose
     covariance: Array | None = None
+    is_upside_down: bool = False
 
 
 class Odometry(NamedTuple):
@@ -71,7 +73,7 @@ def stamped_poses(
 def odometry(data: Buffer, encoding: str) -> Odometry:
     """Decode a ``nav_msgs/Odometry``; ValueError if it is malformed or not finite."""
     reader = WireReader(data, encoding)
-    stamp, frame, child_frame, pose, _ = _stamped_pose(reader, True)
+    stamp, frame, child_frame, pose, *_ = _stamped_pose(reader, True)
     reader.raw(_COVARIANCE_SIZE)
     vx, vy, _, _, _, wz = reader.numbers("6d")
     reader.raw(_COVARIANCE_SIZE)
@@ -97,4 +99,6 @@ def _stamped_pose(reader: WireReader, has_child: bool) -> StampedPose:
     child_frame = reader.text() if has_child else ""
     x, y, _, qx, qy, qz, qw = reader.numbers("7d")
     theta = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-    return StampedPose(stamp, frame, child_frame, (x, y, theta))
+    return StampedPose(
+        stamp / NANO, frame, child_frame, (x, y, theta), None, qx * qx + qy * qy > 0.5
+    )

@@ -38,9 +38,8 @@ def laser_scan(data: Buffer, encoding: str, limits: Limits = LIMITS) -> LaserSca
     """Decode a ``sensor_msgs/LaserScan``.
 
     The beams of a scanner that turns clockwise (a negative increment) are reversed, so that
-    bearings increase; beam ``i`` is then at ``stamp + i * time_increment`` with a negative
-    `time_increment`. ValueError if the message is malformed, has no beams, is beyond a limit, or
-    its fields make no sense together.
+    bearings increase: see `LaserScan.from_message`. ValueError if the message is malformed, has no
+    beams, is beyond a limit, or its fields make no sense together.
     """
     reader = WireReader(data, encoding, limits)
     stamp, frame_id = reader.header()
@@ -120,14 +119,13 @@ def ring_scan(data: Buffer, encoding: str, ring: int, limits: Limits = LIMITS) -
     return LaserScan(
         ranges[order],
         angles=angles[order],
-        stamp=stamp,
         frame_id=frame_id,
         intensities=points["intensity"][order] if "intensity" in names else None,
-    )
+    ).stamped(0, stamp)
 
 
 def _scan(
-    stamp: float,
+    stamp: int,
     frame_id: str,
     geometry: Sequence[float],
     ranges: Array,
@@ -135,23 +133,12 @@ def _scan(
 ) -> LaserScan:
     """Make a scan of the fields of LaserScan, whose seven numbers are `geometry`."""
     angle_min, _, increment, time_increment, scan_time, range_min, range_max = geometry
-    if not len(ranges):
+    if len(ranges) == 0:
         raise ValueError("ranges is empty, expected at least one beam")
-    ranges, intensities, angle_min, increment, stamp, time_increment = counter_clockwise(
-        ranges, intensities, angle_min, increment, stamp, time_increment
-    )
-    return LaserScan(
-        ranges,
-        angle_min,
-        increment,
-        range_min=range_min,
-        range_max=range_max,
-        stamp=stamp,
-        scan_time=scan_time,
-        time_increment=time_increment,
-        frame_id=frame_id,
-        intensities=intensities,
-    )
+    times = {"scan_time": scan_time, "time_increment": time_increment}
+    fields, first = counter_clockwise(ranges, intensities, angle_min, increment, **times)
+    scan = LaserScan(**fields, range_min=range_min, range_max=range_max, frame_id=frame_id)
+    return scan.stamped(first, stamp)
 
 
 def _echoes(reader: WireReader, n: int, limits: Limits) -> tuple[Array, Array, Array]:

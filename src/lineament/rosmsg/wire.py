@@ -69,10 +69,10 @@ class WireReader:
         else:
             raise _unknown(encoding)
 
-    def header(self) -> tuple[float, str]:
-        """Take a ``std_msgs/Header``: its stamp [s] and its frame."""
+    def header(self) -> tuple[int, str]:
+        """Take a ``std_msgs/Header``: its stamp [ns] and its frame."""
         seconds, nanoseconds, length = self.numbers("header")
-        return seconds + 1e-9 * nanoseconds, self._string(length)
+        return seconds * 1_000_000_000 + nanoseconds, self._string(length)
 
     def numbers(self, code: str) -> tuple[Any, ...]:
         """Take numbers of one size, by the letters of `struct`: B, iI, 7d; or "header"."""

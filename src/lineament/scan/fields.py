@@ -13,6 +13,8 @@ _FLOAT64 = np.dtype(np.float64)
 Pose = tuple[float, float, float]
 #: Beams to points: a gap of more steps is where the scan begins, and a turn has so many at most.
 _WIDE, _MOST_BEAMS = 10.0, 20_000
+#: Nanoseconds of a second.
+NANO = 1_000_000_000
 
 
 def number(name: str, value: object) -> float:
@@ -171,21 +173,51 @@ def covariance_of_pose(covariance: ArrayLike) -> Array:
     return matrix
 
 
+def nanoseconds(stamp: float) -> int:
+    """Nanoseconds of a stamp [s], without the rounding of a product."""
+    seconds = math.floor(stamp)
+    return seconds * NANO + round((stamp - seconds) * NANO)
+
+
 def counter_clockwise(
-    ranges: Any, intensities: Any, first: float, step: float, stamp: float, time_step: float
-) -> tuple[Any, Any, float, float, float, float]:
-    """Reverse the beams of a scanner that turns clockwise: bearings increase, times fall."""
-    last = len(ranges) - 1
-    if not step < 0 or last < 1:
-        return ranges, intensities, first, step, stamp, time_step
-    turned = None if intensities is None else intensities[::-1]
-    return ranges[::-1], turned, first + last * step, -step, stamp + last * time_step, -time_step
+    ranges: Any, intensities: Any, angle_min: float, increment: float, **times: float
+) -> tuple[dict[str, Any], int]:
+    """Fields of a scan whose beams may run clockwise, and the index of its first beam in time.
+
+    `times` are `time_increment` and `scan_time`.
+    """
+    n, first = len(ranges), 0
+    if increment < 0 and n > 1:
+        ranges, first = ranges[::-1], n - 1
+        intensities = None if intensities is None else intensities[::-1]
+        angle_min, increment = angle_min + first * increment, -increment
+        times = {name: -time for name, time in times.items()}
+    angles = {"angle_min": angle_min, "angle_increment": increment}
+    return {"ranges": ranges, "intensities": intensities, **angles, **times}, first
 
 
-def stamp_seconds(stamp: Any) -> float:
-    """Seconds of a ROS 2 (sec, nanosec) or ROS 1 (secs, nsecs) stamp, or of a plain number."""
-    if hasattr(stamp, "sec"):
-        return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
-    if hasattr(stamp, "secs"):
-        return float(stamp.secs) + 1e-9 * float(stamp.nsecs)
-    return float(stamp)
+def message_fields(message: Any) -> tuple[dict[str, Any], int, int | None]:
+    """Fields of a scan for a ``sensor_msgs/LaserScan``, its first beam, and its stamp [ns].
+
+    AttributeError if the message is something else.
+    """
+    intensities = getattr(message, "intensities", None)
+    fields, first = counter_clockwise(
+        message.ranges,
+        None if intensities is None or not len(intensities) else intensities,
+        message.angle_min,
+        number("angle_increment", message.angle_increment),
+        scan_time=number("scan_time", message.scan_time),
+        time_increment=number("time_increment", message.time_increment),
+    )
+    fields |= {"range_min": message.range_min, "range_max": message.range_max}
+    header, ns = getattr(message, "header", None), None
+    if header is not None:
+        fields["frame_id"], stamp = header.frame_id, header.stamp
+        if hasattr(stamp, "sec"):  # of ROS 2; and of ROS 1
+            ns = int(stamp.sec) * NANO + int(stamp.nanosec)
+        elif hasattr(stamp, "secs"):
+            ns = int(stamp.secs) * NANO + int(stamp.nsecs)
+        else:
+            fields["stamp"] = float(stamp)
+    return fields, first, ns

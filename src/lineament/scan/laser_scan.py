@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from operator import index
 from typing import Any, Self, SupportsIndex, overload
 
 import numpy as np
@@ -11,20 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._lazy import Pictured
 from .fields import (
+    NANO,
     Array,
     Pose,
     beams_to,
     checked_pose,
-    counter_clockwise,
     covariance_of_pose,
     finite,
     irregular_bearings,
-    number,
+    message_fields,
+    nanoseconds,
     range_limits,
     regular_bearings,
-    stamp_seconds,
     vector,
 )
+
+#: Beams that a stamp may be the time of, in the order in which they are taken.
+STAMPS = ("first", "middle", "last")
 
 
 class LaserScan(Pictured):
@@ -47,9 +51,10 @@ class LaserScan(Pictured):
     range_min, range_max : float
         Limits of valid ranges [m]: ``range_min <= r < range_max``.
     stamp : float
-        Time of the first beam [s].
+        Time of the first beam [s], or of another, see `stamped`: features are where it is then.
     scan_time, time_increment : float
-        Time between scans and between beams [s]; 0 if unknown.
+        Time of a turn of the mirror, and between beams [s]; 0 if unknown, negative if the mirror
+        turns clockwise: the last beam is then taken first.
     frame_id : str
         Name of the sensor's frame.
     intensities : array_like, shape (n,), optional
@@ -79,6 +84,8 @@ class LaserScan(Pictured):
     range_min: float
     range_max: float
     stamp: float
+    #: Index of the beam that was taken at the stamp; it may lie between beams.
+    stamp_beam: float
     scan_time: float
     time_increment: float
     frame_id: str
@@ -117,6 +124,7 @@ class LaserScan(Pictured):
         own["angle_min"], own["angle_increment"] = first, step
         own["range_min"], own["range_max"] = range_limits(range_min, range_max)
         own["stamp"] = finite("stamp", stamp)
+        own["stamp_beam"] = 0.0
         own["scan_time"] = finite("scan_time", scan_time)
         own["time_increment"] = finite("time_increment", time_increment)
         own["frame_id"] = str(frame_id)
@@ -144,22 +152,25 @@ class LaserScan(Pictured):
         kept = range(len(self))[index]
         if kept.step < 0:
             raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
-        own = dict(vars(self))
-        for name in ("angles", "valid", "points"):
-            own.pop(name, None)  # what is made when it is first asked for
-        own["ranges"] = self.ranges[index]
+        own: dict[str, Any] = {"ranges": self.ranges[index]}
         if self.intensities is not None:
             own["intensities"] = self.intensities[index]
         if self.is_regular:
-            own["angle_min"] += kept.start * self.angle_increment
-            own["angle_increment"] *= kept.step
+            own["angle_min"] = self.angle_min + kept.start * self.angle_increment
+            own["angle_increment"] = self.angle_increment * kept.step
         else:
             own["angles"] = self.angles[index]
             own["angle_min"], own["angle_increment"] = irregular_bearings(own["angles"])
-        own["stamp"] += kept.start * self.time_increment
-        own["time_increment"] *= kept.step
+        own["stamp_beam"] = (self.stamp_beam - kept.start) / kept.step
+        own["time_increment"] = self.time_increment * kept.step
+        return self._changed(**own)
+
+    def _changed(self, **fields: Any) -> Self:
+        """Return a copy with other fields, which are checked already."""
+        # What is made when it is first asked for is of the old fields.
+        made = ("angles", "valid", "points") if "ranges" in fields else ()
         other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(own)
+        other.__dict__.update({k: v for k, v in vars(self).items() if k not in made}, **fields)
         return other
 
     def __repr__(self) -> str:
@@ -168,6 +179,11 @@ class LaserScan(Pictured):
             f"{math.degrees(self.angle_min):.1f}° + i·{math.degrees(self.angle_increment):.4f}°, "
             f"stamp={self.stamp:.3f})"
         )
+
+    @cached_property
+    def stamp_ns(self) -> int:
+        """The stamp in nanoseconds [ns], exactly as a message has it."""
+        return nanoseconds(self.stamp)
 
     @cached_property
     def angles(self) -> Array:
@@ -211,13 +227,52 @@ class LaserScan(Pictured):
         >>> LaserScan([1.0, 2.0], 0.0, 0.1).with_pose((3, 4, 0)).pose
         (3.0, 4.0, 0.0)
         """
-        other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(
-            self.__dict__,
+        return self._changed(
             pose=None if pose is None else checked_pose(pose),
             pose_covariance=None if covariance is None else covariance_of_pose(covariance),
         )
-        return other
+
+    def turned_over(self) -> Self:
+        """Return the same scan in the frame of its sensor turned about the x axis.
+
+        Bearings change their sign: what hangs upside down is then in a frame with z upwards.
+        """
+        own: dict[str, Any] = {"ranges": self.ranges[::-1]}
+        own["stamp_beam"] = len(self) - 1 - self.stamp_beam
+        if self.intensities is not None:
+            own["intensities"] = self.intensities[::-1]
+        own["angle_min"] = -float(self.angles[-1]) if len(self) else 0.0
+        if not self.is_regular:
+            own["angles"] = vector("angles", -self.angles[::-1])
+        times = {name: -getattr(self, name) for name in ("scan_time", "time_increment")}
+        return self._changed(**own, **times)
+
+    def stamped(self, beam: str | float, ns: int | None = None) -> Self:
+        """Return the same scan with a stamp that is the time of another beam.
+
+        Parameters
+        ----------
+        beam : str or float
+            ``first``, which is what ROS means; ``middle`` or ``last``, by which some drivers stamp;
+            in the order in which the beams are taken. Or its index, which may lie between beams.
+        ns : int, optional
+            The stamp in nanoseconds, too: as a float, a time of today is known to 0.2 µs only.
+
+        Examples
+        --------
+        >>> LaserScan([1.0, 1.0, 1.0], 0.0, 0.1, time_increment=0.01).stamped("last").stamp_beam
+        2.0
+        """
+        if isinstance(beam, str):
+            if beam not in STAMPS:
+                raise ValueError(f"stamp is {beam!r}, expected {', '.join(STAMPS)}")
+            share = STAMPS.index(beam) / 2
+            is_clockwise = (self.time_increment or self.scan_time) < 0
+            beam = (1 - share if is_clockwise else share) * (len(self) - 1)
+        fields: dict[str, Any] = {"stamp_beam": finite("stamp_beam", beam)}
+        if ns is not None and ns != self.stamp_ns:
+            fields |= {"stamp_ns": index(ns), "stamp": ns / NANO}
+        return self._changed(**fields)
 
     @classmethod
     def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
@@ -248,11 +303,11 @@ class LaserScan(Pictured):
         return cls(ranges, angles=angles, **fields)
 
     @classmethod
-    def from_message(cls, message: Any, *, pose: Pose | None = None) -> Self:
+    def from_message(cls, message: Any, *, pose: Pose | None = None, stamp: str = "first") -> Self:
         """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
 
-        Beams of a scanner that turns clockwise (a negative increment) are reversed, and
-        `time_increment` is negative then.
+        The beams of a scanner that turns clockwise (a negative increment) are put in the order of
+        increasing bearings; `stamp_beam` and the signs of the times say when they were taken.
 
         Parameters
         ----------
@@ -260,6 +315,8 @@ class LaserScan(Pictured):
             ``header`` and ``intensities`` may be missing or empty.
         pose : (x, y, theta), optional
             Pose of the sensor, from elsewhere.
+        stamp : str
+            Which beam is taken at the time of the header: see `stamped`.
 
         Raises
         ------
@@ -276,29 +333,8 @@ class LaserScan(Pictured):
         7.5
         """
         try:
-            header = getattr(message, "header", None)
-            intensities = getattr(message, "intensities", None)
-            has_intensities = intensities is not None and len(intensities) > 0
-            ranges, intensities, angle_min, increment, stamp, time_increment = counter_clockwise(
-                message.ranges,
-                intensities if has_intensities else None,
-                message.angle_min,
-                number("angle_increment", message.angle_increment),
-                0.0 if header is None else stamp_seconds(header.stamp),
-                message.time_increment,
-            )
-            return cls(
-                ranges,
-                angle_min,
-                increment,
-                range_min=message.range_min,
-                range_max=message.range_max,
-                scan_time=message.scan_time,
-                time_increment=time_increment,
-                stamp=stamp,
-                frame_id="" if header is None else header.frame_id,
-                intensities=intensities,
-                pose=pose,
-            )
+            fields, first, ns = message_fields(message)
+            scan = cls(**fields, pose=pose).stamped(first, ns)
         except AttributeError as error:
             raise ValueError(f"message is no sensor_msgs/LaserScan: {error}") from None
+        return scan.stamped(stamp) if stamp != "first" else scan

@@ -66,8 +66,8 @@ class ScanStore:
                 raise IndexError(f"scan {index} is not there")
             if self._starts[index] != _NOT_KEPT:
                 self._file.seek(self._starts[index])
-                topic, fields = pickle.load(self._file)
-                return topic, LaserScan(**fields)
+                topic, fields, stamped = pickle.load(self._file)
+                return topic, LaserScan(**fields).stamped(*stamped)
         return self._found_again(index)
 
     def stamps(self, first: int, count: int) -> list[float]:
@@ -123,4 +123,4 @@ def _pack(topic: str, scan: LaserScan) -> bytes:
             fields[name] = single if is_single else values
     names = ("angle_min", "angle_increment") if scan.is_regular else ("angles",)
     fields.update((name, getattr(scan, name)) for name in names)
-    return pickle.dumps((topic, fields))
+    return pickle.dumps((topic, fields, (scan.stamp_beam, scan.stamp_ns)))

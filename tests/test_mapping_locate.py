@@ -1,0 +1,259 @@
+"""Where am I on this plan: the four verdicts, poses by their covariances, and what is no query."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament.mapping import LineMap, LocalMap, locate
+from lineament.mapping.evidence import evidence_of
+from lineament.mapping.local_map import query_of_scan
+from lineament.motion import relative
+from lineament.reproduce.scans import archived_scans
+from lineament.simulation import SENSORS, World, drive, drive_poses
+from lineament.simulation.buildings import office
+from lineament.simulation.raycast import cast_rays
+
+SENSOR = SENSORS["utm30lx"]
+pytestmark = pytest.mark.slow
+
+
+def plan_of(world):
+    return LineMap.from_lines(world.segments, side=1)
+
+
+@cache
+def storey():
+    return office(11, (32.0, 20.0), identical=0.0)
+
+
+@cache
+def storey_plan():
+    return plan_of(storey().plan)
+
+
+def local_map(world, way, seed=0, odometry=None, step=0.2):
+    """Drive along a way; returns the local map and the last pose."""
+    stamps, poses = drive_poses(way, speed=1.0, rate=1 / step)
+    tracker, local, extract = ln.Tracker(roughness=0.0), LocalMap(), ln.Extractor()
+    for k, (stamp, pose) in enumerate(zip(stamps, poses, strict=True)):
+        scan = SENSOR.scan(world, tuple(pose), np.random.default_rng([seed, k]), stamp)
+        features, at = extract(scan), tuple(pose) if odometry else None
+        local.add(features, tracker(features, at), at)
+    return local, tuple(poses[-1])
+
+
+def ways(building, count, length=2.0):
+    """Stretches of the way through a building."""
+    legs = np.stack((building.waypoints[:-1], building.waypoints[1:]), axis=1)
+    legs = np.concatenate((legs, legs[:, ::-1]))
+    long = legs[np.linalg.norm(legs[:, 1] - legs[:, 0], axis=1) > length]
+    for start, end in long[:: max(len(long) // count, 1)][:count]:
+        yield np.array([start, start + (end - start) * length / math.dist(start, end)])
+
+
+def error(where, pose):
+    x, y, turn = relative(pose, where.pose)
+    return math.hypot(x, y), abs(turn)
+
+
+@cache
+def seen():
+    """Local maps of a furnished storey, with their poses."""
+    found = []
+    for k, way in enumerate(ways(storey(), 12)):
+        found.append(local_map(storey().world, way, k, odometry=True))
+    return found
+
+
+def test_places_are_found_and_their_errors_are_those_of_the_covariances():
+    squares, right = [], 0
+    for local, pose in seen():
+        where = locate(local, storey_plan())
+        if where:
+            assert where.verdict == "located"
+            assert error(where, pose) < (0.05, 0.01)
+            off = np.subtract(where.pose, pose)
+            off[2] = math.remainder(off[2], 2 * math.pi)
+            squares.append(off @ np.linalg.solve(where.covariance, off))
+            right += 1
+            assert where.evidence.explained > 0.35
+            assert where.evidence.contradicted < 0.05
+    assert right >= 10
+    # Sum of χ² of three degrees of freedom, within four deviations.
+    assert abs(sum(squares) - 3 * right) < 4 * math.sqrt(6 * right)
+
+
+@pytest.mark.parametrize("trap", ["mirrored", "other storey", "feet"])
+def test_plans_that_are_not_of_this_place(trap):
+    storeys = {
+        "mirrored": storey().mirrored(),
+        "other storey": office(12, (32.0, 20.0)).plan,
+        "feet": World(storey().plan.segments / 0.3048),
+    }
+    plan = plan_of(storeys[trap])
+    verdicts = [locate(local, plan).verdict for local, _ in seen()]
+    assert "located" not in verdicts
+    assert verdicts.count("not on this map") >= 8
+
+
+def test_moved_walls_do_not_move_the_pose():
+    plan = plan_of(storey().moved(1, share=1.0).plan)
+    found = [(locate(local, plan), pose) for local, pose in seen()]
+    located = [error(where, pose) for where, pose in found if where]
+    assert len(located) >= 4
+    assert max(located) < (0.1, 0.02)
+
+
+def test_identical_rooms_are_ambiguous_and_the_right_one_is_among_them():
+    rooms = [
+        [(x, 0), (x + 4, 0), (x + 4, 3), (x + 2.5, 3), (x + 2.5, 2.4), (x, 2.4), (x, 0)]
+        for x in (0, 5, 10)
+    ]
+    world = World.of_polygons(rooms)
+    scan = SENSOR.scan(world, (6.0, 1.0, 0.5), np.random.default_rng(0))
+    where = locate(ln.extract(scan), plan_of(world))
+    assert where.verdict == "ambiguous"
+    poses = [where.pose, *(pose for pose, _ in where.alternatives)]
+    assert sorted(round(x) for x, _, _ in poses) == [1, 6, 11]
+    assert all(error(locate(ln.extract(scan), plan_of(world), pose), pose) < (0.03, 0.01)
+               for pose in poses)  # fmt: skip
+    # The room next to it has another depth.
+    other = World.of_polygons([rooms[0], [(5, 0), (9, 0), (9, 4), (5, 4), (5, 0)]])
+    alone = SENSOR.scan(other, (1.0, 1.0, 0.5), np.random.default_rng(0))
+    assert locate(ln.extract(alone), plan_of(other)).verdict == "located"
+
+
+def test_corridor_leaves_its_direction_unobserved():
+    c, s = math.cos(0.3), math.sin(0.3)
+    walls = np.array([[0, 0, 200, 0], [200, 2, 0, 2]]).reshape(-1, 2) @ [[c, s], [-s, c]]
+    world = World(walls.reshape(-1, 4))
+    middle = 100 * c - s, 100 * s + c
+    local, pose = local_map(world, [middle, (middle[0] + 2 * c, middle[1] + 2 * s)])
+    where = locate(local, plan_of(world), pose)
+    assert where.verdict == "direction unobserved"
+    assert abs(np.dot(where.unobserved, (c, s))) > 0.999
+    across = np.array([-s, c])
+    assert math.sqrt(across @ where.covariance[:2, :2] @ across) < 0.01
+    assert abs(across @ np.subtract(where.pose, pose)[:2]) < 0.03
+    assert abs(where.pose[2] - 0.3) < 0.01
+
+
+def test_guess_is_faster_but_finds_the_same():
+    for local, pose in seen()[:4]:
+        without = locate(local, storey_plan())
+        guess = pose[0] + 0.4, pose[1] - 0.3, pose[2] + 0.12
+        given = locate(local, storey_plan(), guess)
+        np.testing.assert_allclose(given.pose, without.pose, atol=1e-4)
+        np.testing.assert_allclose(given.covariance, without.covariance, rtol=1e-2, atol=1e-9)
+        far = locate(local, storey_plan(), guess, np.diag((25.0, 25.0, 1.0)))
+        np.testing.assert_allclose(far.pose, without.pose, atol=1e-4)
+    wrong = locate(seen()[0][0], storey_plan(), (2.0, 2.0, 1.0), np.diag((0.01, 0.01, 0.001)))
+    assert not wrong
+
+
+def test_same_query_same_answer():
+    local, _ = seen()[0]
+    first, second = locate(local, storey_plan()), locate(local.query(), plan_of(storey().plan))
+    assert first.pose == second.pose
+    assert first.evidence == second.evidence
+    np.testing.assert_array_equal(first.covariance, second.covariance)
+
+
+@pytest.mark.parametrize("ranges", [[], [math.inf] * 50, [2.0] * 3])
+def test_scans_that_show_nothing_are_nowhere(ranges):
+    where = locate(ln.extract(ln.LaserScan(ranges, 0.0, 0.01)), storey_plan())
+    assert where.verdict != "located"
+    assert np.isfinite(where.pose).all()
+    assert np.isfinite(where.covariance).all()
+
+
+def test_local_map_keeps_the_way_and_needs_the_scan():
+    local, _ = seen()[0]
+    assert repr(local).startswith("LocalMap(")
+    extract, tracker = ln.Extractor(), ln.Tracker()
+    short, none = LocalMap(way=1.0), LocalMap()
+    for scan in drive(storey().world, next(ways(storey(), 1)), SENSOR, speed=1, rate=5):
+        features = extract(scan)
+        tracks = tracker(features, scan.pose)
+        short.add(features, tracks, scan.pose)
+    assert 0.3 < float(repr(short).split()[-2]) <= 1.0
+    with pytest.raises(ValueError, match="local map is empty"):
+        none.query()
+    with pytest.raises(ValueError, match="features have no scan"):
+        none.add(features.transform(0, 0, 0), tracks)
+    with pytest.raises(ValueError, match="way is -1"):
+        LocalMap(-1)
+
+
+def test_walls_of_a_local_map_are_off_by_their_covariance():
+    """The walls of an empty storey, seen from the last pose, against those of the plan."""
+    squares, count = 0.0, 0
+    lines = storey().plan.segments.reshape(-1, 2, 2)
+    for k, way in enumerate(ways(storey(), 6, 2.5)):
+        local, pose = local_map(storey().plan, way, 50 + k, odometry=True)
+        query = local.query()
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        used, errors = [], []
+        for number, wall in enumerate(query.walls):
+            ends = np.array([wall["start"], wall["end"]]) @ [[c, s], [-s, c]] + pose[:2]
+            along = lines[:, 1] - lines[:, 0]
+            along /= np.linalg.norm(along, axis=1)[:, None]
+            r = ends[:, None] - lines[:, 0]
+            off = np.abs(r[..., 0] * along[:, 1] - r[..., 1] * along[:, 0]).max(axis=0)
+            best = off.argmin()
+            if off[best] > 0.03 or np.linalg.norm(ends[1] - ends[0]) < 1.0:
+                continue
+            turn = math.atan2(*(ends[1] - ends[0])[::-1]) - math.atan2(*along[best][::-1])
+            at = wall["centroid"] @ [[c, s], [-s, c]] + pose[:2] - lines[best, 0]
+            errors += [along[best] @ [at[1], -at[0]], math.remainder(turn, math.pi)]
+            errors[-2] = along[best, 0] * at[1] - along[best, 1] * at[0]
+            same = abs(math.remainder(turn, 2 * math.pi)) < 1
+            errors[-2] *= 1 if same else -1
+            used += [2 * number, 2 * number + 1]
+        part = query.covariance[np.ix_(used, used)]
+        squares += np.array(errors) @ np.linalg.solve(part, errors)
+        count += len(errors)
+    assert count > 60
+    assert 0.4 < squares / count < 1.4
+
+
+def test_evidence_counts_beams_as_a_slow_twin_does():
+    plan, rng = storey_plan(), np.random.default_rng(3)
+    pose = storey().free_pose(rng)
+    scan = SENSOR.scan(storey().world, pose, rng)
+    query = query_of_scan(ln.extract(scan))
+    poses = np.array([pose, (pose[0] + 0.5, pose[1], pose[2]), (pose[0], pose[1], pose[2] + 0.5)])
+    found = evidence_of(poses, query.beams, plan.index, 0.02)
+    for (x, y, theta), (_, hit, short, through) in zip(poses, found, strict=True):
+        bearings = np.arctan2(query.beams[:, 3], query.beams[:, 2])
+        expected, met = cast_rays(storey().plan, (x, y, theta), bearings)
+        r = query.beams[:, 4]
+        px, py, qx, qy = storey().plan.segments[met].T
+        length = np.hypot(qx - px, qy - py)
+        towards = np.abs(
+            (qx - px) * np.sin(bearings + theta) - (qy - py) * np.cos(bearings + theta)
+        )
+        off = (r - expected) * towards / length
+        assert abs(hit - (np.abs(off) < 0.066).mean()) < 0.06
+        assert abs(through - (off > 0.09).mean()) < 0.06
+        assert hit + short + through == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("name", "median"), [("static_data", 0.010), ("mocap_02171554", 0.015)])
+def test_kidnapped_in_the_real_arena(data_dir, name, median):
+    path = data_dir / "truth" / f"jackal_{name}.npz"
+    if not path.exists():
+        pytest.skip(f"no {path}")
+    with np.load(path) as archive:
+        plan = LineMap.from_lines(archive["gt_segments"], sigma=0.005)
+    errors, extract = [], ln.Extractor()
+    for scan in archived_scans(path)[::5]:
+        where = locate(extract(scan), plan)
+        if where:
+            errors.append(error(where, scan.pose)[0])
+    assert len(errors) >= 60
+    assert np.median(errors) <= median
+    assert max(errors) < 0.2

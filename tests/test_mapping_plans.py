@@ -1,0 +1,237 @@
+"""Plans: walls from features, from DXF, from tables; what is no plan; written and read again."""
+
+import math
+
+import ezdxf
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament.cli import run
+from lineament.features import Features, make_records
+from lineament.logs import save_log
+from lineament.mapping import LineMap
+from lineament.simulation import SENSORS, building, drive, room, truth
+
+ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
+
+
+def segment(start, end, sigma=0.01, sigma_angle=0.005, misfit=0.0):
+    start, end = np.array(start, float), np.array(end, float)
+    along = end - start
+    return {
+        "start": start,
+        "end": end,
+        "centroid": (start + end) / 2,
+        "angle": math.atan2(along[1], along[0]),
+        "covariance": np.diag((sigma, sigma_angle)) ** 2,
+        "length": np.hypot(*along),
+        "misfit": misfit,
+    }
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def features(*segments, arcs=()):
+    tables = [make_records("segments", segments), make_records("corners", [])]
+    tables += [make_records("arcs", arcs), np.empty(0, np.int32), make_records("breakpoints", [])]
+    return Features(*tables)
+
+
+@pytest.mark.parametrize(
+    ("other", "walls"),
+    [
+        (segment((1.0, 0.0), (3.0, 0.0)), 1),  # the same again
+        (segment((2.1, 0.0), (4.0, 0.0)), 1),  # 10 cm further on
+        (segment((2.3, 0.0), (4.0, 0.0)), 2),  # a gap of a door
+        (segment((0.0, 0.02), (2.0, 0.02)), 1),  # 1.4 deviations beside it
+        (segment((0.0, 0.06), (2.0, 0.06)), 2),  # 4.2 deviations
+        (segment((0.0, 0.06), (2.0, 0.06), misfit=0.02), 1),  # of a wall that bows
+        (segment((0.0, 0.06), (2.0, 0.06), sigma=0.03), 1),  # less well known
+        (segment((0.0, 0.0), (2.0, 0.06)), 2),  # turned by 4.2 deviations
+        (segment((0.0, 0.0), (2.0, 0.06), sigma_angle=0.03), 1),
+        (segment((2.0, 0.0), (0.0, 0.0)), 2),  # its other side
+    ],
+)
+def test_segments_are_one_wall_by_chi_square(other, walls):
+    plan = LineMap.from_features([features(segment((0, 0), (2, 0))), features(other)])
+    assert len(plan.walls) == walls
+    assert plan.walls["side"].tolist() == [1] * walls
+    assert plan.walls["views"].sum() == 2
+
+
+def test_joint_line_is_the_least_squares_one():
+    first, second = (
+        segment((0, 0), (2, 0), 0.01, 0.01),
+        segment((2.1, 0.01), (5, 0.03), 0.02, 0.004),
+    )
+    wall = LineMap.from_features([features(first), features(second)]).walls[0]
+    # By definition: offset at x = 0 and slope of least χ².
+    rows, values, weights = [], [], []
+    for s in (first, second):
+        x, y = s["centroid"]
+        rows += [[1.0, x], [0.0, 1.0]]
+        values += [y, s["angle"]]
+        weights += (1 / np.diag(s["covariance"])).tolist()
+    rows, weights = np.array(rows), np.diag(weights)
+    normal = np.linalg.inv(rows.T @ weights @ rows)
+    offset, slope = normal @ rows.T @ weights @ values
+    x, y = wall["centroid"]
+    lever = np.array([[1.0, x], [0.0, 1.0]])
+    np.testing.assert_allclose([y, wall["angle"]], [offset + slope * x, slope], atol=2e-5)
+    np.testing.assert_allclose(wall["covariance"], lever @ normal @ lever.T, rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose([wall["start"][0], wall["end"][0]], [0, 5], atol=1e-3)
+
+
+def test_map_of_scans_has_the_walls_of_the_building():
+    world, way = building()
+    sensor = SENSORS["utm30lx"]
+    scans = list(drive(world, way, sensor, rate=0.5, seed=2))
+    seen = [truth(world, scan.pose, sensor) for scan in scans]
+    plan = LineMap.from_features(seen, [scan.pose for scan in scans], min_views=2)
+    lines = world.segments.reshape(-1, 2, 2)
+    for ends in plan.ends:
+        off = np.abs(cross(lines[:, 1] - lines[:, 0], ends[:, None] - lines[:, 0]))
+        off /= np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+        assert off.max(axis=0).min() < 1e-3  # both ends lie on the line of one wall
+    assert len(plan.walls) > 60
+
+
+def test_arcs_are_one_column_by_chi_square():
+    def arc(x, radius=0.2):
+        return {"center": (x, 1.0), "radius": radius, "covariance": np.eye(3) * 1e-4}
+
+    scans = [features(segment((0, 0), (2, 0)), arcs=[arc(x)]) for x in (1.0, 1.02, 1.2)]
+    columns = LineMap.from_features(scans).columns
+    np.testing.assert_allclose(columns["center"], [[1.01, 1.0], [1.2, 1.0]])
+    np.testing.assert_allclose(columns["covariance"][0], np.eye(3) * 5e-5)
+    assert columns["views"].tolist() == [2, 1]
+
+
+def test_corners_know_their_opening_and_on_which_side_the_wall_is():
+    free = LineMap.from_lines(ROOM, side=1).corners
+    np.testing.assert_allclose(free["opening"], math.pi / 2)
+    assert free["solid"].tolist() == [0] * 4
+    solid = LineMap.from_lines(ROOM[:, [2, 3, 0, 1]], side=1).corners
+    assert solid["solid"].tolist() == [1] * 4
+    unknown = LineMap.from_lines(ROOM).corners
+    assert unknown["solid"].tolist() == [-1] * 4
+    to_middle = np.array([2, 1.5]) - unknown["position"]
+    off = np.cos(unknown["bisector"] - np.arctan2(to_middle[:, 1], to_middle[:, 0]))
+    assert (off > 0.9).all()
+    tee = LineMap.from_lines([[0, 0, 4, 0], [2, 0, 2, 3]]).corners
+    assert len(tee) == 2
+
+
+def draw(path, unit=6, **more):
+    drawing = ezdxf.new("R2010", units=unit)
+    scale = {6: 1.0, 4: 1000.0, 1: 1 / 0.0254, 0: 1.0}[unit]
+    space = drawing.modelspace()
+    space.add_lwpolyline(scale * np.array([(0, 0), (4, 0), (4, 3)]), dxfattribs={"layer": "A-WALL"})
+    block = drawing.blocks.new("corner")
+    block.add_line((0, 0), (-4 * scale, 0))
+    block.add_line((-4 * scale, 0), (-4 * scale, -3 * scale))
+    space.add_blockref("corner", (4 * scale, 3 * scale), dxfattribs={"layer": "A-WALL"})
+    space.add_line((1, 1), (1, 1), dxfattribs={"layer": "A-WALL"})
+    space.add_arc((0, 0), scale, 0, 90, dxfattribs={"layer": "DOORS"})
+    space.add_circle((2 * scale, scale), 0.2 * scale, dxfattribs={"layer": "A-WALL-COLS"})
+    space.add_text("room 1", dxfattribs={"layer": "TEXT"})
+    for name in more.get("only", ()):
+        for entity in list(space):
+            if entity.dxf.layer != name:
+                space.delete_entity(entity)
+    drawing.saveas(path)
+    return path
+
+
+@pytest.mark.parametrize("unit", [6, 4, 1, 0])
+def test_dxf_in_any_unit_with_blocks_and_polylines(tmp_path, unit):
+    plan = LineMap.read(draw(tmp_path / "plan.dxf", unit))
+    lines = np.sort(plan.ends.reshape(-1, 4).round(6), axis=0)
+    np.testing.assert_allclose(lines, np.sort(ROOM, axis=0), atol=1e-6)
+    assert (plan.walls["side"] == 0).all()
+    np.testing.assert_allclose(plan.columns["radius"], [0.2])
+    np.testing.assert_allclose(plan.columns["center"], [[2, 1]])
+
+
+def test_dxf_layers_are_chosen_by_name(tmp_path):
+    path = draw(tmp_path / "plan.dxf")
+    doors = LineMap.read(path, layers=["door*"])
+    assert len(doors.walls) > 5
+    np.testing.assert_allclose(np.linalg.norm(doors.ends, axis=2), 1.0, atol=1e-6)
+    everything = LineMap.read(path, layers=["*"])
+    assert len(everything.walls) == 4 + len(doors.walls)
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "line"),
+    [
+        ("a.dxf", lambda p: p.write_text("no"), r"a\.dxf: is no DXF"),
+        ("a.dxf", lambda _: None, r"a\.dxf: No such file"),
+        ("a.dxf", lambda p: draw(p, only=["TEXT"]), r"a\.dxf: has no walls: 0 entities"),
+        ("a.parquet", lambda p: p.write_text("no"), r"a\.parquet: is no table of features"),
+        ("a.png", lambda _: None, r"a\.png: a plan is a \.dxf or a \.parquet"),
+    ],
+)
+def test_what_is_no_plan_is_one_clear_line(tmp_path, name, make, line):
+    make(tmp_path / name)
+    with pytest.raises(ln.LineamentError, match=line) as caught:
+        LineMap.read(tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_layer_that_is_not_there_names_those_that_are(tmp_path):
+    path = draw(tmp_path / "a.dxf")
+    with pytest.raises(ln.LineamentError, match=r"no layer is B-\*; there are: A-WALL, DOORS"):
+        LineMap.read(path, layers=["B-*"])
+
+
+@pytest.mark.parametrize(
+    ("lines", "line"),
+    [
+        ([], "no walls: 0 lines"),
+        ([[1, 1, 1, 1]], "no walls: 1 lines, none has a length"),
+        ([[0, 0, np.nan, 1]], "no walls"),
+        (1000 * ROOM, "is 4000 m wide, .* is it drawn in metres"),
+    ],
+)
+def test_walls_without_length_and_plans_without_walls(lines, line):
+    with pytest.raises(ln.LineamentError, match=line):
+        LineMap.from_lines(lines)
+    plan = LineMap.from_lines([*ROOM, [1, 1, 1, 1], [0, 0, np.inf, 1]])
+    assert len(plan.walls) == 4
+
+
+@pytest.mark.parametrize("ending", ["dxf", "parquet"])
+def test_written_maps_are_read_again(tmp_path, ending):
+    world = room()
+    scans = [SENSORS["utm30lx"].scan(world, (x, 0, 0.3), np.random.default_rng(1)) for x in (-2, 0)]
+    extract = ln.Extractor()
+    plan = LineMap.from_features(map(extract, scans), [scan.pose for scan in scans])
+    plan.write(tmp_path / f"a.{ending}")
+    again = LineMap.read(tmp_path / f"a.{ending}")
+    np.testing.assert_allclose(
+        np.sort(again.ends.reshape(-1, 4), axis=0), np.sort(plan.ends.reshape(-1, 4), axis=0),
+        atol=1e-5,
+    )  # fmt: skip
+    if ending == "parquet":
+        order = [w["centroid"].tolist() for w in plan.walls]
+        back = {tuple(np.round(w["centroid"], 5)): w["covariance"] for w in again.walls}
+        for wall, place in zip(plan.walls, order, strict=True):
+            np.testing.assert_allclose(back[tuple(np.round(place, 5))], wall["covariance"])
+
+
+def test_table_of_extract_in_the_world_is_a_plan(tmp_path):
+    log, table = str(tmp_path / "log.npz"), str(tmp_path / "log.parquet")
+    save_log(log, drive(room(), [(-2, 0), (1, 0)], SENSORS["utm30lx"], rate=1))
+    assert run(["extract", log, "--world", "-o", table, "-q"]) == 0
+    walls = LineMap.read(table).walls
+    often = walls[walls["views"] > 1]
+    ends = np.stack((often["start"], often["end"]), axis=1)
+    lines = room().segments.reshape(-1, 2, 2)
+    along = lines[:, 1] - lines[:, 0]
+    off = [cross(along, end[:, None] - lines[:, 0]) for end in ends] / np.linalg.norm(along, axis=1)
+    assert np.abs(off).max(axis=1).min(axis=1).max() < 0.02
+    assert 4 <= len(often) <= 12
