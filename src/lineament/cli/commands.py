@@ -8,6 +8,7 @@ import click
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
+from .locate import locate
 from .options import (
     HUSH,
     LOG,
@@ -145,7 +146,7 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 
 
 _ALL = (
-    *(extract, info, plot, view, live, demo),
+    *(extract, info, plot, view, locate, live, demo),
     *(methods, warmup, compare, reproduce, bench, simulate),
 )
 COMMANDS = {command.name: command for command in _ALL if command.name}
