@@ -127,13 +127,14 @@ class Follower:
         """
         if self._is_torn(features.stamp, odometry):
             self._restart()
-        tracks = self._tracker(features, odometry)
         self._stamp, self._odometry = features.stamp, odometry
+        was_known, tracks = self.is_known, self._tracker(features, odometry)
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
         evidence = self._judge(features)
-        if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED:
+        if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
+            # What was seen before may be of another place: this scan begins anew.
             self._restart()
             self._local.add(features, self._tracker(features, odometry))
         location = None
