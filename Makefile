@@ -5,14 +5,14 @@
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
+.PHONY: demo test test-all boundscheck docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
 test: lint types tests wheel
 
-test-all: coverage docs
+test-all: coverage boundscheck docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -54,6 +54,11 @@ coverage: .venv/ready
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n auto --dist worksteal -m 'not slow'
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
+
+# No kernel reads or writes outside of its arrays: with checked indices, also of all scans of up to eight beams.
+boundscheck: .venv/ready
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck LINEAMENT_BEAMS=8 $(BIN)/python -m pytest -n auto --dist worksteal \
+	tests/test_kernel_range.py tests/test_optimal_properties.py tests/test_twins.py tests/test_polylines.py tests/test_budget.py
 
 # The site of the documents, with its tutorials run; what it needs is installed when it is first made.
 .venv/docs: requirements-docs.lock .venv/ready

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import random
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import numba
 import pytest
 from hypothesis import settings
 
@@ -54,6 +58,26 @@ def recorded_scans(data_dir: Path) -> list[LaserScan]:
     """Every sixtieth scan of a recording of offices and corridors."""
     log = open_log(data_dir / "carmen" / "intel-corrected.log.gz")
     return list(islice(log, 0, None, 60))
+
+
+def packages(name: str = "lineament") -> dict[str, ModuleType]:
+    """Modules of a package that are loaded."""
+    inside = name + "."
+    return {key: m for key, m in sys.modules.items() if key == name or key.startswith(inside)}
+
+
+@pytest.fixture(scope="module")
+def plain() -> Iterator[ModuleType]:
+    """The package a second time, its kernels not compiled."""
+    compiled, before = packages(), numba.config.DISABLE_JIT
+    for name in compiled:
+        del sys.modules[name]
+    numba.config.DISABLE_JIT = 1
+    yield importlib.import_module("lineament")
+    numba.config.DISABLE_JIT = before
+    for name in packages():
+        del sys.modules[name]
+    sys.modules.update(compiled)
 
 
 @pytest.fixture

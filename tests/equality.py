@@ -101,6 +101,10 @@ def assert_same_covariances(table, records):
         np.testing.assert_allclose(own / unit, record["covariance"] / unit, atol=1e-6)
 
 
+def direction_of(line):
+    return np.array([math.cos(line["angle"]), math.sin(line["angle"])])
+
+
 def assert_sound(features, scan, name):
     """Hold what is true of the features of any scan, by a method without edges and slits."""
     for table in (getattr(features, kind) for kind in TABLES):
@@ -122,7 +126,8 @@ def assert_sound(features, scan, name):
         assert scan.valid[[first, last]].all()
         beams = valid[(valid - first) % n <= (last - first) % n]
         # On a ring, the measurement at which it was opened belongs to its first and its last line.
-        assert line["n_points"] in (len(beams), 1 + n * (first == last))
+        assert line["n_points"] == len(beams)
+        assert (line["end"] - line["start"]) @ direction_of(line) > 0
         assert set(features.clusters[beams]) == {line["cluster"]}
     for corner in corners:
         before, after = corner["segments"]

@@ -18,6 +18,7 @@ from naive_fit import (
     opening_and_side,
     quality,
 )
+from naive_optimal import estimated_noise
 
 LEAST_SIGMA = 1e-4
 
@@ -29,24 +30,24 @@ def valid(scan) -> list[bool]:
     return [one(r) for r in scan.ranges.tolist()]
 
 
-def sigma(scan):
-    """Range noise by the lower median of second differences; None where nothing is valid."""
-    ok, r = valid(scan), scan.ranges
-    if not any(ok):
-        return None
-    sizes = sorted(
-        abs(r[i - 1] - 2 * r[i] + r[i + 1])
-        for i in range(1, len(scan) - 1, 3)
-        if ok[i - 1] and ok[i] and ok[i + 1]
-    )
-    if not sizes:
-        return LEAST_SIGMA
-    # The median of |N(0, s)| is 0.6745 s; s² = (1 + 4 + 1) σ².
-    value = 1.4826 * sizes[(len(sizes) - 1) // 2] / math.sqrt(6)
-    if value >= LEAST_SIGMA:
-        return value
-    lattice = [size for size in sizes if size > LEAST_SIGMA]
-    return max(min(lattice) / math.sqrt(12), LEAST_SIGMA) if lattice else LEAST_SIGMA
+def noise_of(scan) -> tuple[float, float, float, float]:
+    """Noise of the rivals: that of `optimal`, but of few measurements too, and of a lattice."""
+    if not any(valid(scan)):
+        return (math.nan, 0.0, 0.0, 0.0)
+    constant, growth = estimated_noise(scan, fewest=1)
+    if constant + growth <= 1.0001 * LEAST_SIGMA**2:
+        steps = second_differences(scan)
+        lattice = [step for step in steps if LEAST_SIGMA < step < 0.15]
+        if len(lattice) > len(steps) / 8:
+            constant = max(constant, min(lattice) ** 2 / 12)
+    return (math.sqrt(constant), math.sqrt(growth), 0.0, 0.0)
+
+
+def second_differences(scan) -> list[float]:
+    """What each range is off the mean of its neighbours, twice."""
+    usable = [ok and 1e-6 <= r < 1e3 for ok, r in zip(valid(scan), scan.ranges, strict=True)]
+    r, inner = scan.ranges, range(1, len(scan) - 1)
+    return [abs(r[i - 1] - 2 * r[i] + r[i + 1]) for i in inner if all(usable[i - 1 : i + 2])]
 
 
 def fitted(method, own, corner_before, corner_after):
@@ -68,7 +69,7 @@ def paper_of(method, noise_sigma=math.nan):
 def liu(scan, method, filtered, noise=None):
     """All of the method, from filtered ranges."""
     if noise is None:
-        noise = (sigma(scan) or math.nan, 0.0, 0.0, 0.0)
+        noise = noise_of(scan)
     paper = paper_of(method, noise[0])
     found = adaptive_clusters(
         filtered, scan.angles, scan.angle_increment, scan.is_full_circle, paper
@@ -88,6 +89,11 @@ def liu(scan, method, filtered, noise=None):
             after = pieces[k + 1] if k + 1 < len(pieces) else pieces[0] if found.closed else None
             core = fitted(method, own, first in strong, after is not None and after[0] in strong)
             line = fit_line(points[core], scan.angles[core], measured[core], noise, method.fit)
+            # Without the points next to its corners it may lead the other way.
+            way = points[own[-1]] - points[own[0]]
+            if way @ [math.cos(line["angle"]), math.sin(line["angle"])] < 0:
+                line["angle"] = math.remainder(line["angle"] + math.pi, 2 * math.pi)
+                line["covariance"] = line["covariance"] * [[1, -1], [-1, 1]]
             line |= {"first_beam": own[0], "last_beam": own[-1], "cluster": label}
             line |= {"start": along(line, points[own[0]]), "end": along(line, points[own[-1]])}
             line["n_points"] = len(own)

@@ -125,7 +125,11 @@ def offset_variance(line, point):
 
 
 def intersection(a, b, near, reach):
-    """Where two lines meet, Σ = A⁻¹ diag A⁻ᵀ; None if that is not within `reach` of a point."""
+    """Where two lines meet, Σ = A⁻¹ diag A⁻ᵀ; None if that is not within `reach` of a point.
+
+    Nor where it would come before the start or the middle of the first, or after those of the
+    second.
+    """
     normals = np.array([[-math.sin(k["angle"]), math.cos(k["angle"])] for k in (a, b)])
     if abs(np.linalg.det(normals)) < 1e-6:
         return None
@@ -133,6 +137,11 @@ def intersection(a, b, near, reach):
     point = np.linalg.solve(normals, offsets)
     if np.linalg.norm(point - near) > reach:
         return None
+    ends = (a, "start", 1), (b, "end", -1)
+    for line, end, way in ends:
+        u = way * np.array([math.cos(line["angle"]), math.sin(line["angle"])])
+        if any((point - at) @ u <= 0 for at in (line["centroid"], line[end])):
+            return None
     inverse = np.linalg.inv(normals)
     spread = np.diag([offset_variance(a, point), offset_variance(b, point)])
     return point, inverse @ spread @ inverse.T

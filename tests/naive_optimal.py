@@ -36,12 +36,12 @@ def third_of(errors, squares):
     return 1.03 * errors[kept].mean(), squares[kept].mean(), int(kept.sum())
 
 
-def estimated_noise(scan: LaserScan) -> tuple[float, float]:
+def estimated_noise(scan: LaserScan, fewest: int = 24) -> tuple[float, float]:
     """Constant and growth, of measurements off the line through their neighbours."""
     usable = np.flatnonzero(scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e3))
     rho, bearing = scan.ranges, scan.angles
     middle = [b for a, b, c in zip(usable, usable[1:], usable[2:], strict=False) if c - a == 2]
-    if len(middle) < 24:
+    if len(middle) < fewest:
         return 1e-8, 0.0
     i = np.array(middle)
     whole = np.sin(bearing[i + 1] - bearing[i - 1])

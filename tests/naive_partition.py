@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 from liu_2023 import Clusters, distances, pieces_of, polar
-from naive import sigma, valid
+from naive import noise_of as estimated
+from naive import valid
 from naive_fit import breakpoints, estimate, principal_line, range_variance
 
 from lineament import LaserScan
@@ -29,7 +30,7 @@ def noise_of(scan, extractor) -> tuple[float, ...]:
     noise = extractor.noise
     if noise is not None:
         return (noise.sigma, noise.proportional, noise.bearing, noise.quantum)
-    return (sigma(scan) or math.nan, 0.0, 0.0, 0.0)
+    return estimated(scan)
 
 
 # Parting

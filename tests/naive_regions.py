@@ -163,12 +163,17 @@ def sample(clusters, method):
 
 
 def vote(clusters, method):
-    """Pieces of each cluster by votes, which are counted again for each peak."""
+    """Pieces of each cluster by votes from its chord on, counted again for each peak."""
     alpha = math.pi / method.angles * np.arange(method.angles)
-    normals = np.column_stack((np.cos(alpha), np.sin(alpha)))
     for span in clusters.spans:
         points = clusters.points[span[0] : span[1] + 1]
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        u = points[-1] - points[0]
+        u = u if math.hypot(*u) > 0 else points[0]
+        u = u / math.hypot(*u)
+        axes = np.array([u, (-u[1], u[0])])
+        box = (points - points[0]) @ axes.T
+        centre = points[0] + 0.5 * (box.min(axis=0) + box.max(axis=0)) @ axes
+        normals = np.column_stack((np.cos(alpha), np.sin(alpha))) @ axes
         radius = max(math.hypot(*(p - centre)) for p in points)
         noise = math.sqrt(range_variance(clusters.rho[span[0]], clusters.noise))
         width = max(method.resolution, 2 * noise, 2 * radius / (method.distances - 1))
@@ -243,6 +248,8 @@ def merged(clusters, pieces, method):
         if out and are_neighbours(clusters, out[-1], (a, b)):
             one = list(range(out[-1][0], out[-1][1] + 1))
             other = list(range(max(a, one[-1] + 1), b + 1))
+            if not other:
+                continue
             _, d, both = line(clusters.points[one + other])
             apart = sum(line(clusters.points[some])[2] for some in (one, other))
             rho, noise = clusters.rho[one[-1]], clusters.noise
@@ -258,10 +265,11 @@ def merged(clusters, pieces, method):
 def cut_apart(points, one, other):
     """Both pieces with the border of least squares, within 20 points of the one they had."""
     (a, b), (c, d) = one, other
-    near, far = max(min(b, c - 1), a + 1), max(b, c - 1)
+    near, far = max(min(b, c - 1), a + 1), min(max(b, c - 1), d - 2)
     borders = range(max(near - 20, a + 2), min(far + 20, d - 3) + 1)
     if not borders:
-        return (a, near), (max(c, near + 1), d)
+        begin = max(c, near + 1)
+        return ((a, near), (begin, d)) if begin < d else (one, other)
     lines = line(points[a : near + 1]), line(points[far + 1 : d + 1])
     first, second = (((points @ normal - distance) ** 2) for normal, distance, _ in lines)
     best, least = None, math.inf

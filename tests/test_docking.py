@@ -145,6 +145,19 @@ def test_a_corner_is_looked_for_within_a_metre(away, is_near):
     assert (dock(room(1), tracks(8), HERE) is not None) == is_near
 
 
+@pytest.mark.parametrize(
+    ("deviations", "is_near"),
+    [((0.3, 0.3, 0.0), True), ((0.4, 0.4, 0.0), False), ((0.0, 0.0, 0.13), True),
+     ((0.0, 0.0, 0.15), False)],
+)  # fmt: skip
+def test_no_corner_is_chosen_where_its_place_is_not_known(deviations, is_near):
+    dock, covariance = Dock((2.0, 3.0)), np.diag(deviations) ** 2
+    assert (dock(room(1), tracks(8), HERE, covariance) is not None) == is_near
+    # One that is followed goes on, wherever it is.
+    if is_near:
+        assert dock(room(1), tracks(8), HERE, 100 * covariance) is not None
+
+
 def test_a_track_alone():
     dock = Dock(track=8)
     assert dock(room(0), tracks(7), HERE) is None

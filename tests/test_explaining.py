@@ -214,3 +214,13 @@ def test_the_evidence_is_of_the_same_run_where_the_noise_is_estimated():
             trace = extractor.trace(hall(sensor, seed))
             for kind, values in trace.evidence.items():
                 assert len(values) == len(getattr(trace.features, kind)), (sensor, seed, kind)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_noise_nothing_is_in_deviations(method):
+    scan = wall_with([29, 30], [1.9, 2.3])
+    trace = Extractor(method, noise=RangeNoise(sigma=0.0)).trace(scan)
+    for beam in range(len(scan)):
+        steps = explain(trace, beam).steps
+        assert steps[0][1].endswith("without noise")
+        assert not any("σ" in text for _, text in steps)

@@ -428,8 +428,9 @@ def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
     walk = [(-2.0, 0.0), (-1.0, 0.0)]
     for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=5):
         frame = pipeline("one", scan)
-        features, tracks, pose = poses.pop()
+        features, tracks, pose, covariance = poses.pop()
         assert (features, pose) == (frame.features, frame.travel.pose)
+        assert covariance is frame.travel.covariance
         assert len(tracks.corners) == len(features.corners)
     assert pose[0] == pytest.approx(1.0, abs=0.02)
 

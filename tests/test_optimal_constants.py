@@ -5,37 +5,15 @@ The kernels run as plain Python, in which a number can be replaced.
 
 import importlib
 import math
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
 
-import numba
 import numpy as np
 import pytest
+from conftest import packages
 from worlds import fan, vertex, wall
 
 ONE = math.radians(1.0)
-
-
-def packages(name: str = "lineament") -> dict[str, ModuleType]:
-    """Modules of a package that are loaded."""
-    inside = name + "."
-    return {key: m for key, m in sys.modules.items() if key == name or key.startswith(inside)}
-
-
-@pytest.fixture(scope="module")
-def plain() -> Iterator[ModuleType]:
-    """The package a second time, its kernels not compiled."""
-    compiled, before = packages(), numba.config.DISABLE_JIT
-    for name in compiled:
-        del sys.modules[name]
-    numba.config.DISABLE_JIT = 1
-    yield importlib.import_module("lineament")
-    numba.config.DISABLE_JIT = before
-    for name in packages():
-        del sys.modules[name]
-    sys.modules.update(compiled)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from ros_bags import every_kind, ranges_of, write
 from text_logs import check_refused
 
 from lineament import LogError
+from lineament.cli import run
 from lineament.logs import open_log
 from lineament.logs.base import Head
 from lineament.logs.rosbag2 import Rosbag2Log
@@ -63,6 +64,13 @@ def test_no_scans(tmp_path, kind):
     listing = r"topics there are: /odom \(nav_msgs/Odometry, 1\)$"
     check_refused(f"has no LaserScan or MultiEchoLaserScan; {listing}", path)
     check_refused(f"on '/odom'; {listing}", path, "/odom")
+
+
+def test_a_picture_names_the_topic_where_a_log_has_several(tmp_path, capsys):
+    path = write(tmp_path, "mcap", two_scanners("mcap", 3))
+    for given, topic in (["--scan", "1"], "/rear"), (["--topic", "/front"], "/front"):
+        assert run(["plot", str(path), *given, "-o", str(tmp_path / "a.png")]) == 0
+        assert f" · {topic} · " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("kind", ["mcap", "mcap-bare", "sqlite3"])

@@ -100,23 +100,27 @@ def test_a_static_link_holds_at_all_times(tmp_path):
 
 
 def test_a_scanner_that_hangs_upside_down(tmp_path):
-    """Its frame is turned about x, on a mast that is turned by 0.5 rad, on a robot that moves."""
+    """It is on a plate that is turned about x, and by 0.5 rad, on a robot."""
     yaw = 0.5
 
     def make(messages):
         header = messages.header(0.0, "base")
         turned = (0.2, 0.1, 1.0), (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0)
-        link = messages.new("geometry_msgs/TransformStamped", header, "laser", turned)
-        yield "/tf_static", 0.0, messages.transforms(link)
+        link = messages.new("geometry_msgs/TransformStamped", header, "plate", turned)
+        on_it = messages.transform(0.0, "plate", "laser", 0.3, 0.2, 0.1)
+        yield "/tf_static", 0.0, messages.transforms(link, on_it)
         at = messages.transform(0.0, "map", "base", 3.0, 4.0, math.pi / 2)
         yield "/tf", 0.0, messages.transforms(at)
         yield "/scan", 0.1, messages.scan(0.1, [1.0, 2.0], [7.0, 8.0], time_increment=0.25)
 
     path = write(tmp_path, "mcap", make)
     (plain,) = open_log(path)
-    (scan,) = open_log(path, pose_topic="/tf:map->base->laser")
-    assert scan.pose == pytest.approx((2.9, 4.2, math.pi / 2 + yaw))
+    (scan,) = open_log(path, pose_topic="/tf:map->base->plate->laser")
     x, y, theta = scan.pose
+    plate = math.pi / 2 + yaw
+    assert theta == pytest.approx(plate - 0.1)
+    assert x == pytest.approx(2.9 + 0.3 * math.cos(plate) + 0.2 * math.sin(plate))
+    assert y == pytest.approx(4.2 + 0.3 * math.sin(plate) - 0.2 * math.cos(plate))
     c, s = math.cos(theta), math.sin(theta)
     mirrored = plain.points * (1, -1)
     np.testing.assert_allclose(

@@ -77,7 +77,6 @@ def _run(arguments: list[str] | None) -> int:
 
 
 def _unwritten(name: str | None, reason: str | None) -> int:
-    sys.stdout = None  # What is left in its buffer is not to be written at the exit.
     return _complain(f"lineament: {name or 'standard output'}: {reason}", 1)
 
 

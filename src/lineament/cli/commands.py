@@ -75,8 +75,8 @@ def plot(
     names = methods or (DEFAULT_METHOD,)
     extractors = {name: make_extractor(name, settings, noise) for name in names}
     opened = open_log(log, **reading)
-    scan = opened.scan(index)
-    title = scan_title(opened.name, index, scan)
+    topic, scan = opened.item(index)
+    title = scan_title(opened.name, index, scan, topic if len(opened.topics) > 1 else "")
     if trace:
         title = f"{title} · {names[0]}"
         plot_trace(extractors[names[0]].trace(scan), output, title=title, dark=dark)

@@ -83,7 +83,9 @@ class _Question:
             self._note("measurement", f"beam {i} at {bearing:.2f}°: {invalid}")
             return self._done("invalid", f"Invalid: {invalid}.")
         text = f"beam {i}: {scan.ranges[i]:.3f} m at {bearing:.2f}°"
-        self._note("measurement", f"{text}, noise {_length(self._sigma(i))} (1 σ)")
+        sigma = self._sigma(i)
+        noise = f"noise {_length(sigma)} (1 σ)" if sigma else "without noise"
+        self._note("measurement", f"{text}, {noise}")
         if not math.isfinite(self.trace.filtered[i]):
             return self._done(*self._left_out())
         moved = self.trace.filtered[i] - scan.ranges[i]
@@ -104,6 +106,11 @@ class _Question:
     def _sigma(self, i: int) -> float:
         noise = self.trace.features.noise
         return math.sqrt(noise.range_variance(float(self.scan.ranges[i]))) if noise else math.nan
+
+    def _sigmas(self, off: float) -> str:
+        """Return a distance in deviations of the noise, in brackets; nothing without noise."""
+        sigma = self._sigma(self.beam)
+        return f" ({abs(off) / sigma:.1f} σ)" if sigma else ""
 
     def _left_out(self) -> tuple[str, str]:
         i, ranges = self.beam, self.scan.ranges
@@ -205,11 +212,9 @@ class _Question:
         segment, i = self.segments[k], self.beam
         length = math.dist(segment["start"], segment["end"])
         off = along_beam(self.scan, i, segment)
-        sigmas = abs(off) / self._sigma(i)
         text = f"segment {k}: {_extent(segment)}, {length:.2f} m, rms {_length(segment['rms'])}"
-        self._note(
-            "fit", f"{text}; this measurement: {_signed(off)} along its beam ({sigmas:.1f} σ)"
-        )
+        off_line = f"{_signed(off)} along its beam{self._sigmas(off)}"
+        self._note("fit", f"{text}; this measurement: {off_line}")
         evidence = self.trace.evidence.get("segments")
         if evidence is None:
             return
@@ -256,8 +261,7 @@ class _Question:
         for k in (run.before, run.after):
             if k >= 0:
                 off = along_beam(self.scan, self.beam, self.segments[k])
-                sigmas = abs(off) / self._sigma(self.beam)
-                text = f"off the line of segment {k} by {_signed(off)} ({sigmas:.1f} σ)"
+                text = f"off the line of segment {k} by {_signed(off)}{self._sigmas(off)}"
                 self._note("neighbour", text)
         count = len(run.beams)
         where = f"{count} measurement{'s' * (count > 1)} here in no line"

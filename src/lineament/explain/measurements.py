@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.noise import LEAST_SIGMA
 from ..methods.trace import Trace
 from ..scan import LaserScan
 
@@ -79,7 +80,7 @@ class Line(NamedTuple):
         xy, noise = trace.scan.points[beams], trace.features.noise
         rho = trace.scan.ranges[beams]
         variance = noise.range_variance(rho) if noise else rho**2
-        weight = rho**2 / (variance + trace.scale**2)
+        weight = rho**2 / (np.maximum(variance, LEAST_SIGMA**2) + trace.scale**2)
         root = np.sqrt(weight)
         (a, b), *_ = np.linalg.lstsq(xy * root[:, None], root, rcond=None)
         off = 1.0 - xy @ (a, b)

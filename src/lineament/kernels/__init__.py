@@ -31,8 +31,11 @@ sums = njit(fastmath={"reassoc"}, **_INTERNAL)
 #: For arithmetic whose last digit does not matter: a product and a sum are rounded at once.
 contracted = njit(fastmath={"contract"}, **_INTERNAL)
 
-#: The least number above 0: no range is 0.
-LEAST_RANGE = 5e-324
+#: The fourth powers of larger ranges, and of the inverse of smaller ones, are no numbers [m].
+LARGEST = 1e60
+
+#: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
+NEAREST, FARTHEST = 1e-6, 1e3
 
 
 @helper

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import LEAST_RANGE, contracted, helper, kernel
+from . import LARGEST, contracted, helper, kernel
 from . import layout as at
 
 F = np.float32
@@ -16,6 +16,7 @@ LANES = 32
 
 def scratch_shape(beams: int, half_width: int) -> tuple[int, int]:
     """Return the shape of the float32 scratch of `filter_ranges`."""
+    half_width = min(half_width, beams)
     padded = -(-(beams + 2 * half_width) // LANES) * LANES
     return 5, padded + half_width
 
@@ -31,31 +32,33 @@ def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, ci
     From RANGE, FILTERED: NaN where not usable. The window goes over the seam of a full circle; else
     it ends at the ends of the scan. `scratch` is a float32 array, see `scratch_shape`.
     """
-    n, h, beams = floats.shape[1] - at.EXTRA, half_width, at.beams_of(floats)
-    least, away = max(range_min, LEAST_RANGE), F(-1e4 * sigma_r)
-    ranges, filtered = beams[at.RANGE], beams[at.FILTERED]
-    _pad(ranges, n, least, min(range_max, FARTHEST), h, circular, away, scratch[0])
+    n, beams = floats.shape[1] - at.EXTRA, at.beams_of(floats)
+    # Wider than the scan, the window takes in all of it, once.
+    h, wraps = min(half_width, n), circular and n > half_width
+    least, away = max(range_min, 1.0 / LARGEST), F(-1e4 * sigma_r)
+    most, ranges, filtered = min(range_max, LARGEST), beams[at.RANGE], beams[at.FILTERED]
+    _pad(ranges, n, least, min(range_max, FARTHEST), h, wraps, away, scratch[0])
     _sum_up(sigma_d, sigma_r, h, scratch)
     near, weight, shift = scratch[0, h:], scratch[1, h:], scratch[2, h:]
     for i in range(n):
         value = ranges[i]
         moved = value + shift[i] / weight[i] if near[i] != away else value
-        filtered[i] = moved if (value >= least) & (value < range_max) else math.nan
+        filtered[i] = moved if (value >= least) & (value < most) else math.nan
 
 
 @helper
-def _pad(ranges, n, least, farthest, h, circular, away, padded):
+def _pad(ranges, n, least, farthest, h, wraps, away, padded):
     """Copy ranges, so far `away` where not usable that their weight is 0.
 
-    `h` more stand on either side, from over the seam of a full circle.
+    `h` more stand on either side, from over the seam of a full circle if it `wraps`.
     """
     inside = padded[h:]
     for i in range(n):
         value = ranges[i]
         inside[i] = F(value) if (value >= least) & (value < farthest) else away
     for i in range(h):
-        padded[i] = padded[n + i] if circular and n > h else away
-        inside[n + i] = inside[i] if circular and n > h else away
+        padded[i] = padded[n + i] if wraps else away
+        inside[n + i] = inside[i] if wraps else away
     for i in range(n + 2 * h, len(padded)):
         padded[i] = away
 

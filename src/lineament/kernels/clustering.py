@@ -29,7 +29,7 @@ def cluster(floats, ints, bearings, step, circular, noise, scale, floor, density
     after, limit_after = rho[1:], limit[1:]
     for i in range(count - 1):
         limit_after[i] = scaled_step * max(after[i], rho[i]) + noise_floor
-    limit[0] = scaled_step * max(rho[0], rho[count - 1]) + noise_floor
+    limit[0] = scaled_step * max(rho[0], rho[max(count - 1, 0)]) + noise_floor
     for i in range(count):
         second[i] = math.nan
     part_points(work, bearings, circular, count, density_k, min_points)

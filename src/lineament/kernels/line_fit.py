@@ -49,7 +49,8 @@ def fit_line(x, y, rho, first, last, noise, kind):
     for iteration in range(3 if kind == WEIGHTED else 1):
         weighted = iteration > 0
         cx, cy, c, s = _line(x, y, rho, noise, c, s, weighted, kind)
-    if c * (x[-1] - x[0]) + s * (y[-1] - y[0]) < 0.0:
+    end = len(x) - 1
+    if c * (x[end] - x[0]) + s * (y[end] - y[0]) < 0.0:
         c, s = -c, -s
     # To first order the offset is Σwe/W and the angle Σwte/S, with t along the line from the
     # centroid, so their covariance is that of these sums, whatever the weights.

@@ -51,7 +51,7 @@ def extract_rows(
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]
         noise = noises[row]
-        estimate_noise(floats, range_min, range_max, given_noise, noise)
+        estimate_noise(floats, ints, bearings, range_min, range_max, given_noise, noise)
         filter_ranges(
             floats, range_min, range_max, p.sigma_d, p.sigma_r, p.half_width, circular,
             filter_scratch,

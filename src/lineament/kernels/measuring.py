@@ -41,11 +41,9 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
         (m + 1, 4), where the rows begin in the tables: the first is 0.
     """
     work, how = at.named(floats, ints), Options(*options)
-    segments, corners, _, breaks, clusters, offsets = tables
+    segments, corners, _, breaks, labels, offsets = tables
     counts, cut = work.counts, work.pieces
-    _place_measured(
-        work.beams[how.source], work.points, work.marks, counts, bearings, clusters[row]
-    )
+    _place_measured(work.beams[how.source], work.points, work.marks, counts, bearings, labels[row])
     places, beam = work.points[at.MEASURED_X : at.MEASURED_RHO + 1], work.marks[at.BEAM]
     x, y, rho = places[0], places[1], places[2]
     segment_ints, corner_ints = segments.view(np.int32), corners.view(np.int32)
@@ -53,6 +51,8 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
     segment, corner = offsets[row, 0], offsets[row, 1]
     for k in range(pieces):
         first, last, n = cut[at.FIRST, k], cut[at.LAST, k], segment + k
+        # The first point of a ring is repeated at its end, and counts once.
+        last -= counts[at.CLOSED] != 0 and last - first + 1 == counts[at.POINTS]
         a, b = _clear_of_corners(cut[at.BEFORE], pieces, k, first, last, how.trim)
         line = fit_line(x, y, rho, a, b, noise, how.fit)
         count = last - first + 1
@@ -82,11 +82,12 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
     offsets[row + 1, 0] = segment + pieces
     offsets[row + 1, 1] = corner
     offsets[row + 1, 2] = offsets[row, 2]
-    n = 0 if counts[at.CLOSED] else counts[at.CLUSTERS]  # All around, nothing ends.
+    clusters = 0 if counts[at.CLOSED] else counts[at.CLUSTERS]  # All around, nothing ends.
     first, last = work.clusters[at.FIRST], work.clusters[at.LAST]
     offsets[row + 1, 3] = write_breaks(
-        places, beam, first, last, n, circular, how.gap, bearings.shape[1], breaks, offsets[row, 3]
-    )
+        places, beam, first, last, clusters, circular, how.gap, bearings.shape[1], breaks,
+        offsets[row, 3],
+    )  # fmt: skip
 
 
 @helper

@@ -1,75 +1,153 @@
-"""Range noise of a scan, estimated from the scan itself.
+"""Range noise of a scan, estimated from the scan itself: a variance of constant + growth · ρ².
 
-By the residuals of T. Gasser, L. Sroka, C. Jennen-Steinmetz, *Residual variance and residual
-pattern in nonlinear regression*, Biometrika 73 (1986), but their median in place of their mean.
+From what a measurement is off the line through its two neighbours. These three span triangles with
+the scanner at the origin: with the cross products c₁ of the first two, c₂ of the last two and c of
+the outer ones, the middle range is ρ (c₁ + c₂ - c)/c beyond the line, for any direction of the
+line. The square of that has 1.5 times the variance of a range.
 """
 
 import math
 
 import numpy as np
 
-from . import helper, kernel, usable
+from . import FARTHEST, NEAREST, helper, kernel, sums, usable
 from . import layout as at
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
 LEAST_SIGMA = 1e-4
-#: No scanner reports its ranges in coarser steps [m].
-COARSEST_QUANTUM = 0.15
+#: Nor worse, at its farthest measurement [m]: what is farther off is clutter.
+MOST_SIGMA = 0.1
+#: Deviations beyond which errors are no noise.
+_SIGMAS = 3.0
 _BITS_OF_INFINITY = 0x7FF0000000000000
+#: Square of a deviation of a normal distribution, over that which a third of its squares is below.
+_THIRD = 1.0 / 0.4307**2
+#: What is cut off at three deviations is 3 % of the variance.
+_WHOLE = 1.03
+#: Of overlapping triples, so many count as one.
+_OVERLAP = 1.94
+#: No scanner reports its ranges in coarser steps [m].
+_COARSEST_QUANTUM = 0.15
+#: Of ranges on a lattice, at least so large a share differs from the neighbours'.
+_SHARE = 0.125
 
 
 @kernel
-def estimate_noise(floats, range_min, range_max, given, noise):
+def estimate_noise(floats, ints, bearings, range_min, range_max, given, noise):
     """Write the noise of a scan: as `given`, or, where that is NaN, estimated.
 
-    It is NaN for a scan without a usable range.
+    It is NaN for a scan without a usable range. Where most ranges equal their neighbours, they lie
+    on a lattice coarser than the noise, and it is that of the rounding. From RANGE; what is in
+    points is lost.
     """
     for part in range(4):
         noise[part] = given[part]
-    if math.isnan(given[0]):
-        ranges, scratch = at.beams_of(floats)[at.RANGE], at.points_of(floats)[at.SPARE]
-        n = floats.shape[1] - at.EXTRA
-        sigma = range_sigma(ranges, n, range_min, range_max, scratch)
-        noise[0] = sigma
-        for part in range(1, 4):
-            noise[part] = 0.0 * sigma
-
-
-@helper
-def range_sigma(ranges, n, range_min, range_max, scratch):
-    """Estimate the range noise [m] from the second differences of neighbours.
-
-    On a smooth surface ρ[i-1] - 2ρ[i] + ρ[i+1] has the variance 6σ², and the median of its size
-    is hardly moved by jumps and corners. Triples do not overlap. Where half of them are exactly
-    zero, the ranges lie on a lattice coarser than the noise, and σ is that of the rounding.
-    """
+    if not math.isnan(given[0]):
+        return
+    work = at.named(floats, ints)
+    ranges, points, beam = work.beams[at.RANGE], work.points, work.marks[at.BEAM]
+    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     count, any_usable = np.int64(0), False
-    for i in range(1, n - 1, 3):
-        a, b, c = ranges[i - 1], ranges[i], ranges[i + 1]
-        if (
-            usable(a, range_min, range_max)
-            and usable(b, range_min, range_max)
-            and usable(c, range_min, range_max)
-        ):
-            scratch[count] = abs(a - 2.0 * b + c)
+    for i in range(bearings.shape[1]):
+        r = ranges[i]
+        any_usable |= usable(r, range_min, range_max)
+        if usable(r, max(range_min, NEAREST), min(range_max, FARTHEST)):
+            beam[count] = i
+            rho[count], x[count], y[count] = r, r * bearings[0, i], r * bearings[1, i]
             count += 1
-    if count == 0:
-        for i in range(n):
-            any_usable |= usable(ranges[i], range_min, range_max)
-        return LEAST_SIGMA if any_usable else math.nan
-    sigma = 1.4826 / math.sqrt(6.0) * ranked(scratch, count, (count - 1) // 2)
-    return sigma if sigma >= LEAST_SIGMA else _rounding_sigma(scratch, count)
+    fewest = np.int64(1)
+    constant, growth = fit_noise(points, beam, count, at.SPACING, at.SPARE, fewest)
+    if constant + growth <= 1.0001 * LEAST_SIGMA * LEAST_SIGMA:
+        constant = max(constant, _rounding_variance(rho, points[at.SPACING], count))
+    noise[0] = math.sqrt(constant) if any_usable else math.nan
+    noise[1], noise[2], noise[3] = math.sqrt(growth), 0.0, 0.0
 
 
 @helper
-def _rounding_sigma(differences, count):
-    """Deviation of rounding to a lattice, whose step is the least of the second differences."""
-    quantum = math.inf
+def fit_noise(points, beam, count, row, spare, fewest):
+    """Estimate the noise from the triples: its constant part, and its growth.
+
+    By the third of them that is least off, as no clutter is; of the nearer and the farther half
+    apart: it grows with range where these differ by more than chance. `points` are x, y and range
+    first, and two rows of scratch.
+    """
+    least, most = LEAST_SIGMA * LEAST_SIGMA, MOST_SIGMA * MOST_SIGMA
+    middle, used = _fill_triples(points, beam, count, row)
+    if used < fewest:
+        return least, 0.0
+    near, near_square, near_count = _least_third(points, count, row, spare, 0.0, middle)
+    far, far_square, far_count = _least_third(points, count, row, spare, middle, math.inf)
+    constant, growth = (near * near_count + far * far_count) / (near_count + far_count), 0.0
+    both = 1.0 / max(near_count, 1.0) + 1.0 / max(far_count, 1.0)
+    chance = _SIGMAS * math.sqrt(2.0 * _OVERLAP * both)
+    if near_count > 0.0 and far > near * (1.0 + chance):
+        growth = (far - near) / (far_square - near_square)
+        constant = near - growth * near_square
+        if constant < least:
+            growth = 0.5 * (near / near_square + far / far_square)
+    constant = min(max(constant, least), most)
+    if growth > 0.0:
+        farthest = 0.0
+        for i in range(count):
+            farthest = max(farthest, points[at.RHO, i])
+        growth = min(growth, (most - constant) / (farthest * farthest))
+    return constant, growth
+
+
+@helper
+def _rounding_variance(rho, triple, count):
+    """Variance of rounding to a lattice, whose step is the least of the second differences."""
+    step, off, used = math.inf, 0, 0
+    for i in range(1, count - 1):
+        if triple[i] < math.inf:
+            used += 1
+            difference = abs(rho[i - 1] - 2.0 * rho[i] + rho[i + 1])
+            # What is coarser than any lattice is a jump.
+            if LEAST_SIGMA < difference < _COARSEST_QUANTUM:
+                step, off = min(step, difference), off + 1
+    return step * step / 12.0 if off > _SHARE * used else 0.0
+
+
+@sums
+def _fill_triples(points, beam, count, row):
+    """Fill a row with the squared error of each range by its neighbours; inf where one is missing.
+
+    Returns the mean square of those ranges, and how many there are.
+    """
+    x, y, rho, triple = points[at.X], points[at.Y], points[at.RHO], points[row]
+    x1, y1, rho1, x2, y2 = x[1:], y[1:], rho[1:], x[2:], y[2:]
+    beam2, triple1 = beam[2:], triple[1:]
+    total, used = 0.0, 0.0
+    for i in range(count - 2):
+        outer = x[i] * y2[i] - y[i] * x2[i]
+        inner = x[i] * y1[i] - y[i] * x1[i] + x1[i] * y2[i] - y1[i] * x2[i]
+        error = rho1[i] * (inner - outer) / outer
+        neighbours = beam2[i] - beam[i] == 2
+        triple1[i] = error * error / 1.5 if neighbours else math.inf
+        total += rho1[i] * rho1[i] if neighbours else 0.0
+        used += 1.0 if neighbours else 0.0
+    triple[0] = triple[max(count - 1, 0)] = math.inf
+    return total / max(used, 1.0), used
+
+
+@sums
+def _least_third(points, count, row, spare, low, high):
+    """Variance by triples of squared ranges from `low` to `high`, their mean square, and number."""
+    rho, triple, kept, n = points[at.RHO], points[row], points[spare], 0.0
     for i in range(count):
-        # What is coarser than any lattice is a jump.
-        if LEAST_SIGMA < differences[i] < min(quantum, COARSEST_QUANTUM):
-            quantum = differences[i]
-    return max(quantum / math.sqrt(12.0), LEAST_SIGMA) if quantum < math.inf else LEAST_SIGMA
+        square = rho[i] * rho[i]
+        kept[i] = triple[i] if (low <= square) & (square < high) else math.inf
+        n += 1.0 if kept[i] < math.inf else 0.0
+    if n == 0.0:
+        return 0.0, 0.0, 0.0
+    limit = _SIGMAS * _SIGMAS * _THIRD * ranked(kept, count, int(n) // 3)
+    total, squares, used = 0.0, 0.0, 0.0
+    for i in range(count):
+        within = kept[i] <= limit
+        total += kept[i] if within else 0.0
+        squares += rho[i] * rho[i] if within else 0.0
+        used += 1.0 if within else 0.0
+    return _WHOLE * total / used, squares / used, used
 
 
 @helper

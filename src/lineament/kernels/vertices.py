@@ -11,7 +11,7 @@ from ..features import records as col
 from . import helper, kernel
 from . import layout as at
 from .rays import turn
-from .writing import write_end
+from .writing import write_end, write_opening
 
 #: How a vertex belongs to the one before: it begins a polyline; its two lines are held together on
 #: its ray; or they are free to meet beside it, and its measurement is on neither as long as it is
@@ -197,25 +197,30 @@ def _normal_equations(work, bearings, k, again):
 def hold_together(floats, ints, row, segments, corners, offsets):
     """Let the segments of a scan end in the vertices of its polylines, and corners be there.
 
-    Centroids move to the nearest point of the new line. Covariances and residuals remain those of
-    the lines fitted each to its own measurements.
+    Centroids move to the nearest point of the new segment. Covariances and residuals remain those
+    of the lines fitted each to its own measurements.
     """
     work = at.named(floats, ints)
     pieces, x, y = work.pieces, work.points[at.X], work.points[at.Y]
-    segment, corner = offsets[row, 0], offsets[row, 1]
+    before, begin, corner = pieces[at.BEFORE], offsets[row, 0], offsets[row, 1]
     for k in range(work.counts[at.PIECES]):
-        first, last = pieces[at.FIRST, k], pieces[at.LAST, k]
+        first, last, segment = pieces[at.FIRST, k], pieces[at.LAST, k], begin + k
         x1, y1, x2, y2 = x[first], y[first], x[last], y[last]
         angle = math.atan2(y2 - y1, x2 - x1)
         c, s = math.cos(angle), math.sin(angle)
         cx, cy = segments[segment, col.S_CENTROID], segments[segment, col.S_CENTROID + 1]
-        along = c * (cx - x1) + s * (cy - y1)
+        length = math.hypot(x2 - x1, y2 - y1)
+        along = min(max(c * (cx - x1) + s * (cy - y1), 0.0), length)
         write_end(segments, segment, col.S_START, x1, y1)
         write_end(segments, segment, col.S_END, x2, y2)
         segments[segment, col.S_CENTROID] = x1 + along * c
         segments[segment, col.S_CENTROID + 1] = y1 + along * s
         segments[segment, col.S_ANGLE] = angle
-        segment += 1
-        if pieces[at.BEFORE, k] >= 0:
-            corners[corner, col.C_POSITION], corners[corner, col.C_POSITION + 1] = x1, y1
+    for k in range(work.counts[at.PIECES]):
+        if before[k] >= 0:
+            i = pieces[at.FIRST, k]
+            corners[corner, col.C_POSITION], corners[corner, col.C_POSITION + 1] = x[i], y[i]
+            write_opening(
+                segments, begin + before[k], begin + k, corners, corners.view(np.int32), corner
+            )
             corner += 1

@@ -22,6 +22,9 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
     x, y = places[0], places[1]
     cx, cy, c, s, var_offset, covariance, var_angle, rms = line
     row = segments[k]
+    if c * (x[last] - x[first]) + s * (y[last] - y[first]) < 0.0:
+        # The fit has left out measurements at the ends.
+        c, s, covariance = -c, -s, -covariance
     for end, i in ((at.S_START, first), (at.S_END, last)):
         along = c * (x[i] - cx) + s * (y[i] - cy)
         write_end(segments, k, end, cx + along * c, cy + along * s)
@@ -59,7 +62,8 @@ def intersect(lines, a, b, x, y, near, corners, k):
     """Put a corner on the intersection of its lines, with Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ.
 
     The lines then end there. Refused, and False, where that lies farther than `near` from the
-    point (x, y) of the cut: nearly parallel lines meet anywhere.
+    point (x, y) of the cut, for nearly parallel lines meet anywhere; and where it is not after the
+    start and the centroid of the one, and before those of the other, which would be reversed.
     """
     n1x, n1y = -math.sin(lines[a, at.S_ANGLE]), math.cos(lines[a, at.S_ANGLE])
     n2x, n2y = -math.sin(lines[b, at.S_ANGLE]), math.cos(lines[b, at.S_ANGLE])
@@ -71,6 +75,12 @@ def intersect(lines, a, b, x, y, near, corners, k):
     px = (n2y * d1 - n1y * d2) / determinant
     py = (n1x * d2 - n2x * d1) / determinant
     if math.sqrt((px - x) * (px - x) + (py - y) * (py - y)) > near:
+        return False
+    start = _place_along(lines, a, lines[a, at.S_START], lines[a, at.S_START + 1])
+    end = _place_along(lines, b, lines[b, at.S_END], lines[b, at.S_END + 1])
+    if not _place_along(lines, a, px, py) > max(start, 0.0):
+        return False
+    if not _place_along(lines, b, px, py) < min(end, 0.0):
         return False
     write_end(lines, a, at.S_END, px, py)
     write_end(lines, b, at.S_START, px, py)
@@ -93,13 +103,19 @@ def write_place(corners, k, x, y, first, ax, ay, second, bx, by):
 @helper
 def offset_variance(lines, k, px, py):
     """Variance of a line's offset at a point: that at its centroid, with the lever arm."""
-    dx, dy = px - lines[k, at.S_CENTROID], py - lines[k, at.S_CENTROID + 1]
-    t = math.cos(lines[k, at.S_ANGLE]) * dx + math.sin(lines[k, at.S_ANGLE]) * dy
+    t = _place_along(lines, k, px, py)
     return (
         lines[k, at.S_COVARIANCE]
         + 2.0 * t * lines[k, at.S_COVARIANCE + 1]
         + t * t * lines[k, at.S_COVARIANCE + 3]
     )
+
+
+@helper
+def _place_along(lines, k, px, py):
+    """Place of a point along a line, from its centroid."""
+    dx, dy = px - lines[k, at.S_CENTROID], py - lines[k, at.S_CENTROID + 1]
+    return math.cos(lines[k, at.S_ANGLE]) * dx + math.sin(lines[k, at.S_ANGLE]) * dy
 
 
 @helper

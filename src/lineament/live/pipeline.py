@@ -113,7 +113,7 @@ class Pipeline:
                     features = kept.extractor(straight)
                     tracks = kept.tracker.again(features)
             if kept.dock is not None:
-                dock = kept.dock(features, tracks, travel.pose)
+                dock = kept.dock(features, tracks, travel.pose, travel.covariance)
         if not self._config.track:
             tracks = None
         return Frame(scan, straight, features, tracks, travel, dock)

@@ -217,9 +217,13 @@ class Log(Pictured, ABC):
         LogError
             If there is no such scan.
         """
+        return self.item(index)[1]
+
+    def item(self, index: int) -> tuple[str, LaserScan]:
+        """Read one scan as `scan` does, behind its topic."""
         if index >= 0:
-            for scan in islice(self, index, None):
-                return scan
+            for item in islice(self.items(), index, None):
+                return item
         raise LogError(self.name, f"has no scan {index}, expected 0 to {len(self) - 1}")
 
     def __repr__(self) -> str:

@@ -25,9 +25,9 @@ class Hough(NearMethod):
     """Lines x cos α + y sin α = d by votes in (α, d), within the clusters of a scan.
 
     1. *Part* the scan at its breakpoints. In each cluster:
-    2. *Vote*: each point for all lines through it, `angles` directions over half a turn; d is
-       counted from the middle of the cluster, in cells of `resolution`, wider where the noise or
-       the cluster needs it.
+    2. *Vote*: each point for all lines through it, `angles` directions over half a turn from the
+       chord of the cluster; d is counted from its middle, in cells of `resolution`, wider where
+       the noise or the cluster needs it.
     3. *Peak*: of the cell with the most votes, take the longest run of consecutive points near
        its line, fit a line, take the longest run near that, and again.
     4. Withdraw the run's votes, and look for the next peak, until none has `min_points`.
@@ -37,9 +37,14 @@ class Hough(NearMethod):
 
     name = "hough"
 
-    angles: int = parameter(180, "directions that are voted for: 180 are 1° apart", low=4)
+    angles: int = parameter(
+        180, "directions that are voted for: 180 are 1° apart", low=4, below=3601
+    )
     distances: int = parameter(
-        256, "cells of the accumulator in d; it takes 4 · angles · distances bytes", low=4
+        256,
+        "cells of the accumulator in d; it takes 4 · angles · distances bytes",
+        low=4,
+        below=8193,
     )
     resolution: float = parameter(
         0.02,

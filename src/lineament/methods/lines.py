@@ -9,7 +9,7 @@ from ..kernels.line_fit import FITS, WEIGHTED
 from ..kernels.rivals.pdbs import BORGES_ALDON, FIXED
 from ..kernels.rivals.settling import settle
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import MOST_VERTICES, method, parameter
 from .workspace import Block, budget_scratch
 
 
@@ -51,7 +51,10 @@ class LineMethod(MethodBase):
     )
     max_missing: int = parameter(5, "missing beams in a row over which a cluster goes on", low=0)
     max_vertices: int = parameter(
-        0, "pieces are joined until their polylines have no more vertices; 0: any number", low=0
+        0,
+        "pieces are joined until their polylines have no more vertices; 0: any number",
+        low=0,
+        below=MOST_VERTICES,
     )
 
     @classmethod

@@ -16,7 +16,7 @@ from ..kernels.layout import FILTERED, RANGE
 from ..kernels.line_fit import FITS
 from ..kernels.liu import Parameters, extract_rows
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import MOST_VERTICES, method, parameter
 from .trace import intermediates
 from .workspace import Block, budget_scratch
 
@@ -107,7 +107,10 @@ class Liu(MethodBase):
         low=0,
     )
     max_vertices: int = parameter(
-        0, "pieces are joined or left out until they have no more vertices; 0: any number", low=0
+        0,
+        "pieces are joined or left out until they have no more vertices; 0: any number",
+        low=0,
+        below=MOST_VERTICES,
     )
 
     @classmethod

@@ -17,7 +17,7 @@ from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
 from ..kernels.vertices import hold_together
 from .base import MethodBase
-from .parameters import method, parameter
+from .parameters import MOST_VERTICES, method, parameter
 from .trace import CANDIDATE, intermediates
 from .workspace import Block
 
@@ -76,6 +76,7 @@ class Optimal(MethodBase):
         "if not 0, a map instead of features: polylines of at most so many vertices in all, with "
         "the least range error; their vertices are the corners, and `evidence` does not matter",
         low=0,
+        below=MOST_VERTICES,
     )
 
     def own_arrays(self, beams: int) -> tuple[tuple[NDArray[Any], ...], Array, NDArray[np.int64]]:

@@ -12,6 +12,10 @@ T = TypeVar("T")
 
 _NUMBERS = {int: ("a whole number", Integral), float: ("a number", Real)}
 _INFINITE = sys.float_info.max
+#: No whole number is as large.
+_MANY = 2**31
+#: No budget of vertices is as large: time and memory grow with it.
+MOST_VERTICES = 1025
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +46,15 @@ class Bounds:
         if not isinstance(value, _NUMBERS[self.kind][1]):
             return False
         number = int(value) if isinstance(value, Integral) else float(value)
-        return self.low <= number and self.above < number < self.below
+        most = min(self.below, _MANY) if self.kind is int else self.below
+        return self.low <= number and self.above < number < most
 
     def check(self, name: str, value: Any) -> None:
         """Refuse a value out of bounds, with the name of the parameter."""
         if not self.holds(value):
-            raise ValueError(f"{name} is {value!r}, expected {self}")
+            many = self.kind is int and isinstance(value, Integral) and int(value) >= _MANY
+            less = f" and < {_MANY}" if many and self.below > _MANY else ""
+            raise ValueError(f"{name} is {value!r}, expected {self}{less}")
 
 
 def parameter(

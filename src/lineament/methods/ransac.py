@@ -33,7 +33,7 @@ class Ransac(NearMethod):
 
     name = "ransac"
 
-    trials: int = parameter(30, "pairs that are drawn for a piece", low=1)
+    trials: int = parameter(30, "pairs that are drawn for a piece", low=1, below=10001)
     window: int = parameter(
         30, "points over which a pair is drawn: one of those left, and one of those after it", low=1
     )

@@ -90,7 +90,9 @@ class Block:
         """Put a scan, and its noise, into the workspace, for kernels that are called one by one."""
         self.row = row
         self.work.beams[at.RANGE, : self.beams] = self.ranges[row]
-        estimate_noise(self.floats, self.range_min, self.range_max, self.noise, self.noises[row])
+        limits = self.range_min, self.range_max
+        floats, ints, noise = self.workspace
+        estimate_noise(floats, ints, self.bearings, *limits, self.noise, noise)
 
     @property
     def workspace(self) -> tuple[Array, NDArray[np.int64], Array]:

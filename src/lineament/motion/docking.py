@@ -109,7 +109,9 @@ class Dock:
         self.track = track
         self._point = point
 
-    def __call__(self, features: Features, tracks: Tracks, pose: Pose) -> CornerPose | None:
+    def __call__(
+        self, features: Features, tracks: Tracks, pose: Pose, covariance: Array | None = None
+    ) -> CornerPose | None:
         """Find the corner in a scan; None where it is not seen, or has not two walls.
 
         Parameters
@@ -119,12 +121,14 @@ class Dock:
             Of the features.
         pose : (x, y, theta)
             Of the scan, in the frame of the point: by `Odometer`, or in the world.
+        covariance : ndarray, shape (3, 3), optional
+            Of the pose. A corner is looked for where it shows the point to 0.5 m.
         """
         if self._point is not None:
             if self.track in tracks.ended:
                 self.track = None
             if self.track is None:
-                self.track = self._nearest(features, tracks, pose)
+                self.track = self._nearest(features, tracks, pose, covariance)
         if self.track is None:
             return None
         places = np.flatnonzero(tracks.corners == self.track)
@@ -134,10 +138,16 @@ class Dock:
             self._point = x, y
         return found
 
-    def _nearest(self, features: Features, tracks: Tracks, pose: Pose) -> int | None:
+    def _nearest(
+        self, features: Features, tracks: Tracks, pose: Pose, covariance: Array | None
+    ) -> int | None:
         """Return the track of the corner with two walls that is nearest to the point."""
         assert self._point is not None
         x, y, _ = compose(inverse(pose), (self._point[0], self._point[1], 0.0))
+        if covariance is not None:
+            along, across, turn = np.sqrt(np.diag(covariance)).tolist()
+            if 2 * math.hypot(along, across, turn * math.hypot(x, y)) > _REACH:
+                return None
         corners = features.corners
         away = np.hypot(*(corners["position"] - (x, y)).T)
         away[(corners["segments"] < 0).any(axis=1)] = math.inf  # edges too, which have no track

@@ -30,9 +30,9 @@ _NOTE = "Beside a corner: its quality, the share of such corners found again fro
 _DATES = 631_152_000
 
 
-def scan_title(log: str | os.PathLike[str], index: int, scan: LaserScan) -> str:
-    """Return a title of a picture: log, scan, and the time at which it was taken."""
-    parts = [Path(str(log).rstrip("/")).name, f"scan {index}"]
+def scan_title(log: str | os.PathLike[str], index: int, scan: LaserScan, topic: str = "") -> str:
+    """Return a title of a picture: log, scan, its topic if given, and the time of the scan."""
+    parts = [Path(str(log).rstrip("/")).name, f"scan {index}", *([topic] if topic else [])]
     if scan.stamp > _DATES:
         parts.append(f"{datetime.fromtimestamp(scan.stamp, UTC):%Y-%m-%d %H:%M:%S} UTC")
     elif scan.stamp:

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 
-from .. import helper, inlined, sums, usable
+from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
 from . import layout as at
 from .constants import SIGMAS, STEEPEST
 
-#: No scanner sees nearer or farther [m], and the fourth powers of much less or more are no numbers.
-_NEAREST, _FARTHEST = 1e-6, 1e3
 #: Fewer measurements are no cluster.
 _LEAST_CLUSTER = 3
 
@@ -20,7 +18,7 @@ def list_points(work, ranges, start, limits, bearings):
     points, beam = work.points, work.beams[at.BEAM]
     x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     cosines, sines = bearings[0], bearings[1]
-    range_min, range_max = max(limits[0], _NEAREST), min(limits[1], _FARTHEST)
+    range_min, range_max = max(limits[0], NEAREST), min(limits[1], FARTHEST)
     count = 0
     for first, end in ((start, len(ranges)), (0, start)):
         for i in range(first, end):

@@ -24,8 +24,8 @@ BEND = math.cos(math.radians(20.0))
 RARE = 8.0
 #: Distance of a corner from the measurements on both its sides [m], at most.
 REACH = 0.3
-#: Standard deviation of a corner, of the radius of an arc, and of the noise at the farthest
-#: measurement [m], at most.
+#: Standard deviation of a corner, and of the radius of an arc [m], at most; that of the noise is as
+#: large at most, see `noise.MOST_SIGMA`.
 MOST_DEVIATION = 0.1
 #: Radius of an arc [m], at most, and the turn that it shows [rad], at least.
 ARC_RADIUS, ARC_TURN = 1.5, 0.7

@@ -6,14 +6,17 @@ import numpy as np
 
 from .. import inlined, kernel
 from ...features.records import S_CLUSTER
+from ..noise import LEAST_SIGMA, fit_noise
 from ..writing import write_arc, write_breaks, write_segment
 from . import layout as at
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
 from .fits import measure
 from .joining import join_all
-from .noise import estimate_noise
 from .partition import clearest_border, fill_sums, merge_lines, partition
+
+#: Fewer triples say little of the noise.
+_FEWEST = np.int64(24)
 
 
 @kernel
@@ -47,7 +50,7 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
     for row in range(rows):
         start, closed, lines = np.int64(0), False, np.int64(0)
         count = list_points(work, ranges[row], start, limits, bearings)
-        estimate_noise(work, count, given)
+        _estimate_noise(work, count, given)
         count = cluster(work, count, n, circular, missing)
         if circular and count > 0:
             start, closed = opening(work, count)
@@ -74,6 +77,20 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
             noises[row, 0] = math.sqrt(work.noise[0]) if count > 0 else math.nan
             noises[row, 1] = math.sqrt(work.noise[1])
         counts[0], counts[1], counts[2] = count, lines, surfaces
+
+
+@inlined
+def _estimate_noise(work, count, given):
+    """Step 1: write the noise as (constant, growth, variance of a bearing)."""
+    noise = work.noise
+    if math.isnan(given[0]):
+        noise[0], noise[1] = fit_noise(
+            work.points, work.beams[at.BEAM], count, at.KEY, at.SCRATCH, _FEWEST
+        )
+        noise[2] = 0.0
+        return
+    noise[0] = max(given[0] * given[0] + given[3] * given[3] / 12.0, LEAST_SIGMA * LEAST_SIGMA)
+    noise[1], noise[2] = given[1] * given[1], given[2] * given[2]
 
 
 @inlined

@@ -20,7 +20,7 @@ def measure(work, surfaces, estimated):
     """Fit the lines, with their covariances. Returns how many surfaces are left.
 
     A line whose centroid is not between its ends, or that is shorter than the spacing of its
-    beams, runs along them, and is left out.
+    beams, runs along them, and is left out; so is one that only one measurement is near.
     """
     spans, pieces, sums, kept = work.spans, work.pieces, work.sums, 0
     x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
@@ -34,7 +34,7 @@ def measure(work, surfaces, estimated):
             begins = p[at.UX] * (x[first] - p[at.CX]) + p[at.UY] * (y[first] - p[at.CY])
             ends = p[at.UX] * (x[last] - p[at.CX]) + p[at.UY] * (y[last] - p[at.CY])
             spacing = abs(x[first] * y[first + 1] - y[first] * x[first + 1]) / rho[first]
-            if not (begins < 0.0 < ends and ends - begins > spacing):
+            if not (begins < 0.0 < ends and ends - begins > spacing and spans[at.COUNT, kept] > 1):
                 continue
         else:
             p[:] = pieces[k]
@@ -73,7 +73,7 @@ def fit_line(points, first, end, a, b, noise, piece):
         used += 1.0 if counts else 0.0
     sxx, sxy, syy = sxx - sx * sx / total, sxy - sx * sy / total, syy - sy * sy / total
     ux, uy = direction(sxx, sxy, syy, TOTAL)
-    if ux * (x[-1] - x0) + uy * (y[-1] - y0) < 0.0:
+    if ux * (x[len(x) - 1] - x0) + uy * (y[len(y) - 1] - y0) < 0.0:
         ux, uy = -ux, -uy
     cx, cy = x0 + sx / total, y0 + sy / total
     along = ux * ux * sxx + 2.0 * ux * uy * sxy + uy * uy * syy

@@ -6,17 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Of `points`, by measurement in beam order (on a full circle from any beam on): place and range
-#: [m]; least energy of the measurements before; least energy of those of its group; what keeps it
-#: from counting for its group; χ² of the blocks that end by it and that begin before it; two rows
-#: of scratch, by measurement or by group.
-X, Y, RHO, ENERGY, LOWEST, RUNNING, ENDS, BEGINS, KEY, SCRATCH = range(10)
-POINTS = 10
+#: [m]; least energy of the measurements before; by group, the least energy with a line from one of
+#: its candidates to the anchor; what keeps it from counting for its group; χ² of the blocks that
+#: end by it and that begin before it; two rows of scratch, by measurement or by group; and one by
+#: row of groups.
+X, Y, RHO, ENERGY, LOWEST, RUNNING, ENDS, BEGINS, KEY, SCRATCH, ROW_KEY = range(11)
+POINTS = 11
 #: Of `beams`, by measurement: its beam; whether a break is before it; the measurement at which the
 #: line that ends before it begins, or -1; first and last measurement of each cluster.
 BEAM, BROKEN, ORIGIN, CLUSTER_FIRST, CLUSTER_LAST = range(5)
 BEAMS = 5
-#: The candidates that run along, and their energies; before, whether a measurement is a spike.
-RUNNER, VALUE, SPIKE = CLUSTER_FIRST, SCRATCH, CLUSTER_FIRST
+#: The candidates that run along, and their energies; the anchor of each group of candidates;
+#: before, whether a measurement is a spike.
+RUNNER, VALUE, ANCHOR, SPIKE = CLUSTER_FIRST, SCRATCH, CLUSTER_LAST, CLUSTER_FIRST
 #: Of a row of `pieces`, by surface: the line a x + b y = 1 [1/m]; its centroid [m] and direction;
 #: the covariance of its offset there and its angle; root mean square and misfit [m]. Of an arc:
 #: centre, radius [m], six covariances, root mean square [m], and by how much lines are worse.

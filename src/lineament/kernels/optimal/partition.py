@@ -15,9 +15,9 @@ from .. import contracted, helper, inlined
 from . import layout as at
 from .constants import BEND, CLUTTER, LEAST, RARE, SIGMAS, TAU
 
-#: Measurements of the blocks that bound χ² from below, candidates of a group, and those that run
-#: along. They change the time, not the result.
-BLOCK, GROUP, RUNNERS = 8, 16, 3
+#: Measurements of the blocks that bound χ² from below, candidates of a group, groups of a row, and
+#: candidates that run along. They change the time, not the result.
+BLOCK, GROUP, ROW, RUNNERS = 8, 16, 16, 3
 
 
 @contracted
@@ -118,13 +118,14 @@ def partition(work, count, evidence):
 def _part_stretch(work, first, last, evidence):
     """Part the measurements first … last - 1, knowing the least energy of those before.
 
-    Candidates for the beginning of the last line come in groups. A group has a key: with the blocks
-    that end by now it is a lower bound of the energy with a line from any of them on. Groups below
-    the least energy found so far are opened. The few candidates that were least run along: they are
-    always evaluated, and do not count for their group.
+    Candidates for the beginning of the last line come in groups, and groups in rows. A group has a
+    key: with the blocks that end by now it is a lower bound of the energy with a line from any of
+    them on. Groups below the least energy found so far are opened. The few candidates that were
+    least run along: they are always evaluated, and do not count for their group.
     """
     points, beams, sums = work.points, work.beams, work.sums
-    energy, key, lowest = points[at.ENERGY], points[at.KEY], points[at.LOWEST]
+    energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
+    lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
     origin, runner, value = beams[at.ORIGIN], beams[at.RUNNER], points[at.VALUE]
     running, ends, begins = points[at.RUNNING], points[at.ENDS], points[at.BEGINS]
     price, most = CLUTTER * evidence, max(1.0, (LEAST - 1) * CLUTTER) * evidence
@@ -146,11 +147,13 @@ def _part_stretch(work, first, last, evidence):
             least = min(value[r], least)
         found = leader if least < total + price else np.int64(-1)
         total = min(least, total + price)
-        q, fresh = (i - first) // GROUP, (i - first) % GROUP == 0
+        q, place = (i - first) // GROUP, (i - first) % GROUP
         running[i] = math.inf if i == first else 0.0
         new = energy[i] + evidence - begins[i] + running[i]
-        key[q] = new if fresh else min(key[q], new)
-        lowest[q] = energy[i] if fresh else min(lowest[q], energy[i])
+        key[q] = min(key[q], new) if place else new
+        row_key[q // ROW] = min(row_key[q // ROW], new) if place or q % ROW else new
+        lowest[q] = min(lowest[q], energy[i] + evidence) if place else energy[i] + evidence
+        anchor[q] = i
         bound = min(bound, new)
         if bound + ends[j] < total:
             total, found, oldest = _open_groups(
@@ -159,9 +162,9 @@ def _part_stretch(work, first, last, evidence):
             # What is so far above can never be the least again.
             while oldest < q and key[oldest] + ends[j] > total + most:
                 oldest += 1
-            bound = key[oldest]
-            for k in range(oldest + 1, q + 1):
-                bound = min(bound, key[k])
+            bound = math.inf
+            for k in range(oldest // ROW, q // ROW + 1):
+                bound = min(bound, row_key[k])
         energy[j], origin[j] = total, found
 
 
@@ -174,37 +177,54 @@ def _open_groups(points, beams, sums, first, j, oldest, evidence, total, found):
     group that may still be opened.
     """
     ended, began = points[at.ENDS, j], points[at.BEGINS, j]
-    energy, key, lowest = points[at.ENERGY], points[at.KEY], points[at.LOWEST]
+    energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
+    lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
     running, runner, value = points[at.RUNNING], beams[at.RUNNER], points[at.VALUE]
     last, back = j - LEAST + 1, oldest
-    for q in range(oldest, (last - 1 - first) // GROUP + 1):
-        if key[q] + ended >= total:
+    groups = (last - 1 - first) // GROUP + 1
+    for row in range(oldest // ROW, (groups - 1) // ROW + 1):
+        if row_key[row] + ended >= total:
             continue
-        low = first + q * GROUP
-        high = min(low + GROUP, last)
-        # Each line is at least as bad as the shortest of the group.
-        shortest = cost(sums, high - 1, j)
-        key[q] = lowest[q] + evidence - began + (shortest if shortest < math.inf else 0.0)
-        if key[q] + began >= total:
-            continue
-        least, second, best = math.inf, math.inf, low
-        for c in range(low, high):
-            now = energy[c] + evidence + cost(sums, c, j) + running[c]
-            second = min(second, max(least, now))
-            best = c if now < least else best
-            least = min(least, now)
-        key[q] = least - began
-        found = best if least < total else found
-        total = min(least, total)
-        worst = 0
-        for r in range(1, RUNNERS):
-            worst = r if value[r] > value[worst] else worst
-        if least < value[worst]:
-            out, group = runner[worst], (runner[worst] - first) // GROUP
-            running[out], running[best], key[q] = 0.0, math.inf, second - began
-            key[group] = min(key[group], value[worst] - began)
-            back = min(back, group)
-            runner[worst], value[worst] = best, least
+        row_key[row], lower = math.inf, math.inf
+        for q in range(max(row * ROW, oldest), min((row + 1) * ROW, groups)):
+            if key[q] + ended >= total:
+                lower = min(lower, key[q])
+                continue
+            low = first + q * GROUP
+            # Each line is at least as bad as one up to the anchor and one from there on. Of few
+            # measurements, the differences of the running sums have lost too many digits.
+            rest = cost(sums, anchor[q], j) if j - anchor[q] >= BLOCK else 0.0
+            key[q] = lowest[q] - began + (rest if rest < math.inf else 0.0)
+            if key[q] + began >= total:
+                lower = min(lower, key[q])
+                continue
+            least, second, best = math.inf, math.inf, low
+            for c in range(low, min(low + GROUP, last)):
+                now = energy[c] + evidence + cost(sums, c, j) + running[c]
+                second = min(second, max(least, now))
+                best = c if now < least else best
+                least = min(least, now)
+            found = best if least < total else found
+            total = min(least, total)
+            worst = 0
+            for r in range(1, RUNNERS):
+                worst = r if value[r] > value[worst] else worst
+            runs = least < value[worst]
+            key[q] = (second if runs else least) - began
+            lower = min(lower, key[q])
+            if low + GROUP <= last:
+                anchor[q], lowest[q] = j, key[q] + began
+            if runs:
+                out, group = runner[worst], (runner[worst] - first) // GROUP
+                running[out], running[best] = 0.0, math.inf
+                key[group] = min(key[group], value[worst] - began)
+                row_key[group // ROW] = min(row_key[group // ROW], key[group])
+                rest = cost(sums, out, anchor[group])
+                rest = energy[out] + evidence + (rest if rest < math.inf else 0.0)
+                lowest[group] = min(lowest[group], rest)
+                back = min(back, group)
+                runner[worst], value[worst] = best, least
+        row_key[row] = min(row_key[row], lower)
     return total, found, back
 
 

@@ -24,7 +24,7 @@ def find_by_votes(floats, ints, noise, parameters, votes, normals):
 
     `parameters` are a tuple, see `Parameters`, and `methods.hough.Hough`; `votes` is the
     accumulator, an int32 array of shape (A, D); `normals`, shape (A, 2), are the unit normals of
-    the lines that are voted for, over half a turn.
+    the lines that are voted for, over half a turn from the direction of a cluster.
     """
     work, p = at.extended(floats, ints), Parameters(*parameters)
     prepare(work, noise, p.epsilon, p.sigmas)
@@ -39,18 +39,19 @@ def find_by_votes(floats, ints, noise, parameters, votes, normals):
 def _find_in_cluster(work, start, stop, width, p, votes, normals):
     """Find the lines of one cluster, from `start` to `stop`."""
     x, y, free = work.points[at.X], work.points[at.Y], work.marks[at.FREE]
-    ox, oy, radius = _circle(x, y, start, stop)
+    disc = _disc(x, y, start, stop)
+    ox, oy, ux, uy, radius = disc
     width = max(width, 2.0 * radius / (votes.shape[1] - 1))
     if width == math.inf:
         return
-    disc, used = (ox, oy, radius), np.int64(2.0 * radius / width) + 1
+    used = np.int64(2.0 * radius / width) + 1
     _clear(votes, used)
     _vote(x, y, start, stop, disc, width, np.int32(1), votes, normals)
     while True:
         a, k, most = _peak(votes, used)
         if most < p.min_points:
             return
-        nx, ny = normals[a, 0], normals[a, 1]
+        nx, ny = _normal(normals, a, ux, uy)
         line = nx, ny, nx * ox + ny * oy + (k + 0.5) * width - radius
         near, i, j = refined_run(work, start, stop, line, 0.5 * width, p.max_misses, 4)
         if near == 0:
@@ -65,16 +66,35 @@ def _find_in_cluster(work, start, stop, width, p, votes, normals):
 
 
 @helper
-def _circle(x, y, start, stop):
-    """Centre of the bounding box of some points, and their greatest distance from it."""
-    left, right, low, high = x[start], x[start], y[start], y[start]
+def _disc(x, y, start, stop):
+    """Centre of the box of some points along their chord; its direction; their greatest distance.
+
+    Where the chord has no length, as of a ring, the direction is that of the first beam. So the
+    same lines are found in whatever direction the scanner looks.
+    """
+    ux, uy = x[stop] - x[start], y[stop] - y[start]
+    if not math.hypot(ux, uy) > 0.0:
+        ux, uy = x[start], y[start]
+    norm = math.hypot(ux, uy)
+    ux, uy = ux / norm, uy / norm
+    left, right, low, high = 0.0, 0.0, 0.0, 0.0
     for i in range(start, stop + 1):
-        left, right = min(left, x[i]), max(right, x[i])
-        low, high = min(low, y[i]), max(high, y[i])
-    ox, oy, radius = 0.5 * (left + right), 0.5 * (low + high), 0.0
+        dx, dy = x[i] - x[start], y[i] - y[start]
+        along, across = ux * dx + uy * dy, ux * dy - uy * dx
+        left, right = min(left, along), max(right, along)
+        low, high = min(low, across), max(high, across)
+    along, across = 0.5 * (left + right), 0.5 * (low + high)
+    ox, oy = x[start] + along * ux - across * uy, y[start] + along * uy + across * ux
+    radius = 0.0
     for i in range(start, stop + 1):
         radius = max(radius, math.hypot(x[i] - ox, y[i] - oy))
-    return ox, oy, radius
+    return ox, oy, ux, uy, radius
+
+
+@helper
+def _normal(normals, a, ux, uy):
+    """Return a normal that is voted for, counted from the direction of a cluster."""
+    return normals[a, 0] * ux - normals[a, 1] * uy, normals[a, 0] * uy + normals[a, 1] * ux
 
 
 @helper
@@ -87,10 +107,11 @@ def _clear(votes, used):
 @helper
 def _vote(x, y, first, last, disc, width, vote, votes, normals):
     """Add a vote of each point for each line through it."""
-    ox, oy, radius = disc
+    ox, oy, ux, uy, radius = disc
     offset = radius / width
     for a in range(votes.shape[0]):
-        c, s, cells = normals[a, 0] / width, normals[a, 1] / width, votes[a]
+        nx, ny = _normal(normals, a, ux, uy)
+        c, s, cells = nx / width, ny / width, votes[a]
         for i in range(first, last + 1):
             cells[np.int64(c * (x[i] - ox) + s * (y[i] - oy) + offset)] += vote
 

@@ -7,7 +7,7 @@ M.-J. Aldon, *Line extraction in 2D range images for mobile robotics* (2004).
 
 import math
 
-from .. import helper, kernel, usable
+from .. import LARGEST, helper, kernel, usable
 from .. import layout as at
 from ..clustering import list_points, part_points
 from ..line_fit import range_variance
@@ -40,9 +40,10 @@ def part_by_distance(floats, ints, bearings, sensor, noise, rule, max_missing, m
     measured, ranges, points = work.beams[at.RANGE], work.beams[at.FILTERED], work.points
     limit, second = points[at.DISTANCE_THRESHOLD], points[at.DENSITY_THRESHOLD]
     rho, beam, cosines, sines = points[at.RHO], work.marks[at.BEAM], bearings[0], bearings[1]
+    least, most = max(range_min, 1.0 / LARGEST), min(range_max, LARGEST)
     for i in range(n):
         r = measured[i]
-        ranges[i] = r if usable(r, range_min, range_max) else math.nan
+        ranges[i] = r if usable(r, least, most) else math.nan
     count = list_points(work.beams, points, work.marks, bearings)
     for i in range(count):
         second[i] = math.nan

@@ -110,6 +110,8 @@ def _merge(work, noise, epsilon):
         if kept > 0 and _are_neighbours(work, kept):
             a, b, c, d = first[kept - 1], last[kept - 1], first[kept], last[kept]
             c = max(c, b + 1)
+            if c > d:
+                continue
             _, _, distance, both = joint_line(work, a, b, c, d)
             _, _, _, one = stretch_line(work, a, b)
             _, _, _, other = stretch_line(work, c, d)
@@ -125,16 +127,18 @@ def _merge(work, noise, epsilon):
 def _cut(work, k):
     """Move the border of a piece and the one before it to where least squares to both lines are.
 
-    Both keep three points if they can; points between them that had no piece get one. The later
-    may begin before the earlier does, where that has just been cut itself.
+    Both keep three points if they can; points between them that had no piece get one. Each keeps
+    two: where they have no more, they go on sharing one. The later may begin before the earlier
+    does, where that has just been cut itself.
     """
     first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
     x, y = work.points[at.X], work.points[at.Y]
     a, b, c, d = first[k - 1], last[k - 1], first[k], last[k]
-    near, far = max(min(b, c - 1), a + 1), max(b, c - 1)
+    near, far = max(min(b, c - 1), a + 1), min(max(b, c - 1), d - 2)
     low, high = max(near - _MARGIN, a + 2), min(far + _MARGIN, d - 3)
     if low > high:
-        last[k - 1], first[k] = near, max(c, near + 1)
+        if max(c, near + 1) < d:
+            last[k - 1], first[k] = near, max(c, near + 1)
         return
     n1x, n1y, d1, _ = stretch_line(work, a, near)
     n2x, n2y, d2, _ = stretch_line(work, far + 1, d)
