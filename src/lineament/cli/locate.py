@@ -25,11 +25,7 @@ LAYERS = click.option(
     callback=lambda _context, _option, names: names.split(",") if names else None,
     help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
 )
-UNITS = click.option(
-    "--units",
-    type=click.Choice(["m", "dm", "cm", "mm", "ft", "in"]),
-    help="Units of the DXF.  [default: those that it names, or m]",
-)
+UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
 
 
 @click.command()
@@ -37,7 +33,7 @@ UNITS = click.option(
 @MAP
 @click.option("-o", "--output", required=True, type=PATH, help="Poses: .tum, .csv or .parquet.")
 @LAYERS
-@UNITS
+@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
 @click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
 @METHOD
 @SET
