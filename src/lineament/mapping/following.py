@@ -21,8 +21,9 @@ STEP, TURN, PERIOD = 0.5, 0.26, 1.0
 GAP, JUMP = 5.0, 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
 WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
-#: So many scans in a row that chance explains as well, or looks at the plan without it, are enough.
-MOST_DOUBTS, MOST_MISSED = 4, 2
+#: So many scans in a row that chance explains as well are enough; of looks at the plan that say
+#: that it is not there, three: each that says otherwise takes back a part of one.
+MOST_DOUBTS, MOST_MISSED, TAKEN_BACK = 4, 2.0, 0.25
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
 _DRIFT, _TURN_DRIFT = 0.005, 0.002
 #: Error of walls and beams beside their covariances [m]: where scans are judged by themselves.
@@ -119,7 +120,7 @@ class Follower:
         """Forget what was seen, and where."""
         self._tracker, self._local = Tracker(), LocalMap(self.way)
         self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), _UNKNOWN
-        self._doubts = self._missed = 0
+        self._doubts, self._missed = 0, 0.0
         self._since = self._turned = math.inf
         self._looked = math.nan
 
@@ -210,10 +211,10 @@ class Follower:
             found = locate(query, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
             self._covariance = found.covariance if found else _UNKNOWN
-            self._missed = 0
+            self._missed = 0.0
             return found
         found = locate(query, self.plan, self._pose, self._covariance)
-        self._missed = self._missed + 1 if found.verdict == LOST else 0
+        self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
             self._pose, self._covariance = combined(
                 (self._pose, self._covariance), (found.pose, _spread_of(found))
