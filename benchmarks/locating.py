@@ -2,7 +2,8 @@
 
 Simulated storeys with furniture and people that the plan does not have; a local map of up to 5 m
 of way is looked for on its plan, on that plan with walls moved by 0.3 m, mirrored, and on that of
-another storey. Then the scans of the real arena, each by itself, where they were recorded.
+another storey. Then the scans of the real arena, each by itself, where they were recorded: errors
+from the motion capture, and from its poses refined on the walls.
 """
 
 from __future__ import annotations
@@ -211,6 +212,30 @@ def table(rows: np.ndarray) -> None:
     )
 
 
+def arena() -> None:
+    """Print where single scans of the real arena are found on its fitted walls."""
+    folder = Path(os.environ.get("LINEAMENT_DATA", "../shared/data")) / "truth"
+    print("\n| arena | scans | located | right | median error | by refined poses |")
+    print("|---|--:|--:|--:|--:|--:|")
+    for name, file in (("standing", "static_data"), ("moving", "mocap_02171554")):
+        path, extract, errors = folder / f"jackal_{file}.npz", ln.Extractor(), []
+        if not path.exists():
+            continue
+        archive = np.load(path)
+        plan = LineMap.from_lines(archive["gt_segments"], sigma=0.005)
+        scans = list(ln.open_log(path))
+        for k, scan in enumerate(scans):
+            if where := locate(extract(scan), plan):
+                truths = archive["poses"][k], archive["poses_refined"][k]
+                errors.append([math.dist(where.pose[:2], truth[:2]) for truth in truths])
+        by_capture, refined_ones = np.median(errors, axis=0) * 1000
+        right = 100 * (np.max(errors, axis=1) < RIGHT[0]).mean()
+        print(
+            f"| {name} | {len(scans)} | {len(errors)} | {right:.1f} % | {by_capture:.1f} mm | "
+            f"{refined_ones:.1f} mm |"
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--queries", type=int, default=20_000)
@@ -236,6 +261,7 @@ def main() -> None:
             waiting.cancel()
     rows = np.concatenate(done)
     table(rows)
+    arena()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from lineament.live import LiveConfig, Pipeline
 from lineament.motion import Tracker
 from lineament.motion.relocation import is_contradicted, relocated
 from lineament.scan.poses import compose, inverse, poses_along, relative
-from lineament.simulation import SENSORS, World
+from lineament.simulation import SENSORS, World, scene
 
 STILL, DRIVE, TURN = (0.0, 0.0, 0.0), (0.5, 0.0, 0.1), (0.3, 0.0, -0.3)
 #: What is known of a motion after a pause.
@@ -44,7 +44,8 @@ PAUSES = [
 def paused(room, sensor, pause, seed):
     """Poses, motions and world positions of numbered corners around a pause."""
     twist, gap, meanwhile, jump = pause
-    rng, extract, tracker = np.random.default_rng(seed), ln.Extractor(), Tracker(roughness=0.0)
+    chance = seed, round(10 * gap), round(jump + 100), len(room.segments)
+    rng, extract, tracker = np.random.default_rng(chance), ln.Extractor(), Tracker(roughness=0.0)
     start = (*np.add((-1.0, -0.7), rng.uniform(-0.3, 0.3, 2)), rng.uniform(-3, 3))
     way = [compose(start, tuple(pose)) for pose in poses_along(twist, np.arange(8) * 0.1)]
     way.append(compose(way[-1], tuple(poses_along(meanwhile, [gap])[0])))
@@ -87,6 +88,25 @@ def test_after_a_pause_or_a_jump_the_motion_is_right_or_not_observed(sensor):
         if name == "irregular" or i in (0, 1, 4, 5):
             assert all(of), (name, i)
     assert not all(observed["rectangle", 3])
+
+
+@pytest.mark.slow
+def test_nothing_is_sure_and_wrong_in_rooms_of_all_kinds():
+    extract, known = ln.Extractor(), 0
+    for seed in range(40):
+        rng, (room, start) = np.random.default_rng(seed), scene("room", seed)
+        for _ in range(3):
+            motion = (*rng.uniform(-0.5, 0.5, 2), rng.uniform(-1.0, 1.0))
+            pose = (*start[:2], rng.uniform(-3, 3))
+            tracker, way = Tracker(roughness=0.0), [pose, compose(pose, (0.05, 0.0, 0.02))]
+            way.append(compose(way[-1], motion))
+            for place, stamp in zip(way, (0.0, 0.1, 10.0), strict=True):
+                tracks = tracker(extract(SENSORS["utm30lx"].scan(room, place, rng, stamp)))
+            off = np.subtract(tracks.motion.pose, motion)
+            is_right = np.abs(off).max() < 0.05
+            assert is_right or not tracks.motion.observable, seed
+            known += is_right
+    assert known > 95
 
 
 def test_odometry_of_a_node_holds_over_a_pause():

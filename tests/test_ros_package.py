@@ -199,12 +199,15 @@ def test_parameters_are_those_of_live(package):
         "noise": 0.02,
         "deskew": False,  # what YAML makes of off
         "laser_pose": [0.1, 0.0, 0.5],
+        "upside_down": True,
+        "stamp": "last",
         "dock": [5.3, 1.8],
         "parameters.evidence": 12,
     }
     config = package.node.config_of(node)
     assert (config.topic, config.noise, config.deskew) == ("/front/scan", 0.02, "off")
     assert (config.laser_pose, config.dock) == ((0.1, 0.0, 0.5), (5.3, 1.8))
+    assert (config.upside_down, config.stamp) == (True, "last")
     assert config.parameters == {"evidence": 12}
     node.parameters["methd"] = "liu"
     with pytest.raises(LineamentError, match="parameter methd is not known, expected one of topic"):

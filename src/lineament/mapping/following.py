@@ -13,7 +13,7 @@ from ..scan.poses import compose, relative
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
+from .locate import LOCATED, LOST, MOST_CONTRADICTED, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -159,11 +159,14 @@ class Follower:
             self._local.add(features, self._tracker(features, odometry))
         location = None
         waited = features.stamp - self._looked
-        if self._since > STEP or self._turned > TURN or waited > PERIOD:
+        is_doubtful = self.is_known and evidence.contradicted > MOST_CONTRADICTED
+        if is_doubtful or self._since > STEP or self._turned > TURN or waited > PERIOD:
             location = self._look()
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
-        return Whereabouts(self._verdict, self._pose, self._covariance, evidence, location)
+        is_wrong = self.is_known and evidence.contradicted > MOST_CONTRADICTED
+        verdict = LOST if is_wrong else self._verdict
+        return Whereabouts(verdict, self._pose, self._covariance, evidence, location)
 
     def _is_torn(self, stamp: float, odometry: Pose | None) -> bool:
         """Whether the motion since the last scan is unknown."""

@@ -96,6 +96,11 @@ class LineMap:
         """Both ends of each wall, shape (n, 2, 2) [m]."""
         return np.stack((self.walls["start"], self.walls["end"]), axis=1)
 
+    @property
+    def area(self) -> float:
+        """Area of the rectangle around all walls [m²]."""
+        return float(np.prod(np.ptp(self.ends.reshape(-1, 2), axis=0)))
+
     @cached_property
     def corners(self) -> NDArray[np.void]:
         """Where two walls end together: records of `hypotheses.MEETING`."""

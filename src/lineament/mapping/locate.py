@@ -29,8 +29,9 @@ TRIED, SIFTED, REFINED, JUDGED = 800, 60, 24, 12
 _FEWEST_BEAMS, _FEW_BEAMS = 12, 40
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
 _NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
-#: The best pose is more likely than the next by so much (nats), and than chance.
-SURE, NO_CHANCE = math.log(1000), 8.5
+#: The best pose is more likely than the next by so much (nats), and than chance: that of a wrong
+#: pose, times the number of poses that a plan has room for.
+SURE = math.log(1000)
 #: The same over the best pose of the mirror image.
 NOT_MIRRORED = 3.0
 #: Shares of the beams: fewer explained, or more contradicted, are not of this map.
@@ -130,7 +131,8 @@ def locate(
     poses, found = _searched(tried, query, plan)
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
-    where, odds = _judged(poses, found, query, plan, len(tried)), found[0, 0]
+    room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
+    where, odds = _judged(poses, found, query, plan, room), found[0, 0]
     if where.verdict == LOCATED and guess is None:
         # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
         image = query.mirrored()
@@ -217,12 +219,12 @@ def _distinct(
     return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
 
 
-def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int) -> Location:
+def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float) -> Location:
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
     covariance = np.asarray(np.linalg.inv(information + np.diag((1e-2, 1e-2, 1e-2))), np.float64)
-    chance = math.log(max(tries, 1))
+    chance = math.log(max(room, 1.0))
     n = len(query.beams)
     evidences = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     first = evidences[0]
@@ -235,7 +237,7 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, tries: int)
     x, y = vectors[:, 1].tolist()
     unobserved = None
     if (
-        first.log_odds < NO_CHANCE
+        first.log_odds < SURE
         or first.explained < LEAST_EXPLAINED
         or first.contradicted > MOST_CONTRADICTED
     ):

@@ -16,6 +16,8 @@ COARSE, FINE = (0.25, 0.07), (0.06, 0.02)
 #: How far walls are from straight where they are compared [m].
 ROUGH = 0.01
 _ROUNDS = 6
+#: Squared deviation beyond which a pair is left out.
+GATE = chi_square(0.999, 2)
 
 
 def refined(
@@ -28,7 +30,7 @@ def refined(
     found = np.ascontiguousarray(poses, np.float64).copy()
     pairs = np.full((len(found), len(query.walls)), -1, np.int64)
     information = np.zeros((len(found), 3, 3))
-    settings = (*first, ROUGH, chi_square(0.999, 2), float(_ROUNDS))
+    settings = (*first, ROUGH, GATE, float(_ROUNDS))
     kernel(found, query.table, *index, settings, pairs, information)
     found[:, 2] = np.remainder(found[:, 2] + math.pi, 2 * math.pi) - math.pi
     return found, pairs, information
@@ -37,13 +39,17 @@ def refined(
 def adjusted(
     pose: Array, pairs: NDArray[np.int64], query: Query, index: Index
 ) -> tuple[Array, Array]:
-    """Return a pose and its information (3, 3) by pairs of walls, with all their covariances."""
+    """Return a pose and its information (3, 3) by pairs of walls, with all their covariances.
+
+    Pairs beyond the gate are left out: furniture in front of a wall is not the wall.
+    """
     used = np.flatnonzero((pairs >= 0) & (pairs < len(index.walls)))
-    if not len(used):
-        return pose, np.zeros((3, 3))
-    walls, local = index.walls[pairs[used]], query.walls[used]
-    rows = np.ravel(2 * used[:, None] + np.arange(2))
-    for _ in range(2):
+    information = np.zeros((3, 3))
+    for step in range(3):
+        if not len(used):
+            break
+        walls, local = index.walls[pairs[used]], query.walls[used]
+        rows = np.ravel(2 * used[:, None] + np.arange(2))
         error, jacobian, same, a = _errors(pose, local, walls)
         # Signs are those of the plan's walls.
         sign = np.stack((same, np.ones(len(same))), axis=1).ravel()
@@ -53,7 +59,14 @@ def adjusted(
         weighted = np.linalg.solve(spread, jacobian)
         information = jacobian.T @ weighted
         held = information + np.diag((1e-2, 1e-2, 1e-2))
-        pose = pose - np.linalg.solve(held, weighted.T @ error)
+        change = np.linalg.solve(held, weighted.T @ error)
+        pose = pose - change
+        if step < 2:
+            left = (error - jacobian @ change).reshape(-1, 2)
+            k = np.arange(len(used))
+            own = spread.reshape(len(used), 2, len(used), 2)[k, :, k]
+            d2 = np.einsum("ni,nij,nj->n", left, np.linalg.inv(own), left)
+            used = used[d2 <= max(GATE, np.sort(d2)[len(d2) // 2])]
     return pose, information
 
 

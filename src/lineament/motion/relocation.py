@@ -23,8 +23,9 @@ _SAME = np.array((0.3, 0.3, 0.15))
 _LEAST, _WORTH = 0.5, 100.0
 #: A motion is contradicted where a smaller share is found again.
 _CONTRADICTED = 0.3
-#: -2 log of the odds at which a motion is sure: 99 to 1.
-_SURE = 9.2
+#: A motion by which all walls are found again is sure where others cost so much more, 99 to 1;
+#: where some are missing, so much more, and what these cost by this factor.
+_SURE, _MISSING = 9.2, 0.5
 #: Motions beyond so many deviations of what is expected are left out.
 _FAR = 4.0
 #: Two walls agree by chance: a motion that is not expected needs so many, and so does any doubt.
@@ -61,12 +62,13 @@ def relocated(
     motions = np.concatenate(([pose for pose, _ in expected], _motions(earlier, later)))
     costs = np.array([_surprise(motions, *one) for one in expected])
     kept = costs.min(axis=0) < math.inf
-    motions, costs = motions[kept], costs[:, kept]
+    motions, costs = _refined(earlier, later, motions[kept]), costs[:, kept]
     share, count = _found_again(earlier, later, motions)
     cost = costs.min(axis=0) + _WORTH * (1.0 - share)
     best = int(np.argmin(cost))
     is_other = (np.abs(_off(motions, motions[best])) > _SAME).any(axis=1)
-    is_sure = cost[is_other].min(initial=math.inf) >= cost[best] + _SURE
+    margin = _SURE + _MISSING * _WORTH * (1.0 - share[best])
+    is_sure = cost[is_other].min(initial=math.inf) >= cost[best] + margin
     is_enough = count[best] >= _ENOUGH or costs[1:, best].min(initial=math.inf) < math.inf
     if not (is_sure and is_enough and share[best] >= _LEAST):
         return None
@@ -123,14 +125,41 @@ def _surprise(motions: Array, pose: Pose, deviations: Array) -> Array:
     return np.where(square < _FAR**2, square + 2 * np.log(deviations).sum(), math.inf)
 
 
+def _refined(before: _Walls, now: _Walls, motions: Array) -> Array:
+    """Motions (n, 3) nearer to where all walls that are about right lie on those of before."""
+    shorter = np.minimum(before.lengths[:, None], now.lengths)
+    turn, off, beside = _compared(before, now, motions)
+    weight = (beside & (np.abs(turn) < 2 * _TURNED) & (np.abs(off) < 3 * _NEAR)) * shorter
+    total = np.maximum(weight.sum(axis=(1, 2)), 1e-9)
+    motions = motions.copy()
+    motions[:, 2] -= (weight * turn).sum(axis=(1, 2)) / total
+    _, off, _ = _compared(before, now, motions)
+    normals = np.column_stack((-np.sin(before.angles), np.cos(before.angles)))
+    outer = np.einsum("mab,ai,aj->mij", weight, normals, normals)
+    pull = np.einsum("mab,mab,ai->mi", weight, off, normals)
+    outer += 0.01 * total[:, None, None] * np.eye(2)  # parallel walls do not move along
+    motions[:, :2] -= np.linalg.solve(outer, pull[:, :, None])[:, :, 0]
+    return motions
+
+
 def _found_again(before: _Walls, now: _Walls, motions: Array) -> tuple[Array, NDArray[np.int64]]:
     """Share of the later walls, by length, that lie along an earlier one; and their number."""
+    turn, off, beside = _compared(before, now, motions)
+    found = (beside & (np.abs(turn) < _TURNED) & (np.abs(off) < _NEAR)).any(axis=1)
+    return found @ now.lengths / max(now.lengths.sum(), 1e-9), found.sum(axis=1)
+
+
+def _compared(before: _Walls, now: _Walls, motions: Array) -> tuple[Array, Array, Mask]:
+    """Turn and offset of each later wall from each earlier one, and whether they are side by side.
+
+    All of shape (motions, before, now).
+    """
     x, y, theta = motions.T[:, :, None, None]
     c, s = np.cos(theta), np.sin(theta)
     tx, ty = np.cos(before.angles)[:, None], np.sin(before.angles)[:, None]
 
     def seen(points: Array) -> tuple[Array, Array]:
-        """Place along and off each earlier wall, shape (motions, before, now)."""
+        """Place along and off each earlier wall."""
         px, py = points.T
         dx = c * px - s * py + x - before.start[:, 0, None]
         dy = s * px + c * py + y - before.start[:, 1, None]
@@ -140,10 +169,7 @@ def _found_again(before: _Walls, now: _Walls, motions: Array) -> tuple[Array, ND
     length = before.lengths[:, None]
     shared = np.minimum(np.maximum(first, last), length) - np.maximum(np.minimum(first, last), 0)
     turn = _wrapped(now.angles + theta - before.angles[:, None])
-    is_pair = (np.abs(turn) < _TURNED) & (np.abs(off) < _NEAR)
-    is_pair &= shared > _BESIDE * np.minimum(length, now.lengths)
-    found = is_pair.any(axis=1)
-    return found @ now.lengths / max(now.lengths.sum(), 1e-9), found.sum(axis=1)
+    return turn, off, shared > _BESIDE * np.minimum(length, now.lengths)
 
 
 def _off(motions: Array, pose: Pose | Array) -> Array:
