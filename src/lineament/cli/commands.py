@@ -97,6 +97,7 @@ def plot(
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
+@click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
@@ -107,6 +108,7 @@ def view(
     reading: dict[str, Any],
     host: str,
     port: int,
+    plan: Path | None,
     no_browser: bool,
 ) -> None:
     """Look at LOGS in the browser: scans, features, and why a segment is missing.
@@ -118,7 +120,12 @@ def view(
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
-    session = Session(logs, extractors, **reading)
+    drawn = None
+    if plan is not None:
+        from ..mapping import LineMap
+
+        drawn = LineMap.read(plan)
+    session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 
 

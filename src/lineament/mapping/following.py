@@ -13,7 +13,7 @@ from ..scan.poses import compose, relative
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, MOST_CONTRADICTED, UNOBSERVED, Location, locate
+from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -24,6 +24,8 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: So many scans in a row that chance explains as well are enough; of looks at the plan that say
 #: that it is not there, three: each that says otherwise takes back a part of one.
 MOST_DOUBTS, MOST_MISSED, TAKEN_BACK = 4, 2.0, 0.25
+#: A scan that is contradicted by a larger share of its beams is not where the pose says.
+DENIED = 0.12
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
 _DRIFT, _TURN_DRIFT = 0.005, 0.002
 #: Error of walls and beams beside their covariances [m]: where scans are judged by themselves.
@@ -159,12 +161,12 @@ class Follower:
             self._local.add(features, self._tracker(features, odometry))
         location = None
         waited = features.stamp - self._looked
-        is_doubtful = self.is_known and evidence.contradicted > MOST_CONTRADICTED
+        is_doubtful = self.is_known and evidence.contradicted > DENIED
         if is_doubtful or self._since > STEP or self._turned > TURN or waited > PERIOD:
             location = self._look()
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
-        is_wrong = self.is_known and evidence.contradicted > MOST_CONTRADICTED
+        is_wrong = self.is_known and evidence.contradicted > DENIED
         verdict = LOST if is_wrong else self._verdict
         return Whereabouts(verdict, self._pose, self._covariance, evidence, location)
 
