@@ -266,6 +266,7 @@ def test_the_viewer_locates_logs_on_a_plan(files):
         scan = json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))
         assert (scan["pose"], scan["where"]["covariance"]) == (None, None)
     with Session(files / "one.npz", {"optimal": ln.Extractor()}) as session:
+        assert session.wait(60)
         assert json.loads(answer(session, "/api/plan")) == {"walls": []}
         assert json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))["where"] is None
 
