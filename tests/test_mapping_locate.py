@@ -126,6 +126,30 @@ def test_identical_rooms_are_ambiguous_and_the_right_one_is_among_them():
     assert locate(ln.extract(alone), plan_of(other)).verdict == "located"
 
 
+def test_place_that_is_its_own_mirror_image_is_ambiguous():
+    """A niche in the middle of one wall: a mirrored plan would look the same."""
+    room = [(0, 0), (5, 0), (5, 4), (3, 4), (3, 4.6), (2, 4.6), (2, 4), (0, 4), (0, 0)]
+    world = World.of_polygons([room])
+    aside = World.of_polygons([[(0, 0), (6, 0), (6, 3), (3, 3), (3, 5), (0, 5), (0, 0)]])
+    verdicts = []
+    for of in (world, aside):
+        scan = SENSOR.scan(of, (2.0, 2.5, 1.4), np.random.default_rng(0))
+        where = locate(ln.extract(scan), plan_of(of))
+        assert error(where, (2.0, 2.5, 1.4)) < (0.02, 0.01)
+        verdicts.append(where.verdict)
+    assert verdicts == ["ambiguous", "located"]
+
+
+def test_errors_of_the_plan_are_those_of_the_pose():
+    local, pose = seen()[0]
+    exact, rough = (
+        locate(local, LineMap.from_lines(storey().plan.segments, side=1, sigma=sigma), pose)
+        for sigma in (0.0, 0.05)
+    )
+    assert np.sqrt(exact.covariance[0, 0]) < 0.01
+    assert 0.015 < np.sqrt(rough.covariance[0, 0]) < 0.06
+
+
 def test_corridor_leaves_its_direction_unobserved():
     c, s = math.cos(0.3), math.sin(0.3)
     walls = np.array([[0, 0, 200, 0], [200, 2, 0, 2]]).reshape(-1, 2) @ [[c, s], [-s, c]]

@@ -62,18 +62,23 @@ class LogError(LineamentError):
         return type(self), (self.path, self.problem, self.line)
 
 
-def needs(package: str) -> str:
+def needs(package: str, extra: str = "") -> str:
     """Return that an optional package is missing, with the command that installs it."""
-    return f"needs {package}, which is not installed: pip install 'lineament[{EXTRAS[package]}]'"
+    extra = extra or EXTRAS[package]
+    return f"needs {package}, which is not installed: pip install 'lineament[{extra}]'"
 
 
 @contextmanager
 def needed_by(who: str) -> Iterator[None]:
-    """Turn the missing import of an optional package into a LineamentError."""
+    """Turn the missing import of an optional package into a LineamentError.
+
+    Where `who` is an extra itself, that is the one to install: several need scipy.
+    """
     try:
         yield
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        raise LineamentError(f"{who} {needs(package)}") from None
+        extra = who if who in EXTRAS.values() else ""
+        raise LineamentError(f"{who} {needs(package, extra)}") from None

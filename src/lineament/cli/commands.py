@@ -9,6 +9,7 @@ from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
 from .locate import locate
+from .mapping import map_command
 from .options import (
     HUSH,
     LOG,
@@ -153,7 +154,7 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 
 
 _ALL = (
-    *(extract, info, plot, view, locate, live, demo),
+    *(extract, info, plot, view, live, locate, map_command, demo),
     *(methods, warmup, compare, reproduce, bench, simulate),
 )
 COMMANDS = {command.name: command for command in _ALL if command.name}

@@ -15,8 +15,8 @@ from .options import (
     check_ending,
     complain,
     make_extractor,
-    reading,
 )
+from .options import reading_odometry as reading
 
 MAP = click.option("--map", "plan", type=PATH, required=True, help="The plan: .dxf or .parquet.")
 LAYERS = click.option(

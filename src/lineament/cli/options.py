@@ -103,17 +103,27 @@ QUIET = click.option("-q", "--quiet", **_QUIET)
 HUSH = click.option("-q", "--quiet", expose_value=False, **_QUIET)
 
 
-def reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of reading a log; the command gets them as ``open_log(log, **reading)``."""
+def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    def adding(command: Callable[..., None]) -> Callable[..., None]:
+        """Add the options of a log; the command gets them as ``open_log(log, **reading)``."""
 
-    @wraps(command)
-    def collecting(**given: Any) -> None:
-        names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits")
-        command(reading={name: given.pop(name) for name in names}, **given)
+        @wraps(command)
+        def collecting(**given: Any) -> None:
+            names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits")
+            command(reading={name: given.pop(name) for name in names}, **given)
 
-    for option in (LIMITS, KEEP_GOING, _POSES, _RING, _ECHO, TOPIC):
-        collecting = option(collecting)
-    return collecting
+        for option in (LIMITS, KEEP_GOING, poses, _RING, _ECHO, TOPIC):
+            collecting = option(collecting)
+        return collecting
+
+    return adding
+
+
+reading = _reading(_POSES)
+#: The same where the poses are odometry, and others are made.
+reading_odometry = _reading(
+    click.option("--odometry", "pose_topic", metavar="TOPIC", help="Topic of the odometry.")
+)
 
 
 def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = False) -> None:

@@ -19,6 +19,7 @@ from ..mapping import VERDICTS, LineMap
 from ..mapping.following import Follower, Whereabouts
 from ..progress import Track, untracked
 from ..scan import LaserScan
+from .mapping import write_tum
 
 #: Formats of the poses.
 ENDINGS = (".tum", ".csv", ".parquet")
@@ -119,11 +120,11 @@ def locate_log(
     found = list(follow(scans, drawn, extractor, odometry=odometry))
     if not found:
         raise LogError(log.name, "has no scans, expected some")
-    with naming_errors(output), written_beside(output) as temporary:
-        if ending == ".tum":
-            _write_tum(temporary, found)
-        else:
-            _write_table(temporary, found, is_csv=ending == ".csv")
+    if ending == ".tum":
+        placed = [(stamp, where.pose) for stamp, where in found if where]
+        write_tum(output, [stamp for stamp, _ in placed], [pose for _, pose in placed])
+    else:
+        _write_table(output, found, is_csv=ending == ".csv")
     stamps = [stamp for stamp, _ in found]
     known = [bool(where) for _, where in found]
     return Located(
@@ -156,17 +157,8 @@ def plan_warning(plan: LineMap, name: object) -> str:
     return f"{name}: is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)"
 
 
-def _write_tum(path: Path, found: list[tuple[float, Whereabouts]]) -> None:
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        for stamp, where in found:
-            if where:
-                x, y, theta = where.pose
-                z, w = math.sin(theta / 2), math.cos(theta / 2)
-                file.write(f"{stamp:.9f} {x:.6f} {y:.6f} 0 0 0 {z:.9f} {w:.9f}\n")
-
-
 def _write_table(
-    path: Path, found: list[tuple[float, Whereabouts]], *, is_csv: bool = False
+    path: str | os.PathLike[str], found: list[tuple[float, Whereabouts]], *, is_csv: bool
 ) -> None:
     import pyarrow as pa
     import pyarrow.csv
@@ -188,7 +180,8 @@ def _write_table(
     for name in ("explained", "short", "contradicted", "log_odds"):
         columns[name] = [getattr(where.evidence, name) for where in places]
     table = pa.table(columns)
-    if is_csv:
-        pyarrow.csv.write_csv(table, path)
-    else:
-        pq.write_table(table, path)
+    with naming_errors(path), written_beside(path) as temporary:
+        if is_csv:
+            pyarrow.csv.write_csv(table, temporary)
+        else:
+            pq.write_table(table, temporary)

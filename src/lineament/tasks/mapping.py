@@ -1,0 +1,139 @@
+"""A whole log to a map of its walls: what `lineament map` does."""
+
+import math
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import LogError
+from ..extractor import Extractor, load_kernels
+from ..files import written_beside
+from ..logs import open_log
+from ..mapping import LineMap
+from ..mapping.drive_map import Drive
+from ..mapping.making import make_map, onto_plan
+from ..progress import Track, untracked
+from ..scan import Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mapping:
+    """A map that was made of a log.
+
+    Numbers of scans, of key frames, of those that were lost, and of loops, closed and left out;
+    way [m]; the map; wall time [s].
+    """
+
+    log: str
+    output: str
+    scans: int
+    frames: int
+    lost: int
+    loops: int
+    refused: int
+    way: float
+    map: LineMap
+    seconds: float
+
+    def __str__(self) -> str:
+        lost = f", {self.lost} times lost" if self.lost else ""
+        refused = f", {self.refused} refused" if self.refused else ""
+        return (
+            f"{self.log} -> {self.output}\n"
+            f"  {self.scans} scans, {self.frames} key frames, {self.way:.0f} m{lost}\n"
+            f"  {self.loops} loops{refused}\n"
+            f"  {self.map}\n"
+            f"  {self.seconds:.1f} s, {self.scans / self.seconds:.0f} scans/s"
+        )
+
+
+def map_log(
+    path: str | os.PathLike[str],
+    output: str | os.PathLike[str],
+    extractor: Extractor | None = None,
+    *,
+    poses: str | os.PathLike[str] | None = None,
+    onto: str | os.PathLike[str] | None = None,
+    odometry: bool = True,
+    track: Track = untracked,
+    **reading: Any,
+) -> Mapping:
+    """Make a map of the walls of a log.
+
+    Parameters
+    ----------
+    path : path-like
+        The log, of any format that `lineament.open_log` reads.
+    output : path-like
+        The map: ``.dxf``, ``.svg`` or ``.parquet``.
+    extractor : Extractor, optional
+        The method.
+    poses : path-like, optional
+        Where to write the pose of each scan: ``stamp x y z qx qy qz qw`` [s, m], a line a scan.
+    onto : path-like, optional
+        A plan in whose frame the map is to be; without, it is that of the first scan.
+    odometry : bool
+        Whether the poses of the log are taken as odometry, where it has them.
+    track : callable
+        ``track(items, name, total)`` yields the scans and shows the progress.
+    **reading
+        As for `lineament.open_log`.
+
+    Raises
+    ------
+    LineamentError
+        If the log cannot be read or has no scans, no walls are found, the drive is not on the plan,
+        or the output cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from lineament.simulation import SENSORS, simulate_log
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> simulate_log(folder / "log.npz", "building", SENSORS["lms181"], scans=60, rate=2)
+    >>> made = map_log(folder / "log.npz", folder / "map.parquet", odometry=False)
+    >>> made.scans, len(made.map.walls) > 10
+    (60, True)
+    """
+    extractor = Extractor() if extractor is None else extractor
+    plan = None if onto is None else LineMap.read(onto)
+    load_kernels([extractor])
+    started = time.perf_counter()
+    log = open_log(path, **reading)
+    drive, stamps = Drive(), []
+    for scan in track((scan for _, scan in log.items()), Path(log.name).name, len(log)):
+        drive.add(scan, extractor(scan), scan.pose if odometry else None)
+        stamps.append(scan.stamp)
+    if not stamps:
+        raise LogError(log.name, "has no scans, expected a drive")
+    made = make_map(drive.frames, drive.scans)
+    if plan is not None:
+        made = onto_plan(made, drive.frames, plan)
+    made.map.write(output)
+    if poses is not None:
+        write_tum(poses, stamps, made.poses)
+    way = sum(math.dist(a[:2], b[:2]) for a, b in zip(made.frames, made.frames[1:], strict=False))
+    return Mapping(
+        log=str(path),
+        output=str(output),
+        scans=len(stamps),
+        frames=len(drive.frames),
+        lost=len(drive.lost),
+        loops=len(made.loops.ends),
+        refused=made.refused,
+        way=way,
+        map=made.map,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def write_tum(path: str | os.PathLike[str], stamps: list[float], poses: list[Pose]) -> None:
+    """Write stamps [s] and poses as lines of ``stamp x y z qx qy qz qw``, whole or not at all."""
+    lines = []
+    for stamp, (x, y, theta) in zip(stamps, poses, strict=True):
+        z, w = math.sin(theta / 2), math.cos(theta / 2)
+        lines.append(f"{stamp:.6f} {x:.6f} {y:.6f} 0 0 0 {z:.9f} {w:.9f}\n")
+    with written_beside(path) as temporary:
+        temporary.write_text("".join(lines))
