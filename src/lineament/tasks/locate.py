@@ -100,13 +100,15 @@ def locate_log(
     Examples
     --------
     >>> import tempfile
-    >>> from lineament.simulation import SENSORS, room, simulate_log
+    >>> from lineament.logs import save_npz
+    >>> from lineament.simulation import SENSORS, drive, room
     >>> folder = Path(tempfile.mkdtemp())
-    >>> simulate_log(folder / "log.npz", "room", SENSORS["utm30lx"], scans=20)
+    >>> scans = drive(room(), [(-2, 0), (-1, 0)], SENSORS["utm30lx"], speed=1, rate=10)
+    >>> save_npz(folder / "log.npz", scans)
     >>> LineMap.from_lines(room().segments).write(folder / "plan.dxf")
     >>> found = locate_log(folder / "log.npz", folder / "plan.dxf", folder / "poses.tum")
     >>> found.verdicts["located"], found.first
-    (20, 0.0)
+    (11, 0.0)
     """
     ending = ending_of(output, ENDINGS)
     extractor = Extractor() if extractor is None else extractor
