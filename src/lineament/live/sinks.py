@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
@@ -151,7 +152,8 @@ class RosSink:
         """Publish the report on ``/diagnostics``, and the verdict on the last pose."""
         self._diagnose(self._topic, report.level, str(report), report.values, time)
         if (where := self._where) is not None:
-            self._diagnose(f"{self._topic}/pose", where.level, where.verdict, where.values, time)
+            level = 0 if where else 1 if where.is_known else 2
+            self._diagnose(f"{self._topic}/pose", level, where.verdict, _figures(where), time)
 
     def _diagnose(
         self, topic: str, level: int, summary: str, values: dict[str, str], time: tuple[int, int]
@@ -216,3 +218,17 @@ class FoxgloveSink:
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
     return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)
+
+
+def _figures(where: Whereabouts) -> dict[str, str]:
+    """Pose, deviations and evidence by name, as text."""
+    (x, y, theta), evidence = where.pose, where.evidence
+    of_x, of_y, of_theta = (math.sqrt(where.covariance[k, k]) for k in range(3))
+    return {
+        "x [m]": f"{x:.3f} ± {of_x:.3f}",
+        "y [m]": f"{y:.3f} ± {of_y:.3f}",
+        "theta [°]": f"{math.degrees(theta):.2f} ± {math.degrees(of_theta):.2f}",
+        "explained [%]": f"{100 * evidence.explained:.1f}",
+        "contradicted [%]": f"{100 * evidence.contradicted:.1f}",
+        "log odds": f"{evidence.log_odds:.1f}",
+    }

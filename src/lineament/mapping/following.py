@@ -63,25 +63,6 @@ class Whereabouts:
         """Whether there is a pose, at least but for a direction."""
         return self.verdict in (LOCATED, UNOBSERVED) and self.covariance[2, 2] < 1.0
 
-    @property
-    def level(self) -> int:
-        """Level of ROS diagnostics: 0 located, 1 a direction is unobserved, 2 not located."""
-        return {LOCATED: 0, UNOBSERVED: 1}.get(self.verdict, 2)
-
-    @property
-    def values(self) -> dict[str, str]:
-        """The figures by name, as text."""
-        (x, y, theta), evidence = self.pose, self.evidence
-        of_x, of_y, of_theta = np.sqrt(np.diag(self.covariance)).tolist()
-        return {
-            "x [m]": f"{x:.3f} ± {of_x:.3f}",
-            "y [m]": f"{y:.3f} ± {of_y:.3f}",
-            "theta [°]": f"{math.degrees(theta):.2f} ± {math.degrees(of_theta):.2f}",
-            "explained [%]": f"{100 * evidence.explained:.1f}",
-            "contradicted [%]": f"{100 * evidence.contradicted:.1f}",
-            "log odds": f"{evidence.log_odds:.1f}",
-        }
-
     def __bool__(self) -> bool:
         return self.verdict == LOCATED
 
