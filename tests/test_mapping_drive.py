@@ -1,6 +1,7 @@
 """Maps of drives: the graph, the joint adjustment, and a small storey from end to end."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -178,7 +179,8 @@ def test_a_drive_becomes_a_map(driven, storey):
 @pytest.mark.parametrize("ending", ["dxf", "svg", "parquet"])
 def test_the_command_writes_map_and_poses(tmp_path, ending):
     scans = list(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms181"], speed=0.5, rate=4, seed=2))
-    save_log(tmp_path / "log.npz", scans)
+    mixed = [*scans[:3], scans[4], scans[3], *scans[5:]]  # as in logs of several writers
+    save_log(tmp_path / "log.npz", mixed)
     target, poses = tmp_path / f"map.{ending}", tmp_path / "out.tum"
     arguments = ["map", str(tmp_path / "log.npz"), "-o", str(target), "--poses", str(poses)]
     result = CliRunner().invoke(cli, [*arguments, "--no-odometry"])
@@ -186,9 +188,12 @@ def test_the_command_writes_map_and_poses(tmp_path, ending):
     assert "key frames" in result.output
     rows = np.loadtxt(poses)
     assert rows.shape == (len(scans), 8)
+    np.testing.assert_allclose(rows[:, 0], [scan.stamp for scan in scans])
     last = relative(scans[0].pose, scans[-1].pose)
     np.testing.assert_allclose(rows[-1, 1:3], last[:2], atol=0.05)
     assert target.stat().st_size > 500
+    if ending == "svg":
+        assert re.search(r"> *\d+ walls? and \d+ corners?(, .*)? *<", target.read_text("utf-8"))
     if ending == "parquet":
         assert len(LineMap.read(target).walls) >= 4
 

@@ -86,7 +86,10 @@ class PlanWriter(Writer):
         if len(markers.edges):
             found += f", {count(len(markers.edges), 'edge')} (lighter)"
         often = f", each seen {count(least, 'time')} at least" if least > 1 else ""
-        caption = f"{' and '.join(found.rsplit(', ', 1))} of {count(self._written, 'scan')}{often}"
+        # A map is written as features of no beams.
+        is_map = self._written == 1 and not len(self._first.features.clusters)
+        scans = "" if is_map else f" of {count(self._written, 'scan')}"
+        caption = f"{' and '.join(found.rsplit(', ', 1))}{scans}{often}"
         self._draw(self._temporary, Plan(markers, views, caption))
 
     @abstractmethod

@@ -103,7 +103,9 @@ def map_log(
     started = time.perf_counter()
     log = open_log(path, **reading)
     drive, stamps = Drive(), []
-    for scan in track((scan for _, scan in log.items()), Path(log.name).name, len(log)):
+    # In the order of time, which is not that of every log: scans are all held in memory for that.
+    scans = sorted(log, key=lambda scan: scan.stamp)
+    for scan in track(scans, Path(log.name).name, len(scans)):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
         stamps.append(scan.stamp)
     if not stamps:
