@@ -159,7 +159,7 @@ def test_odometry(make):
 
 def test_corner_pose(make):
     found = CornerPose((1.5, -2.0, -3.0), np.arange(9.0).reshape(3, 3))
-    back = read(make, make.corner_pose("/scan/dock", MOMENT, found))
+    back = read(make, make.placed("/scan/dock", MOMENT, found.pose, found.covariance))
     assert back.header.frame_id == "laser_link"
     assert in_plane(back.pose.pose) == pytest.approx(found.pose)
     np.testing.assert_array_equal(covariance_of(back.pose.covariance), found.covariance)
@@ -268,7 +268,7 @@ def test_frames_of_all_lengths_leave_numbers_aligned(make, length):
     travel = Travel((1.0, 2.0, 0.0), np.eye(3), (0.0, 0.0, 0.0), np.eye(3))
     back = read(make, make.odometry("/f", moment, travel))
     np.testing.assert_array_equal(covariance_of(back.twist.covariance), np.eye(3))
-    back = read(make, make.corner_pose("/f", moment, CornerPose(travel.pose, np.eye(3))))
+    back = read(make, make.placed("/f", moment, travel.pose, np.eye(3)))
     np.testing.assert_array_equal(covariance_of(back.pose.covariance), np.eye(3))
     message = make.diagnostics("/f", moment, "n" * length, "", 0, "", {"a": "b"})
     (status,) = read(make, message).status

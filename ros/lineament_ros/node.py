@@ -38,6 +38,9 @@ KNOWN = (
     "track",
     "dock",
     "dock_track",
+    "map",
+    "layers",
+    "units",
 )
 #: Below this are the parameters of the method: parameters.evidence.
 OF_METHOD = "parameters"

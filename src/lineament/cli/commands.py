@@ -8,6 +8,7 @@ import click
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
+from .locate import locate
 from .mapping import map_command
 from .options import (
     HUSH,
@@ -97,6 +98,7 @@ def plot(
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
+@click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
@@ -107,6 +109,7 @@ def view(
     reading: dict[str, Any],
     host: str,
     port: int,
+    plan: Path | None,
     no_browser: bool,
 ) -> None:
     """Look at LOGS in the browser: scans, features, and why a segment is missing.
@@ -118,7 +121,12 @@ def view(
 
     names = methods or ((DEFAULT_METHOD,) if settings else method_names())
     extractors = {name: make_extractor(name, settings, noise) for name in names}
-    session = Session(logs, extractors, **reading)
+    drawn = None
+    if plan is not None:
+        from ..mapping import LineMap
+
+        drawn = LineMap.read(plan)
+    session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 
 
@@ -146,7 +154,7 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 
 
 _ALL = (
-    *(extract, info, plot, view, live, map_command, demo),
+    *(extract, info, plot, view, live, locate, map_command, demo),
     *(methods, warmup, compare, reproduce, bench, simulate),
 )
 COMMANDS = {command.name: command for command in _ALL if command.name}

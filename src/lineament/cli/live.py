@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .locate import UNITS
 from .options import (
     LIMITS,
     METHOD,
@@ -61,6 +62,9 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
+@click.option("--map", type=TEXT_PATH, metavar="PLAN", help="Publish the pose on this plan.")
+@click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
+@click.option("--units", type=UNITS, help="Units of the plan.  [default: those that it names]")
 @click.option(
     "--from", "log", type=TEXT_PATH, metavar="LOG", help="Play a log in place of a topic."
 )

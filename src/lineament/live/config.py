@@ -22,6 +22,7 @@ _CHOICES: dict[str, tuple[object, ...]] = {
     "stamp": STAMPS,
     "reliability": ("best-effort", "reliable"),
     "ros": (0, 1, 2),
+    "units": ("m", "dm", "cm", "mm", "ft", "in"),
 }
 _BOUNDS: dict[str, tuple[float, float]] = {
     "depth": (1, 1000),
@@ -97,6 +98,12 @@ class LiveConfig:
         followed, and its pose goes to ``TOPIC/dock``.
     dock_track : int, optional
         The same of the corner of this track.
+    map : str, optional
+        A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``.
+    layers : str
+        Layers of the plan that hold walls, by commas, as in `LineMap.read`.
+    units : str, optional
+        Units of the plan, as there.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -149,6 +156,9 @@ class LiveConfig:
     track: bool = False
     dock: Point | None = None
     dock_track: int | None = None
+    map: str | None = None
+    layers: str = ""
+    units: str | None = None
     log: str | None = None
     log_topic: str | None = None
     poses: str | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..extractor import Extractor
 from ..features import Features
@@ -17,6 +17,10 @@ from ..scan import LaserScan, Pose
 from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
+
+if TYPE_CHECKING:
+    from ..mapping import LineMap
+    from ..mapping.following import Whereabouts
 
 #: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
 _LATEST = 2**31 * NANO - 1
@@ -49,6 +53,8 @@ class Frame(NamedTuple):
         Where the sensor has come to; None unless features are tracked, for whatever purpose.
     dock : CornerPose or None
         The corner that is docked to; None unless one was asked for, and where it is not seen.
+    where : Whereabouts or None
+        Where the sensor is on the plan; None without one.
     """
 
     scan: LaserScan
@@ -57,6 +63,7 @@ class Frame(NamedTuple):
     tracks: Tracks | None
     travel: Travel | None = None
     dock: CornerPose | None = None
+    where: Whereabouts | None = None
 
 
 class Pipeline:
@@ -71,6 +78,8 @@ class Pipeline:
     ------
     ValueError
         If the method or one of its parameters is unknown or out of bounds.
+    LineamentError
+        If the plan cannot be read.
 
     Examples
     --------
@@ -84,6 +93,7 @@ class Pipeline:
     def __init__(self, config: LiveConfig) -> None:
         self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
+        self._plan = None if config.map is None else _plan_of(config)
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
@@ -116,7 +126,8 @@ class Pipeline:
                 dock = kept.dock(features, tracks, travel.pose, travel.covariance)
         if not self._config.track:
             tracks = None
-        return Frame(scan, straight, features, tracks, travel, dock)
+        where = None if kept.follower is None else kept.follower(features, scan.pose)
+        return Frame(scan, straight, features, tracks, travel, dock, where)
 
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
@@ -148,20 +159,33 @@ class Pipeline:
         if name not in self._publishers:
             if len(self._publishers) >= _MOST_PUBLISHERS:
                 del self._publishers[next(iter(self._publishers))]
-            self._publishers[name] = _Publisher(self._config)
+            self._publishers[name] = _Publisher(self._config, self._plan)
         return self._publishers[name]
 
 
 class _Publisher:
     """What is kept of a publisher from scan to scan."""
 
-    def __init__(self, config: LiveConfig) -> None:
+    def __init__(self, config: LiveConfig, plan: LineMap | None) -> None:
         method = get_method(config.method, **config.parameters)
         self.extractor = Extractor(method, noise=config.noise)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
         self.dock = Dock(config.dock, track=config.dock_track) if config.is_docking else None
+        self.follower = None
+        if plan is not None:
+            from ..mapping.following import Follower
+
+            self.follower = Follower(plan)
         self.last: LaserScan | None = None
+
+
+def _plan_of(config: LiveConfig) -> LineMap:
+    from ..mapping import LineMap
+
+    assert config.map is not None
+    layers = config.layers.split(",") if config.layers else None
+    return LineMap.read(config.map, layers, units=config.units)
 
 
 def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:

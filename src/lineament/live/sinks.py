@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
@@ -14,6 +15,7 @@ from .counters import Report
 from .pipeline import Frame, time_of
 
 if TYPE_CHECKING:
+    from ..mapping.following import Whereabouts
     from ..output.foxglove import FoxgloveMessages
 
 DIAGNOSTICS = "/diagnostics"
@@ -78,14 +80,16 @@ class RosSink:
     config : LiveConfig
         Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
         ``TOPIC/markers``; where they are tracked, the motion of the sensor goes to
-        ``TOPIC/odometry``, and the pose of a corner that is asked for to ``TOPIC/dock``. The scans
-        of a log are published too, with their poses on ``/tf``.
+        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``, and that on a
+        plan to ``TOPIC/pose``, in the frame ``map``. The scans of a log are published too, with
+        their poses on ``/tf``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
         self._publisher, self._make, self._name = publisher, messages, config.name
         self._publishes_scan = config.log is not None
         self._topic = topic = config.scan_topic
+        self._where: Whereabouts | None = None
         topics = {
             f"{topic}/features": "sensor_msgs/PointCloud2",
             f"{topic}/corners": "geometry_msgs/PoseArray",
@@ -96,6 +100,8 @@ class RosSink:
             topics[f"{topic}/odometry"] = "nav_msgs/Odometry"
         if config.is_docking:
             topics[f"{topic}/dock"] = "geometry_msgs/PoseWithCovarianceStamped"
+        if config.map is not None:
+            topics[f"{topic}/pose"] = "geometry_msgs/PoseWithCovarianceStamped"
         if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
@@ -122,7 +128,15 @@ class RosSink:
         if (travel := frame.travel) is not None:
             messages[f"{topic}/odometry"] = lambda to: make.odometry(to, moment, travel)
         if (dock := frame.dock) is not None:
-            messages[f"{topic}/dock"] = lambda to: make.corner_pose(to, moment, dock)
+            messages[f"{topic}/dock"] = lambda to: make.placed(
+                to, moment, dock.pose, dock.covariance
+            )
+        self._where = where = frame.where
+        if where is not None and where.is_known:
+            on_plan = moment._replace(frame=WORLD_FRAME)
+            messages[f"{topic}/pose"] = lambda to: make.placed(
+                to, on_plan, where.pose, where.covariance
+            )
         if self._publishes_scan:
             if (pose := scan.pose) is not None:
                 messages["/tf"] = lambda to: make.transform(to, moment, pose)
@@ -135,15 +149,23 @@ class RosSink:
                 self._publisher.publish(message(name))
 
     def diagnose(self, report: Report, time: tuple[int, int]) -> None:
-        """Publish the report on ``/diagnostics``."""
+        """Publish the report on ``/diagnostics``, and the verdict on the last pose."""
+        self._diagnose(self._topic, report.level, str(report), report.values, time)
+        if (where := self._where) is not None:
+            level = 0 if where else 1 if where.is_known else 2
+            self._diagnose(f"{self._topic}/pose", level, where.verdict, _figures(where), time)
+
+    def _diagnose(
+        self, topic: str, level: int, summary: str, values: dict[str, str], time: tuple[int, int]
+    ) -> None:
         message = self._make.diagnostics(
             DIAGNOSTICS,
             Moment(*time, "", ""),
-            name=f"{self._name}: {self._topic}",
+            name=f"{self._name}: {topic}",
             hardware_id=self._topic,
-            level=report.level,
-            summary=str(report),
-            values=report.values,
+            level=level,
+            summary=summary,
+            values=values,
         )
         self._publisher.publish(message)
 
@@ -196,3 +218,17 @@ class FoxgloveSink:
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
     return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)
+
+
+def _figures(where: Whereabouts) -> dict[str, str]:
+    """Pose, deviations and evidence by name, as text."""
+    (x, y, theta), evidence = where.pose, where.evidence
+    of_x, of_y, of_theta = (math.sqrt(where.covariance[k, k]) for k in range(3))
+    return {
+        "x [m]": f"{x:.3f} ± {of_x:.3f}",
+        "y [m]": f"{y:.3f} ± {of_y:.3f}",
+        "theta [°]": f"{math.degrees(theta):.2f} ± {math.degrees(of_theta):.2f}",
+        "explained [%]": f"{100 * evidence.explained:.1f}",
+        "contradicted [%]": f"{100 * evidence.contradicted:.1f}",
+        "log odds": f"{evidence.log_odds:.1f}",
+    }

@@ -174,6 +174,7 @@ class LineMap:
         path: str | os.PathLike[str],
         layers: Sequence[str] | None = None,
         *,
+        units: str | None = None,
         sigma: float = 0.0,
     ) -> Self:
         """Read a plan: DXF, or a table of features in the frame of the world (Parquet).
@@ -185,6 +186,8 @@ class LineMap:
         layers : sequence of str, optional
             The layers of a DXF that hold walls, ``*`` stands for anything; by default those with
             "wall" in their name, or all if there are none.
+        units : str, optional
+            Those of a DXF: m, dm, cm, mm, ft or in; by default those that it names, or metres.
         sigma : float
             How far the drawn walls are from where they stand [m].
 
@@ -193,7 +196,7 @@ class LineMap:
         LineamentError
             If the file cannot be read or has no walls.
         """
-        return cls(*read_plan(path, layers), sigma=sigma)
+        return cls(*read_plan(path, layers, units), sigma=sigma)
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""

@@ -19,23 +19,31 @@ UNITS = {
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 8: 2.54e-8,
     9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0,
 }  # fmt: skip
+#: Numbers of the units that a person names.
+NAMES = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "dm": 14}
 #: A bend becomes chords that are off it by no more [m].
 SAG = 0.01
 
 Plan = tuple[NDArray[np.void], NDArray[np.void]]
 
 
-def read_plan(path: str | os.PathLike[str], layers: Sequence[str] | None = None) -> Plan:
+def read_plan(
+    path: str | os.PathLike[str],
+    layers: Sequence[str] | None = None,
+    units: str | None = None,
+) -> Plan:
     """Return walls and columns of a plan by the ending of its path; see `LineMap.read`."""
     ending = Path(path).suffix.lower()
     if ending == ".dxf":
-        return _read_dxf(path, layers)
+        return _read_dxf(path, layers, units)
     if ending == ".parquet":
         return _read_table(path)
     raise LineamentError(f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}")
 
 
-def _read_dxf(path: str | os.PathLike[str], layers: Sequence[str] | None) -> Plan:
+def _read_dxf(
+    path: str | os.PathLike[str], layers: Sequence[str] | None, units: str | None
+) -> Plan:
     with needed_by(f"{path}:"):
         import ezdxf
     try:
@@ -44,7 +52,8 @@ def _read_dxf(path: str | os.PathLike[str], layers: Sequence[str] | None) -> Pla
         raise LineamentError(f"{path}: {error.strerror or 'is no DXF'}") from None
     except ezdxf.DXFError as error:  # type: ignore[attr-defined]
         raise LineamentError(f"{path}: is no DXF: {error}") from None
-    unit = UNITS.get(drawing.header.get("$INSUNITS", 0), 1.0)
+    drawn = drawing.header.get("$INSUNITS", 0) if units is None else NAMES[units]
+    unit = UNITS.get(drawn, 1.0)
     entities = list(_exploded(drawing.modelspace()))
     names = dict.fromkeys(entity.dxf.layer for entity in entities)
     if layers is None:

@@ -21,7 +21,7 @@ from .markers import is_drawn
 from .scene import ODOMETRY_FRAME, Layer, Message, Moment, SceneMessages, cloud_of, single
 
 if TYPE_CHECKING:
-    from ..motion import CornerPose, Tracks, Travel
+    from ..motion import Tracks, Travel
 
 # Numbers of visualization_msgs/Marker: its types and its actions.
 LINE_LIST, SPHERE_LIST = 5, 7
@@ -73,11 +73,11 @@ class RosMessages(SceneMessages):
         writer.array(_six(travel.twist_covariance))
         return self._message(topic, "nav_msgs/Odometry", writer)
 
-    def corner_pose(self, topic: str, moment: Moment, found: "CornerPose") -> Message:
-        """``geometry_msgs/PoseWithCovarianceStamped``, in the frame of the scan."""
+    def placed(self, topic: str, moment: Moment, pose: Pose, covariance: Array) -> Message:
+        """``geometry_msgs/PoseWithCovarianceStamped``, in the frame of the moment."""
         writer = self._begin(moment)
-        writer.numbers("7d", *_pose(found.pose))
-        writer.array(_six(found.covariance))
+        writer.numbers("7d", *_pose(pose))
+        writer.array(_six(covariance))
         return self._message(topic, "geometry_msgs/PoseWithCovarianceStamped", writer)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:

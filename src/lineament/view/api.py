@@ -14,6 +14,7 @@ _MOST_DIGITS = 12
 _ROUTES = {
     "/api/logs": (Session.logs, ()),
     "/api/log": (Session.facts, ("log",)),
+    "/api/plan": (Session.plan, ()),
     "/api/stamps": (Session.stamps, ("log", "first", "count")),
     "/api/poses": (Session.poses, ("log", "first", "count")),
     "/api/drive": (Session.drive, ("log", "first", "step", "count")),
@@ -38,6 +39,7 @@ def answer(session: Session, target: str) -> bytes:
 
     - ``/api/logs``: the names of logs and methods.
     - ``/api/log?log=``: what a log is, and how much of it has been read.
+    - ``/api/plan``: the walls of the plan.
     - ``/api/stamps?log=&first=&count=``, ``/api/poses?...``: stamps, poses of some scans.
     - ``/api/drive?log=&first=&step=&count=``: poses and points of every so many scans.
     - ``/api/scan?log=&i=&method=``: a scan and what a method finds in it.

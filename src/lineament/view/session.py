@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..logs import find_logs
 from ..progress import compiling_now
 from ..scan import LaserScan
 from .shown import ShownLog
+
+if TYPE_CHECKING:
+    from ..mapping import LineMap
 
 #: Logs that are kept open; of more, the one that was asked for least recently is closed.
 KEPT = 4
@@ -30,6 +33,8 @@ class Session:
     their number from 0 on; each is opened when it is first asked for, the first at once where
     there is no other. The page shows the extractors by their names, the first of them first.
 
+    With a plan, the poses of the logs are odometry, and those on the plan take their place.
+
     Raises a LogError if no log is found, or the only one cannot be read up to its first scan.
     """
 
@@ -37,12 +42,13 @@ class Session:
         self,
         paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
         extractors: Mapping[str, Extractor],
+        plan: LineMap | None = None,
         **reading: Any,
     ) -> None:
         paths = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
         self.extractors = dict(extractors)
         self._busy = {name: threading.Lock() for name in self.extractors}
-        self._paths, self._reading = find_logs(paths), reading
+        self._paths, self._reading, self._plan = find_logs(paths), reading, plan
         self.name = ", ".join(map(str, paths))
         self._open: dict[int, ShownLog] = {}  # the one that was asked for last is the last
         self._opening = threading.Lock()
@@ -68,7 +74,7 @@ class Session:
             shown = self._open.pop(number, None)
             if shown is None:
                 room = ROOM // min(len(self._paths), KEPT)
-                shown = ShownLog(self._paths[number], room, self._reading)
+                shown = ShownLog(self._paths[number], room, self._reading, self._plan)
             self._open[number] = shown
             if len(self._open) > KEPT:
                 self._open.pop(next(iter(self._open))).close()
@@ -97,6 +103,11 @@ class Session:
         """Return the poses of some scans (m, m, rad); NaN where there is none."""
         return {"first": first, "poses": self.log(log).store.poses(first, count)}
 
+    def plan(self) -> dict[str, Any]:
+        """Return the walls of the plan, ``x1 y1 x2 y2`` each [m]; none where there is no plan."""
+        walls = [] if self._plan is None else self._plan.ends.reshape(-1, 4).round(4).tolist()
+        return {"walls": walls}
+
     def drive(self, log: int, first: int, step: int, count: int) -> dict[str, Any]:
         """Return poses and points of every `step`-th scan; see `ShownLog.drive`."""
         return self.log(log).drive(first, step, count)
@@ -110,7 +121,9 @@ class Session:
         topic, scan = self.log(log).store.item(index)
         with self._busy[method]:
             features = self.extractors[method](scan).to_dict()
-        return {"index": index, "method": method, "topic": topic} | _beams(scan) | features
+        where = self.log(log).where(index)
+        about = {"index": index, "method": method, "topic": topic, "where": where}
+        return about | _beams(scan) | features
 
     def trace(self, log: int, index: int, method: str, beam: int) -> dict[str, Any]:
         """Return what became of a beam; ValueError if it is not there, IndexError for the scan."""

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import tempfile
 import threading
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LineamentError
+from ..extractor import Extractor
 from ..kernels import FARTHEST
 from ..logs import open_log, save_npz
 from ..scan import LaserScan
-from .store import ScanStore
+from .store import Item, ScanStore
+
+if TYPE_CHECKING:
+    from ..mapping import LineMap
 
 #: Most points of a scan that is shown behind others.
 MOST_POINTS = 360
@@ -27,7 +33,9 @@ class ShownLog:
     the log cannot be read up to its first scan.
     """
 
-    def __init__(self, path: str, capacity: int, reading: dict[str, Any]) -> None:
+    def __init__(
+        self, path: str, capacity: int, reading: dict[str, Any], plan: LineMap | None = None
+    ) -> None:
         log = open_log(path, **reading)
         log.scan(0)
         self._about: dict[str, Any] = {"format": log.format, "total": None}
@@ -35,6 +43,7 @@ class ShownLog:
         # Another log, as each iteration counts its faults anew.
         again = lambda: open_log(path, **reading).items()  # noqa: E731
         self.store = ScanStore(again, capacity=capacity)
+        self._plan, self._where = plan, dict[int, dict[str, Any]]()
         # The thread alone holds the log, and a temporary copy that it may have, while it reads.
         self._reader = threading.Thread(
             target=self._fill, args=(log,), name="reader of the log", daemon=True
@@ -71,6 +80,10 @@ class ShownLog:
                 scans.append({"index": index, "pose": scan.pose, "points": points})
         return {"scans": scans}
 
+    def where(self, index: int) -> dict[str, Any] | None:
+        """Return what is known of the pose of a scan on the plan; None without one."""
+        return self._where.get(index)
+
     def npz(self, index: int) -> bytes:
         """Return a scan as an npz log; ValueError if it has no beams, IndexError if not read."""
         _, scan = self.store.item(index)
@@ -79,10 +92,25 @@ class ShownLog:
             save_npz(path, [scan])
             return path.read_bytes()
 
+    def _located(self, items: Iterable[Item]) -> Iterator[Item]:
+        """Yield scans with their poses on the plan, or none while that is not known."""
+        from ..mapping.following import Follower
+
+        assert self._plan is not None
+        follower, extract = Follower(self._plan), Extractor()
+        for index, (topic, scan) in enumerate(items):
+            where = follower(extract(scan), scan.pose)
+            self._where[index] = {
+                "verdict": where.verdict,
+                "covariance": where.covariance.tolist() if where.is_known else None,
+                **asdict(where.evidence),
+            }
+            yield topic, scan.with_pose(where.pose if where.is_known else None)
+
     def _fill(self, log: Any) -> None:
         try:
             self._about["total"] = len(log)
-            self.store.fill(log.items())
+            self.store.fill(log.items() if self._plan is None else self._located(log.items()))
         except LineamentError as error:
             self._faults["error"] = str(error)
         except Exception as error:  # Nobody else could report it: the page does.

@@ -74,6 +74,25 @@ export class Drawing {
     }
   }
 
+  /** The walls of the plan. */
+  plan(walls) {
+    this.#pen(this.theme.ink, 1.2);
+    for (const [a, b, c, d] of walls) this.#path([[a, b], [c, d]].map((p) => this.plane.toPixels(p, this.size)));
+  }
+
+  /** The ellipse of three deviations about the sensor, at least as large as can be seen. */
+  pose(where) {
+    if (!where?.covariance) return;
+    const [[xx, xy], [, yy]] = where.covariance, middle = (xx + yy) / 2;
+    const spread = Math.hypot((xx - yy) / 2, xy), turn = Math.atan2(2 * xy, xx - yy) / 2;
+    const radii = [middle + spread, middle - spread].map((v) => Math.max(3 * Math.sqrt(Math.max(v, 0)) * this.plane.scale, 4));
+    const { x, y } = this.frame, [u, v] = this.plane.toPixels([x, y], this.size);
+    this.ctx.beginPath();
+    this.ctx.ellipse(u, v, ...radii, -turn, 0, 2 * Math.PI);
+    this.#pen(where.verdict === "located" ? this.theme.accent : this.theme.edge, 2);
+    this.ctx.stroke();
+  }
+
   grid() {
     const { plane, size, theme } = this, step = roundLength(plane.scale, 56);
     const [left, top] = plane.toMetres([0, 0], size);

@@ -14,6 +14,8 @@ export const LAYERS = [
   { name: "breakpoints", key: "break", draw: (on, d, s) => on && s.scan && d.breakpoints(s.scan) },
   { name: "edges", key: "edge", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "edges", s.sigmas) },
   { name: "corners", key: "corner", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "corners", s.sigmas) },
+  { name: "plan", draw: (on, d, s) => on && s.plan && d.plan(s.plan) },
+  { name: "pose", draw: (on, d, s) => on && s.plan && s.scan && d.pose(s.scan.where) },
 ];
 
 /** The boxes that switch them. */
@@ -47,6 +49,11 @@ export class Layers {
 
   toggle(k) {
     this.#boxes[LAYERS[k].name].click();
+  }
+
+  /** Whether there is a plan, and a pose on it. */
+  offerPlan(isThere) {
+    for (const name of ["plan", "pose"]) this.#boxes[name].parentElement.hidden = !isThere;
   }
 
   /** The drive is there in the world frame alone. */

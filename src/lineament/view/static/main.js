@@ -24,6 +24,7 @@ class App {
   panels = [];
   number = 0; // of the log
   drive = null; // of the log
+  plan = null; // walls [x1, y1, x2, y2], where there is one
   world = false; // the frame that is shown
   asked = null; // { panel, beam, index } that "why?" is about
   cursor = null; // { panel, point } of the pointer
@@ -47,6 +48,10 @@ class App {
     this.pins = new Pins($("pins"), $("unpin"), $("pins-hint"));
     this.layers = new Layers($("layers"), () => this.redraw());
     this.layers.hide(wanted.hidden);
+    const { walls } = await ask("plan");
+    if (walls.length) this.plan = walls;
+    this.layers.offerPlan(walls.length > 0);
+    wanted.world ||= walls.length > 0 && !location.hash;
     $("sigmas").value = wanted.sigmas ?? "3";
     if (!$("sigmas").value) $("sigmas").value = "3";
     const methods = wanted.methods.filter((name) => this.methods.includes(name));
@@ -168,7 +173,9 @@ class App {
   #loaded(index) {
     const { scan, frame, size } = this.panels[0], { view, beam } = this.#wanted;
     $("problem").hidden = true;
-    $("topic").textContent = `${scan.topic} in `;
+    const { where } = scan, percent = (share) => `${Math.round(100 * share)} %`;
+    const verdict = where && `${where.verdict}: ${percent(where.explained)} explained, ${percent(where.contradicted)} contradicted; `;
+    $("topic").textContent = `${verdict ?? ""}${scan.topic} in `;
     if (this.asked && this.asked.index !== index) this.asked = null;
     document.body.dataset.scan = index;
     if (view) this.look(() => this.plane.look(view, size));
@@ -186,7 +193,7 @@ class App {
     const [{ scan, outline, size }] = this.panels;
     if (!scan || !size.width) return;
     this.#fits = true;
-    const points = [...outline, ...(this.world ? this.drive.outline : [])];
+    const points = [...outline, ...(this.world ? [...this.drive.outline, ...(this.plan ?? [])] : [])];
     this.plane.fit(points.length ? points : [[0, 0]], size);
     this.redraw();
   }

@@ -104,6 +104,7 @@ export class Panel {
     const scene = {
       scan: seen, index: scan?.index, sigmas: app.sigmas,
       drive: app.world && scan ? app.drive : null, backdrop: this.#backdrop,
+      plan: app.world ? app.plan : null,
     };
     drawing.grid();
     for (const layer of LAYERS) layer.draw(shown[layer.name], drawing, scene);

@@ -1,0 +1,76 @@
+"""The command that finds a log on a plan."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import (
+    LOG,
+    METHOD,
+    NOISE,
+    PATH,
+    QUIET,
+    SET,
+    check_ending,
+    complain,
+    make_extractor,
+)
+from .options import reading_odometry as reading
+
+MAP = click.option("--map", "plan", type=PATH, required=True, help="The plan: .dxf or .parquet.")
+LAYERS = click.option(
+    "--layers",
+    metavar="NAMES",
+    callback=lambda _context, _option, names: names.split(",") if names else None,
+    help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
+)
+UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
+
+
+@click.command()
+@LOG
+@MAP
+@click.option("-o", "--output", required=True, type=PATH, help="Poses: .tum, .csv or .parquet.")
+@LAYERS
+@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
+@METHOD
+@SET
+@NOISE
+@reading
+@QUIET
+def locate(
+    log: Path | str,
+    plan: Path,
+    output: Path,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    no_odometry: bool,
+    quiet: bool,
+    reading: dict[str, Any],
+    **drawn: Any,
+) -> None:
+    """Find where each scan of LOG was taken on a plan, and where that is not known.
+
+    Poses of the log are taken as odometry: their changes, not where they are.
+    """
+    from ..tasks.locate import ENDINGS, locate_log
+    from .progress import tracker
+
+    check_ending(output, ENDINGS)
+    found = locate_log(
+        log,
+        plan,
+        output,
+        make_extractor(method, settings, noise),
+        odometry=not no_odometry,
+        track=tracker(quiet),
+        **drawn,
+        **reading,
+    )
+    if found.warning:
+        complain(f"lineament: {found.warning}")
+    if not quiet:
+        click.echo(str(found))

@@ -1,0 +1,236 @@
+"""`Follower`: where a sensor is on a plan, scan by scan; when it is lost, and found again."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..features import Features
+from ..motion import Tracker
+from ..motion.odometry import compose_jacobians
+from ..scan import Array, Pose
+from ..scan.poses import compose, relative
+from .evidence import Evidence, evidence_of
+from .line_map import LineMap
+from .local_map import LocalMap, beams_of, thinned
+from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
+
+#: The plan is looked at after so much way, turn or time [m, rad, s].
+STEP, TURN, PERIOD = 0.5, 0.26, 1.0
+#: Scans farther apart are not of one drive: by time without odometry [s], by odometry [m].
+GAP, JUMP = 5.0, 2.0
+#: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
+WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
+#: So many scans in a row that chance explains as well are enough; of looks at the plan that say
+#: that it is not there, three: each that says otherwise takes back a part of one.
+MOST_DOUBTS, MOST_MISSED, TAKEN_BACK = 4, 2.0, 0.25
+#: A scan that is contradicted by a larger share of its beams is not where the pose says.
+DENIED = 0.12
+#: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
+_DRIFT, _TURN_DRIFT = 0.005, 0.002
+#: Error of walls and beams beside their covariances [m]: where scans are judged by themselves.
+_TIGHT = 0.03
+_UNKNOWN = np.diag((1e6, 1e6, 10.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whereabouts:
+    """Where the sensor is at one scan.
+
+    Attributes
+    ----------
+    verdict : str
+        One of `VERDICTS`; "located" too between two looks at the plan, while the covariance of the
+        pose is small.
+    pose : (x, y, theta)
+        In the frame of the plan [m, m, rad]; only a guess where the verdict is not "located".
+    covariance : ndarray, shape (3, 3)
+        Of the pose [m, m, rad].
+    evidence : Evidence
+        What the beams of this scan alone say of the pose.
+    location : Location or None
+        What `locate` found, if the plan was looked at with this scan.
+    """
+
+    verdict: str
+    pose: Pose
+    covariance: Array
+    evidence: Evidence
+    location: Location | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a pose, at least but for a direction."""
+        return self.verdict in (LOCATED, UNOBSERVED) and self.covariance[2, 2] < 1.0
+
+    def __bool__(self) -> bool:
+        return self.verdict == LOCATED
+
+
+class Follower:
+    """Follows a sensor on a plan from scan to scan, without a first guess.
+
+    The last metres are looked for on the whole plan until they are located. From then on the pose
+    moves on with the tracker, and each few decimetres the plan is looked at near it. The sensor is
+    lost where scan after scan contradicts the plan, and where nothing fixes the pose any more: its
+    covariance grows. It is then looked for on the whole plan again, by what was seen since.
+
+    Parameters
+    ----------
+    plan : LineMap
+    way : float
+        Length of the way that is looked for [m].
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, drive, room
+    >>> plan = LineMap.from_lines(room().segments)
+    >>> follower, extract = Follower(plan), ln.Extractor()
+    >>> for scan in drive(room(), [(-2, 0), (-1, 0)], SENSORS["utm30lx"], speed=1, rate=10):
+    ...     where = follower(extract(scan))
+    >>> where.verdict, [round(value, 2) + 0.0 for value in where.pose]
+    ('located', [-1.0, 0.0, 0.0])
+    """
+
+    def __init__(self, plan: LineMap, way: float = 5.0) -> None:
+        self.plan, self.way = plan, way
+        self._stamp = math.nan
+        self._odometry: Pose | None = None
+        self._restart()
+
+    def _restart(self) -> None:
+        """Forget what was seen, and where."""
+        self._tracker, self._local = Tracker(), LocalMap(self.way)
+        self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), _UNKNOWN
+        self._doubts, self._missed = 0, 0.0
+        self._since = self._turned = math.inf
+        self._looked = math.nan
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the pose is known well enough to be followed."""
+        return self._verdict in (LOCATED, UNOBSERVED) and self._deviations[0] < WORST
+
+    @property
+    def _deviations(self) -> tuple[float, float]:
+        """Largest deviation of the place [m], and that of the angle [rad]."""
+        spread = self._covariance
+        return math.sqrt(np.linalg.eigvalsh(spread[:2, :2])[1]), math.sqrt(spread[2, 2])
+
+    def __call__(self, features: Features, odometry: Pose | None = None) -> Whereabouts:
+        """Take in the next scan.
+
+        Parameters
+        ----------
+        features : Features
+            As `Extractor` returns them, with their scan.
+        odometry : (x, y, theta), optional
+            Pose of the sensor by odometry, in any frame that stays [m, m, rad].
+        """
+        if self._is_torn(features.stamp, odometry):
+            self._restart()
+        self._stamp, self._odometry = features.stamp, odometry
+        was_known, tracks = self.is_known, self._tracker(features, odometry)
+        self._local.add(features, tracks, odometry)
+        if tracks.motion is not None:
+            self._move(tracks.motion.pose, tracks.motion.covariance)
+        evidence = self._judge(features)
+        if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
+            # What was seen before may be of another place: this scan begins anew.
+            self._restart()
+            self._local.add(features, self._tracker(features, odometry))
+        location = None
+        waited = features.stamp - self._looked
+        is_doubtful = self.is_known and evidence.contradicted > DENIED
+        if is_doubtful or self._since > STEP or self._turned > TURN or waited > PERIOD:
+            location = self._look()
+            self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
+            evidence = self._judge(features)
+        is_wrong = self.is_known and evidence.contradicted > DENIED
+        verdict = LOST if is_wrong else self._verdict
+        return Whereabouts(verdict, self._pose, self._covariance, evidence, location)
+
+    def _is_torn(self, stamp: float, odometry: Pose | None) -> bool:
+        """Whether the motion since the last scan is unknown."""
+        duration = stamp - self._stamp
+        if odometry is None or self._odometry is None:
+            return duration > GAP or duration < 0
+        x, y, _ = relative(self._odometry, odometry)
+        return duration < 0 or math.hypot(x, y) > JUMP
+
+    def _move(self, motion: Pose, covariance: Array) -> None:
+        """Go on by a motion."""
+        way, turn = math.hypot(motion[0], motion[1]), abs(motion[2])
+        of_pose, of_motion = compose_jacobians(self._pose, motion)
+        drift = np.diag((_DRIFT**2 * way,) * 2 + (_TURN_DRIFT**2 * (way + turn),))
+        self._covariance = (
+            of_pose @ self._covariance @ of_pose.T + of_motion @ (covariance + drift) @ of_motion.T
+        )
+        self._pose = compose(self._pose, motion)
+        self._since += way
+        self._turned += turn
+        if self._verdict in (LOCATED, UNOBSERVED):
+            self._verdict = self._by_covariance()
+
+    def _by_covariance(self) -> str:
+        """Return the verdict on a pose that was located, as it is known now."""
+        place, turn = self._deviations
+        if place > WORST or turn > WORST_TURN:
+            return LOST
+        return UNOBSERVED if place > UNSURE else LOCATED
+
+    def _judge(self, features: Features) -> Evidence:
+        """Return what the beams of a scan alone say of the pose; count scans that doubt it."""
+        assert features.scan is not None
+        beams = thinned(beams_of(features, features.scan))
+        pose = np.array([self._pose])
+        spread = min(math.hypot(_TIGHT, self._deviations[0]), UNSURE)
+        odds, explained, short, contradicted = evidence_of(pose, beams, self.plan.index, spread)[0]
+        self._doubts = self._doubts + 1 if self.is_known and odds < 0 else 0
+        return Evidence(odds, explained, short, contradicted, len(beams))
+
+    def _look(self) -> Location:
+        """Look for the last metres on the plan: near the pose if it is known, or everywhere."""
+        query = self._local.query()
+        if not self.is_known:
+            found = locate(query, self.plan)
+            self._verdict, self._pose = found.verdict, found.pose
+            self._covariance = found.covariance if found else _UNKNOWN
+            self._missed = 0.0
+            return found
+        found = locate(query, self.plan, self._pose, self._covariance)
+        self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
+        if found.verdict in (LOCATED, UNOBSERVED):
+            self._pose, self._covariance = combined(
+                (self._pose, self._covariance), (found.pose, _spread_of(found))
+            )
+            self._verdict = self._by_covariance()
+        return found
+
+
+def _spread_of(found: Location) -> Array:
+    """Return the covariance of a location, as wide as its alternatives lie apart."""
+    spread = found.covariance.copy()
+    if found.unobserved is not None:
+        for pose, _ in found.alternatives:
+            way = np.dot(found.unobserved, np.subtract(pose[:2], found.pose[:2]))
+            spread[:2, :2] += np.outer(found.unobserved, found.unobserved) * way**2
+    return spread
+
+
+def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:
+    """Combine two poses, each with its covariance, whose errors may be the same ones.
+
+    Covariance intersection (Julier and Uhlmann 1997): of the weighted means that never claim too
+    much, that of the least determinant.
+    """
+    of_known, of_other = np.linalg.inv(known[1]), np.linalg.inv(other[1])
+    weights = np.linspace(0.0, 1.0, 21)[:, None, None]
+    sums = (1 - weights) * of_known + weights * of_other
+    best = int(np.linalg.det(sums).argmax())
+    covariance = np.linalg.inv(sums[best])
+    off = np.subtract(other[0], known[0])
+    off[2] = math.remainder(off[2], 2 * math.pi)
+    x, y, theta = (known[0] + weights[best, 0, 0] * covariance @ of_other @ off).tolist()
+    return (x, y, math.remainder(theta, 2 * math.pi)), covariance

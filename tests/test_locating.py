@@ -1,0 +1,298 @@
+"""A log on a plan: followed, lost where it is carried away, found again; the command and live."""
+
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import lineament as ln
+from lineament.cli import run
+from lineament.live import LiveConfig
+from lineament.live.counters import Counts, Report
+from lineament.live.pipeline import Pipeline
+from lineament.live.sinks import RosSink
+from lineament.logs import save_npz
+from lineament.mapping import LineMap
+from lineament.mapping.following import Follower, combined
+from lineament.output.ros_messages import RosMessages
+from lineament.simulation import SENSORS, World, room
+from lineament.simulation.buildings import office
+from lineament.simulation.wheels import Wheels
+from lineament.view import Session
+from lineament.view.api import answer
+
+TRUTH = Path(os.environ.get("LINEAMENT_DATA", "data")) / "truth"
+SEED, SIZE, RATE = 1, (40.0, 24.0), 4.0
+
+
+@pytest.fixture(scope="module")
+def storey():
+    return office(SEED, SIZE)
+
+
+@pytest.fixture(scope="module")
+def drive(storey):
+    """Scans with odometry, and where they were taken."""
+    scans, truth = storey.drive(
+        SENSORS["utm30lx"], seed=SEED, speed=1.0, rate=RATE, people=6, wheels=Wheels()
+    )
+    return [scan for scan, _ in zip(scans, range(200), strict=False)], truth[:200]
+
+
+def plan_of(world: World) -> LineMap:
+    return LineMap.from_lines(world.segments)
+
+
+def bare(scan, stamp):
+    """The same scan at another time, without odometry."""
+    bearings = scan.angle_min, scan.angle_increment
+    return ln.LaserScan(scan.ranges, *bearings, range_max=scan.range_max, stamp=stamp)
+
+
+def followed(scans, plan, odometry=True):
+    follower, extract = Follower(plan), ln.Extractor()
+    return [follower(extract(scan), scan.pose if odometry else None) for scan in scans]
+
+
+def errors(found, truth):
+    """Errors of the poses that are located: place, turn, NEES."""
+    rows = []
+    for where, true in zip(found, truth, strict=True):
+        off = np.subtract(where.pose, true)
+        off[2] = math.remainder(off[2], 2 * math.pi)
+        if where:
+            nees = off @ np.linalg.solve(where.covariance, off) / 3
+            rows.append((math.hypot(off[0], off[1]), abs(off[2]), nees))
+    return np.array(rows).reshape(-1, 3).T
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_followed_from_the_first_metres_on(storey, drive, odometry):
+    scans, truth = drive
+    found = followed(scans[:80], plan_of(storey.plan), odometry)
+    place, turn, nees = errors(found, truth[:80])
+    assert len(place) > 0.9 * len(found)
+    assert place.max() < 0.1
+    assert turn.max() < math.radians(1)
+    assert np.median(place) < 0.005
+    assert nees.mean() < 1.2
+    looks = [where for where in found if where.location is not None]
+    assert len(looks) < 0.8 * len(found)
+
+
+@pytest.mark.parametrize("kind", ["mirrored", "another"])
+def test_never_located_on_a_plan_of_another_building(storey, drive, kind):
+    other = storey.mirrored() if kind == "mirrored" else office(SEED + 50, SIZE).plan
+    found = followed(drive[0][:80], plan_of(other))
+    assert not any(found)
+    assert {where.verdict for where in found} <= {"not on this map", "ambiguous"}
+
+
+def test_carried_away_lost_at_once_and_found_again(storey, drive):
+    """Stamps go on, wheels are not asked: only the walls say that it is elsewhere."""
+    scans, truth = drive
+    kept = [*range(60), *range(130, 200)]
+    joined = [bare(scans[k], i / RATE) for i, k in enumerate(kept)]
+    found = followed(joined, plan_of(storey.plan))
+    place, _, _ = errors(found, [truth[k] for k in kept])
+    assert place.max() < 0.2  # wherever it is located, there is no old pose
+    lost = [not where for where in found]
+    assert not any(lost[20:60])
+    assert lost[60] or found[60].location is not None
+    assert not any(lost[-10:])
+
+
+def test_a_gap_is_lost_time(storey, drive):
+    scans, truth = drive
+    after = [bare(scan, scan.stamp + 60) for scan in scans[100:140]]
+    before = [bare(scan, scan.stamp) for scan in scans[:20]]
+    found = followed([*before, *after], plan_of(storey.plan))
+    place, _, _ = errors(found, [*truth[:20], *truth[100:140]])
+    assert place.max() < 0.2
+    assert found[20].location is not None
+    assert any(found[-10:])
+
+
+def test_combined_poses_claim_no_more_than_the_better_of_the_two():
+    narrow, wide = np.diag((1e-4, 1.0, 1e-4)), np.diag((4e-4, 1e-4, 4e-4))
+    pose, covariance = combined(((0, 0, math.pi - 0.01), narrow), ((0.01, 0.5, -math.pi), wide))
+    assert 0 <= pose[0] <= 0.01
+    assert pose[1] == pytest.approx(0.5, abs=0.01)
+    assert abs(math.remainder(pose[2] - math.pi, 2 * math.pi)) <= 0.01
+    diagonal = np.diag(covariance)
+    assert (diagonal >= np.minimum(np.diag(narrow), np.diag(wide)) - 1e-12).all()
+    same, spread = combined(((1.0, 2.0, 3.0), narrow), ((1.0, 2.0, 3.0), narrow))
+    assert same == pytest.approx((1.0, 2.0, 3.0))
+    np.testing.assert_allclose(spread, narrow)
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Scans of a room, and its plan as DXF."""
+    place, sensor = room(), SENSORS["utm30lx"]
+    scans = [
+        sensor.scan(place, (-2 + 0.1 * k, 0.2, 0.3), np.random.default_rng(k), k / 10)
+        for k in range(12)
+    ]
+    scans = [bare(scan, scan.stamp) for scan in scans]
+    save_npz(tmp_path / "log.npz", scans)
+    save_npz(tmp_path / "one.npz", scans[:1])
+    plan_of(place).write(tmp_path / "plan.dxf")
+    return tmp_path
+
+
+@pytest.mark.parametrize("log", ["log", "one"])
+@pytest.mark.parametrize("ending", ["tum", "csv", "parquet"])
+def test_the_command(files, capsys, log, ending):
+    out = files / f"poses.{ending}"
+    status = run(["locate", f"{files / log}.npz", "--map", str(files / "plan.dxf"), "-o", str(out)])
+    said = capsys.readouterr()
+    scans = 12 if log == "log" else 1
+    assert (status, said.err) == (0, "")
+    assert f"{scans} scans: 100.0 % located" in said.out
+    assert "located first after 0.0 s, lost 0 times" in said.out
+    if ending == "parquet":
+        table = pq.read_table(out)
+        assert table["verdict"].to_pylist() == ["located"] * scans
+        x = table["x"].to_numpy()
+        assert (table["cov_xx"].to_numpy() > 0).all()
+    elif ending == "csv":
+        x = np.genfromtxt(out, delimiter=",", names=True, encoding="utf-8")["x"].reshape(-1)
+    else:
+        rows = np.loadtxt(out, ndmin=2)
+        x = rows[:, 1]
+        assert rows.shape == (scans, 8)
+        np.testing.assert_allclose(2 * np.arctan2(rows[:, 6], rows[:, 7]), 0.3, atol=0.01)
+    np.testing.assert_allclose(x, -2 + 0.1 * np.arange(scans), atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("units", "status", "told"),
+    [
+        ("mm", 0, "plan.dxf: is 0.006 m x 0.004 m: is it drawn in other units? (--units)"),
+        ("m", 0, ""),
+    ],
+)
+def test_units_and_a_plan_of_no_size(files, capsys, units, status, told):
+    log, plan = str(files / "log.npz"), str(files / "plan.dxf")
+    out = str(files / "poses.csv")
+    assert run(["locate", log, "--map", plan, "-o", out, "--units", units]) == status
+    said = capsys.readouterr()
+    assert told in said.err
+    assert ("never located" in said.out) == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--layers", "doors"], "no layer is doors"),
+        (["--map", "none.dxf"], "none.dxf: No such file"),
+        (["-o", "a.txt"], "expected an ending of .tum, .csv, .parquet"),
+    ],
+)
+def test_one_line_for_what_cannot_be_done(files, capsys, arguments, told):
+    given = [str(files / "log.npz"), "--map", str(files / "plan.dxf"), "-o", str(files / "a.tum")]
+    assert run(["locate", *given, *arguments]) in (1, 2)
+    said = capsys.readouterr().err
+    assert told in said
+    assert said.count("\n") == 1
+    assert not (files / "a.tum").exists()
+
+
+class Kept:
+    """A publisher that keeps what it is given."""
+
+    unsent = 0
+
+    def __init__(self):
+        self.topics, self.sent = {}, []
+
+    def advertise(self, topic, kind):
+        self.topics[topic] = kind
+
+    def listeners(self, topic):
+        return topic in self.topics
+
+    def publish(self, message):
+        self.sent.append(message)
+
+
+@pytest.mark.parametrize("layers", ["", "walls,segments,*"])
+def test_live_publishes_pose_and_verdict(files, layers):
+    config = LiveConfig(map=str(files / "plan.dxf"), layers=layers)
+    publisher, pipeline = Kept(), Pipeline(config)
+    sink = RosSink(publisher, RosMessages("cdr"), config)
+    assert publisher.topics["/scan/pose"] == "geometry_msgs/msg/PoseWithCovarianceStamped"
+    sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
+    assert len(publisher.sent) == 1
+    for scan in ln.open_log(files / "log.npz"):
+        frame = pipeline("a", scan)
+        sink.publish(frame)
+    assert frame.where.verdict == "located"
+    of_pose = [message for message in publisher.sent if message.topic == "/scan/pose"]
+    assert len(of_pose) == 12
+    assert b"map\0" in of_pose[0].data
+    publisher.sent.clear()
+    sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
+    assert len(publisher.sent) == 2
+    assert b"lineament: /scan/pose\0" in publisher.sent[1].data
+    assert b"located\0" in publisher.sent[1].data
+    nowhere = ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)
+    publisher.sent.clear()
+    sink.publish(pipeline("b", nowhere))
+    assert not [message for message in publisher.sent if message.topic == "/scan/pose"]
+
+
+def test_the_viewer_locates_logs_on_a_plan(files):
+    plan = LineMap.read(files / "plan.dxf")
+    with Session(files / "log.npz", {"optimal": ln.Extractor()}, plan) as session:
+        assert session.wait(60)
+        walls = json.loads(answer(session, "/api/plan"))["walls"]
+        np.testing.assert_allclose(walls, plan.ends.reshape(-1, 4), atol=1e-4)
+        scan = json.loads(answer(session, "/api/scan?log=0&i=3&method=optimal"))
+        assert scan["where"]["verdict"] == "located"
+        assert scan["where"]["explained"] > 0.8
+        assert np.shape(scan["where"]["covariance"]) == (3, 3)
+        np.testing.assert_allclose(scan["pose"], (-1.7, 0.2, 0.3), atol=0.02)
+        poses = json.loads(answer(session, "/api/poses?log=0&first=0&count=12"))["poses"]
+        np.testing.assert_allclose(poses, [(-2 + 0.1 * k, 0.2, 0.3) for k in range(12)], atol=0.02)
+    elsewhere = LineMap.from_lines([[0, 0, 9, 0], [9, 0, 9, 1], [9, 1, 0, 1], [0, 1, 0, 0]])
+    with Session(files / "one.npz", {"optimal": ln.Extractor()}, elsewhere) as session:
+        assert session.wait(60)
+        scan = json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))
+        assert (scan["pose"], scan["where"]["covariance"]) == (None, None)
+    with Session(files / "one.npz", {"optimal": ln.Extractor()}) as session:
+        assert session.wait(60)
+        assert json.loads(answer(session, "/api/plan")) == {"walls": []}
+        assert json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))["where"] is None
+
+
+@pytest.mark.skipif(not (TRUTH / "jackal_static_data.npz").exists(), reason="needs the arena")
+@pytest.mark.parametrize(
+    ("name", "typical"), [("jackal_static_data", 0.01), ("jackal_mocap_02171554", 0.02)]
+)
+def test_the_arena(name, typical, tmp_path):
+    """Kidnapped to the first scan; the fitted walls are the plan."""
+    with np.load(TRUTH / f"{name}.npz", allow_pickle=True) as archive:
+        plan_of_arena = LineMap.from_lines(archive["gt_segments"], sigma=0.005)
+        truth = archive["poses_refined"][::2]
+        scans = [
+            ln.LaserScan(
+                ranges,
+                float(archive["angle_min"]),
+                float(archive["angle_increment"]),
+                range_max=float(archive["range_max"]),
+                stamp=float(stamp),
+            )
+            for ranges, stamp in zip(archive["ranges"][::2], archive["stamps"][::2], strict=True)
+        ]
+    plan_of_arena.write(tmp_path / "plan.dxf")
+    found = followed(scans, LineMap.read(tmp_path / "plan.dxf", sigma=0.005))
+    place, _, _ = errors(found, truth)
+    assert len(place) > 0.85 * len(scans)
+    assert np.median(place) < typical
+    assert (place < 0.2).mean() > 0.99
