@@ -42,7 +42,8 @@ def simulated(sensor):
 def deviation(features, rho):
     """Deviation of a measurement about its surface."""
     noise = features.noise
-    return math.hypot(noise.sigma, noise.proportional * rho, noise.quantum / 12**0.5, SURFACE)
+    constant = max(math.hypot(noise.sigma, noise.quantum / 12**0.5), 1e-4)
+    return math.hypot(constant, noise.proportional * rho, SURFACE)
 
 
 def assert_sound(scan, features, extractor):
@@ -93,7 +94,7 @@ def assert_sound(scan, features, extractor):
             assert_drawn_on_its_rays(scan, segment)
         else:
             assert ahead[0] < 0 < ahead[1]
-            assert_drawn_where_it_was_measured(scan, features, segment, extractor.method.evidence)
+            assert_drawn_where_it_was_measured(scan, features, segment)
     for corner in corners:
         assert is_map or math.sqrt(np.linalg.eigvalsh(corner["covariance"])[-1]) <= MOST
         assert_joined(corner, segments)
@@ -124,32 +125,30 @@ def assert_drawn_on_its_rays(scan, segment):
         assert -((ray - low) % (2 * math.pi)) - 1e-9 <= turn <= (high - ray) % (2 * math.pi) + 1e-9
 
 
-def assert_drawn_where_it_was_measured(scan, features, segment, evidence):
-    """Its ends are abreast of its first and last measurement, and near its own, or at a corner.
+def assert_drawn_where_it_was_measured(scan, features, segment):
+    """It passes its first and last measurement, and ends abreast of them, or at a corner near them.
 
-    A line costs a measurement its squared deviations, at most half of the evidence. Where that
-    allows more than the 3 deviations within which the fit counts it, as no preset does, nothing
-    keeps the line near those that it does not count.
+    What was measured of it is longer than the step of its beams, so that it does not run along
+    them. Corners may cut it shorter than that.
     """
     beams, along = beams_of(scan, segment), direction_of(segment)
-    own = scan.points[beams]
+    own, rho = scan.points[beams], scan.ranges[beams]
     spacing = np.hypot(*np.diff(own, axis=0).T)
     step = abs(math.sin(scan.angles[beams[1]] - scan.angles[beams[0]]))
-    assert np.hypot(*(segment["end"] - segment["start"])) >= step * scan.ranges[beams].min()
+    assert (own[-1] - own[0]) @ along >= step * rho.min()
     places = {kind: [] for kind in ("corner", "slit", "edge")}
     for corner in features.corners:
         places[corner["kind"]].append(corner["position"].tolist())
-    error = 3 * deviation(features, scan.ranges[beams].max())
     for name, k in (("start", 0), ("end", -1)):
-        place, nearest = segment[name], own[k]
+        place, nearest, error = segment[name], own[k], 3 * deviation(features, rho[k])
+        ahead, aside = (nearest - segment["centroid"]) @ np.c_[along, (-along[1], along[0])]
+        assert abs(aside) <= error + 1e-9 * rho[k]
         if place.tolist() in places["corner"]:
             assert np.hypot(*(place - nearest)) <= max(REACH, spacing[k] + error)
             continue
         # An edge is half a spacing beyond, which is a uniform error of at most so much.
         beyond = MOST * math.sqrt(12) / 2 if place.tolist() in places["edge"] else 0.0
-        assert abs((place - nearest) @ along) <= beyond + 1e-9 * scan.ranges[beams].max()
-        if evidence / 2 <= 3**2:
-            assert np.hypot(*(own - place).T).min() <= spacing[k] + error
+        assert abs((place - segment["centroid"]) @ along - ahead) <= beyond + 1e-9 * rho.max()
 
 
 def assert_joined(corner, segments):
@@ -235,7 +234,40 @@ def test_ranges_that_no_scanner_reports_are_no_features():
         assert (features.clusters == -1).all()
 
 
-# However they are asked for
+def scan_at(points):
+    return LaserScan(np.hypot(*points.T), angles=np.arctan2(points[:, 1], points[:, 0]))
+
+
+def test_a_corner_is_within_the_spacing_and_the_deviations_there():
+    """One deviation is 0.11 m at the nearer wall's first measurement, 0.13 m at the farther's last.
+
+    0.2 m and 3 deviations are 0.535 m; by those of the farther wall, it was 0.57 m.
+    """
+    far = np.column_stack([np.full(40, 4.0), np.linspace(-1.0, 0.97, 40)])
+    extractor, found = Extractor("optimal", noise=RangeNoise(0.0, 0.03)), []
+    for distance in (0.5, 0.53, 0.54, 0.56):
+        near = np.column_stack([4.0 - distance - 0.2 * np.arange(12), np.ones(12)])
+        features = extractor(scan_at(np.concatenate([far, near])))
+        assert features.segments["last_beam"].tolist() == [39, 51]
+        found.append(features.corners["position"].round(9).tolist())
+    assert found == [[[4.0, 1.0]], [[4.0, 1.0]], [], []]
+
+
+@pytest.mark.parametrize(("turn", "beside"), [(10, 0), (15, 1), (18, 2), (19, 2)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_wall_that_bends_ends_where_its_line_passes_its_measurements(turn, beside, side):
+    """Its last half metre turns away: what is 9 cm beside the line is not drawn as of it."""
+    heading = math.radians(turn)
+    away = 0.1 * np.arange(1, 6)[:, None] * (-math.sin(heading), math.cos(heading))
+    straight = np.column_stack([np.full(41, 2.0), np.linspace(-1.0, 1.0, 41)])
+    points = np.concatenate([straight, straight[-1:] + away])[::side] * (1, side)
+    (wall,) = Extractor("optimal", noise=0.001)(scan_at(points)).segments
+    aside = abs((points - wall["centroid"]) @ (-math.sin(wall["angle"]), math.cos(wall["angle"])))
+    near = np.flatnonzero(aside <= 3 * math.hypot(SURFACE, 0.001))
+    assert len(near) == 46 - beside
+    assert [wall["first_beam"], wall["last_beam"]] == [near[0], near[-1]]
+    ends = points[near[[0, -1]]] - [wall["start"], wall["end"]]
+    assert np.hypot(*ends.T) == pytest.approx(aside[near[[0, -1]]])
 
 
 # Seen in another way
