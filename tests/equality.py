@@ -119,10 +119,9 @@ def assert_directed(segments):
 
 def assert_positive_definite(covariances):
     """In units of the deviations: offsets may be Gm where angles are nrad."""
-    for own in covariances:
-        assert (own.diagonal() > 0).all()
-        scale = np.sqrt(own.diagonal())
-        assert (np.linalg.eigvalsh(own / np.outer(scale, scale)) > 0).all()
+    scale = np.sqrt(covariances.diagonal(axis1=1, axis2=2))
+    assert (scale > 0).all()
+    assert (np.linalg.eigvalsh(covariances / (scale[:, :, None] * scale[:, None])) > 0).all()
 
 
 def assert_sound(features, scan, method):

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from equality import assert_directed, direction_of
+from equality import assert_directed, assert_positive_definite, direction_of
 from hostile import hard_scans, hostile_scans
 from worlds import degenerate_scans, full_circle, random_scan, seen
 
@@ -57,18 +57,11 @@ def assert_in_range(features, clusters, valid):
             values = tables[name][field]
             # The corners of maps have no response.
             assert field in ("kind", "response") or np.isfinite(values).all(), (name, field)
-        if len(tables[name]):
-            covariance = tables[name]["covariance"]
-            scale = np.sqrt(covariance.diagonal(axis1=1, axis2=2))
-            assert (scale >= 0).all()
-            unit = scale[:, :, None] * scale[:, None, :]
-            correlation = covariance / np.where(unit > 0, unit, 1)
-            assert (np.linalg.eigvalsh(correlation) > -1e-6).all()
+        assert_positive_definite(tables[name]["covariance"])
     for name in ("segments", "arcs"):
         first, last, row = tables[name]["first_beam"], tables[name]["last_beam"], rows[name]
         count = tables[name]["n_points"]
-        assert valid[row, first].all()
-        assert valid[row, last].all()
+        assert valid[row, [first, last]].all()
         assert ((first >= 0) & (first < n) & (last >= 0) & (last < n)).all()
         assert ((count >= 2) & (count <= (last - first) % max(n, 1) + 1)).all()
     segments, row = tables["segments"], rows["segments"]

@@ -6,7 +6,7 @@ from itertools import islice, product
 
 import numpy as np
 import pytest
-from equality import assert_directed, direction_of
+from equality import assert_directed, assert_positive_definite, direction_of
 from hostile import all_hostile, hostile_scans
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -58,16 +58,13 @@ def assert_sound(scan, features, extractor):
     for table in (segments, corners, arcs):
         for name in table.dtype.names:
             assert name == "kind" or np.isfinite(table[name]).all(), (name, table[name])
-        if len(table):
-            assert (np.linalg.eigvalsh(table["covariance"]) > 0).all()
+        assert_positive_definite(table["covariance"])
     assert np.isfinite(features.breakpoints["position"]).all()
     for table in (segments, arcs):
-        first, last = table["first_beam"], table["last_beam"]
+        first, last, count = (table[name] for name in ("first_beam", "last_beam", "n_points"))
         assert ((first >= 0) & (first < n) & (last >= 0) & (last < n)).all()
-        assert (table["n_points"] <= (last - first) % max(n, 1) + 1).all()
-        assert (table["n_points"] >= 2).all()
-        assert scan.valid[first].all()
-        assert scan.valid[last].all()
+        assert ((count >= 2) & (count <= (last - first) % max(n, 1) + 1)).all()
+        assert scan.valid[[first, last]].all()
     assert (features.clusters[segments["first_beam"]] == segments["cluster"]).all()
     assert (segments["misfit"] >= 0).all()
     assert (arcs["radius"] > 0).all()
