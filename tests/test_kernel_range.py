@@ -36,10 +36,8 @@ FEW = [
 ]
 
 
-def made(name, **parameters):
-    return (
-        get_method("optimal", max_vertices=6) if name == "maps" else get_method(name, **parameters)
-    )
+def made(name):
+    return get_method("optimal", max_vertices=6) if name == "maps" else get_method(name)
 
 
 # What holds of any features
