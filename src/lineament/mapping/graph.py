@@ -110,7 +110,7 @@ def optimise(poses: Array, edges: Edges) -> tuple[Array, Array]:
 
 def factorised(matrix: Any) -> Any:
     """Factorise a sparse, symmetric, positive definite matrix: `solve` is its method."""
-    with needed_by("mapping"):
+    with needed_by("map", "mapping"):
         from scipy.sparse.linalg import splu
 
     return splu(
