@@ -22,6 +22,7 @@ from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room
 from lineament.simulation.buildings import office
 from lineament.simulation.wheels import Wheels
+from lineament.tasks.mapping import map_log
 from lineament.view import Session
 from lineament.view.api import answer
 
@@ -82,6 +83,18 @@ def test_followed_from_the_first_metres_on(storey, drive, odometry):
     assert nees.mean() < 1.2
     looks = [where for where in found if where.location is not None]
     assert len(looks) < 0.8 * len(found)
+
+
+def test_a_map_of_a_drive_is_a_plan_whose_doors_are_open(tmp_path):
+    """`lineament map`, then `locate` with the same furniture: nothing passes through walls."""
+    place = office(4, (30, 20))
+    scans, _ = place.drive(SENSORS["utm30lx"], seed=1, rate=4, people=3)
+    scans = [bare(scan, scan.stamp) for scan, _ in zip(scans, range(120), strict=False)]
+    save_npz(tmp_path / "log.npz", scans)
+    map_log(tmp_path / "log.npz", tmp_path / "plan.dxf")
+    found = followed(scans[::2], LineMap.read(tmp_path / "plan.dxf", sigma=0.01))
+    assert sum(map(bool, found)) > 0.95 * len(found)
+    assert np.mean([where.evidence.contradicted for where in found]) < 0.01
 
 
 @pytest.mark.parametrize("kind", ["mirrored", "another"])
