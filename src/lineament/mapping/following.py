@@ -1,15 +1,18 @@
 """`Follower`: where a sensor is on a plan, scan by scan; when it is lost, and found again."""
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker
+from ..motion.deskew import deskew
 from ..motion.odometry import compose_jacobians
-from ..scan import Array, Pose
-from ..scan.poses import compose, relative
+from ..scan import Array, LaserScan, Pose
+from ..scan.poses import Twist, compose, relative, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
@@ -17,6 +20,8 @@ from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
+#: What was seen on so much way is compared with the plan where the pose is known [m].
+SEEN = 1.0
 #: Scans farther apart are not of one drive: by time without odometry [s], by odometry [m].
 GAP, JUMP = 5.0, 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
@@ -113,6 +118,11 @@ class Follower:
         return self._verdict in (LOCATED, UNOBSERVED) and self._deviations[0] < WORST
 
     @property
+    def twist(self) -> Twist | None:
+        """Velocity of the sensor in the last scans, as `deskew` takes it."""
+        return self._tracker.twist
+
+    @property
     def _deviations(self) -> tuple[float, float]:
         """Largest deviation of the place [m], and that of the angle [rad]."""
         spread = self._covariance
@@ -192,13 +202,13 @@ class Follower:
 
     def _look(self) -> Location:
         """Look for the last metres on the plan: near the pose if it is known, or everywhere."""
-        query = self._local.query()
         if not self.is_known:
-            found = locate(query, self.plan)
+            found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
             self._covariance = found.covariance if found else _UNKNOWN
             self._missed = 0.0
             return found
+        query = self._local.query(SEEN)
         found = locate(query, self.plan, self._pose, self._covariance)
         self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
@@ -207,6 +217,22 @@ class Follower:
             )
             self._verdict = self._by_covariance()
         return found
+
+
+def follow(
+    scans: Iterable[LaserScan], plan: LineMap, extractor: Extractor, *, odometry: bool = True
+) -> Iterator[tuple[LaserScan, Whereabouts]]:
+    """Yield each scan and where it was taken; deskewed, if it says how long its sweep takes.
+
+    `odometry` is whether the poses of the scans are odometry.
+    """
+    follower, before = Follower(plan), None
+    for scan in scans:
+        pose, twist = scan.pose if odometry else None, follower.twist
+        if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
+            twist = twist_between(before[0], pose, scan.stamp - before[1])
+        before = None if pose is None else (pose, scan.stamp)
+        yield scan, follower(extractor(deskew(scan, twist)), pose)
 
 
 def _spread_of(found: Location) -> Array:
