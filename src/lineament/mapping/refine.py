@@ -59,10 +59,10 @@ def adjusted(
         same = np.where((u * v).sum(axis=1) >= 0, 1.0, -1.0)
         turn = np.arctan2(same * (u * normal).sum(axis=1), same * (u * v).sum(axis=1))
         error = np.column_stack(((normal * off).sum(axis=1), turn)).ravel()
-        jacobian = np.zeros((n, 2, 3))
-        jacobian[:, 0, :2], jacobian[:, 1, 2] = normal, 1.0
-        jacobian[:, 0, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
-        jacobian = jacobian.reshape(-1, 3)
+        slopes = np.zeros((n, 2, 3))
+        slopes[:, 0, :2], slopes[:, 1, 2] = normal, 1.0
+        slopes[:, 0, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
+        jacobian = slopes.reshape(-1, 3)
         # All pairs with a wall of the plan have its error.
         lever = np.tile(np.eye(2), (n, 1, 1))
         lever[:, 0, 1] = (v * off).sum(axis=1) - 0.5 * walls[:, 4]
