@@ -30,6 +30,8 @@ _FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
 _SCANS = 6
 #: Deviations of walls that are one, beside their covariances [m, rad].
 _APART = np.diag((0.03, 0.01)) ** 2
+#: Where no more than this share of the most sights goes on, a wall ends.
+_SHARE = 0.2
 
 
 def find_loops(
@@ -151,20 +153,20 @@ def _records(
     gap: float,
     views: int = 1,
 ) -> NDArray[np.void]:
-    """Walls along their lines, each as far as sights lie no farther apart than a gap."""
+    """Walls along their lines, each as far as sights lie no farther apart than a gap.
+
+    Where a number of views is asked for, a wall ends where hardly any of its sights go on: at a
+    grazing angle, a few cross doorways.
+    """
     w, (low, high) = sights.walls[chosen], _extents(sights, lines, poses, chosen)
-    order = np.lexsort((low, w))
-    w, low, high = w[order], low[order], high[order]
     found = []
-    k = 0
-    while k < len(w):
-        end, first, reach = k + 1, low[k], high[k]
-        while end < len(w) and w[end] == w[k] and low[end] <= reach + gap:
-            reach = max(reach, high[end])
-            end += 1
-        if end - k >= views and reach - first > 0.1:
-            found.append((w[k], first, reach, end - k))
-        k = end
+    for number in np.unique(w).tolist():
+        own, their = low[w == number], high[w == number]
+        for begin, end in _covered(own, their, gap, 0.0):
+            of = (own <= end) & (their >= begin)
+            parts = [(begin, end)] if views == 1 else _covered(own[of], their[of], gap, _SHARE)
+            if of.sum() >= views:
+                found += [(number, a, b, of.sum()) for a, b in parts if b - a > 0.1]
     walls = np.zeros(len(found), WALL)
     if not found:
         return walls
@@ -183,6 +185,16 @@ def _records(
     walls["covariance"] = lever @ lines.covariances[line] @ lever.transpose(0, 2, 1)
     walls["side"], walls["views"] = 1, table[:, 3]
     return walls
+
+
+def _covered(low: Array, high: Array, gap: float, share: float) -> list[tuple[float, float]]:
+    """Parts that more than a share of the most stretches cover; short gaps count as covered."""
+    places = np.concatenate((low, high + gap))
+    order = np.argsort(places, kind="stable")
+    cover = np.cumsum(np.repeat((1, -1), len(low))[order])
+    edges = np.flatnonzero(np.diff(cover > share * cover.max(), prepend=False))
+    ends = places[order][edges].tolist()
+    return [(begin, end - gap) for begin, end in zip(ends[::2], ends[1::2], strict=True)]
 
 
 def _extents(
