@@ -162,7 +162,8 @@ def run(state: Path, seed: int, workers: int, inputs: int) -> None:
     """Keep the workers at work to the end; one that crashes or hangs goes on with its next."""
     state.mkdir(parents=True, exist_ok=True)
     # No input is charged with the time to compile.
-    subprocess.run([sys.executable, "-m", "lineament", "warmup", "-q"], check=True)
+    methods = (word for name in method_names() for word in ("-m", name))
+    subprocess.run([sys.executable, "-m", "lineament", "warmup", "-q", *methods], check=True)
     running: dict[int, subprocess.Popen[bytes]] = {}
     waiting = set(range(workers))
     try:
