@@ -10,7 +10,6 @@ import argparse
 import math
 import os
 import time
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,8 +20,8 @@ from lineament.evaluation.icp import icp
 from lineament.evaluation.maps import absolute_errors, doubled_walls
 from lineament.evaluation.relations import read_relations
 from lineament.logs import open_log
+from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.graph import Edges, optimise
 from lineament.mapping.making import make_map
 from lineament.scan.poses import compose
 from lineament.simulation import SENSORS, Wheels, office
@@ -61,13 +60,10 @@ def rival(found, loops):
     for motion in motions:
         start.append(compose(start[-1], motion))
     n = len(motions)
-    ends = np.column_stack((np.arange(n), np.arange(1, n + 1)))
-    chain = Edges(
-        ends, np.array(motions), np.tile(np.linalg.inv(ICP), (n, 1, 1)), np.zeros(n, bool)
-    )
-    # A lost turn is one wrong motion of many: all may be wrong.
-    both = chain.together(loops)
-    poses, _ = optimise(np.array(start), replace(both, robust=np.ones(len(both.ends), bool)))
+    pairs = [(k, k + 1) for k in range(n)]
+    both = np.append(edges_of(pairs, motions, np.tile(ICP, (n, 1, 1))), loops)
+    both["loop"] = True  # a lost turn is one wrong motion of many: all may be wrong
+    poses = optimise(np.array(start), both, rounds=40).poses
     return placed(found, poses)
 
 
@@ -107,7 +103,7 @@ def rows(name, scans, truth, relations, odometry=False):
     played = scans[-1].stamp - scans[0].stamp
     print(
         f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {len(found.lost)}, "
-        f"{len(made.loops.ends)} loops; {seconds:.0f} s of processor, played in {played:.0f} s -->"
+        f"{len(made.loops)} loops; {seconds:.0f} s of processor, played in {played:.0f} s -->"
     )
 
 
