@@ -96,7 +96,8 @@ corners[["scan", "stamp", "x", "y", "quality", "corner"]].head()
 # ## Go on
 #
 # - The tutorials: [a bag to a data frame](tutorials/frame.md), [corners in the
-#   world](tutorials/world.md), [a docking pose](tutorials/dock.md), [live on a
-#   robot](tutorials/live.md), [many logs on Dask](tutorials/dask.md).
+#   world](tutorials/world.md), [where am I](tutorials/where.md), [a docking
+#   pose](tutorials/dock.md), [live on a robot](tutorials/live.md), [many logs on
+#   Dask](tutorials/dask.md).
 # - What it finds in [real scans](gallery.md), and [how good that is](results.md).
 # - [The methods](methods.md), and all names [from Python](python.md).

@@ -37,6 +37,9 @@ RUNS = {
     "info wall.npz": "",
     "plot wall.npz -m iepf -o p.png": "p.png",
     "view wall.npz -m iepf --no-browser": "",
+    "map room.npz -o plan.dxf": "plan.dxf",
+    "map room.npz -o plan.svg --poses drive.tum": "drive.tum",
+    "locate room.npz --map walls.parquet -o where.csv": "where.csv",
     "live --from wall.npz --ros 0 --rate 0 -m iepf": "",
     "demo wall.npz -o demo": "demo",
     "methods": "",
@@ -52,9 +55,20 @@ WRITING = [command for command, output in RUNS.items() if output]
 posix = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signals here")
 
 
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    """A log of a room, and its map."""
+    folder = tmp_path_factory.mktemp("plan")
+    log, walls = str(folder / "room.npz"), str(folder / "walls.parquet")
+    assert run(["simulate", "room", "--scans", "4", "--sensor", "lms181", "-o", log, "-q"]) == 0
+    assert run(["map", log, "-o", walls, "-q"]) == 0
+    return folder
+
+
 @pytest.fixture
-def work(tmp_path, monkeypatch, npz, benchmark):  # noqa: ARG001, F811
+def work(tmp_path, monkeypatch, npz, benchmark, plan):  # noqa: ARG001, F811
     """Work in a folder with the inputs of all commands, without what takes them long."""
+    shutil.copytree(plan, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("LINEAMENT_DATA", "")
     monkeypatch.delenv("LINEAMENT_DATA")

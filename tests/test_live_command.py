@@ -156,7 +156,7 @@ def test_a_log_is_played_until_its_end(peer, domain, log):
 def test_the_motion_of_a_log_is_published(peer, domain, log):
     peer.listen("/scan/odometry", "Odometry", 1000)
     scans = {round(1e9 * scan.stamp): scan for scan in ln.open_log(log)}
-    with Running(domain=domain, log=log, rate=20.0, track=True) as node:
+    with Running(domain=domain, log=log, rate=0.0, track=True) as node:
         node.end()
         eventually(lambda: peer._readers["/scan/odometry"].read(1))
     last = peer.take("/scan/odometry")[-1]
@@ -176,7 +176,7 @@ def test_the_pose_of_a_corner_is_published(peer, domain, log):
     """A corner of the room, 5 m ahead and 2 m to the left when the drive begins."""
     peer.listen("/scan/dock", "PoseWithCovarianceStamped", 1000)
     scans = list(ln.open_log(log))
-    with Running(domain=domain, log=log, rate=20.0, dock=(5.3, 1.8)) as node:
+    with Running(domain=domain, log=log, rate=0.0, dock=(5.3, 1.8)) as node:
         node.end()
         eventually(lambda: peer._readers["/scan/dock"].read(1))
     last = peer.take("/scan/dock")[-1]
@@ -258,6 +258,9 @@ track = true
 [parameters]
 noise_factor = 99.0
 min_points = 6
+[limits]
+beams = 9
+scans = 8
 """)
 
     def kept(config: LiveConfig, is_stopped, *, write, show) -> Report:
@@ -271,7 +274,7 @@ min_points = 6
     configs: list[LiveConfig] = []
     monkeypatch.setattr("lineament.live.running.run_live", kept)
     flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
-    flags += " --dock 2 -1.5"
+    flags += " --dock 2 -1.5 --limit scans=7"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0
     assert capfd.readouterr() == ("3 scans, 2 dropped, 1 lost, 0 malformed messages\n", "begun\n")
     assert run(["live", "--ros", "1", "__name:=front", "-q"]) == 0
@@ -284,6 +287,7 @@ min_points = 6
             echo="last",
             method="iepf",
             parameters={"noise_factor": 3.0, "min_points": 6},
+            limits={"beams": 9, "scans": 7},
             track=True,
             localhost=True,
             foxglove=8765,

@@ -17,11 +17,13 @@ from lineament.live.pipeline import Pipeline
 from lineament.live.sinks import RosSink
 from lineament.logs import save_npz
 from lineament.mapping import LineMap
-from lineament.mapping.following import Follower, combined
+from lineament.mapping.following import Follower, combined, follow
 from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room
+from lineament.simulation import drive as drive_scans
 from lineament.simulation.buildings import office
 from lineament.simulation.wheels import Wheels
+from lineament.tasks.mapping import map_log
 from lineament.view import Session
 from lineament.view.api import answer
 
@@ -82,6 +84,32 @@ def test_followed_from_the_first_metres_on(storey, drive, odometry):
     assert nees.mean() < 1.2
     looks = [where for where in found if where.location is not None]
     assert len(looks) < 0.8 * len(found)
+
+
+def test_a_map_of_a_drive_is_a_plan_whose_doors_are_open(tmp_path):
+    """`lineament map`, then `locate` with the same furniture: nothing passes through walls."""
+    place = office(4, (30, 20))
+    scans, _ = place.drive(SENSORS["utm30lx"], seed=1, rate=4, people=3)
+    scans = [bare(scan, scan.stamp) for scan, _ in zip(scans, range(120), strict=False)]
+    save_npz(tmp_path / "log.npz", scans)
+    map_log(tmp_path / "log.npz", tmp_path / "plan.dxf")
+    found = followed(scans[::2], LineMap.read(tmp_path / "plan.dxf", sigma=0.01))
+    assert sum(map(bool, found)) > 0.95 * len(found)
+    assert np.mean([where.evidence.contradicted for where in found]) < 0.01
+
+
+def test_scans_that_say_how_long_they_sweep_are_deskewed(storey):
+    """At 1 m/s, sweeps of 25 ms: what is seen moves by 25 mm."""
+    scans = list(drive_scans(storey.world, storey.waypoints[:3], SENSORS["utm30lx"],
+                             speed=1.0, rate=5, seed=3, moving=True))  # fmt: skip
+    plan = plan_of(storey.plan)
+    found = [where for _, where in follow(scans, plan, ln.Extractor())]
+    place, _, nees = errors(found, [scan.pose for scan in scans])
+    skewed, _, _ = errors(followed(scans, plan), [scan.pose for scan in scans])
+    assert len(place) == len(scans)
+    assert np.median(place) < 0.002
+    assert nees.mean() < 1.1
+    assert np.median(skewed) > 0.004
 
 
 @pytest.mark.parametrize("kind", ["mirrored", "another"])
@@ -273,7 +301,7 @@ def test_the_viewer_locates_logs_on_a_plan(files):
 
 @pytest.mark.skipif(not (TRUTH / "jackal_static_data.npz").exists(), reason="needs the arena")
 @pytest.mark.parametrize(
-    ("name", "typical"), [("jackal_static_data", 0.01), ("jackal_mocap_02171554", 0.02)]
+    ("name", "typical"), [("jackal_static_data", 0.01), ("jackal_mocap_02171554", 0.015)]
 )
 def test_the_arena(name, typical, tmp_path):
     """Kidnapped to the first scan; the fitted walls are the plan."""
@@ -293,6 +321,6 @@ def test_the_arena(name, typical, tmp_path):
     plan_of_arena.write(tmp_path / "plan.dxf")
     found = followed(scans, LineMap.read(tmp_path / "plan.dxf", sigma=0.005))
     place, _, _ = errors(found, truth)
-    assert len(place) > 0.85 * len(scans)
+    assert len(place) > 0.9 * len(scans)
     assert np.median(place) < typical
     assert (place < 0.2).mean() > 0.99

@@ -69,10 +69,10 @@ def needs(package: str, extra: str = "") -> str:
 
 
 @contextmanager
-def needed_by(who: str) -> Iterator[None]:
+def needed_by(who: str, extra: str = "") -> Iterator[None]:
     """Turn the missing import of an optional package into a LineamentError.
 
-    Where `who` is an extra itself, that is the one to install: several need scipy.
+    `extra` is the one to install where several have the package, as they have scipy.
     """
     try:
         yield
@@ -80,5 +80,4 @@ def needed_by(who: str) -> Iterator[None]:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        extra = who if who in EXTRAS.values() else ""
         raise LineamentError(f"{who} {needs(package, extra)}") from None

@@ -12,7 +12,7 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, poses_along, relative, twist_between
 from .evidence import evidence_of
 from .local_map import Query, beams_of
-from .locate import _distinct as distinct
+from .locate import distinct
 from .placing import (
     PASSED,
     ROUGHNESS,

@@ -1,15 +1,18 @@
 """`Follower`: where a sensor is on a plan, scan by scan; when it is lost, and found again."""
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker
+from ..motion.deskew import deskew
 from ..motion.odometry import compose_jacobians
-from ..scan import Array, Pose
-from ..scan.poses import compose, relative
+from ..scan import Array, LaserScan, Pose
+from ..scan.poses import Twist, compose, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
@@ -17,6 +20,8 @@ from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
+#: What was seen on so much way is compared with the plan where the pose is known [m].
+SEEN = 1.0
 #: Scans farther apart are not of one drive: by time without odometry [s], by odometry [m].
 GAP, JUMP = 5.0, 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
@@ -110,13 +115,12 @@ class Follower:
     @property
     def is_known(self) -> bool:
         """Whether the pose is known well enough to be followed."""
-        return self._verdict in (LOCATED, UNOBSERVED) and self._deviations[0] < WORST
+        return self._verdict in (LOCATED, UNOBSERVED) and self._unsure < WORST
 
     @property
-    def _deviations(self) -> tuple[float, float]:
-        """Largest deviation of the place [m], and that of the angle [rad]."""
-        spread = self._covariance
-        return math.sqrt(np.linalg.eigvalsh(spread[:2, :2])[1]), math.sqrt(spread[2, 2])
+    def twist(self) -> Twist | None:
+        """Velocity of the sensor in the last scans, as `deskew` takes it."""
+        return self._tracker.twist
 
     def __call__(self, features: Features, odometry: Pose | None = None) -> Whereabouts:
         """Take in the next scan.
@@ -136,14 +140,15 @@ class Follower:
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
         evidence = self._judge(features)
+        self._doubts = self._doubts + 1 if self.is_known and evidence.log_odds < 0 else 0
         if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
             # What was seen before may be of another place: this scan begins anew.
             self._restart()
             self._local.add(features, self._tracker(features, odometry))
         location = None
-        waited = features.stamp - self._looked
-        is_doubtful = self.is_known and evidence.contradicted > DENIED
-        if is_doubtful or self._since > STEP or self._turned > TURN or waited > PERIOD:
+        is_due = self._since > STEP or self._turned > TURN
+        is_due |= features.stamp - self._looked > PERIOD
+        if is_due or (self.is_known and evidence.contradicted > DENIED):
             location = self._look()
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
@@ -156,8 +161,7 @@ class Follower:
         duration = stamp - self._stamp
         if odometry is None or self._odometry is None:
             return duration > GAP or duration < 0
-        x, y, _ = relative(self._odometry, odometry)
-        return duration < 0 or math.hypot(x, y) > JUMP
+        return duration < 0 or math.dist(self._odometry[:2], odometry[:2]) > JUMP
 
     def _move(self, motion: Pose, covariance: Array) -> None:
         """Go on by a motion."""
@@ -173,50 +177,65 @@ class Follower:
         if self._verdict in (LOCATED, UNOBSERVED):
             self._verdict = self._by_covariance()
 
+    @property
+    def _unsure(self) -> float:
+        """Largest deviation of the place [m]."""
+        return math.sqrt(np.linalg.eigvalsh(self._covariance[:2, :2])[1])
+
     def _by_covariance(self) -> str:
         """Return the verdict on a pose that was located, as it is known now."""
-        place, turn = self._deviations
-        if place > WORST or turn > WORST_TURN:
+        if self._unsure > WORST or self._covariance[2, 2] > WORST_TURN**2:
             return LOST
-        return UNOBSERVED if place > UNSURE else LOCATED
+        return UNOBSERVED if self._unsure > UNSURE else LOCATED
 
     def _judge(self, features: Features) -> Evidence:
-        """Return what the beams of a scan alone say of the pose; count scans that doubt it."""
+        """Return what the beams of a scan alone say of the pose."""
         assert features.scan is not None
         beams = thinned(beams_of(features, features.scan))
-        pose = np.array([self._pose])
-        spread = min(math.hypot(_TIGHT, self._deviations[0]), UNSURE)
-        odds, explained, short, contradicted = evidence_of(pose, beams, self.plan.index, spread)[0]
-        self._doubts = self._doubts + 1 if self.is_known and odds < 0 else 0
+        spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
+        found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
+        odds, explained, short, contradicted = found[0].tolist()
         return Evidence(odds, explained, short, contradicted, len(beams))
 
     def _look(self) -> Location:
-        """Look for the last metres on the plan: near the pose if it is known, or everywhere."""
-        query = self._local.query()
+        """Look for what was seen on the plan: near the pose if it is known, or everywhere."""
         if not self.is_known:
-            found = locate(query, self.plan)
+            found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
             self._covariance = found.covariance if found else _UNKNOWN
             self._missed = 0.0
             return found
-        found = locate(query, self.plan, self._pose, self._covariance)
+        found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
         self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
+            spread = found.covariance.copy()
+            if found.unobserved is not None:
+                # As wide as its alternatives lie apart.
+                along = np.array(found.unobserved)
+                for pose, _ in found.alternatives:
+                    off = along @ np.subtract(pose[:2], found.pose[:2])
+                    spread[:2, :2] += off**2 * np.outer(along, along)
             self._pose, self._covariance = combined(
-                (self._pose, self._covariance), (found.pose, _spread_of(found))
+                (self._pose, self._covariance), (found.pose, spread)
             )
             self._verdict = self._by_covariance()
         return found
 
 
-def _spread_of(found: Location) -> Array:
-    """Return the covariance of a location, as wide as its alternatives lie apart."""
-    spread = found.covariance.copy()
-    if found.unobserved is not None:
-        for pose, _ in found.alternatives:
-            way = np.dot(found.unobserved, np.subtract(pose[:2], found.pose[:2]))
-            spread[:2, :2] += np.outer(found.unobserved, found.unobserved) * way**2
-    return spread
+def follow(
+    scans: Iterable[LaserScan], plan: LineMap, extractor: Extractor, *, odometry: bool = True
+) -> Iterator[tuple[LaserScan, Whereabouts]]:
+    """Yield each scan and where it was taken; deskewed, if it says how long its sweep takes.
+
+    `odometry` is whether the poses of the scans are odometry.
+    """
+    follower, before = Follower(plan), None
+    for scan in scans:
+        pose, twist = scan.pose if odometry else None, follower.twist
+        if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
+            twist = twist_between(before[0], pose, scan.stamp - before[1])
+        before = None if pose is None else (pose, scan.stamp)
+        yield scan, follower(extractor(deskew(scan, twist)), pose)
 
 
 def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:

@@ -34,84 +34,53 @@ LONG, OF_ENDS, LEAST_TURN = 0.5, 0.5, 0.3
 BOX, TURN = 0.6, math.radians(12)
 
 
-def meetings(walls: NDArray[np.void], reach: float = REACH) -> NDArray[np.void]:
+def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
     """Return where two walls end together, or one ends on the other: records of `MEETING`."""
-    if not len(walls):
-        return np.zeros(0, MEETING)
     ends = np.stack((walls["start"], walls["end"]), axis=1)
-    low, high = ends.min(axis=1) - reach, ends.max(axis=1) + reach
+    low, high = ends.min(axis=1) - REACH, ends.max(axis=1) + REACH
     # Only walls whose boxes overlap can meet.
-    beside = (low[:, None, 0] <= high[:, 0]) & (low[:, 0] <= high[:, None, 0])
-    beside &= (low[:, None, 1] <= high[:, 1]) & (low[:, 1] <= high[:, None, 1])
-    i, j = np.nonzero(np.triu(beside, 1))
-    u = np.stack((np.cos(walls["angle"]), np.sin(walls["angle"])), axis=1)
-    sine = _cross(u[i], u[j])
+    beside = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    pairs = np.column_stack(np.nonzero(np.triu(beside, 1)))
+    u = np.column_stack((np.cos(walls["angle"]), np.sin(walls["angle"])))
+    sine = _cross(u[pairs[:, 0]], u[pairs[:, 1]])
     crossing = np.abs(sine) > LEAST_SINE
-    i, j, sine = i[crossing], j[crossing], sine[crossing]
-    between = walls["start"][j] - walls["start"][i]
-    along_i, along_j = _cross(between, u[j]) / sine, _cross(between, u[i]) / sine
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    found = []
-    for way_i in (1, -1):
-        for way_j in (1, -1):
-            # An arm leads from the vertex along the wall: to its end, or back to its start.
-            arm_i = length[i] - along_i if way_i > 0 else along_i
-            arm_j = length[j] - along_j if way_j > 0 else along_j
-            near_i = np.minimum(np.abs(along_i), np.abs(length[i] - along_i)) <= reach
-            near_j = np.minimum(np.abs(along_j), np.abs(length[j] - along_j)) <= reach
-            inside_i = (along_i >= -reach) & (along_i <= length[i] + reach)
-            inside_j = (along_j >= -reach) & (along_j <= length[j] + reach)
-            good = (arm_i >= np.minimum(ARM, 0.5 * length[i])) & inside_i & inside_j
-            good &= (arm_j >= np.minimum(ARM, 0.5 * length[j])) & (near_i | near_j)
-            # The vertex is at the near end of a wall, unless the other ends on it.
-            k = np.flatnonzero(good)
-            at = walls["start"][i[k]] + along_i[k, None] * u[i[k]]
-            found.append(_records(walls, u, i[k], j[k], way_i, way_j, at))
-    joined: NDArray[np.void] = np.concatenate(found)
-    return joined
+    pairs, sine = pairs[crossing], sine[crossing]
+    between = walls["start"][pairs[:, 1]] - walls["start"][pairs[:, 0]]
+    along = np.column_stack([_cross(between, u[k]) for k in pairs.T[::-1]]) / sine[:, None]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[pairs]
+    near = (np.minimum(np.abs(along), np.abs(length - along)) <= REACH).any(axis=1)
+    near &= ((along >= -REACH) & (along <= length + REACH)).all(axis=1)
+    found = [np.zeros(0, MEETING)]
+    for ways in np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
+        # An arm leads from the vertex along the wall: to its end, or back to its start.
+        arm = np.where(ways > 0, length - along, along)
+        k = np.flatnonzero(near & (arm >= np.minimum(ARM, 0.5 * length)).all(axis=1))
+        corners, of = np.zeros(len(k), MEETING), pairs[k]
+        leads = np.broadcast_to(ways, of.shape)
+        # Arms in counter-clockwise order, less than half a turn apart.
+        swap = (ways.prod() * sine[k] < 0)[:, None]
+        of, leads = np.where(swap, of[:, ::-1], of), np.where(swap, leads[:, ::-1], leads)
+        va, vb = (leads[:, [side]] * u[of[:, side]] for side in (0, 1))
+        middle = va + vb
+        corners["position"] = walls["start"][pairs[k, 0]] + along[k, :1] * u[pairs[k, 0]]
+        corners["bisector"] = np.arctan2(middle[:, 1], middle[:, 0])
+        corners["opening"] = np.arctan2(_cross(va, vb), (va * vb).sum(axis=1))
+        corners["covariance"] = _spread(walls[of], corners["position"])
+        # What is seen lies to the left of a wall: between the arms if a leads on and b leads back.
+        one_sided = (walls["side"][of] == 1).all(axis=1)
+        corners["walls"], corners["solid"] = of, np.where(one_sided, leads[:, 0] < 0, -1)
+        found.append(corners[~one_sided | (leads[:, 0] != leads[:, 1])])
+    return np.concatenate(found)
 
 
-def _records(
-    walls: NDArray[np.void],
-    u: Array,
-    i: NDArray[np.intp],
-    j: NDArray[np.intp],
-    way_i: int,
-    way_j: int,
-    at: Array,
-) -> NDArray[np.void]:
-    """Make the records of corners whose arms lead `way` along their walls."""
-    corners = np.zeros(len(i), MEETING)
-    # Arms in counter-clockwise order, less than half a turn apart.
-    swap = _cross(way_i * u[i], way_j * u[j]) < 0
-    a, b = np.where(swap, j, i), np.where(swap, i, j)
-    way_a, way_b = np.where(swap, way_j, way_i), np.where(swap, way_i, way_j)
-    va, vb = way_a[:, None] * u[a], way_b[:, None] * u[b]
-    middle = va + vb
-    corners["position"], corners["walls"] = at, np.stack((a, b), axis=1)
-    corners["bisector"] = np.arctan2(middle[:, 1], middle[:, 0])
-    corners["opening"] = np.arctan2(_cross(va, vb), (va * vb).sum(axis=1))
-    # What is seen lies to the left of a wall: between the arms if a leads on and b leads back.
-    free = np.where(way_a > 0, 0, 1), np.where(way_b > 0, 1, 0)
-    one_sided = walls["side"][a] * walls["side"][b] == 1
-    corners["solid"] = np.where(one_sided, free[0], -1)
-    corners["covariance"] = _spread(walls, u, a, b, at)
-    agreed: NDArray[np.void] = corners[~one_sided | (free[0] == free[1])]
-    return agreed
-
-
-def _spread(
-    walls: NDArray[np.void], u: Array, a: NDArray[np.intp], b: NDArray[np.intp], at: Array
-) -> Array:
-    """Covariance of the place where two lines meet, from those of both."""
-    normals = np.stack((-u[:, 1], u[:, 0]), axis=1)
-    inverse = np.linalg.inv(np.stack((normals[a], normals[b]), axis=1))
-    variances = np.zeros((len(a), 2, 2))
-    for row, wall in enumerate((a, b)):
-        lever = ((at - walls["centroid"][wall]) * u[wall]).sum(axis=1)
-        (v00, v01), (_, v11) = walls["covariance"][wall].transpose(1, 2, 0)
-        variances[:, row, row] = v00 + 2 * lever * v01 + lever**2 * v11
-    return np.asarray(inverse @ variances @ inverse.transpose(0, 2, 1))
+def _spread(walls: NDArray[np.void], at: Array) -> Array:
+    """Covariances of places (n, 2) where two lines meet, from those of both, (n, 2)."""
+    u = np.stack((np.cos(walls["angle"]), np.sin(walls["angle"])), axis=-1)
+    lever = np.ones(u.shape)
+    lever[:, :, 1] = ((at[:, None] - walls["centroid"]) * u).sum(axis=2)
+    variances = np.einsum("nwi,nwij,nwj->nw", lever, walls["covariance"], lever)
+    inverse = np.linalg.inv(np.stack((-u[:, :, 1], u[:, :, 0]), axis=-1))
+    return np.asarray((inverse * variances[:, None]) @ inverse.transpose(0, 2, 1))
 
 
 def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
@@ -135,17 +104,13 @@ def anchors(walls: NDArray[np.void], corners: NDArray[np.void]) -> Array:
     Kinds are 0 and 1 for corners that are free or solid, -1 where that is not known, and 2 and 3
     for the starts and ends of walls.
     """
-    table = np.zeros((len(corners), 5))
-    table[:, :2], table[:, 2] = corners["position"], corners["bisector"]
-    table[:, 3], table[:, 4] = corners["solid"], corners["opening"]
+    names = ("bisector", "solid", "opening")
+    tables = [np.column_stack((corners["position"], *(corners[name] for name in names)))]
     long = walls[np.linalg.norm(walls["end"] - walls["start"], axis=1) > LONG]
-    tables = [table]
     for turn, of in ((0.0, long), (math.pi, long[long["side"] == 0])):
         for kind, name in ((2, "start"), (3, "end")):
-            table = np.zeros((len(of), 5))
-            table[:, :2], table[:, 2] = of[name], of["angle"] + turn
-            table[:, 3] = kind if not turn else 5 - kind
-            tables.append(table)
+            rest = of["angle"] + turn, np.full(len(of), 5.0 - kind if turn else kind)
+            tables.append(np.column_stack((of[name], *rest, np.zeros(len(of)))))
     return np.concatenate(tables)
 
 

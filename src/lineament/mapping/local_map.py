@@ -157,11 +157,16 @@ class LocalMap:
         while self._kept and self._way > self.way:
             self._kept.popleft()
 
-    def query(self) -> Query:
-        """Return walls and beams in the frame of the last scan; ValueError before there is one."""
+    def query(self, way: float = math.inf) -> Query:
+        """Return walls and beams of the last metres of way, in the frame of the last scan.
+
+        ValueError before there is a scan.
+        """
         if self._last is None:
             raise ValueError("the local map is empty, expected a scan")
         sights = self._sights
+        gone = np.cumsum([sight.way for sight in sights[:0:-1]])
+        sights = sights[len(sights) - 1 - int((gone <= way).sum()) :]
         poses: list[Pose] = [(0.0, 0.0, 0.0)]
         for sight in sights[:0:-1]:
             poses.append(compose(poses[-1], inverse(sight.motion)))

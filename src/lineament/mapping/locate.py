@@ -27,6 +27,8 @@ LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
 #: Poses that are tried by few beams, refined, and judged by all beams.
 TRIED, SIFTED, REFINED, JUDGED = 800, 60, 24, 12
 _FEWEST_BEAMS, _FEW_BEAMS = 12, 40
+#: The best is compared with poses so far off [m].
+_SLIDES = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
 _NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance: that of a wrong
@@ -34,8 +36,8 @@ _NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
 SURE = math.log(1000)
 #: The same over the best pose of the mirror image.
 NOT_MIRRORED = 3.0
-#: Shares of the beams: fewer explained, or more contradicted, are not of this map.
-LEAST_EXPLAINED, MOST_CONTRADICTED = 0.35, 0.05
+#: If more of the beams are contradicted, it is not this map.
+MOST_CONTRADICTED = 0.05
 #: A direction in which the pose is known no better is unobserved [m].
 UNSURE = 0.15
 #: Errors of beams and walls beside their covariances [m]: where poses are tried, and judged.
@@ -132,7 +134,7 @@ def locate(
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
     room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
-    where, odds = _judged(poses, found, query, plan, room), found[0, 0]
+    odds, where = found[0, 0], _judged(poses, found, query, plan, room)
     if where.verdict == LOCATED and guess is None:
         # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
         image = query.mirrored()
@@ -155,12 +157,12 @@ def _tried(query: Query, plan: LineMap) -> Array:
 
 
 def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap) -> Array:
-    """Poses around a guess, or where those are too many, the guess and those that have votes."""
+    """Poses within 2 σ of a guess; where those are too many, those within 4 σ that have votes."""
     spread = _GUESS if covariance is None else covariance_of_pose(covariance)
-    deviations = np.sqrt(np.diag(spread))
-    counts = 2 * np.ceil(deviations / (*[BOX / 2] * 2, TURN / 2)).astype(np.int64) + 1
+    reach = 2 * np.sqrt(np.diag(spread))
+    counts = 2 * np.ceil(reach / (*[BOX / 2] * 2, TURN / 2)).astype(np.int64) + 1
     if np.prod(counts.astype(float)) <= TRIED:
-        steps = [np.linspace(-d, d, n) for d, n in zip(deviations, counts, strict=True)]
+        steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
     tried = _tried(query, plan)
     off = tried - guess
@@ -174,46 +176,28 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     if not len(tried):
         return tried, np.zeros((0, 4))
     for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
-        found = evidence_of(tried, _few(query.beams, count), plan.index, _WIDE)
-        tried = tried[_distinct(tried, found[:, 0], _NEAR, most)]
-    poses, _, _ = refined(tried, query, plan.index, COARSE)
-    poses, _, _ = refined(poses, query, plan.index, FINE)
+        few = np.linspace(0, len(query.beams) - 1, min(count, len(query.beams))).astype(np.intp)
+        found = evidence_of(tried, query.beams[few], plan.index, _WIDE)
+        tried = tried[distinct(tried, found[:, 0], _NEAR, most)]
+    poses, _, _ = refined(refined(tried, query, plan.index, COARSE)[0], query, plan.index, FINE)
     found = evidence_of(poses, query.beams, plan.index, _TIGHT)
-    best = found[:, 0].argmax()
-    slid = _slid(poses[best : best + 1], query, plan)
-    poses = np.concatenate((poses, slid))
-    found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
-    kept = _distinct(poses, found[:, 0], _SAME, JUDGED)
+    # Poses some way off along both axes of the local map may look alike.
+    best = poses[found[:, 0].argmax()]
+    lengths = np.linalg.norm(query.walls["end"] - query.walls["start"], axis=1)
+    main = np.angle((lengths * np.exp(4j * query.walls["angle"])).sum()) / 4 + best[2]
+    slid = np.tile(best, (2 * len(_SLIDES), 1))
+    along = np.array([(math.cos(main), math.sin(main)), (-math.sin(main), math.cos(main))])
+    slid[:, :2] += np.kron(along.T, _SLIDES).T
+    poses = np.concatenate((poses, refined(slid, query, plan.index, FINE)[0]))
+    found = evidence_of(poses, query.beams, plan.index, _TIGHT)
+    kept = distinct(poses, found[:, 0], _SAME, JUDGED)
     return poses[kept], found[kept]
 
 
-def _few(beams: Array, count: int) -> Array:
-    """Return about so many of the beams, evenly spread."""
-    if len(beams) <= count:
-        return beams
-    return beams[np.linspace(0, len(beams) - 1, count).astype(np.intp)]
-
-
-def _slid(poses: Array, query: Query, plan: LineMap) -> Array:
-    """Return poses some way off along both axes of the local map, refined where that is alike."""
-    turn = _main_direction(query) + poses[0, 2]
-    axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    steps = np.array([-1.0, -0.6, -0.3, 0.3, 0.6, 1.0])
-    moved = np.repeat(poses, 2 * len(steps), axis=0)
-    moved[:, :2] += (axes[:, None] * steps[:, None]).reshape(-1, 2)
-    return refined(moved, query, plan.index, FINE)[0]
-
-
-def _main_direction(query: Query) -> float:
-    """Direction of most walls, to quarters of a turn [rad]."""
-    lengths = np.linalg.norm(query.walls["end"] - query.walls["start"], axis=1)
-    return float(np.angle((lengths * np.exp(4j * query.walls["angle"])).sum()) / 4)
-
-
-def _distinct(
+def distinct(
     poses: Array, scores: Array, apart: tuple[float, float], most: int
 ) -> NDArray[np.int64]:
-    """Return the best poses, each farther from all better ones than `apart`."""
+    """Return the best poses, each farther from all better ones than `apart` [m, rad]."""
     chosen = np.empty(most, np.int64)
     order = np.argsort(-scores, kind="stable")
     return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
@@ -223,31 +207,21 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
-    covariance = np.asarray(np.linalg.inv(information + np.diag((1e-2, 1e-2, 1e-2))), np.float64)
-    chance = math.log(max(room, 1.0))
-    n = len(query.beams)
-    evidences = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
-    first = evidences[0]
+    covariance = np.asarray(np.linalg.inv(information + 1e-2 * np.eye(3)), np.float64)
+    chance, n = math.log(max(room, 1.0)), len(query.beams)
+    first, *rest = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     others = [
         (_pose(pose), other)
-        for pose, other in zip(poses[1:], evidences[1:], strict=True)
+        for pose, other in zip(poses[1:], rest, strict=True)
         if first.log_odds - other.log_odds < SURE
     ]
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     x, y = vectors[:, 1].tolist()
-    unobserved = None
-    if (
-        first.log_odds < SURE
-        or first.explained < LEAST_EXPLAINED
-        or first.contradicted > MOST_CONTRADICTED
-    ):
+    verdict, unobserved = AMBIGUOUS if others else LOCATED, None
+    if first.log_odds < SURE or first.contradicted > MOST_CONTRADICTED:
         verdict = LOST
     elif values[1] > UNSURE**2:
         verdict, unobserved = UNOBSERVED, (x, y)
-    elif others:
-        verdict = AMBIGUOUS
-    else:
-        verdict = LOCATED
     return Location(verdict, _pose(best), covariance, first, unobserved, others)
 
 

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,15 @@ UNITS = {
 NAMES = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "dm": 14}
 #: A bend becomes chords that are off it by no more [m].
 SAG = 0.01
+#: What walls are drawn with, and what is taken apart into that.
+_DRAWN = ("LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE")
+_WHOLE = ("INSERT", "LWPOLYLINE", "POLYLINE", "MLINE")
+#: Fields of segments and arcs, and their columns in a table.
+_FIELDS = {
+    "start": ("start_x", "start_y"), "end": ("end_x", "end_y"), "centroid": ("x", "y"),
+    "center": ("x", "y"), "angle": ("angle",), "length": ("length",), "misfit": ("misfit",),
+    "radius": ("radius",),
+}  # fmt: skip
 
 Plan = tuple[NDArray[np.void], NDArray[np.void]]
 
@@ -55,7 +63,7 @@ def _read_dxf(
     drawn = drawing.header.get("$INSUNITS", 0) if units is None else NAMES[units]
     unit = UNITS.get(drawn, 1.0)
     entities = list(_exploded(drawing.modelspace()))
-    names = dict.fromkeys(entity.dxf.layer for entity in entities)
+    names = dict.fromkeys(layer for layer, _ in entities)
     if layers is None:
         chosen = {name for name in names if "wall" in name.lower()} or set(names)
     else:
@@ -63,104 +71,74 @@ def _read_dxf(
         if not chosen:
             there = ", ".join(names) or "none"
             raise LineamentError(f"{path}: no layer is {' or '.join(layers)}; there are: {there}")
-    lines: list[list[float]] = []
-    columns: list[tuple[float, float, float]] = []
-    for entity in entities:
-        if entity.dxf.layer in chosen:
-            _draw(entity, unit, lines, columns)
-    ends = unit * np.array(lines, np.float64).reshape(-1, 2, 2)
+    lines, rings = [np.zeros((0, 2, 2))], []
+    for entity in (entity for layer, entity in entities if layer in chosen):
+        dxf = entity.dxf
+        if entity.dxftype() == "CIRCLE":
+            rings.append((*entity.ocs().to_wcs(dxf.center).vec2, dxf.radius))
+        else:
+            is_line = entity.dxftype() == "LINE"
+            along = (dxf.start, dxf.end) if is_line else entity.flattening(SAG / unit)
+            vertices = unit * np.array([(vertex.x, vertex.y) for vertex in along])
+            lines.append(np.stack((vertices[:-1], vertices[1:]), axis=1))
+    ends = np.concatenate(lines)
     ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 1e-6]
     if not len(ends):
         raise LineamentError(
             f"{path}: has no walls: {len(entities)} entities on {len(names)} layers, no line"
         )
-    found = np.zeros(len(columns), COLUMN)
-    for record, (x, y, radius) in zip(found, columns, strict=True):
-        record["center"], record["radius"], record["views"] = (unit * x, unit * y), unit * radius, 1
-    return walls_of(ends), found
+    columns, circles = np.zeros(len(rings), COLUMN), unit * np.array(rings).reshape(-1, 3)
+    columns["center"], columns["radius"], columns["views"] = circles[:, :2], circles[:, 2], 1
+    return walls_of(ends), columns
 
 
-def _exploded(entities: Any) -> Iterator[Any]:
-    """Yield what lines are made of; blocks and polylines are taken apart."""
+def _exploded(entities: Any, block: str = "0") -> Iterator[tuple[str, Any]]:
+    """Yield what is drawn and its layer; in a block, layer 0 is the layer of the block."""
     for entity in entities:
-        kind = entity.dxftype()
-        if kind == "INSERT":
-            for part in _exploded(entity.virtual_entities()):
-                if part.dxf.layer == "0":  # what is drawn on layer 0 lies on that of its block
-                    part.dxf.layer = entity.dxf.layer
-                yield part
-        elif kind in ("LWPOLYLINE", "POLYLINE", "MLINE"):
-            yield from entity.virtual_entities()
-        elif kind in ("LINE", "ARC", "CIRCLE"):
-            yield entity
-
-
-def _draw(
-    entity: Any,
-    unit: float,
-    lines: list[list[float]],
-    columns: list[tuple[float, float, float]],
-) -> None:
-    """Add the lines of an entity, or its circle."""
-    kind = entity.dxftype()
-    if kind == "LINE":
-        lines.append([*entity.dxf.start.vec2, *entity.dxf.end.vec2])
-    elif kind == "CIRCLE":
-        x, y, _ = entity.ocs().to_wcs(entity.dxf.center)
-        columns.append((x, y, entity.dxf.radius))
-    elif kind == "ARC":
-        vertices = [(v.x, v.y) for v in entity.flattening(SAG / unit)]
-        lines.extend([*a, *b] for a, b in pairwise(vertices))
+        layer = block if entity.dxf.layer == "0" else entity.dxf.layer
+        if entity.dxftype() in _WHOLE:
+            yield from _exploded(entity.virtual_entities(), layer)
+        elif entity.dxftype() in _DRAWN:
+            yield layer, entity
 
 
 def _read_table(path: str | os.PathLike[str]) -> Plan:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = [
-        *["kind", "scan", "x", "y", "angle", "start_x", "start_y", "end_x", "end_y"],
-        "radius",
-        "misfit",
-    ]
-    columns += [f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22")]
+    names = {name: None for columns in _FIELDS.values() for name in columns}
+    columns = [*names, "scan", *(f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22"))]
     try:
-        table = pq.read_table(path, columns=columns)
+        table = pq.read_table(path, columns=["kind", *columns])
     except OSError as error:
         raise LineamentError(f"{path}: {error.strerror or 'is no Parquet'}") from None
     except (pa.ArrowInvalid, KeyError) as error:
         raise LineamentError(f"{path}: is no table of features: {error}") from None
-    values = {name: table[name].to_numpy() for name in columns[1:]}
+    values = {name: table[name].to_numpy() for name in columns}
     kinds = np.asarray(table["kind"].to_pylist())
-    none = make_records("breakpoints", []), make_records("corners", [])
     merger = Merger()
     for scan in np.unique(values["scan"]):
-        of_scan = {
-            kind: {n: v[(kinds == kind) & (values["scan"] == scan)] for n, v in values.items()}
-            for kind in ("segment", "arc")
-        }
-        segments, arcs = _segments(of_scan["segment"]), _arcs(of_scan["arc"])
-        clusters = np.empty(0, np.int32)
-        merger.add(Features(segments, none[1], arcs, clusters, none[0]))
+        of_scan = values["scan"] == scan
+        merger.add(
+            Features(
+                _records(SEGMENT, values, of_scan & (kinds == "segment")),
+                make_records("corners", []),
+                _records(ARC, values, of_scan & (kinds == "arc")),
+                np.empty(0, np.int32),
+                make_records("breakpoints", []),
+            )
+        )
     return merger.result()
 
 
-def _segments(of: dict[str, Any]) -> NDArray[np.void]:
-    records = np.zeros(len(of["x"]), SEGMENT)
-    for name, x, y in (("start", "start_x", "start_y"), ("end", "end_x", "end_y"),
-                       ("centroid", "x", "y")):  # fmt: skip
-        records[name] = np.stack((of[x], of[y]), axis=1)
-    records["angle"], records["misfit"] = of["angle"], np.nan_to_num(of["misfit"])
-    rows = [[of["cov_00"], of["cov_01"]], [of["cov_01"], of["cov_11"]]]
-    records["covariance"] = np.array(rows).transpose(2, 0, 1)
-    records["length"] = np.linalg.norm(records["end"] - records["start"], axis=1)
-    return records
-
-
-def _arcs(of: dict[str, Any]) -> NDArray[np.void]:
-    records = np.zeros(len(of["x"]), ARC)
-    records["center"] = np.stack((of["x"], of["y"]), axis=1)
-    records["radius"] = of["radius"]
-    for i in range(3):
-        for j in range(3):
-            records["covariance"][:, i, j] = of[f"cov_{min(i, j)}{max(i, j)}"]
+def _records(
+    dtype: np.dtype[np.void], values: dict[str, NDArray[Any]], rows: NDArray[np.bool_]
+) -> NDArray[np.void]:
+    """Make records of rows of a table."""
+    records = np.zeros(int(rows.sum()), dtype)
+    for name in _FIELDS.keys() & set(dtype.names or ()):
+        columns = np.stack([values[column][rows] for column in _FIELDS[name]], axis=-1)
+        records[name] = np.nan_to_num(columns).reshape(records[name].shape)
+    for i, j in np.ndindex(records["covariance"].shape[1:]):
+        records["covariance"][:, i, j] = values[f"cov_{min(i, j)}{max(i, j)}"][rows]
     return records

@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,9 +16,8 @@ from ..extractor import Extractor, load_kernels
 from ..files import ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
-from ..mapping.following import Follower, Whereabouts
+from ..mapping.following import Whereabouts, follow
 from ..progress import Track, untracked
-from ..scan import LaserScan
 from .mapping import write_tum
 
 #: Formats of the poses.
@@ -119,7 +118,9 @@ def locate_log(
     if log.topic is None and len(log.topics) > 1:
         raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
     scans = track((scan for _, scan in log.items()), Path(log.name).name, len(log))
-    found = list(follow(scans, drawn, extractor, odometry=odometry))
+    found = [
+        (scan.stamp, where) for scan, where in follow(scans, drawn, extractor, odometry=odometry)
+    ]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
     if ending == ".tum":
@@ -140,15 +141,6 @@ def locate_log(
         warning=plan_warning(drawn, plan),
         seconds=time.perf_counter() - started,
     )
-
-
-def follow(
-    scans: Iterable[LaserScan], plan: LineMap, extractor: Extractor, *, odometry: bool = True
-) -> Iterator[tuple[float, Whereabouts]]:
-    """Yield stamp and whereabouts of each scan."""
-    follower = Follower(plan)
-    for scan in scans:
-        yield scan.stamp, follower(extractor(scan), scan.pose if odometry else None)
 
 
 def plan_warning(plan: LineMap, name: object) -> str:

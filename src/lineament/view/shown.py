@@ -6,6 +6,7 @@ import tempfile
 import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from itertools import tee
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,12 +95,12 @@ class ShownLog:
 
     def _located(self, items: Iterable[Item]) -> Iterator[Item]:
         """Yield scans with their poses on the plan, or none while that is not known."""
-        from ..mapping.following import Follower
+        from ..mapping.following import follow
 
         assert self._plan is not None
-        follower, extract = Follower(self._plan), Extractor()
-        for index, (topic, scan) in enumerate(items):
-            where = follower(extract(scan), scan.pose)
+        items, copy = tee(items)
+        found = follow((scan for _, scan in copy), self._plan, Extractor())
+        for index, ((topic, _), (scan, where)) in enumerate(zip(items, found, strict=False)):
             self._where[index] = {
                 "verdict": where.verdict,
                 "covariance": where.covariance.tolist() if where.is_known else None,
