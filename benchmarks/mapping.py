@@ -101,8 +101,9 @@ def rows(name, scans, truth, relations, odometry=False):
     )
     judged(name, "ICP, the same loops", rival(found, made.loops), truth, relations)
     played = scans[-1].stamp - scans[0].stamp
+    lost = sum(frame.is_lost for frame in found.frames)
     print(
-        f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {len(found.lost)}, "
+        f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
         f"{len(made.loops)} loops; {seconds:.0f} s of processor, played in {played:.0f} s -->"
     )
 

@@ -145,25 +145,11 @@ def adjust(
     motions: Sequence[tuple[Pose, Array]],
     seen: Sequence[tuple[Records, Numbers]],
 ) -> tuple[list[Pose], Array, Records, Array]:
-    """Adjust the poses of a few scans, and the walls that they saw, in the frame of the last scan.
+    """Adjust the poses of a few scans, the last of which stays, and the walls that they saw.
 
-    Parameters
-    ----------
-    poses : sequence of (x, y, theta)
-        First poses, the last of which stays.
-    motions : sequence of (pose, covariance)
-        From each scan to the next.
-    seen : sequence of (segments, numbers)
-        Segments of each scan; those of the same number are the same wall.
-
-    Returns
-    -------
-    poses : list of (x, y, theta)
-    covariances : ndarray, shape (n, 3, 3)
-        Of the poses.
-    walls : structured array of `WALL`
-    covariance : ndarray, shape (2m, 2m)
-        Of (offset, angle) of all walls.
+    There is a motion with its covariance from each scan to the next, and segments of each scan with
+    the number of the wall of each. Returns the poses, their covariances (n, 3, 3), the walls, and
+    the covariance (2m, 2m) of (offset, angle) of all walls.
     """
     n, sights = len(poses), sights_of(seen)
     names, sights["wall"] = np.unique(sights["wall"], return_inverse=True)

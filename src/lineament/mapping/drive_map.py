@@ -55,20 +55,10 @@ _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 
 @dataclass(slots=True, eq=False)
 class KeyFrame:
-    """A scan that stands for those around it.
+    """A scan that stands for those around it: number `index` of the log.
 
-    Attributes
-    ----------
-    index : int
-        Of its scan in the log.
-    scan, features
-        In the frame of the sensor.
-    walls : ndarray of int64, shape (n,)
-        Which wall each of the segments shows.
-    pose : (x, y, theta)
-        In the frame of the first key frame.
-    motion : Motion
-        From the key frame before.
+    `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
+    first key frame, `motion` that since the one before: a guess where nothing explains the scan.
     """
 
     index: int
@@ -77,24 +67,18 @@ class KeyFrame:
     walls: Numbers
     pose: Pose
     motion: Motion
+    is_lost: bool
 
 
 class Drive:
     """Places the scans of a log, one after the other, by the walls of the last metres.
 
-    Attributes
-    ----------
-    frames : list of KeyFrame
-    scans : list of (int, Pose)
-        Of each scan: the key frame that it belongs to, and its pose in that one's frame.
-    lost : list of int
-        Key frames that nothing of what was seen before explains.
+    `scans` has the key frame that each belongs to, and its pose in that one's frame.
     """
 
     def __init__(self) -> None:
         self.frames: list[KeyFrame] = []
         self.scans: list[tuple[int, Pose]] = []
-        self.lost: list[int] = []
         #: Walls of the last metres, corners and arcs, in the frame of the last key frame; numbers
         #: of the walls, that of the next, those that are gone, and the first key frame since lost.
         self._around: Features
@@ -116,10 +100,8 @@ class Drive:
             way, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
             is_key = way >= SPACING or turn >= TURN or is_lost
             self._go_on(scan.stamp, motion.pose)
-        if is_lost:
-            self.lost.append(len(self.frames))
         if is_key:
-            self._key(features, motion, scan, is_lost or not self.frames)
+            self._key(features, motion, scan, is_lost)
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
         self._last = scan.stamp, odometry, pose
@@ -204,13 +186,13 @@ class Drive:
             motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
         return motion
 
-    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_new: bool) -> None:
+    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_lost: bool) -> None:
         """Take a key frame; its segments are walls that are known, or new ones."""
         here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
-        if is_new:
+        if is_lost:
             self._first = len(self.frames)
-        else:
+        elif self.frames:
             around = self._around.transform(*inverse(motion.pose))
             before, now = associate(around, features, roughness=ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
@@ -220,7 +202,8 @@ class Drive:
         is_unknown = walls < 0
         walls[is_unknown] = self._next + np.arange(is_unknown.sum())
         self._next += int(is_unknown.sum())
-        self.frames.append(KeyFrame(len(self.scans), scan, features, walls, here, motion))
+        key = KeyFrame(len(self.scans), scan, features, walls, here, motion, is_lost)
+        self.frames.append(key)
         self._look_around()
 
     def _look_around(self) -> None:
@@ -240,5 +223,6 @@ class Drive:
         mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
         corners = last.features.corners.copy()
         corners["segments"] = mine[corners["segments"]]
-        self._around = replace(last.features, segments=segments, corners=corners)
+        arcs = last.features.arcs[:0]  # people
+        self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
         self._index = index_of(as_walls(segments))

@@ -25,32 +25,19 @@ _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Walls are merged so many times after each search; so much off are one [m].
 _MERGED, _APART = 2, 0.03
-#: Loops with less weight are wrong.
-_RIGHT = 0.5
 #: A drive is looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
-#: Where no more than this share of the most sights goes on, a wall ends.
-_SHARE = 0.2
-#: A wall was seen so often, or in no map.
-VIEWS = 3
+#: A wall was seen by so many key frames; where no more than this share of the most sights goes on,
+#: it ends.
+_VIEWS, _SHARE = 3, 0.2
 
 
 @dataclass(slots=True, eq=False)
 class DriveMap:
-    """A map of a drive.
+    """A map of a drive, in the frame of its first scan, and the poses of all scans.
 
-    Attributes
-    ----------
-    map : LineMap
-        Its walls, with covariances that hold those of the poses.
-    poses : list of (x, y, theta)
-        Of all scans.
-    survey : Survey
-        Key frames, their poses, and what they saw of each wall, in the frame of the first one.
-    loops : structured array of `EDGE`
-        Those that were closed, between key frames.
-    refused : int
-        Loops that were left out, since they contradict the others.
+    The covariances of its walls hold those of the poses. `loops` between key frames, of `EDGE`,
+    were closed; those that contradict the others were refused.
     """
 
     map: LineMap
@@ -60,20 +47,10 @@ class DriveMap:
     refused: int
 
 
-def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int = VIEWS) -> DriveMap:
+def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     """Close the loops of a drive, and adjust poses and walls together.
 
-    Parameters
-    ----------
-    frames, scans
-        As `Drive` has them.
-    views : int
-        How often a part of a wall was seen, by key frames, to be in the map.
-
-    Raises
-    ------
-    LineamentError
-        If there are no walls.
+    Key frames and scans are those of `Drive`. LineamentError if there are no walls.
     """
     motions = [frame.motion for frame in frames[1:]]
     spreads = [_TWICE * motion.covariance + _LEAST for motion in motions]
@@ -91,7 +68,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int =
         if not len(near):
             break
         found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
-        right = found.weights[len(chain) :] > _RIGHT
+        right = found.weights[len(chain) :] > 0.5
         loops, refused = near[right], int((~right).sum())
         weak = loops.copy()
         weak["information"] /= _TWICE
@@ -101,7 +78,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int =
             sights = merged(sights, found.poses, found.lines, _APART)
         found = optimise(found.poses, chain, sights, _count(sights))
     survey = Survey(frames, found.poses, sights, found.with_poses())
-    least = min(views, len(frames))
+    least = min(_VIEWS, len(frames))
     walls = walls_along(sights, found.poses, survey.lines, views=least, share=_SHARE)
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     return DriveMap(LineMap(walls), every, survey, loops, refused)

@@ -125,7 +125,7 @@ def map_log(
         output=str(output),
         scans=len(stamps),
         frames=len(drive.frames),
-        lost=len(drive.lost),
+        lost=sum(frame.is_lost for frame in drive.frames),
         loops=len(made.loops),
         refused=made.refused,
         way=way,
