@@ -135,8 +135,8 @@ def test_a_wall_ends_where_hardly_any_sight_goes_on():
     sights["ends"][:20], sights["ends"][20:40], sights["ends"][40:] = (0, 2), (3, 5), (0, 5)
     pose = np.zeros((1, 3))
     lines = lines_of(sights, pose, 1)
-    for views, share, ends in ((1, 0.0, [(0, 5)]), (3, 0.2, [(0, 2), (3, 5)]), (43, 0.2, [])):
-        walls = walls_along(sights, pose, lines, views=views, share=share)
+    for views, ends in ((1, [(0, 5)]), (3, [(0, 2), (3, 5)]), (43, [])):
+        walls = walls_along(sights, pose, lines, views=views)
         found = np.column_stack((walls["start"][:, 0], walls["end"][:, 0]))
         np.testing.assert_allclose(found, np.reshape(ends, (-1, 2)), atol=1e-12)
 

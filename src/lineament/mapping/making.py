@@ -27,9 +27,8 @@ _SPREADS = (0.8, 0.12), (0.3, 0.06)
 _MERGED, _APART = 2, 0.03
 #: A drive is looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
-#: A wall was seen by so many key frames; where no more than this share of the most sights goes on,
-#: it ends.
-_VIEWS, _SHARE = 3, 0.2
+#: A wall was seen by so many key frames.
+_VIEWS = 3
 
 
 @dataclass(slots=True, eq=False)
@@ -79,7 +78,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         found = optimise(found.poses, chain, sights, _count(sights))
     survey = Survey(frames, found.poses, sights, found.with_poses())
     least = min(_VIEWS, len(frames))
-    walls = walls_along(sights, found.poses, survey.lines, views=least, share=_SHARE)
+    walls = walls_along(sights, found.poses, survey.lines, views=least)
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     return DriveMap(LineMap(walls), every, survey, loops, refused)
 

@@ -32,16 +32,9 @@ COLUMN = np.dtype(
 #: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
 #: it from its centroid [m], and how far its surface is off a straight line [m²].
 SIGHT = np.dtype(
-    [
-        ("frame", "i8"),
-        ("wall", "i8"),
-        ("centroid", "f8", 2),
-        ("angle", "f8"),
-        ("covariance", "f8", (2, 2)),
-        ("ends", "f8", 2),
-        ("misfit", "f8"),
-    ]
-)
+    [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
+     ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8")]
+)  # fmt: skip
 
 #: Walls on one line are one wall if no more lies between them [m]: a door is wider; whole ones.
 GAP, WHOLE = 0.2, 1e4
@@ -49,6 +42,8 @@ GAP, WHOLE = 0.2, 1e4
 SHORTEST, LEAST_SURE = 0.15, 0.2
 #: Sights are no shorter [m]; beyond so many deviations they count less.
 _SHORT, _KERNEL = 0.1, 3.0
+#: Where no more than this share of the most sights goes on, a wall ends.
+_SHARE = 0.2
 #: Lines whose directions differ by more are never one [rad]; share of the parts of a wall that the
 #: tests keep together.
 _TURN, _GATE = 0.35, 0.99
@@ -110,10 +105,9 @@ def lines_of(sights: Records, poses: Array, count: int) -> Records:
 
     From the mean of its sights on, by robust least squares.
     """
-    (places, angles), w = placed(sights, poses), sights["wall"]
+    (places, angles), w, lines = placed(sights, poses), sights["wall"], np.zeros(count, WALL)
     sure, firm = (1.0 / sights["covariance"][:, k, k, None] for k in range(2))
-    lines, (x, y) = np.zeros(count, WALL), summed(firm * unit(angles), w, count).T
-    lines["angle"] = np.arctan2(y, x)
+    lines["angle"] = np.arctan2(*summed(firm * unit(angles), w, count).T[::-1])
     total = np.maximum(summed(sure, w, count), 1e-12)
     lines["centroid"] = summed(sure * places, w, count) / total
     information = np.linalg.inv(sights["covariance"])
@@ -142,16 +136,11 @@ def robust(off: Array, information: Array) -> Array:
 
 
 def walls_along(
-    sights: Records,
-    poses: Array,
-    lines: Records,
-    gap: float = GAP,
-    views: int = 1,
-    share: float = 0.0,
+    sights: Records, poses: Array, lines: Records, gap: float = GAP, views: int = 1
 ) -> Records:
     """Return walls along their lines, as far as sights lie no farther apart than a gap [m].
 
-    Each part was seen so often. A wall ends where no more than a share of the most sights of it go
+    Each part was seen so often. If that is more than once, a wall ends where hardly any sight goes
     on: at a grazing angle, a few cross doorways.
     """
     low, high = extents(sights, poses, lines)
@@ -160,7 +149,7 @@ def walls_along(
     w, places, begins = w[order], places[order], order < len(low)
     cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(len(lines))
     np.maximum.at(most, w, cover)
-    edges = np.flatnonzero(np.diff(cover > share * most[w], prepend=False))
+    edges = np.flatnonzero(np.diff(cover > (_SHARE * most[w] if views > 1 else 0), prepend=False))
     seen: Numbers = np.cumsum(begins)[edges[1::2]] - np.cumsum(~begins)[edges[::2]]
     first, last = edges.reshape(-1, 2)[seen >= views].T
     walls: Records = lines[w[first]]
@@ -200,7 +189,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
         kept[k] = True
         if not len(near):
             continue
-        # Where they are nearest to each other, or in the middle of what they share.
+        # The middle of what they share, or of what is between them.
         shared = (np.maximum(begin, first[near]) + np.minimum(end, last[near])) / 2
         arm = points[near] + shared[:, None] * u[near] - points[k]
         off = np.column_stack((arm[:, 0] * u[k, 1] - arm[:, 1] * u[k, 0],
@@ -273,8 +262,7 @@ def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Reco
     """Make records of walls from both ends of each, shape (n, 2, 2)."""
     walls = np.zeros(len(ends), WALL)
     walls["start"], walls["end"], walls["centroid"] = ends[:, 0], ends[:, 1], ends.mean(axis=1)
-    along = ends[:, 1] - ends[:, 0]
-    walls["angle"] = np.arctan2(along[:, 1], along[:, 0])
+    walls["angle"] = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1])
     walls["covariance"], walls["side"], walls["views"] = covariance, side, 1
     return walls
 
