@@ -161,7 +161,9 @@ def against_truth(found, made, truth, segments):
 def draw(path, made, walls, about):
     """Draw a map beside another."""
     figure, axes = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
-    for axis, ends, title in zip(axes, (made.map.ends, walls), ("lineament map", about)):
+    for axis, ends, title in zip(
+        axes, (made.map.ends, walls), ("lineament map", about), strict=True
+    ):
         axis.add_collection(LineCollection(ends, colors="k", linewidths=0.5))
         axis.autoscale()
         axis.set(aspect="equal", title=title)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Array, Pose
-from ..scan.poses import compose, relative
+from ..scan.poses import relative
 from .adjust import edges_of
 from .drive_map import KeyFrame
 from .line_map import LineMap
@@ -53,7 +53,7 @@ class Survey:
     def query(self, q: int) -> Query | None:
         """Return what was seen on the last metres before a key frame, in its frame."""
         before, here = self.way[q] - self.way[: q + 1], self.pose(q)
-        last = np.flatnonzero((before <= _QUERY) & (np.arange(q + 1) >= self.lost(q)))
+        last = np.flatnonzero(before <= _QUERY)
         walls, beams = self.walls(here, last), []
         n = len(walls)
         if n < 4:
@@ -77,41 +77,22 @@ class Survey:
 
         The deviations [m, rad] are those of the poses from each other.
         """
-        ends, motions, spreads = [], [], []
+        ends, motions, spreads, way = [], [], [], self.way
+        covariance = np.diag((spread[0], *spread)) ** 2
         plans: dict[int, LineMap | None] = {}
         for q, query in self.queries(_EVERY):
-            lost = self.lost(q)
-            for j in self._passed(q, 2.0 + 2.0 * spread[0]) + ([-lost] if lost else []):
+            for j in self._passed(q, 2.0 + 2.0 * spread[0]):
                 if j not in plans:
-                    plans[j] = self._plan(j)
-                if (plan := plans[j]) is None:
-                    continue
-                place, guess = self.pose(max(j, 0)), None
-                if j >= 0:
-                    guess = relative(place, self.pose(q))
-                where = locate(query, plan, guess, np.diag((spread[0], *spread)) ** 2)
-                if where:
-                    here = compose(place, where.pose)
-                    away = np.hypot(*(self.poses[: lost or q, :2] - here[:2]).T)
-                    k = j if j >= 0 else int(away.argmin())
-                    ends.append((k, q))
-                    motions.append(relative(self.pose(k), here))
-                    spreads.append(where.covariance + _FLOOR)
+                    walls = self.walls(self.pose(j), np.flatnonzero(abs(way - way[j]) <= _PLAN))
+                    plans[j] = LineMap(walls) if len(walls) > 3 else None
+                if (plan := plans[j]) is not None:
+                    guess = relative(self.pose(j), self.pose(q))
+                    where = locate(query, plan, guess, covariance)
+                    if where:
+                        ends.append((j, q))
+                        motions.append(where.pose)
+                        spreads.append(where.covariance + _FLOOR)
         return edges_of(ends, motions, spreads, loop=True)
-
-    def _plan(self, j: int) -> LineMap | None:
-        """Return what was seen around a key frame, or in all before -j, in the frame of the first.
-
-        That is where the way was lost: what was seen since may be anywhere.
-        """
-        way = self.way
-        near = np.flatnonzero(abs(way - way[j]) <= _PLAN) if j >= 0 else np.arange(-j)
-        walls = self.walls(self.pose(max(j, 0)), near)
-        return LineMap(walls) if len(walls) > 3 else None
-
-    def lost(self, q: int) -> int:
-        """Return the key frame at which the way was lost the last time before another, or 0."""
-        return max((k for k in range(q + 1) if self.frames[k].is_lost), default=0)
 
     def _passed(self, q: int, reach: float) -> list[int]:
         """Return the nearest key frame of each stretch of the way that passed near.
