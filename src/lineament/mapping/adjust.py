@@ -34,8 +34,8 @@ EDGE = np.dtype(
 #: which takes so many more rounds.
 _KERNEL, _WIDE, _WIDER = 3.0, 256.0, 4
 _ROUNDS, _SMALL = 6, 1e-4
-#: Walls whose covariances are found at a time.
-_BATCH = 200
+#: Walls whose covariances are found at a time; of larger matrices no inverse is made.
+_BATCH, _DENSE = 200, 6000
 
 
 def edges_of(ends: Any, motions: Any, covariances: Any, loop: bool = False) -> Records:
@@ -65,22 +65,26 @@ def errors_of_motions(edges: Records, poses: Array) -> tuple[Array, Array, Array
 class Adjusted:
     """Poses (n, 3), lines of walls as if the poses were known, and the weight of each edge.
 
-    `gain` holds how the walls follow the poses; `solve` solves the equations of the poses.
+    `gain` holds how the walls follow the poses; `matrix` is that of the equations of the poses.
     """
 
     poses: Array
     lines: Records
     weights: Array
     gain: Any
-    solve: Callable[[Array], Array]
+    matrix: Any
 
     def with_poses(self) -> Records:
         """Return the lines with covariances that hold those of the poses."""
-        lines = self.lines.copy()
+        lines, is_small = self.lines.copy(), self.matrix.shape[0] <= _DENSE
+        # One inverse is quicker than a solution for each wall.
+        solve = _solver(self.matrix.toarray() if is_small else self.matrix)
         for first in range(0, len(lines), _BATCH):
-            columns = self.gain[:, 2 * first : 2 * (first + _BATCH)].toarray()
+            gain = self.gain[:, 2 * first : 2 * (first + _BATCH)]
+            columns = gain.toarray()
             by_wall = columns.reshape(len(columns), -1, 2)
-            spread = np.einsum("iwa,iwb->wab", by_wall, self.solve(columns).reshape(by_wall.shape))
+            solved = solve(gain if is_small else columns).reshape(by_wall.shape)
+            spread = np.einsum("iwa,iwb->wab", by_wall, solved)
             lines["covariance"][first : first + _BATCH] += spread
         return lines
 
@@ -127,8 +131,8 @@ def optimise(
         blocks.append((1e9 * np.eye(3)[None], here, here))
         both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
         gain = both @ _matrix([(own, every, every)], count, count, dense)
-        solve = _solver(_matrix(blocks, n, n, dense) - gain @ both.T)
-        step = solve(gain @ towards.ravel() - gradient.ravel())
+        matrix = _matrix(blocks, n, n, dense) - gain @ both.T
+        step = _solver(matrix)(gain @ towards.ravel() - gradient.ravel())
         turn = (own @ (-towards - (both.T @ step).reshape(-1, 2))[:, :, None])[:, :, 0]
         state = state + step.reshape(-1, 3)
         state[:, 2] = wrapped(state[:, 2])
@@ -137,7 +141,7 @@ def optimise(
         if kernel <= _KERNEL and max(abs(step).max(), abs(turn).max(initial=0)) < _SMALL:
             break
         kernel = max(kernel / 4, _KERNEL)
-    return Adjusted(state, lines, weights, gain, solve)
+    return Adjusted(state, lines, weights, gain, matrix)
 
 
 def adjust(
@@ -156,7 +160,7 @@ def adjust(
     m, pairs = len(names), [(k, k + 1) for k in range(n - 1)]
     chain = edges_of(pairs, [motion for motion, _ in motions], [spread for _, spread in motions])
     found = optimise(np.array(poses), chain, sights, m, held=n - 1, rounds=3, dense=True)
-    inverse, every = found.solve(np.eye(3 * n)), np.arange(m)
+    inverse, every = _inverse(found.matrix), np.arange(m)
     walls = bowed(walls_along(sights, found.poses, found.lines, WHOLE), sights)
     covariance = (found.gain.T @ inverse @ found.gain).reshape(m, 2, m, 2)
     covariance[every, :, every] += walls["covariance"]
