@@ -10,27 +10,33 @@ import argparse
 import math
 import os
 import time
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import LineCollection
 
 from lineament import Extractor
 from lineament.evaluation.icp import icp
 from lineament.evaluation.maps import absolute_errors, doubled_walls
 from lineament.evaluation.relations import read_relations
 from lineament.logs import open_log
+from lineament.mapping import LineMap
+from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.graph import Edges, optimise
+from lineament.mapping.loops import moved
 from lineament.mapping.making import make_map
-from lineament.scan.poses import compose
+from lineament.mapping.walls import walls_of, wrapped
+from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, Wheels, office
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 LOGS = {
     "Intel lab": ("truth/intel_graph.npz", "graph/intel-lab.relations"),
     "fr079": ("truth/fr079_graph.npz", "../relations/fr079.relations"),
+    "ACES": ("carmen/aces-corrected.log.gz", None),
+    "CSAIL": ("carmen/csail-corrected.log.gz", None),
 }
 COLUMNS = (
     "log",
@@ -61,13 +67,10 @@ def rival(found, loops):
     for motion in motions:
         start.append(compose(start[-1], motion))
     n = len(motions)
-    ends = np.column_stack((np.arange(n), np.arange(1, n + 1)))
-    chain = Edges(
-        ends, np.array(motions), np.tile(np.linalg.inv(ICP), (n, 1, 1)), np.zeros(n, bool)
-    )
-    # A lost turn is one wrong motion of many: all may be wrong.
-    both = chain.together(loops)
-    poses, _ = optimise(np.array(start), replace(both, robust=np.ones(len(both.ends), bool)))
+    pairs = [(k, k + 1) for k in range(n)]
+    both = np.append(edges_of(pairs, motions, np.tile(ICP, (n, 1, 1))), loops)
+    both["loop"] = True  # a lost turn is one wrong motion of many: all may be wrong
+    poses = optimise(np.array(start), both, rounds=40).poses
     return placed(found, poses)
 
 
@@ -97,41 +100,121 @@ def rows(name, scans, truth, relations, odometry=False):
     found = drive(scans, odometry)
     made = make_map(found.frames, found.scans)
     seconds = time.process_time() - started
-    ends = np.column_stack((made.map.walls["start"], made.map.walls["end"]))
+    ends = made.map.ends.reshape(-1, 4)
     length = np.hypot(*(ends[:, 2:] - ends[:, :2]).T).sum()
+    about = f"{doubled_walls(ends):.0f} of {length:.0f}"
     judged(name, "motions alone", placed(found, [f.pose for f in found.frames]), truth, relations)
-    judged(
-        name, "`map`", made.poses, truth, relations, f"{doubled_walls(ends):.0f} of {length:.0f}"
-    )
+    judged(name, "`map`", made.poses, truth, relations, about)
     judged(name, "ICP, the same loops", rival(found, made.loops), truth, relations)
     played = scans[-1].stamp - scans[0].stamp
+    lost = sum(frame.is_lost for frame in found.frames)
     print(
-        f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {len(found.lost)}, "
-        f"{len(made.loops.ends)} loops; {seconds:.0f} s of processor, played in {played:.0f} s -->"
+        f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
+        f"{len(made.loops)} loops, {made.refused} refused; {seconds:.0f} s of processor, played in "
+        f"{played:.0f} s: {played / seconds:.1f} x -->"
     )
+    return found, made
+
+
+def loops_off(found, made, truth):
+    """How far loops are off the true motions, shape (n, 3) [m, m, rad]."""
+    at = [truth[frame.index] for frame in found.frames]
+    pairs = zip(made.loops["ends"].tolist(), made.loops["motion"].tolist(), strict=True)
+    off = [relative(relative(at[a], at[b]), tuple(motion)) for (a, b), motion in pairs]
+    return np.array(off).reshape(-1, 3)
+
+
+def nees(made, truth, segments):
+    """Squares of offset and angle of walls off the true ones (n, 2), over their variances."""
+    lines, found = segments[:, 2:] - segments[:, :2], []
+    lengths = np.hypot(*lines.T)
+    u, angles = lines / lengths[:, None], np.arctan2(lines[:, 1], lines[:, 0])
+    for wall in moved(made.map.walls, inverse(truth[0])):
+        arm = wall["centroid"] - segments[:, :2]
+        along, off = (arm * u).sum(axis=1), u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
+        turn = wrapped(wall["angle"] - angles)
+        near = (abs(turn) < 0.2) & (abs(off) < 0.15) & (along > -0.1) & (along < lengths + 0.1)
+        if near.any() and math.dist(wall["start"], wall["end"]) > 0.3:
+            k = np.where(near, abs(off), np.inf).argmin()
+            found.append(np.square((off[k], turn[k])) / np.diag(wall["covariance"]))
+    return np.array(found)
+
+
+def against_truth(found, made, truth, segments):
+    """Print what is known of a simulated storey alone."""
+    off = loops_off(found, made, truth)
+    wrong = (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
+    a, b = (np.array(poses)[::20, None, :2] for poses in (made.poses, truth))
+    a, b = (np.linalg.norm(of - of[:, 0], axis=2) for of in (a, b))
+    spans = a[b > 20] / b[b > 20] - 1
+    squares = nees(made, truth, segments)
+    mean, median = squares.mean(axis=0), np.median(squares, axis=0)
+    print(
+        f"<!-- {len(off)} loops, {wrong.sum()} wrong; spans over 20 m off by "
+        f"{100 * np.std(spans):.4f} %, at most {100 * abs(spans).max():.4f} %; squares of "
+        f"{len(squares)} walls over their variances: offsets {mean[0]:.2f} (median "
+        f"{median[0]:.2f}), angles {mean[1]:.2f} ({median[1]:.2f}) -->",
+        flush=True,
+    )
+
+
+def draw(path, made, walls, about):
+    """Draw a map beside another."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
+    for axis, ends, title in zip(
+        axes, (made.map.ends, walls), ("lineament map", about), strict=True
+    ):
+        axis.add_collection(LineCollection(ends, colors="k", linewidths=0.5))
+        axis.autoscale()
+        axis.set(aspect="equal", title=title)
+    figure.savefig(path, dpi=80)
+
+
+def corrected(found, truth):
+    """Walls of the key frames at poses that were corrected, in the frame of the first."""
+    features = (frame.features for frame in found.frames)
+    poses = [relative(truth[0], truth[frame.index]) for frame in found.frames]
+    return LineMap.from_features(features, poses, min_views=3).ends
+
+
+def storey(seed, rate, pictures):
+    for odometry in (True, False):
+        building = office(seed)
+        scans, truth = building.drive(
+            SENSORS["utm30lx"], seed=seed, rate=rate, people=8, wheels=Wheels()
+        )
+        about = f"storey {seed}, {'wheels' if odometry else 'no odometry'}"
+        found, made = rows(about, list(scans), truth, None, odometry)
+        against_truth(found, made, truth, building.world.segments)
+        if pictures and odometry:
+            walls = moved(walls_of(building.world.segments.reshape(-1, 2, 2)), truth[0])
+            ends = np.stack((walls["start"], walls["end"]), axis=1)
+            draw(pictures / "map_storey.png", made, ends, "the building")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--storey", type=int, help="seed of a simulated storey of 60 m x 40 m")
+    parser.add_argument("--rate", type=float, default=5.0, help="scans of it in a second")
+    parser.add_argument("--log", choices=LOGS, help="this log alone")
+    parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
     chosen = parser.parse_args()
     print("|" + "|".join(COLUMNS) + "|\n" + "|---" * len(COLUMNS) + "|")
+    if chosen.storey is not None:
+        storey(chosen.storey, chosen.rate, chosen.pictures)
+        return
     for name, (path, relations) in LOGS.items():
-        if chosen.storey is not None or not (DATA / path).exists():
+        if chosen.log not in (None, name) or not (DATA / path).exists():
             continue
         scans = sorted(open_log(DATA / path), key=lambda scan: scan.stamp)
         stamps = np.array([scan.stamp for scan in scans])
-        verified = read_relations(DATA / relations, stamps)
+        verified = relations and read_relations(DATA / relations, stamps)
         truth = [scan.pose for scan in scans]
         judged(name, "the log’s corrected poses", truth, truth, verified)
-        rows(name, scans, truth, verified)
-    if chosen.storey is not None:
-        for odometry in (True, False):
-            made, truth = office(chosen.storey).drive(
-                SENSORS["utm30lx"], seed=chosen.storey, rate=5, people=8, wheels=Wheels()
-            )
-            about = "a storey, wheels" if odometry else "a storey, no odometry"
-            rows(about, list(made), truth, None, odometry)
+        found, made = rows(name, scans, truth, verified)
+        if chosen.pictures:
+            path = chosen.pictures / f"map_{name.split()[0].lower()}.png"
+            draw(path, made, corrected(found, truth), "walls at the log’s corrected poses")
 
 
 if __name__ == "__main__":

@@ -1,176 +1,207 @@
-"""Poses and walls of a local map, adjusted together: each measurement counts once."""
+"""Poses, motions between them, and the walls seen from them: one sparse least squares."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..motion.association import chi_square
-from ..motion.odometry import compose_jacobians
+from ..errors import needed_by
 from ..scan import Array, Pose
-from ..scan.poses import compose
-from .walls import WALL
+from .walls import (
+    SIGHT,
+    WHOLE,
+    Numbers,
+    Records,
+    bowed,
+    errors,
+    lines_of,
+    move,
+    robust,
+    sights_of,
+    summed,
+    walls_along,
+    wrapped,
+)
 
-_ROUNDS = 3
+#: A motion between two poses: their indices, the second in the frame of the first [m, m, rad], its
+#: inverse covariance, and whether it may be wrong: a loop.
+EDGE = np.dtype(
+    [("ends", "i8", 2), ("motion", "f8", 3), ("information", "f8", (3, 3)), ("loop", "?")]
+)
+
+#: Loops that are off by more than so many deviations count less; at first, by so many times more,
+#: which takes so many more rounds.
+_KERNEL, _WIDE, _WIDER = 3.0, 256.0, 4
+_ROUNDS, _SMALL = 6, 1e-4
+#: Walls whose covariances are found at a time; of larger matrices no inverse is made.
+_BATCH, _DENSE = 200, 6000
+
+
+def edges_of(ends: Any, motions: Any, covariances: Any, loop: bool = False) -> Records:
+    """Make records of `EDGE`."""
+    edges = np.zeros(len(ends), EDGE)
+    if len(ends):
+        edges["ends"], edges["motion"], edges["loop"] = ends, motions, loop
+        edges["information"] = np.linalg.inv(covariances)
+    return edges
+
+
+def errors_of_motions(edges: Records, poses: Array) -> tuple[Array, Array, Array]:
+    """How far poses are off, in the first frame (m, 3), and its derivatives by both poses."""
+    a, b = poses[edges["ends"][:, 0]], poses[edges["ends"][:, 1]]
+    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
+    dx, dy, turn = (b - a).T
+    off = np.column_stack((c * dx + s * dy, -s * dx + c * dy, turn)) - edges["motion"]
+    off[:, 2] = wrapped(off[:, 2])
+    of_b = np.zeros((len(a), 3, 3))
+    of_b[:, 0, 0], of_b[:, 0, 1], of_b[:, 1, 0], of_b[:, 1, 1], of_b[:, 2, 2] = c, s, -s, c, 1.0
+    of_a = -of_b
+    of_a[:, 0, 2], of_a[:, 1, 2] = -s * dx + c * dy, -c * dx - s * dy
+    return off, of_a, of_b
+
+
+@dataclass(slots=True, eq=False)
+class Adjusted:
+    """Poses (n, 3), lines of walls as if the poses were known, and the weight of each edge.
+
+    `gain` holds how the walls follow the poses; `matrix` is that of the equations of the poses.
+    """
+
+    poses: Array
+    lines: Records
+    weights: Array
+    gain: Any
+    matrix: Any
+
+    def with_poses(self) -> Records:
+        """Return the lines with covariances that hold those of the poses."""
+        lines, is_small = self.lines.copy(), self.matrix.shape[0] <= _DENSE
+        # One inverse is quicker than a solution for each wall.
+        solve = _solver(self.matrix.toarray() if is_small else self.matrix)
+        for first in range(0, len(lines), _BATCH):
+            gain = self.gain[:, 2 * first : 2 * (first + _BATCH)]
+            columns = gain.toarray()
+            by_wall = columns.reshape(len(columns), -1, 2)
+            solved = solve(gain if is_small else columns).reshape(by_wall.shape)
+            spread = np.einsum("iwa,iwb->wab", by_wall, solved)
+            lines["covariance"][first : first + _BATCH] += spread
+        return lines
+
+
+def optimise(
+    poses: Array,
+    edges: Records,
+    sights: Records | None = None,
+    count: int = 0,
+    *,
+    held: int = 0,
+    rounds: int = _ROUNDS,
+    dense: bool = False,
+) -> Adjusted:
+    """Adjust poses (n, 3) and the lines of `count` walls by Gauss-Newton; one pose is held.
+
+    Sights beyond 3 deviations count less. Loops have a weight of k⁴ / (k² + e²)², with e² their
+    square (Geman and McClure), which is 1 where they are right and 0 where they are wrong; k comes
+    down to 3 from round to round, so that at first none is left out. Walls are eliminated (Schur),
+    so that the equations are of the poses alone.
+    """
+    sights = np.zeros(0, SIGHT) if sights is None else sights
+    state, n, lines = poses.copy(), len(poses), lines_of(sights, poses, count)
+    information, (a, b) = np.linalg.inv(sights["covariance"]), edges["ends"].T
+    w, frames, every, here = sights["wall"], sights["frame"], np.arange(count), np.array([held])
+    kernel = _KERNEL * (_WIDE if edges["loop"].any() else 1.0)
+    for _ in range(rounds + _WIDER * (kernel > _KERNEL)):
+        off, of_pose, of_wall = errors(sights, state, lines)
+        weighted = robust(off, information)
+        by_pose = of_pose.transpose(0, 2, 1) @ weighted
+        by_wall = of_wall.transpose(0, 2, 1) @ weighted
+        apart, of_a, of_b = errors_of_motions(edges, state)
+        squares = np.einsum("ni,nij,nj->n", apart, edges["information"], apart)
+        weights = np.where(edges["loop"], kernel**4 / (kernel**2 + squares) ** 2, 1.0)
+        sure = edges["information"] * weights[:, None, None]
+        by_a, by_b = of_a.transpose(0, 2, 1) @ sure, of_b.transpose(0, 2, 1) @ sure
+        gradient = summed((by_pose @ off[:, :, None])[:, :, 0], frames, n)
+        gradient += summed((by_a @ apart[:, :, None])[:, :, 0], a, n)
+        gradient += summed((by_b @ apart[:, :, None])[:, :, 0], b, n)
+        towards = summed((by_wall @ off[:, :, None])[:, :, 0], w, count)
+        own = _inverse(summed(by_wall @ of_wall, w, count) + 1e-6 * np.eye(2))
+        blocks = [(by_a @ of_b, a, b), (by_b @ of_a, b, a), (by_a @ of_a, a, a)]
+        blocks += [(by_b @ of_b, b, b), (by_pose @ of_pose, frames, frames)]
+        blocks.append((1e9 * np.eye(3)[None], here, here))
+        both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
+        gain = both @ _matrix([(own, every, every)], count, count, dense)
+        matrix = _matrix(blocks, n, n, dense) - gain @ both.T
+        step = _solver(matrix)(gain @ towards.ravel() - gradient.ravel())
+        turn = (own @ (-towards - (both.T @ step).reshape(-1, 2))[:, :, None])[:, :, 0]
+        state = state + step.reshape(-1, 3)
+        state[:, 2] = wrapped(state[:, 2])
+        lines["covariance"] = own
+        move(lines, turn)
+        if kernel <= _KERNEL and max(abs(step).max(), abs(turn).max(initial=0)) < _SMALL:
+            break
+        kernel = max(kernel / 4, _KERNEL)
+    return Adjusted(state, lines, weights, gain, matrix)
 
 
 def adjust(
     poses: Sequence[Pose],
     motions: Sequence[tuple[Pose, Array]],
-    seen: Sequence[tuple[NDArray[np.void], NDArray[np.int64]]],
-) -> tuple[list[Pose], Array, NDArray[np.void], Array]:
-    """Adjust the poses of scans, and the walls that they saw, in the frame of the last scan.
+    seen: Sequence[tuple[Records, Numbers]],
+) -> tuple[list[Pose], Array, Records, Array]:
+    """Adjust the poses of a few scans, the last of which stays, and the walls that they saw.
 
-    Parameters
-    ----------
-    poses : sequence of (x, y, theta)
-        First poses, the last of which stays.
-    motions : sequence of (pose, covariance)
-        From each scan to the next.
-    seen : sequence of (segments, numbers)
-        Segments of each scan; those of the same number, from 0, are the same wall.
-
-    Returns
-    -------
-    poses : list of (x, y, theta)
-    covariances : ndarray, shape (n, 3, 3)
-        Of the poses.
-    walls : structured array of `WALL`
-    covariance : ndarray, shape (2m, 2m)
-        Of (offset, angle) of all walls.
+    There is a motion with its covariance from each scan to the next, and segments of each scan with
+    the number of the wall of each. Returns the poses, their covariances (n, 3, 3), the walls, and
+    the covariance (2m, 2m) of (offset, angle) of all walls.
     """
-    segments = np.concatenate([of_scan for of_scan, _ in seen])
-    scans = np.repeat(np.arange(len(seen)), [len(of_scan) for of_scan, _ in seen])
-    _, first, number = np.unique(
-        np.concatenate([numbers for _, numbers in seen])[::-1],
-        return_index=True,
-        return_inverse=True,
-    )
-    first, number = len(segments) - 1 - first, number[::-1]
-    state = np.array(poses, np.float64)
-    # Each wall begins as it was seen last.
-    centers, angles = _placed(state[scans[first]], segments[first])
-    weights = np.linalg.inv(segments["covariance"] + 1e-12 * np.eye(2))
-    share = np.ones(len(segments))
-    n_free = 3 * (len(poses) - 1)
-    size = n_free + 2 * len(first)
-    for step in range(_ROUNDS):
-        error, jacobian, at = _errors(state, centers, angles, segments, scans, number, n_free)
-        if step:
-            d2 = np.einsum("ni,nij,nj->n", error, weights, error)
-            share = np.minimum(1.0, chi_square(0.99, 2) / np.maximum(d2, 1e-12))
-        weighted = share[:, None, None] * weights @ jacobian
-        normal, right = np.zeros((size + 3, size + 3)), np.zeros(size + 3)
-        # The last pose stays: what belongs to it goes to three lines that are left out.
-        blocks = jacobian.transpose(0, 2, 1) @ weighted
-        np.add.at(normal, (at[:, :, None], at[:, None, :]), blocks)
-        np.add.at(right, at, (weighted.transpose(0, 2, 1) @ error[:, :, None])[:, :, 0])
-        _add_motions(normal, right, state, motions, size)
-        inverse = np.asarray(np.linalg.inv(normal[:size, :size]), np.float64)
-        change = -inverse @ right[:size]
-        state[:-1] += change[:n_free].reshape(-1, 3)
-        shift, turn = change[n_free:].reshape(-1, 2).T
-        centers += shift[:, None] * np.stack((-np.sin(angles), np.cos(angles)), axis=1)
-        angles += turn
-    spreads = np.zeros((len(poses), 3, 3))
-    for k in range(len(poses) - 1):
-        spreads[k] = inverse[3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
-    covariance = inverse[n_free:, n_free:].copy()
-    walls = _walls(state, centers, angles, segments, scans, number)
-    # A part of a wall that bows lies beside the whole, and is turned.
-    misfit = np.bincount(number, segments["misfit"] ** 2) / walls["views"]
-    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-    both = np.stack((misfit, 4 * misfit / lengths**2), axis=1).ravel()
-    covariance[np.diag_indices_from(covariance)] += both
-    for k in range(len(walls)):
-        walls["covariance"][k] = covariance[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
-    return [(x, y, theta) for x, y, theta in state.tolist()], spreads, walls, covariance
+    n, sights = len(poses), sights_of(seen)
+    names, sights["wall"] = np.unique(sights["wall"], return_inverse=True)
+    m, pairs = len(names), [(k, k + 1) for k in range(n - 1)]
+    chain = edges_of(pairs, [motion for motion, _ in motions], [spread for _, spread in motions])
+    found = optimise(np.array(poses), chain, sights, m, held=n - 1, rounds=3, dense=True)
+    inverse, every = _inverse(found.matrix), np.arange(m)
+    walls = bowed(walls_along(sights, found.poses, found.lines, WHOLE), sights)
+    covariance = (found.gain.T @ inverse @ found.gain).reshape(m, 2, m, 2)
+    covariance[every, :, every] += walls["covariance"]
+    walls["covariance"] = covariance[every, :, every]
+    spreads = inverse.reshape(n, 3, n, 3)[np.arange(n), :, np.arange(n)]
+    return found.poses.tolist(), spreads, walls, covariance.reshape(2 * m, 2 * m)
 
 
-def _placed(poses: Array, segments: NDArray[np.void]) -> tuple[Array, Array]:
-    """Centroids (n, 2) and angles (n,) of segments, each seen from its pose (n, 3)."""
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x, y = segments["centroid"].T
-    places = poses[:, :2] + np.stack((c * x - s * y, s * x + c * y), axis=1)
-    return places, segments["angle"] + poses[:, 2]
+def _matrix(blocks: list[tuple[Array, Any, Any]], n: int, m: int, dense: bool) -> Any:
+    """Matrix of blocks (k, a, b) at their places, those at the same place added up."""
+    _, a, b = blocks[0][0].shape
+    if dense:
+        full = np.zeros((n, m, a, b))
+        for values, rows, columns in blocks:
+            np.add.at(full, (rows, columns), values)
+        return full.transpose(0, 2, 1, 3).reshape(a * n, b * m)
+    with needed_by("mapping"):
+        from scipy.sparse import coo_array
+
+    entries = []
+    for values, rows, columns in blocks:
+        i = a * rows[:, None, None] + np.arange(a)[:, None]
+        j = b * columns[:, None, None] + np.arange(b)
+        entries.append([x.ravel() for x in np.broadcast_arrays(values, i, j)])
+    values, i, j = map(np.concatenate, zip(*entries, strict=True))
+    return coo_array((values, (i, j)), shape=(a * n, b * m)).tocsc()
 
 
-def _errors(
-    state: Array,
-    centers: Array,
-    angles: Array,
-    segments: NDArray[np.void],
-    scans: NDArray[np.int64],
-    number: NDArray[np.int64],
-    n_free: int,
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Offsets and angles (n, 2) of segments from their walls, by pose and wall (n, 2, 5), where."""
-    places, turned = _placed(state[scans], segments)
-    angle = angles[number]
-    u = np.stack((np.cos(angle), np.sin(angle)), axis=1)
-    normal = np.stack((-u[:, 1], u[:, 0]), axis=1)
-    lever, between = places - state[scans, :2], places - centers[number]
-    error = np.stack(
-        (
-            (normal * between).sum(axis=1),
-            np.remainder(turned - angle + math.pi, 2 * math.pi) - math.pi,
-        ),
-        axis=1,
-    )
-    jacobian = np.zeros((len(segments), 2, 5))
-    jacobian[:, 0, :2] = normal
-    jacobian[:, 0, 2] = normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]
-    jacobian[:, 0, 3], jacobian[:, 0, 4] = -1.0, -(u * between).sum(axis=1)
-    jacobian[:, 1, 2], jacobian[:, 1, 4] = 1.0, -1.0
-    at = np.empty((len(segments), 5), np.int64)
-    is_last = scans == len(state) - 1
-    size = n_free + 2 * len(centers)
-    at[:, :3] = np.where(is_last, size, 3 * scans)[:, None] + np.arange(3)
-    at[:, 3:] = n_free + 2 * number[:, None] + np.arange(2)
-    return error, jacobian, at
+def _inverse(matrices: Array) -> Array:
+    return np.asarray(np.linalg.inv(matrices), np.float64)
 
 
-def _add_motions(
-    normal: Array,
-    right: Array,
-    state: Array,
-    motions: Sequence[tuple[Pose, Array]],
-    size: int,
-) -> None:
-    """Add the motions from each scan to the next."""
-    for k, (motion, covariance) in enumerate(motions):
-        x, y, theta = state[k].tolist()
-        of_pose, of_motion = compose_jacobians((x, y, theta), motion)
-        error = state[k + 1] - compose((x, y, theta), motion)
-        error[2] = math.remainder(error[2], 2 * math.pi)
-        weight = np.linalg.inv(of_motion @ covariance @ of_motion.T)
-        jacobian = np.hstack((-of_pose, np.eye(3)))
-        after = size if k == len(motions) - 1 else 3 * k + 3
-        at = np.concatenate((3 * k + np.arange(3), after + np.arange(3)))
-        normal[np.ix_(at, at)] += jacobian.T @ weight @ jacobian
-        right[at] += jacobian.T @ weight @ error
+def _solver(matrix: Any) -> Callable[[Array], Array]:
+    """Return what solves equations with a symmetric, positive definite matrix."""
+    if isinstance(matrix, np.ndarray):
+        inverse = _inverse(matrix)
+        return lambda right: inverse @ right
+    from scipy.sparse.linalg import splu
 
-
-def _walls(
-    state: Array,
-    centers: Array,
-    angles: Array,
-    segments: NDArray[np.void],
-    scans: NDArray[np.int64],
-    number: NDArray[np.int64],
-) -> NDArray[np.void]:
-    """Return the walls, from the first to the last place at which each was seen."""
-    walls = np.zeros(len(centers), WALL)
-    walls["centroid"], walls["angle"], walls["side"] = centers, angles, 1
-    walls["views"] = np.bincount(number)
-    u = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    c, s = np.cos(state[scans, 2]), np.sin(state[scans, 2])
-    for name, first in (("start", np.inf), ("end", -np.inf)):
-        x, y = segments[name].T
-        places = state[scans, :2] + np.stack((c * x - s * y, s * x + c * y), axis=1)
-        along = ((places - centers[number]) * u[number]).sum(axis=1)
-        extreme = np.full(len(centers), first)
-        (np.minimum if name == "start" else np.maximum).at(extreme, number, along)
-        walls[name] = centers + extreme[:, None] * u
-    return walls
+    options = {"SymmetricMode": True}
+    solve: Callable[[Array], Array] = splu(
+        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+    ).solve
+    return solve

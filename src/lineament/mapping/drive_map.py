@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..features import TABLES, Features, make_records
+from ..features import SEGMENT, Features
 from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
@@ -19,7 +17,6 @@ from .placing import (
     PASSED,
     ROUGHNESS,
     as_walls,
-    fuse,
     index_of,
     likely_turns,
     passed,
@@ -28,6 +25,7 @@ from .placing import (
     unlikely,
 )
 from .refine import COARSE, FINE, refined
+from .walls import WHOLE, Numbers, lines_of, sights_of, walls_along
 
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
@@ -51,26 +49,16 @@ _WIDE, _TIGHT = 0.12, 0.04
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
 _LOST = 0.25
-
-Numbers = NDArray[np.int64]
+#: Covariance of a pose that beams found [m, m, rad].
+_NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 
 
 @dataclass(slots=True, eq=False)
 class KeyFrame:
-    """A scan that stands for those around it.
+    """A scan that stands for those around it: number `index` of the log.
 
-    Attributes
-    ----------
-    index : int
-        Of its scan in the log.
-    scan, features
-        In the frame of the sensor.
-    walls : ndarray of int64, shape (n,)
-        Which wall each of the segments shows.
-    pose : (x, y, theta)
-        In the frame of the first key frame.
-    motion : Motion
-        From the key frame before.
+    `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
+    first key frame, `motion` that since the one before: a guess where nothing explains the scan.
     """
 
     index: int
@@ -79,29 +67,24 @@ class KeyFrame:
     walls: Numbers
     pose: Pose
     motion: Motion
+    is_lost: bool
 
 
 class Drive:
     """Places the scans of a log, one after the other, by the walls of the last metres.
 
-    Attributes
-    ----------
-    frames : list of KeyFrame
-    scans : list of (int, Pose)
-        Of each scan: the key frame that it belongs to, and its pose in that one's frame.
-    lost : list of int
-        Key frames that nothing of what was seen before explains.
+    `scans` has the key frame that each belongs to, and its pose in that one's frame.
     """
 
     def __init__(self) -> None:
         self.frames: list[KeyFrame] = []
         self.scans: list[tuple[int, Pose]] = []
-        self.lost: list[int] = []
-        #: Walls, corners and arcs of the last metres, in the frame of the last key frame; the
-        #: number of each wall, and the key frame that saw it last.
+        #: Walls of the last metres, corners and arcs, in the frame of the last key frame; numbers
+        #: of the walls, that of the next, those that are gone, and the first key frame since lost.
         self._around: Features
-        self._numbers, self._seen = np.empty(0, np.int64), np.empty(0, np.int64)
-        self._next = 0
+        self._numbers, self._next = np.empty(0, np.int64), 0
+        self._gone: set[int] = set()
+        self._first = 0
         #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its twist.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
         self._twist = (0.0, 0.0, 0.0)
@@ -110,27 +93,18 @@ class Drive:
 
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
-        corners = features.corners
-        features = replace(features, corners=corners[is_landmark(corners)])
-        if not self.frames:
-            empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
-            self._around = Features(**empty, clusters=np.empty(0, np.int32))
-            self._key(features, Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), scan, True)
-        else:
-            prior, spread = self._expected(scan.stamp, odometry)
-            motion, is_lost = self._place(scan, features, prior, spread)
-            x, y, turn = motion.pose
+        features = replace(features, corners=features.corners[is_landmark(features.corners)])
+        motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
+        if self.frames:
+            motion, is_lost = self._place(scan, features, *self._expected(scan.stamp, odometry))
+            way, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
+            is_key = way >= SPACING or turn >= TURN or is_lost
             self._go_on(scan.stamp, motion.pose)
-            if math.hypot(x, y) >= SPACING or abs(turn) >= TURN or is_lost:
-                if is_lost:
-                    self.lost.append(len(self.frames))
-                self._key(features, motion, scan, is_lost)
-            else:
-                self.scans.append((len(self.frames) - 1, motion.pose))
-                self._last = scan.stamp, odometry, motion.pose
-                return
-        self.scans.append((len(self.frames) - 1, (0.0, 0.0, 0.0)))
-        self._last = scan.stamp, odometry, (0.0, 0.0, 0.0)
+        if is_key:
+            self._key(features, motion, scan, is_lost)
+        pose = (0.0, 0.0, 0.0) if is_key else motion.pose
+        self.scans.append((len(self.frames) - 1, pose))
+        self._last = scan.stamp, odometry, pose
 
     def _go_on(self, stamp: float, pose: Pose) -> None:
         duration = stamp - self._last[0]
@@ -161,39 +135,36 @@ class Drive:
         self, scan: LaserScan, features: Features, prior: Pose, spread: Array
     ) -> tuple[Motion, bool]:
         """Find the pose by the walls around; if it may be another, the one that explains most."""
-        motion = self._match(features, prior, spread)
-        walls = as_walls(features.segments)
-        none = np.zeros((2 * len(walls), 2 * len(walls)))
-        query = Query(walls, none, some(beams_of(features, scan), _BEAMS))
-        best = evidence_of(np.array([motion.pose]), query.beams, self._index, _TIGHT)[0]
+        motion, beams = self._match(features, prior, spread), some(beams_of(features, scan), _BEAMS)
         way, turn = math.sqrt(spread[0, 0]), math.sqrt(spread[2, 2])
         sure = _SURE if way < _NARROW else _SURER
-        if best[1] - best[3] >= sure and motion.observable:
+        if self._explained(motion, beams, 1.0) >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = scored(tried, some(query.beams, _FEW), self._index, _WIDE)
+        few = scored(tried, some(beams, _FEW), self._index, _WIDE)
         few -= unlikely(tried, prior, way, turn)
-        poses = tried[distinct(tried, few, _APART, _TRIED)]
-        poses = np.concatenate((poses, [motion.pose]))
+        poses = np.concatenate((tried[distinct(tried, few, _APART, _TRIED)], [motion.pose]))
+        walls = as_walls(features.segments)
+        query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = scored(poses, query.beams, self._index, _TIGHT)
-        scores -= unlikely(poses, prior, way, turn)
+        scores = scored(poses, beams, self._index, _TIGHT) - unlikely(poses, prior, way, turn)
         scores[-1] += 0.5
-        k = int(scores.argmax())
-        if k < len(poses) - 1:
-            x, y, theta = poses[k].tolist()
-            motion = self._match(features, (x, y, theta), np.diag((0.05, 0.05, 0.02)) ** 2)
-        both = np.array([motion.pose, poses[k]])
-        found = scored(both, query.beams, self._index, _TIGHT)
+        x, y, theta = poses[scores.argmax()].tolist()
+        best = Motion(x, y, theta, _NEAR)
+        if best.pose != motion.pose:
+            motion = self._match(features, best.pose, _NEAR)
+        found = scored(np.array([motion.pose, best.pose]), beams, self._index, _TIGHT)
         if found[1] > found[0] + 1.0:
-            x, y, theta = poses[k].tolist()
-            motion = Motion(x, y, theta, np.diag((0.05, 0.05, 0.02)) ** 2)
-        found = evidence_of(both, query.beams, self._index, _TIGHT)
-        explained, contradicted = found[found[:, 1].argmax(), (1, 3)]
-        if explained - PASSED * contradicted < _LOST:
+            motion = best
+        if self._explained(motion, beams, PASSED) < _LOST:
             return Motion(*prior, spread), True  # what is expected is better than a guess
         return motion, False
+
+    def _explained(self, motion: Motion, beams: Array, less: float) -> float:
+        """Return the share of the beams that are explained, less those that pass through walls."""
+        found = evidence_of(np.array([motion.pose]), beams, self._index, _TIGHT)[0]
+        return float(found[1] - less * found[3])
 
     def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
@@ -215,45 +186,43 @@ class Drive:
             motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
         return motion
 
-    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_new: bool) -> None:
-        """Take a key frame: the walls around it are those known and those of this scan."""
-        pose = compose(self.frames[-1].pose, motion.pose) if self.frames else (0.0, 0.0, 0.0)
-        around = self._around.transform(*inverse(motion.pose))
-        if is_new:
-            empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
-            around = Features(**empty, clusters=np.empty(0, np.int32))
-            self._numbers, self._seen = self._numbers[:0], self._seen[:0]
-        matches = associate(around, features, roughness=ROUGHNESS)
-        here = len(self.frames)
+    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_lost: bool) -> None:
+        """Take a key frame; its segments are walls that are known, or new ones."""
+        here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
-        before, now = matches.segments.T
-        walls[now] = self._numbers[before]
-        new = np.flatnonzero(walls < 0)
-        walls[new] = self._next + np.arange(len(new))
-        self._next += len(new)
-        segments = around.segments.copy()
-        fuse(segments, before, features.segments[now])
-        self._seen[before] = here
-        kept = self._seen >= here - REMEMBERED
-        kept &= ~passed(segments, scan) | (self._seen == here)
-        place = np.cumsum(kept) - 1
-        mine = np.empty(len(walls) + 1, np.int32)
-        mine[now], mine[new], mine[-1] = place[before], kept.sum() + np.arange(len(new)), -1
-        corners = features.corners.copy()
+        if is_lost:
+            self._first = len(self.frames)
+        elif self.frames:
+            around = self._around.transform(*inverse(motion.pose))
+            before, now = associate(around, features, roughness=ROUGHNESS).segments.T
+            walls[now] = self._numbers[before]
+            is_gone = passed(around.segments, scan)
+            is_gone[before] = False
+            self._gone.update(self._numbers[is_gone].tolist())
+        is_unknown = walls < 0
+        walls[is_unknown] = self._next + np.arange(is_unknown.sum())
+        self._next += int(is_unknown.sum())
+        key = KeyFrame(len(self.scans), scan, features, walls, here, motion, is_lost)
+        self.frames.append(key)
+        self._look_around()
+
+    def _look_around(self) -> None:
+        """Find the walls of the last key frames, in the frame of the last one."""
+        last, frames = self.frames[-1], self.frames[self._first :][-REMEMBERED:]
+        seen = sights_of([(frame.features.segments, frame.walls) for frame in frames], ROUGHNESS)
+        seen = seen[~np.isin(seen["wall"], [*self._gone])]
+        self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
+        poses = np.array([relative(last.pose, frame.pose) for frame in frames])
+        walls = walls_along(seen, poses, lines_of(seen, poses, len(self._numbers)), WHOLE)
+        segments = np.zeros(len(walls), SEGMENT)
+        for name in ("start", "end", "centroid", "angle", "covariance"):
+            segments[name] = walls[name]
+        segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+        segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
+        place = {number: k for k, number in enumerate(self._numbers.tolist())}
+        mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
+        corners = last.features.corners.copy()
         corners["segments"] = mine[corners["segments"]]
-        old = np.append(np.where(kept, place, -1), -1).astype(np.int32)
-        others = np.delete(around.corners, matches.corners[:, 0])
-        others["segments"] = old[others["segments"]]
-        others = others[(others["segments"] >= 0).any(axis=1)]
-        arcs = np.delete(around.arcs, matches.arcs[:, 0])
-        near = np.hypot(*arcs["center"].T) < 8.0
-        self._around = replace(
-            around,
-            segments=np.concatenate((segments[kept], features.segments[new])),
-            corners=np.concatenate((corners, others)),
-            arcs=np.concatenate((features.arcs, arcs[near])),
-        )
-        self._index = index_of(as_walls(self._around.segments))
-        self._numbers = np.concatenate((self._numbers[kept], walls[new]))
-        self._seen = np.concatenate((self._seen[kept], np.full(len(new), here)))
-        self.frames.append(KeyFrame(len(self.scans), scan, features, walls, pose, motion))
+        arcs = last.features.arcs[:0]  # people
+        self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
+        self._index = index_of(as_walls(segments))

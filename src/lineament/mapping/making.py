@@ -6,174 +6,124 @@ import numpy as np
 
 from ..errors import LineamentError
 from ..scan import Array, Pose
-from ..scan.poses import compose, inverse, relative
+from ..scan.poses import compose, inverse
+from .adjust import edges_of, optimise
 from .drive_map import KeyFrame
-from .graph import Edges, optimise, wrapped
-from .joint import Lines, Sights, adjust, roughened, roughness
 from .line_map import LineMap
 from .locate import locate
-from .loops import find_loops, merged, queries, whole_walls
+from .loops import Survey, moved
+from .walls import Records, errors, merged, sights_of, walls_along, wrapped
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
-#: What walls say of a motion is known by the walls already: of motions, a 25th counts, and
-#: nothing below these deviations [m, m, rad].
+#: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
+_OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-4, 0.05, 0.4549
+#: What walls say of a motion is known by the walls already: of motions and loops, a 25th counts,
+#: and nothing of motions below these deviations [m, m, rad].
 _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
-#: Deviations by which adjusted key frames are off their neighbours, beside their covariances.
-_NEXT = np.diag((0.003, 0.003, 0.001)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
-_MERGED = 2
-#: Edges with less weight are wrong.
-_RIGHT = 0.5
+#: Walls are merged so many times after each search; so much off are one [m].
+_MERGED, _APART = 2, 0.03
 #: A drive is looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
-#: A wall was seen so often, or in no map.
-VIEWS = 3
+#: A wall was seen by so many key frames.
+_VIEWS = 3
 
 
 @dataclass(slots=True, eq=False)
 class DriveMap:
-    """A map of a drive.
+    """A map of a drive, in the frame of its first scan, and the poses of all scans.
 
-    Attributes
-    ----------
-    map : LineMap
-        Its walls, with covariances that hold those of the poses.
-    poses : list of (x, y, theta)
-        Of all scans.
-    frames : ndarray, shape (n, 3)
-        Poses of the key frames.
-    loops : Edges
-        Those that were closed, between key frames.
-    refused : int
-        Loops that were left out, since they contradict the others.
-    sights, lines
-        What the key frames saw of each wall, and its line in the frame of the first one.
+    The covariances of its walls hold those of the poses. `loops` between key frames, of `EDGE`,
+    were closed; those that contradict the others were refused.
     """
 
     map: LineMap
     poses: list[Pose]
-    frames: Array
-    loops: Edges
+    survey: Survey
+    loops: Records
     refused: int
-    sights: Sights
-    lines: Lines
 
 
-def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]], views: int = VIEWS) -> DriveMap:
+def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     """Close the loops of a drive, and adjust poses and walls together.
 
-    Parameters
-    ----------
-    frames, scans
-        As `Drive` has them.
-    views : int
-        How often a part of a wall was seen, by key frames, to be in the map.
-
-    Raises
-    ------
-    LineamentError
-        If there are no walls.
+    Key frames and scans are those of `Drive`. LineamentError if there are no walls.
     """
-    chain, sights, count = (
-        _chain(frames),
-        _sights(frames),
-        1 + max(int(f.walls.max(initial=0)) for f in frames),
-    )
-    if not len(sights.walls):
+    motions = [frame.motion for frame in frames[1:]]
+    spreads = [_TWICE * motion.covariance + _LEAST for motion in motions]
+    pairs = [(k, k + 1) for k in range(len(motions))]
+    chain = edges_of(pairs, [motion.pose for motion in motions], spreads)
+    seen = [(frame.features.segments, frame.walls) for frame in frames]
+    sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
+    if not len(sights):
         raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
-    poses = np.array([frame.pose for frame in frames])
-    poses, lines, _ = adjust(poses, chain, sights, count)
-    sights = roughened(sights, roughness(sights, lines, poses))
-    own, loops, refused = sights, None, 0
+    found = optimise(poses, chain, sights, _count(sights))
+    sights = sights_of(seen, roughness(sights, found.poses, found.lines))
+    loops, refused = edges_of([], [], []), 0
     for spread in _SPREADS:
-        found = find_loops(frames, poses, own, lines, spread)
-        if not len(found.ends):
+        near = Survey(frames, found.poses, sights, found.lines).loops(spread)
+        if not len(near):
             break
-        followed = np.array(
-            [relative(_pose(poses[k]), _pose(poses[k + 1])) for k in range(len(poses) - 1)]
-        )
-        near = np.linalg.inv(np.array([frame.motion.covariance for frame in frames[1:]]) + _NEXT)
-        near_chain = replace(chain, motions=followed.reshape(-1, 3), information=near)
-        poses, weights = optimise(poses, near_chain.together(found))
-        right = weights[len(chain.ends) :] > _RIGHT
-        refused = int((~right).sum())
-        loops = Edges(
-            found.ends[right],
-            found.motions[right],
-            found.information[right] / _TWICE,
-            found.robust[right],
-        )
-        sights, number = own, count
+        found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
+        right = found.weights[len(chain) :] > 0.5
+        loops, refused = near[right], int((~right).sum())
+        weak = loops.copy()
+        weak["information"] /= _TWICE
+        weak["loop"] = False
         for _ in range(_MERGED):
-            poses, lines, _ = adjust(poses, chain.together(loops), sights, number)
-            labels = merged(sights, lines, poses)
-            sights, number = replace(sights, walls=labels[sights.walls]), int(labels.max()) + 1
-        own, count = sights, number
-        poses, lines, _ = adjust(poses, chain, sights, number)
-    poses, lines, _ = adjust(poses, chain, sights, count, covariances=True)
-    walls = whole_walls(sights, lines, poses, min(views, len(frames)))
-    none = Edges(
-        np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0, bool)
-    )
-    every = [compose(_pose(poses[k]), pose) for k, pose in scans]
-    return DriveMap(LineMap(walls), every, poses, loops or none, refused, sights, lines)
+            found = optimise(found.poses, np.append(chain, weak), sights, _count(sights))
+            sights = merged(sights, found.poses, found.lines, _APART)
+        found = optimise(found.poses, chain, sights, _count(sights))
+    survey = Survey(frames, found.poses, sights, found.with_poses())
+    least = min(_VIEWS, len(frames))
+    walls = walls_along(sights, found.poses, survey.lines, views=least)
+    every = [compose(survey.pose(k), pose) for k, pose in scans]
+    return DriveMap(LineMap(walls), every, survey, loops, refused)
 
 
-def onto_plan(made: DriveMap, frames: list[KeyFrame], plan: LineMap) -> DriveMap:
+def _count(sights: Records) -> int:
+    return int(sights["wall"].max()) + 1
+
+
+def roughness(sights: Records, poses: Array, lines: Records) -> float:
+    """Return how far surfaces are from straight [m], by how far sights are off their walls.
+
+    With it, the median of the squared offsets over their variances is that of χ², of the sights of
+    walls that were seen often: of these, the wall itself takes little off.
+    """
+    often = np.bincount(sights["wall"])[sights["wall"]] >= _OFTEN
+    if not often.any():
+        return _ROUGH
+    # Poses and walls take their part of the errors.
+    free = 3 * len(poses) + 2 * len(lines)
+    left = max(1.0 - free / (2 * len(often)), 0.2)
+    squares = errors(sights, poses, lines)[0][often, 0] ** 2 / left
+    own = sights["covariance"][often, 0, 0] - _ROUGH**2
+    tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
+    right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
+    return next(right, _ROUGHEST)
+
+
+def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
     """Move a map into the frame of a plan, on which it is located without a first guess.
 
     Places along the way are looked for on the plan; the motion on which most of those that are
     located agree is taken. LineamentError if none is located.
     """
-    found = []
-    for q, query in queries(frames, made.frames, made.sights, made.lines, _PLACES):
+    survey, found = made.survey, []
+    for q, query in survey.queries(_PLACES):
         where = locate(query, plan)
         if where:
-            found.append(compose(where.pose, inverse(_pose(made.frames[q]))))
+            found.append(compose(where.pose, inverse(survey.pose(q))))
     if not found:
         raise LineamentError("the drive is not on the plan, or the plan does not say where")
-    moves = np.array(found)
     # Compared where the map is, not at its origin.
-    turned = np.abs(wrapped(moves[:, None, 2] - moves[None, :, 2])) < _AGREE[1]
-    middle = np.append(made.frames[:, :2].mean(axis=0), 0.0)
-    places = np.array([compose(move, _pose(middle))[:2] for move in found])
-    near = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) < _AGREE[0]
-    best = found[int((turned & near).sum(axis=1).argmax())]
-    moved = LineMap.from_features([made.map.to_features()], [best])
+    x, y = survey.poses[:, :2].mean(axis=0).tolist()
+    moves, places = np.array(found), np.array([compose(move, (x, y, 0.0)) for move in found])
+    agree = np.abs(wrapped(moves[:, None, 2] - moves[:, 2])) < _AGREE[1]
+    agree &= np.linalg.norm(places[:, None, :2] - places[:, :2], axis=2) < _AGREE[0]
+    best = found[int(agree.sum(axis=1).argmax())]
     poses = [compose(best, pose) for pose in made.poses]
-    placed = np.array([compose(best, _pose(row)) for row in made.frames])
-    return replace(made, map=moved, poses=poses, frames=placed)
-
-
-def _chain(frames: list[KeyFrame]) -> Edges:
-    """Motions from key frame to key frame, of which the walls know most already."""
-    n = len(frames) - 1
-    ends = np.column_stack((np.arange(n), np.arange(1, n + 1)))
-    motions = np.array([frame.motion.pose for frame in frames[1:]]).reshape(-1, 3)
-    spread = np.array([frame.motion.covariance for frame in frames[1:]]).reshape(-1, 3, 3)
-    return Edges(ends, motions, np.linalg.inv(_TWICE * spread + _LEAST), np.zeros(n, dtype=bool))
-
-
-def _sights(frames: list[KeyFrame]) -> Sights:
-    """Walls as the key frames see them."""
-    segments = np.concatenate([frame.features.segments for frame in frames])
-    numbers = np.concatenate([np.full(len(f.walls), k) for k, f in enumerate(frames)])
-    u = np.column_stack((np.cos(segments["angle"]), np.sin(segments["angle"])))
-    ends = [((segments[e] - segments["centroid"]) * u).sum(axis=1) for e in ("start", "end")]
-    kept = segments["length"] > 0.1
-    sights = Sights(
-        numbers[kept],
-        np.concatenate([frame.walls for frame in frames])[kept],
-        segments["centroid"][kept],
-        segments["angle"][kept],
-        segments["covariance"][kept],
-        np.column_stack(ends)[kept],
-    )
-    return roughened(sights, _ROUGH)
-
-
-def _pose(row: Array) -> Pose:
-    x, y, theta = row.tolist()
-    return x, y, theta
+    return replace(made, map=LineMap(moved(made.map.walls, inverse(best))), poses=poses)

@@ -54,34 +54,6 @@ def as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
     return walls[segments["length"] > 0.05]
 
 
-def fuse(walls: NDArray[np.void], at: NDArray[np.intp], seen: NDArray[np.void]) -> None:
-    """Move walls to the mean of their line and the one that is seen now, by their covariances."""
-    for k, other in zip(at.tolist(), seen, strict=True):
-        wall = walls[k]
-        angle = wall["angle"]
-        u = np.array((math.cos(angle), math.sin(angle)))
-        n = np.array((-u[1], u[0]))
-        between = other["centroid"] - wall["centroid"]
-        along = float(between @ u)
-        turn = math.remainder(other["angle"] - angle, 2 * math.pi)
-        rough = np.diag((ROUGHNESS**2, (2 * ROUGHNESS / max(other["length"], 0.1)) ** 2))
-        arm = np.array(((1.0, -along), (0.0, 1.0)))
-        spread = arm @ (other["covariance"] + rough) @ arm.T
-        gain = wall["covariance"] @ np.linalg.inv(wall["covariance"] + spread)
-        shift, turned = gain @ (float(between @ n) - along * math.tan(turn), turn)
-        left = (np.eye(2) - gain) @ wall["covariance"]
-        wall["covariance"] = (left + left.T) / 2
-        wall["angle"] = math.remainder(angle + turned, 2 * math.pi)
-        wall["centroid"] += shift * n
-        u = np.array((math.cos(wall["angle"]), math.sin(wall["angle"])))
-        ends = np.stack((wall["start"], wall["end"], other["start"], other["end"]))
-        places = (ends - wall["centroid"]) @ u
-        wall["start"] = wall["centroid"] + places.min() * u
-        wall["end"] = wall["centroid"] + places.max() * u
-        wall["length"] = places.max() - places.min()
-        wall["n_points"] = max(wall["n_points"], other["n_points"])
-
-
 def likely_turns(
     around: Features, features: Features, expected: float, spread: float
 ) -> list[float]:
@@ -105,7 +77,7 @@ def unlikely(poses: Array, prior: Pose, way: float, turn: float) -> Array:
     """How unlikely poses (n, 3) are by what is expected [nats]; far off no worse than unlikely."""
     off = poses - prior
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
-    far = (off[:, 0] ** 2 + off[:, 1] ** 2) / (2 * max(way, 0.1) ** 2)
+    far = (off[:, 0] ** 2 + off[:, 1] ** 2) / (2 * way**2)
     return np.asarray(far + np.log1p((off[:, 2] / turn) ** 2 / 2))
 
 

@@ -1,6 +1,7 @@
-"""Walls and columns: their records, and which segments are one wall, by χ² of their common line."""
+"""Walls and columns: their records, the segments that show them, and which of these are one."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,163 +29,271 @@ COLUMN = np.dtype(
     [("center", "f8", 2), ("radius", "f8"), ("covariance", "f8", (3, 3)), ("views", "i4")],
     align=True,
 )
+#: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
+#: it from its centroid [m], and how far its surface is off a straight line [m²].
+SIGHT = np.dtype(
+    [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
+     ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8")]
+)  # fmt: skip
 
-#: Walls on one line are one wall if no more lies between them [m]: a door is wider.
-GAP = 0.2
+#: Walls on one line are one wall if no more lies between them [m]: a door is wider; whole ones.
+GAP, WHOLE = 0.2, 1e4
 #: Segments that are shorter, or less sure of their direction, make no wall [m, rad].
 SHORTEST, LEAST_SURE = 0.15, 0.2
+#: Sights are no shorter [m]; beyond so many deviations they count less.
+_SHORT, _KERNEL = 0.1, 3.0
+#: Where no more than this share of the most sights goes on, a wall ends.
+_SHARE = 0.2
+#: Lines whose directions differ by more are never one [rad]; share of the parts of a wall that the
+#: tests keep together.
+_TURN, _GATE = 0.35, 0.99
 
-#: Lines whose directions differ by more are never one [rad].
-_TURN = 0.35
-#: Share of the parts of a wall that the tests keep together.
-_GATE = 0.99
+Numbers = NDArray[np.int64]
+Records = NDArray[np.void]
+
+
+def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Records:
+    """Return records of `SIGHT` of the segments of key frames, with the number of each's wall.
+
+    Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
+    """
+    segments = np.concatenate([of_frame for of_frame, _ in seen])
+    sights = np.zeros(len(segments), SIGHT)
+    sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
+    sights["wall"] = np.concatenate([walls for _, walls in seen])
+    for name in ("centroid", "angle", "covariance"):
+        sights[name] = segments[name]
+    sights["covariance"] += _bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
+    for k, name in enumerate(("start", "end")):
+        arm = segments[name] - segments["centroid"]
+        sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
+    sights["misfit"] = segments["misfit"] ** 2
+    return sights[segments["length"] > _SHORT]
+
+
+def placed(sights: Records, poses: Array) -> tuple[Array, Array]:
+    """Centroids (m, 2) and angles (m,) in the frame of the poses (n, 3)."""
+    at = poses[sights["frame"]]
+    (c, s), (x, y) = unit(at[:, 2]).T, sights["centroid"].T
+    moved = np.column_stack((at[:, 0] + c * x - s * y, at[:, 1] + s * x + c * y))
+    return moved, at[:, 2] + sights["angle"]
+
+
+def errors(sights: Records, poses: Array, lines: Records) -> tuple[Array, Array, Array]:
+    """Offsets and angles (m, 2) off the walls, and their derivatives by pose and wall."""
+    (places, angles), line = placed(sights, poses), lines[sights["wall"]]
+    u, arm = unit(line["angle"]), places - line["centroid"]
+    of_pose, of_wall = np.zeros((len(u), 2, 3)), np.zeros((len(u), 2, 2))
+    of_pose[:, 0, 0], of_pose[:, 0, 1], of_pose[:, 1, 2] = -u[:, 1], u[:, 0], 1.0
+    of_pose[:, 0, 2] = (u * (places - poses[sights["frame"], :2])).sum(axis=1)
+    of_wall[:, 0, 0] = of_wall[:, 1, 1] = -1.0
+    of_wall[:, 0, 1] = -(u * arm).sum(axis=1)
+    offsets = u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
+    return np.column_stack((offsets, wrapped(angles - line["angle"]))), of_pose, of_wall
+
+
+def extents(sights: Records, poses: Array, lines: Records) -> tuple[Array, Array]:
+    """From where to where along its wall each sight goes, from the wall's centroid on [m]."""
+    (places, angles), line = placed(sights, poses), lines[sights["wall"]]
+    along = ((places - line["centroid"]) * unit(line["angle"])).sum(axis=1)
+    ends = along[:, None] + sights["ends"] * np.cos(angles - line["angle"])[:, None]
+    return ends.min(axis=1), ends.max(axis=1)
+
+
+def lines_of(sights: Records, poses: Array, count: int) -> Records:
+    """Return the line of each wall, a `WALL` without ends, as if the poses were known.
+
+    From the mean of its sights on, by robust least squares.
+    """
+    (places, angles), w, lines = placed(sights, poses), sights["wall"], np.zeros(count, WALL)
+    sure, firm = (1.0 / sights["covariance"][:, k, k, None] for k in range(2))
+    lines["angle"] = np.arctan2(*summed(firm * unit(angles), w, count).T[::-1])
+    total = np.maximum(summed(sure, w, count), 1e-12)
+    lines["centroid"] = summed(sure * places, w, count) / total
+    information = np.linalg.inv(sights["covariance"])
+    for _ in range(2):
+        off, _, of_wall = errors(sights, poses, lines)
+        weighted = of_wall.transpose(0, 2, 1) @ robust(off, information)
+        own = summed(weighted @ of_wall, w, count)
+        lines["covariance"] = np.linalg.inv(own + 1e-6 * np.eye(2))
+        step = lines["covariance"] @ summed(weighted @ off[:, :, None], w, count)
+        move(lines, -step[:, :, 0])
+    return lines
+
+
+def move(lines: Records, steps: Array) -> None:
+    """Move lines by offsets and turns (w, 2)."""
+    u = unit(lines["angle"])
+    lines["centroid"] += steps[:, :1] * np.column_stack((-u[:, 1], u[:, 0]))
+    lines["angle"] = wrapped(lines["angle"] + steps[:, 1])
+
+
+def robust(off: Array, information: Array) -> Array:
+    """Information of errors (m, k), of which those beyond 3 deviations count less."""
+    squares = np.einsum("ni,nij,nj->n", off, information, off)
+    share: Array = _KERNEL**2 / np.maximum(squares, _KERNEL**2)
+    return information * share[:, None, None]
+
+
+def walls_along(
+    sights: Records, poses: Array, lines: Records, gap: float = GAP, views: int = 1
+) -> Records:
+    """Return walls along their lines, as far as sights lie no farther apart than a gap [m].
+
+    Each part was seen so often. If that is more than once, a wall ends where hardly any sight goes
+    on: at a grazing angle, a few cross doorways.
+    """
+    low, high = extents(sights, poses, lines)
+    w, places = np.tile(sights["wall"], 2), np.concatenate((low, high + gap))
+    order = np.lexsort((places, w))
+    w, places, begins = w[order], places[order], order < len(low)
+    cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(len(lines))
+    np.maximum.at(most, w, cover)
+    edges = np.flatnonzero(np.diff(cover > (_SHARE * most[w] if views > 1 else 0), prepend=False))
+    seen: Numbers = np.cumsum(begins)[edges[1::2]] - np.cumsum(~begins)[edges[::2]]
+    first, last = edges.reshape(-1, 2)[seen >= views].T
+    walls: Records = lines[w[first]]
+    begin, end = places[first], places[last] - gap
+    middle = np.where((begin < 0) & (end > 0), 0.0, (begin + end) / 2)
+    u, origin = unit(walls["angle"]), walls["centroid"].copy()
+    for name, along in (("start", begin), ("end", end), ("centroid", middle)):
+        walls[name] = origin + along[:, None] * u
+    walls["covariance"] = _at(walls["covariance"], middle)
+    walls["side"], walls["views"] = 1, seen[seen >= views]
+    return walls
+
+
+def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Records:
+    """Return the sights with a number for each wall that is the same for those that are one.
+
+    They are one if they face the same way, lie along each other or no farther apart than a gap,
+    and the χ² of their common line is within its 99 % quantile; surfaces are off it by their
+    misfits and `apart` [m]. The most often seen come first, and of these the longest.
+    """
+    count, w, points = len(lines), sights["wall"], lines["centroid"]
+    first, last = np.full(count, 1e9), np.full(count, -1e9)
+    low, high = extents(sights, poses, lines)
+    np.minimum.at(first, w, low)
+    np.maximum.at(last, w, high)
+    views = np.bincount(w, minlength=count)
+    bent = np.bincount(w, sights["misfit"], count) / np.maximum(views, 1) + apart**2 / 2
+    order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
+    ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
+    kept = np.zeros(count, dtype=bool)
+    for k in order[views[order] > 0].tolist():
+        near = np.flatnonzero(kept & (abs(wrapped(lines["angle"] - lines["angle"][k])) < _TURN))
+        along = ((ends[k] - points[near, None]) * u[near, None]).sum(axis=2)
+        begin, end = along.min(axis=1), along.max(axis=1)
+        beside = (begin < last[near] + GAP) & (end > first[near] - GAP)
+        near, begin, end = near[beside], begin[beside], end[beside]
+        kept[k] = True
+        if not len(near):
+            continue
+        # The middle of what they share, or of what is between them.
+        shared = (np.maximum(begin, first[near]) + np.minimum(end, last[near])) / 2
+        arm = points[near] + shared[:, None] * u[near] - points[k]
+        off = np.column_stack((arm[:, 0] * u[k, 1] - arm[:, 1] * u[k, 0],
+                               wrapped(lines["angle"][k] - lines["angle"][near])))  # fmt: skip
+        spread = _at(lines["covariance"][near], shared)
+        spread += _at(lines["covariance"][[k]], (arm * u[k]).sum(axis=1))
+        shorter = np.minimum(last[near] - first[near], last[k] - first[k])
+        spread += _bent(bent[near] + bent[k], shorter)
+        squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
+        if squares.min() < chi_square(_GATE, 2):
+            labels[k], kept[k] = near[squares.argmin()], False
+    result = sights.copy()
+    result["wall"] = np.unique(labels, return_inverse=True)[1][w]
+    return result
+
+
+def bowed(walls: Records, sights: Records) -> Records:
+    """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
+    misfits = np.bincount(sights["wall"], sights["misfit"]) / np.bincount(sights["wall"])
+    walls["covariance"] += _bent(misfits, np.linalg.norm(walls["end"] - walls["start"], axis=1))
+    return walls
 
 
 class Merger:
-    """Walls and columns that grow as features are added, all in the frame of the map."""
+    """Walls and columns of features that are added, all in the frame of the map."""
 
     def __init__(self) -> None:
-        self._walls, self._n = np.zeros(64, WALL), 0
-        self._misfit = np.zeros(64)
-        self._columns: list[NDArray[np.void]] = []
+        self._segments: list[Records] = []
+        self._columns: list[Records] = []
 
     def add(self, features: Features) -> None:
         """Add the features of a scan."""
         segments = features.segments
-        walls = np.zeros(len(segments), WALL)
-        for name in ("start", "end", "centroid", "angle", "covariance"):
-            walls[name] = segments[name]
-        walls["side"] = walls["views"] = 1
-        long = np.linalg.norm(walls["end"] - walls["start"], axis=1) >= SHORTEST
         with np.errstate(invalid="ignore"):
-            long &= walls["covariance"][:, 1, 1] < LEAST_SURE**2
-        for wall, misfit in zip(walls[long], segments["misfit"][long] ** 2, strict=True):
-            self._join(wall, float(misfit))
+            sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
+        self._segments.append(segments[sure & (segments["length"] >= SHORTEST)])
         for arc in features.arcs:
             self._see(arc)
 
-    def _join(self, wall: np.void, misfit: float) -> None:
-        """Make a wall part of the one that it fits best, or a new one."""
-        k = self._mate(self._walls[: self._n], self._misfit[: self._n], wall, misfit)
-        if k >= 0:
-            own, other = self._walls[k]["views"], wall["views"]
-            self._misfit[k] += (misfit - self._misfit[k]) * other / (own + other)
-            self._walls[k] = joined(self._walls[k], wall)
-            return
-        if self._n == len(self._walls):
-            self._walls = np.concatenate((self._walls, np.zeros(self._n, WALL)))
-            self._misfit = np.concatenate((self._misfit, np.zeros(self._n)))
-        self._walls[self._n], self._misfit[self._n] = wall, misfit
-        self._n += 1
-
-    @staticmethod
-    def _mate(walls: NDArray[np.void], misfits: Array, wall: np.void, misfit: float) -> int:
-        """Return the wall whose common line with another has the least χ², -1 if none fits."""
-        turn = np.remainder(wall["angle"] - walls["angle"] + math.pi, 2 * math.pi) - math.pi
-        u = np.stack((np.cos(walls["angle"]), np.sin(walls["angle"])), axis=1)
-        ends = np.stack([((wall[e] - walls["start"]) * u).sum(axis=1) for e in ("start", "end")])
-        length = ((walls["end"] - walls["start"]) * u).sum(axis=1)
-        near = (np.abs(turn) < _TURN) & (walls["side"] == wall["side"])
-        near &= (ends.min(axis=0) < length + GAP) & (ends.max(axis=0) > -GAP)
-        k = np.flatnonzero(near)
-        if not len(k):
-            return -1
-        e, spread = _difference(walls[k], wall, u[k], turn[k])
-        both = misfits[k] + misfit
-        spread[:, 0, 0] += both
-        shorter = np.minimum(length[k], np.linalg.norm(wall["end"] - wall["start"]))
-        spread[:, 1, 1] += 4 * both / np.maximum(shorter, SHORTEST) ** 2
-        d2 = np.einsum("ni,nij,nj->n", e, np.linalg.inv(spread), e)
-        return int(k[d2.argmin()]) if d2.min() < chi_square(_GATE, 2) else -1
-
     def _see(self, arc: np.void) -> None:
         """Make an arc part of a column, or a new one."""
-        new = np.zeros((), COLUMN)
-        new["center"], new["radius"], new["covariance"] = arc["center"], arc["radius"], 0
-        new["covariance"], new["views"] = arc["covariance"], 1
-        state = np.append(new["center"], new["radius"])
         for column in self._columns:
-            e = state - np.append(column["center"], column["radius"])
-            if e @ np.linalg.solve(column["covariance"] + new["covariance"], e) < chi_square(
-                _GATE, 3
-            ):
-                gain = column["covariance"] @ np.linalg.inv(
-                    column["covariance"] + new["covariance"]
-                )
+            e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
+            inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
+            if e @ inverse @ e < chi_square(_GATE, 3):
+                gain = column["covariance"] @ inverse
                 column["center"] += (gain @ e)[:2]
                 column["radius"] += (gain @ e)[2]
                 column["covariance"] -= gain @ column["covariance"]
                 column["views"] += 1
                 return
-        self._columns.append(new)
+        new = (arc["center"], arc["radius"], arc["covariance"], 1)
+        self._columns.append(np.array(new, COLUMN))
 
-    def result(self, min_views: int = 1) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        """Return walls and columns that were seen often enough; walls that became one are joined.
-
-        The misfit of a wall is part of its covariance.
-        """
-        before = -1
-        while before != self._n:
-            before, old, misfits = self._n, self._walls[: self._n], self._misfit[: self._n]
-            lengths = np.linalg.norm(old["end"] - old["start"], axis=1)
-            self._walls, self._misfit, self._n = np.zeros(64, WALL), np.zeros(64), 0
-            for k in np.argsort(-lengths, kind="stable"):
-                self._join(old[k], float(misfits[k]))
-        walls = self._walls[: self._n].copy()
-        misfits = self._misfit[: self._n]
-        lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-        walls["covariance"][:, 0, 0] += misfits
-        walls["covariance"][:, 1, 1] += 4 * misfits / lengths**2
+    def result(self, min_views: int = 1) -> tuple[Records, Records]:
+        """Return walls and columns that were seen often enough; parts of one wall are joined."""
         columns = np.array([c for c in self._columns if c["views"] >= min_views], COLUMN)
+        if not sum(map(len, self._segments)):
+            return np.zeros(0, WALL), columns
+        segments, pose = np.concatenate(self._segments), np.zeros((1, 3))
+        sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
+        while (count := int(sights["wall"].max()) + 1) != before:
+            lines, before = lines_of(sights, pose, count), count
+            sights = merged(sights, pose, lines, 0.0)
+        walls = bowed(walls_along(sights, pose, lines, WHOLE), sights)
         return walls[walls["views"] >= min_views], columns
 
 
-def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> NDArray[np.void]:
+def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Records:
     """Make records of walls from both ends of each, shape (n, 2, 2)."""
     walls = np.zeros(len(ends), WALL)
     walls["start"], walls["end"], walls["centroid"] = ends[:, 0], ends[:, 1], ends.mean(axis=1)
-    along = ends[:, 1] - ends[:, 0]
-    walls["angle"] = np.arctan2(along[:, 1], along[:, 0])
+    walls["angle"] = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1])
     walls["covariance"], walls["side"], walls["views"] = covariance, side, 1
     return walls
 
 
-def _difference(
-    walls: NDArray[np.void], wall: np.void, u: Array, turn: Array
-) -> tuple[Array, Array]:
-    """Offset and angle (n, 2) of a wall from others at its centroid, and covariances (n, 2, 2)."""
-    between = wall["centroid"] - walls["centroid"]
-    along = (between * u).sum(axis=1)
-    off = u[:, 0] * between[:, 1] - u[:, 1] * between[:, 0]
-    lever = np.tile(np.eye(2), (len(walls), 1, 1))
+def unit(angles: Array) -> Array:
+    """Return unit vectors (n, 2) of these directions."""
+    return np.column_stack((np.cos(angles), np.sin(angles)))
+
+
+def summed(values: Array, at: Numbers, count: int) -> Array:
+    """Return the sums (count, ...) of the values (m, ...) of each number."""
+    total = np.zeros((count, *values.shape[1:]))
+    np.add.at(total, at, values)
+    return total
+
+
+def wrapped(angles: Array) -> Array:
+    """Angles in [-π, π)."""
+    return np.asarray(np.remainder(angles + math.pi, 2 * math.pi) - math.pi)
+
+
+def _at(covariances: Array, along: Array) -> Array:
+    """Covariances of lines at places so far along them [m]."""
+    lever = np.tile(np.eye(2), (len(along), 1, 1))
     lever[:, 0, 1] = along
-    spread = lever @ walls["covariance"] @ lever.transpose(0, 2, 1) + wall["covariance"]
-    return np.stack((off, turn), axis=1), spread
+    return np.asarray(lever @ covariances @ lever.transpose(0, 2, 1))
 
 
-def joined(wall: np.void, other: np.void) -> np.void:
-    """Return the wall that two are parts of: the mean of their lines by their covariances."""
-    result = wall.copy()
-    angle = float(wall["angle"])
-    u = np.array([math.cos(angle), math.sin(angle)])
-    n = np.array([-u[1], u[0]])
-    turn = math.remainder(float(other["angle"]) - angle, 2 * math.pi)
-    between = other["centroid"] - wall["centroid"]
-    along = float(between @ u)
-    # The other line at the centroid of the first.
-    lever = np.array([[1.0, -along], [0.0, 1.0]])
-    seen = np.array([float(between @ n) - along * math.tan(turn), turn])
-    spread = lever @ other["covariance"] @ lever.T
-    gain = wall["covariance"] @ np.linalg.inv(wall["covariance"] + spread)
-    shift, turned = gain @ seen
-    covariance = (np.eye(2) - gain) @ wall["covariance"]
-    result["covariance"] = (covariance + covariance.T) / 2
-    result["angle"] = math.remainder(angle + turned, 2 * math.pi)
-    result["centroid"] = wall["centroid"] + shift * n
-    u = np.array([math.cos(result["angle"]), math.sin(result["angle"])])
-    points = np.stack((wall["start"], wall["end"], other["start"], other["end"]))
-    places = (points - result["centroid"]) @ u
-    result["start"] = result["centroid"] + places.min() * u
-    result["end"] = result["centroid"] + places.max() * u
-    result["views"] = wall["views"] + other["views"]
-    return result
+def _bent(variance: Array | float, length: Array) -> Array:
+    """Covariances of parts of walls that bow: each lies beside the whole, and is turned."""
+    spread = np.zeros((len(length), 2, 2))
+    spread[:, 0, 0] = variance
+    spread[:, 1, 1] = 4 * variance / np.maximum(length, 0.1) ** 2
+    return spread

@@ -112,18 +112,21 @@ def map_log(
         raise LogError(log.name, "has no scans, expected a drive")
     made = make_map(drive.frames, drive.scans)
     if plan is not None:
-        made = onto_plan(made, drive.frames, plan)
+        made = onto_plan(made, plan)
     made.map.write(output)
     if poses is not None:
         write_tum(poses, stamps, made.poses)
-    way = sum(math.dist(a[:2], b[:2]) for a, b in zip(made.frames, made.frames[1:], strict=False))
+    way = sum(
+        math.dist(a[:2], b[:2])
+        for a, b in zip(made.survey.poses, made.survey.poses[1:], strict=False)
+    )
     return Mapping(
         log=str(path),
         output=str(output),
         scans=len(stamps),
         frames=len(drive.frames),
-        lost=len(drive.lost),
-        loops=len(made.loops.ends),
+        lost=sum(frame.is_lost for frame in drive.frames),
+        loops=len(made.loops),
         refused=made.refused,
         way=way,
         map=made.map,
