@@ -3,6 +3,8 @@
 import json
 import math
 import os
+import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +16,11 @@ from lineament.cli import run
 from lineament.live import LiveConfig
 from lineament.live.counters import Counts, Report
 from lineament.live.pipeline import Pipeline
-from lineament.live.sinks import RosSink
+from lineament.live.sinks import FoxgloveSink, RosSink
 from lineament.logs import save_npz
 from lineament.mapping import LineMap
 from lineament.mapping.following import Follower, combined, follow
+from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room
 from lineament.simulation import drive as drive_scans
@@ -273,6 +276,27 @@ def test_live_publishes_pose_and_verdict(files, layers):
     publisher.sent.clear()
     sink.publish(pipeline("b", nowhere))
     assert not [message for message in publisher.sent if message.topic == "/scan/pose"]
+
+
+def test_foxglove_shows_the_pose_on_the_plan(files):
+    config = LiveConfig(map=str(files / "plan.dxf"))
+    publisher, pipeline = Kept(), Pipeline(config)
+    sink = FoxgloveSink(publisher, FoxgloveMessages(), config)
+    sink.publish(pipeline("a", next(iter(ln.open_log(files / "log.npz")))))
+    (transform,) = (message for message in publisher.sent if message.topic == "/tf")
+    x, y = struct.unpack("<dxd", re.search(rb"\x09(.{17})", transform.data, re.S)[1])
+    assert (x, y) == pytest.approx((-2, 0.2), abs=0.02)
+    sink.publish(pipeline("b", ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)))
+    assert sum(message.topic == "/tf" for message in publisher.sent) == 1
+    publisher.sent.clear()
+    sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
+    assert [message.topic for message in publisher.sent] == ["/scan/plan"]
+
+
+def test_the_viewer_reads_layers_and_units(files, capsys):
+    given = ["view", str(files / "log.npz"), "--map", str(files / "plan.dxf")]
+    assert run([*given, "--layers", "doors"]) == 1
+    assert "no layer is doors" in capsys.readouterr().err
 
 
 def test_the_viewer_locates_logs_on_a_plan(files):
