@@ -270,7 +270,13 @@ def follow_all() -> None:
     for seed in range(11, 17):
         building = office(seed, SIZES[1])
         driven = building.drive(
-            SENSORS["utm30lx"], seed=seed, speed=SPEED, rate=4.0, people=6, wheels=Wheels()
+            SENSORS["utm30lx"],
+            seed=seed,
+            speed=SPEED,
+            rate=4.0,
+            people=6,
+            wheels=Wheels(),
+            moving=True,
         )
         scans, truth = list(islice(driven[0], 240)), np.array(driven[1][:240])
         worlds = building.plan, building.moved(seed).plan, building.mirrored()

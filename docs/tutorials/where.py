@@ -75,11 +75,12 @@ print(locate(features, plan))
 # ## A whole log
 #
 # From the shell it is two commands; the second follows the robot, and reports where
-# it is lost:
+# it is lost. It deskews the scans, if they say how long a sweep takes; those of
+# this simulation are taken at once.
 #
 # ```sh
 # lineament map monday.ros2.mcap -o plan.dxf
-# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv
+# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv --no-deskew
 # lineament view tuesday.ros2.mcap --map plan.dxf    # to look at it
 # ```
 #
@@ -89,7 +90,8 @@ print(locate(features, plan))
 import pandas as pd
 from lineament.tasks.locate import locate_log
 
-print(locate_log(tuesday, "plan.dxf", "tuesday.csv"))
+done = locate_log(tuesday, "plan.dxf", "tuesday.csv", deskewed=False)
+print(done.verdicts, f"lost {done.lost} times")
 rows = pd.read_csv("tuesday.csv")
 rows[["stamp", "verdict", "x", "y", "theta", "cov_xx", "explained"]].head(3)
 

@@ -223,16 +223,27 @@ class Follower:
 
 
 def follow(
-    scans: Iterable[LaserScan], plan: LineMap, extractor: Extractor, *, odometry: bool = True
+    scans: Iterable[LaserScan],
+    plan: LineMap,
+    extractor: Extractor,
+    *,
+    odometry: bool = True,
+    deskewed: bool = True,
 ) -> Iterator[tuple[LaserScan, Whereabouts]]:
-    """Yield each scan and where it was taken; deskewed, if it says how long its sweep takes.
+    """Yield each scan and where it was taken.
 
-    `odometry` is whether the poses of the scans are odometry.
+    `odometry` is whether the poses of the scans are odometry; `deskewed`, whether scans are to be
+    deskewed that say how long their sweep takes.
     """
     follower, before = Follower(plan), None
     for scan in scans:
-        pose, twist = scan.pose if odometry else None, follower.twist
-        if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
+        pose, twist = scan.pose if odometry else None, follower.twist if deskewed else None
+        if (
+            deskewed
+            and pose is not None
+            and before is not None
+            and 0 < scan.stamp - before[1] < GAP
+        ):
             twist = twist_between(before[0], pose, scan.stamp - before[1])
         before = None if pose is None else (pose, scan.stamp)
         yield scan, follower(extractor(deskew(scan, twist)), pose)
