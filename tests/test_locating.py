@@ -46,6 +46,11 @@ def drive(storey):
     return [scan for scan, _ in zip(scans, range(200), strict=False)], truth[:200]
 
 
+def complaints(err):
+    """Lines on stderr but those of the progress, which a slow machine has."""
+    return [line for line in err.splitlines() if not line.endswith(" left")]
+
+
 def plan_of(world: World) -> LineMap:
     return LineMap.from_lines(world.segments)
 
@@ -178,7 +183,7 @@ def test_the_command(files, capsys, log, ending):
     status = run(["locate", f"{files / log}.npz", "--map", str(files / "plan.dxf"), "-o", str(out)])
     said = capsys.readouterr()
     scans = 12 if log == "log" else 1
-    assert (status, said.err) == (0, "")
+    assert (status, complaints(said.err)) == (0, [])
     assert f"{scans} scans: 100.0 % located" in said.out
     assert "located first after 0.0 s, lost 0 times" in said.out
     if ending == "parquet":
@@ -201,25 +206,26 @@ def test_units_and_a_plan_of_no_size(files, capsys):
     given += ["-o", str(files / "poses.csv"), "--units"]
     assert run([*given, "mm"]) == run([*given, "m"]) == 0
     said = capsys.readouterr()
-    warning = "plan.dxf: is 0.006 m x 0.004 m: is it drawn in other units? (--units)\n"
-    assert said.err.endswith(warning)
-    assert said.err.count("\n") == said.out.count("never located") == 1
+    (warning,) = complaints(said.err)
+    assert warning.endswith("plan.dxf: is 0.006 m x 0.004 m: is it drawn in other units? (--units)")
+    assert said.out.count("never located") == 1
 
 
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--layers", "doors"], "no layer is doors"),
-        (["--map", "none.dxf"], "none.dxf: No such file"),
-        (["-o", "a.txt"], "expected an ending of .tum, .csv, .parquet"),
+        (["view", "--layers", "doors"], "no layer is doors"),
+        (["locate", "-o", "a.tum", "--layers", "doors"], "no layer is doors"),
+        (["locate", "-o", "a.tum", "--map", "none.dxf"], "none.dxf: No such file"),
+        (["locate", "-o", "a.txt"], "expected an ending of .tum, .csv, .parquet"),
     ],
 )
-def test_one_line_for_what_cannot_be_done(files, capsys, arguments, told):
-    given = [str(files / "log.npz"), "--map", str(files / "plan.dxf"), "-o", str(files / "a.tum")]
-    assert run(["locate", *given, *arguments]) in (1, 2)
-    said = capsys.readouterr().err
+def test_one_line_for_what_cannot_be_done(files, capsys, monkeypatch, arguments, told):
+    monkeypatch.chdir(files)
+    command, *rest = arguments
+    assert run([command, "log.npz", "--map", "plan.dxf", *rest]) in (1, 2)
+    (said,) = complaints(capsys.readouterr().err)
     assert told in said
-    assert said.count("\n") == 1
     assert not (files / "a.tum").exists()
 
 
@@ -280,12 +286,6 @@ def test_foxglove_shows_the_pose_on_the_plan(files):
     publisher.sent.clear()
     sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
     assert [message.topic for message in publisher.sent] == ["/scan/plan"]
-
-
-def test_the_viewer_reads_layers_and_units(files, capsys):
-    given = ["view", str(files / "log.npz"), "--map", str(files / "plan.dxf")]
-    assert run([*given, "--layers", "doors"]) == 1
-    assert "no layer is doors" in capsys.readouterr().err
 
 
 def test_the_viewer_locates_logs_on_a_plan(files):
