@@ -106,12 +106,22 @@ def direction_of(line):
     return np.array([math.cos(line["angle"]), math.sin(line["angle"])])
 
 
+def assert_directed(segments):
+    """Hold that segments lead from their start to their end, as long as they say."""
+    way = segments["end"] - segments["start"]
+    np.testing.assert_allclose(np.hypot(*way.T), segments["length"], rtol=1e-12)
+    u = np.column_stack((np.cos(segments["angle"]), np.sin(segments["angle"])))
+    along, across = (way * u).sum(axis=1), way[:, 1] * u[:, 0] - way[:, 0] * u[:, 1]
+    digits = 1e-9 * np.abs(segments["centroid"]).max(axis=1, initial=0.0)
+    assert (along > 0).all()
+    assert (np.abs(across) <= 1e-6 * along + digits).all()
+
+
 def assert_positive_definite(covariances):
     """In units of the deviations: offsets may be Gm where angles are nrad."""
-    for own in covariances:
-        assert (own.diagonal() > 0).all()
-        scale = np.sqrt(own.diagonal())
-        assert (np.linalg.eigvalsh(own / np.outer(scale, scale)) > 0).all()
+    scale = np.sqrt(covariances.diagonal(axis1=1, axis2=2))
+    assert (scale > 0).all()
+    assert (np.linalg.eigvalsh(covariances / (scale[:, :, None] * scale[:, None])) > 0).all()
 
 
 def assert_sound(features, scan, method):
@@ -129,6 +139,7 @@ def assert_sound(features, scan, method):
     assert_positive_definite(corners["covariance"])
     assert (segments["n_points"] >= (method.min_points if method.name == "liu" else 2)).all()
     assert (segments["rms"] >= 0).all()
+    assert_directed(segments)
     # What is farther than any scanner sees, or nearer, is missing, as beams are that are not valid.
     usable = scan.valid & (scan.ranges >= 1 / LARGEST) & (scan.ranges < LARGEST)
     valid = np.flatnonzero(usable)
@@ -138,7 +149,6 @@ def assert_sound(features, scan, method):
         beams = valid[(valid - first) % n <= (last - first) % n]
         # On a ring, the measurement at which it was opened belongs to its first and its last line.
         assert line["n_points"] == len(beams)
-        assert (line["end"] - line["start"]) @ direction_of(line) > 0
         own = {features.clusters[first]} if max_vertices else set(features.clusters[beams])
         assert own == {line["cluster"]}
     for corner in corners:

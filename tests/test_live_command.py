@@ -258,6 +258,9 @@ track = true
 [parameters]
 noise_factor = 99.0
 min_points = 6
+[limits]
+beams = 9
+scans = 8
 """)
 
     def kept(config: LiveConfig, is_stopped, *, write, show) -> Report:
@@ -271,7 +274,7 @@ min_points = 6
     configs: list[LiveConfig] = []
     monkeypatch.setattr("lineament.live.running.run_live", kept)
     flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
-    flags += " --dock 2 -1.5"
+    flags += " --dock 2 -1.5 --limit scans=7"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0
     assert capfd.readouterr() == ("3 scans, 2 dropped, 1 lost, 0 malformed messages\n", "begun\n")
     assert run(["live", "--ros", "1", "__name:=front", "-q"]) == 0
@@ -284,6 +287,7 @@ min_points = 6
             echo="last",
             method="iepf",
             parameters={"noise_factor": 3.0, "min_points": 6},
+            limits={"beams": 9, "scans": 7},
             track=True,
             localhost=True,
             foxglove=8765,

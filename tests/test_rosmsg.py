@@ -274,11 +274,13 @@ def read_echoes(*beams, echo="strongest"):
 
 
 @both
-def test_lengths_of_echoes_that_reach_past_the_message(ros, encoding):
-    """The number of beams, and that of the last beam's echoes, one too large."""
+def test_echoes_of_a_damaged_message(ros, encoding):
+    """The number of beams, and that of the last beam's echoes, one too large; a signalling NaN."""
     data = ros_bags.serialized(ros_bags.Messages(ros).echoes(1.0, [[1.0]]), ros)
     at = len(data) - 16  # of the number of beams: echoes and its one, and no intensities
     assert struct.unpack_from("<IIfI", data, at) == (1, 1, 1.0, 0)
+    signalling = bytes(data[: at + 8]) + b"\x01\0\x80\x7f" + bytes(data[at + 12 :])
+    assert np.isnan(multi_echo_scan(signalling, encoding).ranges).all()
     for place, value, problem in (
         (at, 4, "4 beams expected in 12 bytes"),
         (at, 3, "beam 2 of 3 reaches past its end|ends early"),

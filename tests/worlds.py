@@ -46,6 +46,14 @@ def scan_of(ranges, angles, **fields) -> LaserScan:
     return LaserScan(ranges, float(angles[0]), float(step), **fields)
 
 
+def seen(scan, ranges, angles):
+    """Make a scan of other ranges and bearings with the limits of one."""
+    limits = {"range_min": scan.range_min, "range_max": scan.range_max}
+    if scan.is_regular:
+        return LaserScan(ranges, float(angles[0]), scan.angle_increment, **limits)
+    return LaserScan(ranges, angles=angles, **limits)
+
+
 def full_circle(n: int = 720) -> np.ndarray:
     return -math.pi + 2 * math.pi / n * np.arange(n)
 

@@ -131,10 +131,15 @@ def _configured(
     from ..live import LiveConfig, read_config
 
     options = {} if path is None else read_config(path)
+    limits = given.pop("limits") or {}
     options.update({name: value for name, value in given.items() if value is not None})
     for argument in remappings:  # Those of roslaunch are for rospy, which finds them by itself.
         if options.get("ros") != 1 or ":=" not in argument:
             raise click.UsageError(f"got an unexpected argument {argument!r}")
     with wrong_usage():
         config = LiveConfig(**options)
-    return replace(config, parameters={**config.parameters, **settings_of(settings)})
+    return replace(
+        config,
+        parameters={**config.parameters, **settings_of(settings)},
+        limits={**config.limits, **limits},
+    )

@@ -100,9 +100,3 @@ def _parts(floats, ints):  # type: ignore[no-untyped-def]
 def beams_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return `beams` alone: a view costs 5 ns."""
     return floats[0:2]
-
-
-@_inlined  # type: ignore[misc]
-def points_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return `points` alone."""
-    return floats[2:14]

@@ -65,17 +65,11 @@ class LineMethod(MethodBase):
     def part(self, block: Block, min_points: int, noise_factor: float = 3.0) -> None:
         """Part the scan into clusters."""
         if self.clusters == "borges_aldon":
-            rule, constant, missing = BORGES_ALDON, noise_factor, self.max_missing
+            rule, missing = (BORGES_ALDON, noise_factor, self.grazing_angle), self.max_missing
         else:
-            rule, missing = FIXED, block.beams
-            constant = self.distance if self.clusters == "fixed" else math.inf
-        block.part(
-            rule=rule,
-            constant=constant,
-            angle=self.grazing_angle,
-            max_missing=missing,
-            min_points=min_points,
-        )
+            distance = self.distance if self.clusters == "fixed" else math.inf
+            rule, missing = (FIXED, distance, 0.0), block.beams
+        block.part(rule, missing, min_points)
 
     def settle(self, block: Block, misfit: float) -> None:
         """Settle the borders of the pieces, or leave them as the method's paper does."""

@@ -15,6 +15,7 @@ from ..kernels.optimal import layout as at
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
 from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
+from ..kernels.rivals.pdbs import BORGES_ALDON
 from ..kernels.vertices import hold_together
 from .base import MethodBase
 from .parameters import MOST_VERTICES, method, parameter
@@ -107,7 +108,7 @@ class Optimal(MethodBase):
     def find(self, block: Block) -> None:
         """Lay the polylines of a map through the scan that a block has taken."""
         _, costs, follow = block.own
-        block.part(angle=_GRAZING, max_missing=self.max_missing, min_points=3)
+        block.part((BORGES_ALDON, 3.0, _GRAZING), self.max_missing, 3)
         limits = follow.shape[1] - 1, self.max_missing, _LINK, _WORST
         fit_polylines(block.floats, block.ints, block.bearings, *limits, costs, follow)
         block.measure(fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))

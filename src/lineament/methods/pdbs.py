@@ -95,12 +95,6 @@ class PDBS(MethodBase):
             "lee": (self.ratio, 0.0),
             "borges_aldon": (self.noise_factor, self.grazing_angle),
         }
-        constant, angle = constants[self.rule]
-        block.part(
-            rule=RULES[self.rule],
-            constant=constant,
-            angle=angle,
-            max_missing=self.max_missing,
-            min_points=self.min_points,
-        )
+        rule = RULES[self.rule], *constants[self.rule]
+        block.part(rule, self.max_missing, self.min_points)
         block.measure(gap=self.max_missing + 1.0)

@@ -14,7 +14,7 @@ from ..kernels import layout as at
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure
 from ..kernels.noise import estimate_noise
-from ..kernels.rivals.pdbs import BORGES_ALDON, part_by_distance
+from ..kernels.rivals.pdbs import part_by_distance
 from ..progress import hear_compiler
 from ..scan import LaserScan
 
@@ -99,25 +99,11 @@ class Block:
         """Workspace and noise of the scan that was taken, as kernels are given them."""
         return self.floats, self.ints, self.noises[self.row]
 
-    def part(
-        self,
-        *,
-        rule: int = BORGES_ALDON,
-        constant: float = 3.0,
-        angle: float,
-        max_missing: int,
-        min_points: int,
-    ) -> None:
-        """Part the scan that was taken into clusters.
-
-        Parameters are those of `kernels.rivals.pdbs.part_by_distance`; by default the breakpoint
-        detector of Borges and Aldon, with the angle λ and three standard deviations.
-        """
+    def part(self, rule: tuple[int, float, float], max_missing: int, min_points: int) -> None:
+        """Part the scan that was taken into clusters, see `kernels.rivals.pdbs`."""
         floats, ints, noise = self.workspace
-        rules = rule, constant, angle
-        part_by_distance(
-            floats, ints, self.bearings, self.sensor, noise, rules, max_missing, min_points
-        )
+        limits = max_missing, min_points
+        part_by_distance(floats, ints, self.bearings, self.sensor, noise, rule, *limits)
 
     def measure(
         self,

@@ -52,6 +52,7 @@ def laser_scan(data: Buffer, encoding: str, limits: Limits = LIMITS) -> LaserSca
     return _scan(stamp, frame_id, geometry, ranges, intensities if len(intensities) else None)
 
 
+@np.errstate(invalid="ignore")  # A signalling NaN is a NaN.
 def multi_echo_scan(
     data: Buffer, encoding: str, echo: str = "first", limits: Limits = LIMITS
 ) -> LaserScan:

@@ -6,8 +6,8 @@ from .. import helper, inlined, sums
 from ..line_fit import TOTAL, direction
 from ..noise import LEAST_SIGMA
 from . import layout as at
-from .constants import SIGMAS, TAU
-from .partition import solve
+from .constants import LEAST, SIGMAS, TAU
+from .partition import solve, surface_variance
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
 _TOGETHER = 4
@@ -20,21 +20,22 @@ def measure(work, surfaces, estimated):
     """Fit the lines, with their covariances. Returns how many surfaces are left.
 
     A line whose centroid is not between its ends, or that is shorter than the spacing of its
-    beams, runs along them, and is left out; so is one that only one measurement is near.
+    beams, runs along them, and is left out; so is one that too few measurements are near.
     """
-    spans, pieces, sums, kept = work.spans, work.pieces, work.sums, 0
+    spans, pieces, kept = work.spans, work.pieces, 0
     x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
     for k in range(surfaces):
         first, last, p = spans[at.FIRST, k], spans[at.LAST, k], pieces[kept]
         for row in (at.FIRST, at.LAST, at.KIND, at.COUNT):
             spans[row, kept] = spans[row, k]
         if spans[at.KIND, k] == at.LINE:
-            a, b = solve(sums, first, last + 1)
-            spans[at.COUNT, kept] = fit_line(work.points, first, last + 1, a, b, work.noise, p)
+            first, last, count = _fit_between(work, first, last, p)
+            spans[at.FIRST, kept], spans[at.LAST, kept], spans[at.COUNT, kept] = first, last, count
             begins = p[at.UX] * (x[first] - p[at.CX]) + p[at.UY] * (y[first] - p[at.CY])
             ends = p[at.UX] * (x[last] - p[at.CX]) + p[at.UY] * (y[last] - p[at.CY])
             spacing = abs(x[first] * y[first + 1] - y[first] * x[first + 1]) / rho[first]
-            if not (begins < 0.0 < ends and ends - begins > spacing and spans[at.COUNT, kept] > 1):
+            long = begins < 0.0 < ends and ends - begins > spacing
+            if not (long and count > 1 and last - first + 1 >= LEAST):
                 continue
         else:
             p[:] = pieces[k]
@@ -47,6 +48,32 @@ def measure(work, surfaces, estimated):
                 pieces[k, at.AA] *= scale
     _soften_borders(work, kept)
     return kept
+
+
+@inlined
+def _fit_between(work, first, last, piece):
+    """Fit a line that ends where it was measured. Returns its ends, and how many count.
+
+    A wall that bends may end beside the line, where it does not count.
+    """
+    points, noise, begins, ends, count = work.points, work.noise, last, first, 0.0
+    while begins != first or ends != last:
+        begins, ends = first, last
+        a, b = solve(work.sums, first, last + 1)
+        count = fit_line(points, first, last + 1, a, b, noise, piece)
+        while first < last and not _is_near(points, first, noise, piece):
+            first += 1
+        while first < last and not _is_near(points, last, noise, piece):
+            last -= 1
+    return first, last, count
+
+
+@helper
+def _is_near(points, i, noise, piece):
+    """Whether a line passes a measurement as near as by chance, at the scale of the surface."""
+    dx, dy = points[at.X, i] - piece[at.CX], points[at.Y, i] - piece[at.CY]
+    off = piece[at.UX] * dy - piece[at.UY] * dx
+    return off * off <= SIGMAS * SIGMAS * surface_variance(points, i, noise)
 
 
 @sums

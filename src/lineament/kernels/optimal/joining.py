@@ -85,8 +85,10 @@ def _meet(work, scan, k, m):
     points, broken, p, q = work.points, work.beams[at.BROKEN], work.pieces[k], work.pieces[m]
     i, j = work.spans[at.LAST, k], work.spans[at.FIRST, m]
     x, y, rho = points[at.X], points[at.Y], points[at.RHO]
-    nearer, e, far = (p, i, j) if rho[i] <= rho[j] else (q, j, i)
-    error = SIGMAS * math.sqrt(surface_variance(points, far, work.noise))
+    nearer, e = (p, i) if rho[i] <= rho[j] else (q, j)
+    error_i = SIGMAS * math.sqrt(surface_variance(points, i, work.noise))
+    error_j = SIGMAS * math.sqrt(surface_variance(points, j, work.noise))
+    error = max(error_i, error_j)
     between, unbroken, hole, t, depth = -1, True, False, i, 0.0
     while t != j:
         t = t + 1 if t + 1 < scan.count else 0
@@ -100,8 +102,8 @@ def _meet(work, scan, k, m):
     step = gap(points, i, j, p[at.A] - q[at.A], p[at.B] - q[at.B])
     meets = between < LEAST and not hole and step * step <= error * error
     # Corners lie near the measurements on both sides, or within their spacing and its error.
-    reach_i = max(REACH, math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error)
-    reach_j = max(REACH, math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error)
+    reach_i = max(REACH, math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error_i)
+    reach_j = max(REACH, math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error_j)
     determinant = p[at.A] * q[at.B] - q[at.A] * p[at.B]
     inverse = 1.0 / determinant if determinant != 0.0 else math.nan
     cx, cy = (q[at.B] - p[at.B]) * inverse, (p[at.A] - q[at.A]) * inverse
