@@ -1,9 +1,10 @@
-"""The tables of docs/locate.md: ``python benchmarks/locating.py --queries 20000 --seed 100``.
+"""The tables of docs/locate.md: ``python benchmarks/locating.py --queries 20000 --seed 300``.
 
 Simulated storeys with furniture and people that the plan does not have; a local map of up to 5 m
 of way is looked for on its plan, on that plan with walls moved by 0.3 m, mirrored, and on that of
 another storey. Then the scans of the real arena, each by itself, where they were recorded: errors
-from the motion capture, and from its poses refined on the walls.
+from the motion capture, and from its poses refined on the walls. With ``--follow`` logs are
+followed instead.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -25,6 +27,7 @@ import numpy as np
 import lineament as ln
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
 from lineament.mapping.evidence import evidence_of
+from lineament.mapping.following import follow
 from lineament.mapping.refine import COARSE, refined
 from lineament.simulation import SENSORS
 from lineament.simulation.buildings import Building, office
@@ -212,18 +215,25 @@ def table(rows: np.ndarray) -> None:
     )
 
 
+ARENA = (("standing", "static_data"), ("moving", "mocap_02171554"))
+
+
+def arena_of(file: str) -> tuple[np.lib.npyio.NpzFile, list[ln.LaserScan]] | None:
+    """Return a recording of the arena: its archive and its scans; None where it is not there."""
+    path = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"), "truth", f"jackal_{file}.npz")
+    return (np.load(path), list(ln.open_log(path))) if path.exists() else None
+
+
 def arena() -> None:
     """Print where single scans of the real arena are found on its fitted walls."""
-    folder = Path(os.environ.get("LINEAMENT_DATA", "../shared/data")) / "truth"
     print("\n| arena | scans | located | right | median error | by refined poses |")
     print("|---|--:|--:|--:|--:|--:|")
-    for name, file in (("standing", "static_data"), ("moving", "mocap_02171554")):
-        path, extract, errors = folder / f"jackal_{file}.npz", ln.Extractor(), []
-        if not path.exists():
+    for name, file in ARENA:
+        errors, extract, recorded = [], ln.Extractor(), arena_of(file)
+        if recorded is None:
             continue
-        archive = np.load(path)
+        archive, scans = recorded
         plan = LineMap.from_lines(archive["gt_segments"], sigma=0.005)
-        scans = list(ln.open_log(path))
         for k, scan in enumerate(scans):
             if where := locate(extract(scan), plan):
                 truths = archive["poses"][k], archive["poses_refined"][k]
@@ -236,6 +246,69 @@ def arena() -> None:
         )
 
 
+def followed(
+    scans: list[ln.LaserScan], truth: np.ndarray, plan: LineMap, odometry: bool, known: float = 0.0
+) -> np.ndarray:
+    """Return rows of (located, error [m], turn, χ²/3) of the scans of a log on a plan.
+
+    The truth itself is `known` so well [m].
+    """
+    rows = []
+    found = follow(scans, plan, ln.Extractor(), odometry=odometry)
+    for (_, where), true in zip(found, truth, strict=True):
+        off = np.subtract(where.pose, true)
+        off[2] = math.remainder(off[2], 2 * math.pi)
+        spread = where.covariance + known**2 * np.diag((1, 1, 0))
+        nees = off @ np.linalg.solve(spread, off) / 3
+        rows.append((bool(where), math.hypot(off[0], off[1]), abs(off[2]), nees))
+    return np.array(rows)
+
+
+def follow_all() -> None:
+    """Print how logs are followed: six storeys on four plans, and the arena."""
+    found: dict[str, list[np.ndarray]] = {}
+    for seed in range(11, 17):
+        building = office(seed, SIZES[1])
+        driven = building.drive(
+            SENSORS["utm30lx"],
+            seed=seed,
+            speed=SPEED,
+            rate=4.0,
+            people=6,
+            wheels=Wheels(),
+            moving=True,
+        )
+        scans, truth = list(islice(driven[0], 240)), np.array(driven[1][:240])
+        worlds = building.plan, building.moved(seed).plan, building.mirrored()
+        other = office(seed + 6000, SIZES[1]).plan
+        for name, world in zip(
+            ("own", "moved", "mirrored", "other"), (*worlds, other), strict=True
+        ):
+            found.setdefault(name, []).append(followed(scans, truth, plan_of(world), True))
+        sparse = followed(scans[::3], truth[::3], plan_of(worlds[2]), True)
+        found.setdefault("mirrored, a scan each 0.75 m", []).append(sparse)
+    print("| plan | scans | located | right | median error | χ²/3 |\n|---|--:|--:|--:|--:|--:|")
+    for name, parts in found.items():
+        _print_followed(name, np.concatenate(parts))
+    for name, file in ARENA:
+        if (recorded := arena_of(file)) is not None:
+            archive, scans = recorded
+            for sigma, known in ((0.005, 0.0), (0.015, 0.0), (0.015, 0.01)):
+                plan = LineMap.from_lines(archive["gt_segments"], sigma=sigma)
+                rows = followed(scans[::2], archive["poses_refined"][::2], plan, False, known)
+                _print_followed(f"arena, {name}, sigma={sigma}, truth ± {1000 * known:g} mm", rows)
+
+
+def _print_followed(name: str, rows: np.ndarray) -> None:
+    where = rows[rows[:, 0] > 0]
+    right = (where[:, 1] < RIGHT[0]) & (where[:, 2] < RIGHT[1])
+    print(
+        f"| {name} | {len(rows)} | {len(where)} | {right.sum()} | "
+        + (f"{1000 * np.median(where[:, 1]):.1f} mm | {where[:, 3].mean():.2f} |" if len(where)
+           else "– | – |")
+    )  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--queries", type=int, default=20_000)
@@ -243,7 +316,11 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--keep", type=Path, help="folder where the local maps are kept")
     parser.add_argument("--most", type=int, help="local maps of a storey")
+    parser.add_argument("--follow", action="store_true", help="follow logs instead")
     options = parser.parse_args()
+    if options.follow:
+        follow_all()
+        return
     done: list[np.ndarray] = []
     seed, running = options.seed, set()
     with ProcessPoolExecutor(options.workers) as pool:

@@ -75,11 +75,12 @@ print(locate(features, plan))
 # ## A whole log
 #
 # From the shell it is two commands; the second follows the robot, and reports where
-# it is lost:
+# it is lost. It deskews the scans, if they say how long a sweep takes; those of
+# this simulation are taken at once.
 #
 # ```sh
 # lineament map monday.ros2.mcap -o plan.dxf
-# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv
+# lineament locate tuesday.ros2.mcap --map plan.dxf -o tuesday.csv --no-deskew
 # lineament view tuesday.ros2.mcap --map plan.dxf    # to look at it
 # ```
 #
@@ -89,7 +90,8 @@ print(locate(features, plan))
 import pandas as pd
 from lineament.tasks.locate import locate_log
 
-print(locate_log(tuesday, "plan.dxf", "tuesday.csv"))
+done = locate_log(tuesday, "plan.dxf", "tuesday.csv", deskewed=False)
+print(done.verdicts, f"lost {done.lost} times")
 rows = pd.read_csv("tuesday.csv")
 rows[["stamp", "verdict", "x", "y", "theta", "cov_xx", "explained"]].head(3)
 
@@ -120,6 +122,14 @@ located = (rows.verdict == "located").to_numpy()
 off = np.hypot(*(rows[["x", "y"]].to_numpy() - true[:, :2])[located].T)
 print(f"{located.mean():.0%} located; median {1000 * np.median(off):.0f} mm,")
 print(f"largest {1000 * off.max():.0f} mm")
+
+# %% [markdown]
+# The plan holds Monday’s furniture. Where all of it has been moved, too many beams
+# pass through what was there; the verdict is then that this is not the map:
+
+# %%
+wednesday, _ = record("wednesday", storey.refurnished(7), seed=3)
+print(locate_log(wednesday, "plan.dxf", "wednesday.csv", deskewed=False).verdicts)
 
 # %% [markdown]
 # On the plan of another building it is nowhere:

@@ -8,7 +8,7 @@ import click
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
-from .locate import locate
+from .locate import LAYERS, UNITS, locate
 from .mapping import map_command
 from .options import (
     HUSH,
@@ -99,6 +99,8 @@ def plot(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
 @click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
+@LAYERS
+@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
@@ -111,6 +113,7 @@ def view(
     port: int,
     plan: Path | None,
     no_browser: bool,
+    **drawing: Any,
 ) -> None:
     """Look at LOGS in the browser: scans, features, and why a segment is missing.
 
@@ -125,7 +128,7 @@ def view(
     if plan is not None:
         from ..mapping import LineMap
 
-        drawn = LineMap.read(plan)
+        drawn = LineMap.read(plan, **drawing)
     session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 

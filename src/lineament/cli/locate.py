@@ -35,6 +35,7 @@ UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
 @LAYERS
 @click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
 @click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
+@click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
 @METHOD
 @SET
 @NOISE
@@ -48,6 +49,7 @@ def locate(
     settings: tuple[str, ...],
     noise: float | None,
     no_odometry: bool,
+    no_deskew: bool,
     quiet: bool,
     reading: dict[str, Any],
     **drawn: Any,
@@ -66,6 +68,7 @@ def locate(
         output,
         make_extractor(method, settings, noise),
         odometry=not no_odometry,
+        deskewed=not no_deskew,
         track=tracker(quiet),
         **drawn,
         **reading,

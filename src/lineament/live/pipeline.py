@@ -93,7 +93,7 @@ class Pipeline:
     def __init__(self, config: LiveConfig) -> None:
         self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
-        self._plan = None if config.map is None else _plan_of(config)
+        self._plan = plan_of(config)
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
@@ -180,10 +180,12 @@ class _Publisher:
         self.last: LaserScan | None = None
 
 
-def _plan_of(config: LiveConfig) -> LineMap:
+def plan_of(config: LiveConfig) -> LineMap | None:
+    """Read the plan that is configured, if any."""
+    if config.map is None:
+        return None
     from ..mapping import LineMap
 
-    assert config.map is not None
     layers = config.layers.split(",") if config.layers else None
     return LineMap.read(config.map, layers, units=config.units)
 

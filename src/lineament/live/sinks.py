@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import LASER_FRAME, WORLD_FRAME, Message, Moment, layers_of
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of
 from .config import LiveConfig
 from .counters import Report
-from .pipeline import Frame, time_of
+from .pipeline import Frame, plan_of, time_of
 
 if TYPE_CHECKING:
     from ..mapping.following import Whereabouts
@@ -179,7 +179,8 @@ class FoxgloveSink:
     messages : FoxgloveMessages
         Makes the messages.
     config : LiveConfig
-        Scans go to its topic, the layers of features to ``TOPIC/features``.
+        Scans go to its topic, the layers of features to ``TOPIC/features``; with a plan, its walls
+        to ``TOPIC/plan``, and scans are placed on it, where that is known.
     """
 
     def __init__(
@@ -193,6 +194,10 @@ class FoxgloveSink:
             f"{topic}/points": "PointCloud",  # of a scan that is irregular since it was deskewed
             f"{topic}/features": "SceneUpdate",
         }
+        self._plan: tuple[Layer, ...] = ()
+        if (plan := plan_of(config)) is not None:
+            self._plan = (Layer("plan", (0.5, 0.5, 0.5, 1.0), 0.02, plan.ends),)
+            self._topics[f"{topic}/plan"] = "SceneUpdate"
         for name, kind in self._topics.items():
             publisher.advertise(name, kind)
 
@@ -205,14 +210,19 @@ class FoxgloveSink:
         """Publish the deskewed scan and its features, if anybody listens to any of the topics."""
         if not any(map(self._publisher.listeners, self._topics)):
             return
-        scan = frame.straight
+        scan, where = frame.straight, frame.where
         layers = layers_of(markers_of(frame.features, scan))
+        if where is not None:
+            scan = scan.with_pose(where.pose if where.is_known else None)
         moment = _moment(frame, scan.frame_id or LASER_FRAME)
         for message in self._messages.messages(self._topic, moment, scan, layers):
             self._publisher.publish(message)
 
-    def diagnose(self, report: Report, time: tuple[int, int]) -> None:
-        """Do nothing: Foxglove shows scans as they come."""
+    def diagnose(self, report: Report, time: tuple[int, int]) -> None:  # noqa: ARG002
+        """Publish the plan again, for who has come since."""
+        if self._plan and self._publisher.listeners(topic := f"{self._topic}/plan"):
+            moment = Moment(*time, WORLD_FRAME, "")
+            self._publisher.publish(self._messages.features(topic, moment, self._plan))
 
 
 def _moment(frame: Frame, name: str) -> Moment:

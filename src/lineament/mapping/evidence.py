@@ -29,8 +29,8 @@ class Evidence:
     Attributes
     ----------
     log_odds : float
-        Natural logarithm of the likelihood of the beams at this pose over that at a wrong one,
-        less that of the number of poses that the plan has room for: below 0 chance does as well.
+        Logarithm of the likelihood of the beams at this pose over that at a wrong one, less that of
+        the number of poses that the plan has room for: below 0 chance does as well.
     explained, short, contradicted : float
         Shares of the beams that end on a wall of the plan; before one, on something that the plan
         does not have; and that have passed through a wall of the plan.

@@ -9,7 +9,7 @@ import numpy as np
 from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker
-from ..motion.deskew import deskew
+from ..motion.deskew import beam_times, deskew
 from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist, compose, twist_between
@@ -35,6 +35,8 @@ DENIED = 0.12
 _DRIFT, _TURN_DRIFT = 0.005, 0.002
 #: Error of walls and beams beside their covariances [m]: where scans are judged by themselves.
 _TIGHT = 0.03
+#: Velocity that a sensor may have at first [m/s, m/s, rad/s]; share by which it is off later.
+_USUAL, _UNEVEN = np.array((1.0, 0.0, 1.0)), 0.1
 _UNKNOWN = np.diag((1e6, 1e6, 10.0))
 
 
@@ -122,7 +124,9 @@ class Follower:
         """Velocity of the sensor in the last scans, as `deskew` takes it."""
         return self._tracker.twist
 
-    def __call__(self, features: Features, odometry: Pose | None = None) -> Whereabouts:
+    def __call__(
+        self, features: Features, odometry: Pose | None = None, skew: Pose = (0.0, 0.0, 0.0)
+    ) -> Whereabouts:
         """Take in the next scan.
 
         Parameters
@@ -131,6 +135,8 @@ class Follower:
             As `Extractor` returns them, with their scan.
         odometry : (x, y, theta), optional
             Pose of the sensor by odometry, in any frame that stays [m, m, rad].
+        skew : (x, y, theta)
+            What the scan as a whole may be off, as the sensor moved while it swept [m, m, rad].
         """
         if self._is_torn(features.stamp, odometry):
             self._restart()
@@ -139,6 +145,9 @@ class Follower:
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
+        c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
+        off = np.array((c * skew[0] - s * skew[1], s * skew[0] + c * skew[1], skew[2]))
+        blurred = np.outer(off, off)
         evidence = self._judge(features)
         self._doubts = self._doubts + 1 if self.is_known and evidence.log_odds < 0 else 0
         if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
@@ -149,12 +158,12 @@ class Follower:
         is_due = self._since > STEP or self._turned > TURN
         is_due |= features.stamp - self._looked > PERIOD
         if is_due or (self.is_known and evidence.contradicted > DENIED):
-            location = self._look()
+            location = self._look(blurred)
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
         is_wrong = self.is_known and evidence.contradicted > DENIED
         verdict = LOST if is_wrong else self._verdict
-        return Whereabouts(verdict, self._pose, self._covariance, evidence, location)
+        return Whereabouts(verdict, self._pose, self._covariance + blurred, evidence, location)
 
     def _is_torn(self, stamp: float, odometry: Pose | None) -> bool:
         """Whether the motion since the last scan is unknown."""
@@ -197,18 +206,18 @@ class Follower:
         odds, explained, short, contradicted = found[0].tolist()
         return Evidence(odds, explained, short, contradicted, len(beams))
 
-    def _look(self) -> Location:
+    def _look(self, blurred: Array) -> Location:
         """Look for what was seen on the plan: near the pose if it is known, or everywhere."""
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
-            self._covariance = found.covariance if found else _UNKNOWN
+            self._covariance = found.covariance + blurred if found else _UNKNOWN
             self._missed = 0.0
             return found
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
         self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
-            spread = found.covariance.copy()
+            spread = found.covariance + blurred
             if found.unobserved is not None:
                 # As wide as its alternatives lie apart.
                 along = np.array(found.unobserved)
@@ -223,19 +232,31 @@ class Follower:
 
 
 def follow(
-    scans: Iterable[LaserScan], plan: LineMap, extractor: Extractor, *, odometry: bool = True
+    scans: Iterable[LaserScan],
+    plan: LineMap,
+    extractor: Extractor,
+    *,
+    odometry: bool = True,
+    deskewed: bool = True,
 ) -> Iterator[tuple[LaserScan, Whereabouts]]:
-    """Yield each scan and where it was taken; deskewed, if it says how long its sweep takes.
+    """Yield each scan and where it was taken.
 
-    `odometry` is whether the poses of the scans are odometry.
+    `odometry` is whether the poses of the scans are odometry; `deskewed`, whether scans are to be
+    deskewed that say how long their sweep takes.
     """
-    follower, before = Follower(plan), None
+    follower, before, last = Follower(plan), None, _USUAL
     for scan in scans:
-        pose, twist = scan.pose if odometry else None, follower.twist
+        pose, twist, skew = scan.pose if odometry else None, follower.twist, np.zeros(3)
         if pose is not None and before is not None and 0 < scan.stamp - before[1] < GAP:
             twist = twist_between(before[0], pose, scan.stamp - before[1])
         before = None if pose is None else (pose, scan.stamp)
-        yield scan, follower(extractor(deskew(scan, twist)), pose)
+        straight = deskew(scan, twist) if deskewed else scan
+        if deskewed and (times := beam_times(scan)) is not None:
+            now = np.array(twist or (0.0, 0.0, 0.0))
+            skew = (np.abs(now - last) + _UNEVEN * np.abs(now)) * np.ptp(times) / 2
+            last = now
+        x, y, turn = skew.tolist()
+        yield scan, follower(extractor(straight), pose, (x, y, turn))
 
 
 def combined(known: tuple[Pose, Array], other: tuple[Pose, Array]) -> tuple[Pose, Array]:

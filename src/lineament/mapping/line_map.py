@@ -4,6 +4,7 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from itertools import repeat
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -158,14 +159,12 @@ class LineMap:
         sigma : float
             As for the map.
         """
-        merger = Merger()
-        spreads = None if pose_covariances is None else iter(pose_covariances)
-        places = None if poses is None else iter(poses)
-        for found in features:
-            if places is not None:
-                spread = None if spreads is None else next(spreads)
-                found = found.transform(*next(places), spread)
-            merger.add(found)
+        merger, none = Merger(), repeat(None)
+        spreads = none if pose_covariances is None else pose_covariances
+        for seen, pose, spread in zip(
+            features, none if poses is None else poses, spreads, strict=False
+        ):
+            merger.add(seen if pose is None else seen.transform(*pose, spread))
         return cls(*merger.result(min_views), sigma=sigma)
 
     @classmethod
@@ -201,20 +200,17 @@ class LineMap:
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""
         walls, corners, columns = self.walls, self.corners, self.columns
-        segments = np.zeros(len(walls), SEGMENT)
-        for name in ("start", "end", "centroid", "angle", "covariance"):
-            segments[name] = walls[name]
-        segments["n_points"] = walls["views"]
+        segments, points, arcs = (
+            np.zeros(len(of), dtype)
+            for of, dtype in ((walls, SEGMENT), (corners, CORNER), (columns, ARC))
+        )
+        for records, of in ((segments, walls), (points, corners), (arcs, columns)):
+            for name in {*(records.dtype.names or ())} & {*(of.dtype.names or ())}:
+                records[name] = of[name]
         segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-        points = np.zeros(len(corners), CORNER)
-        for name in ("position", "covariance", "opening"):
-            points[name] = corners[name]
-        points["convex"] = corners["solid"] == 1
-        points["segments"], points["kind"] = corners["walls"], "corner"
-        arcs = np.zeros(len(columns), ARC)
-        for name in ("center", "radius", "covariance"):
-            arcs[name] = columns[name]
-        arcs["n_points"] = columns["views"]
+        segments["n_points"], arcs["n_points"] = walls["views"], columns["views"]
+        points["convex"], points["kind"] = corners["solid"] == 1, "corner"
+        points["segments"] = corners["walls"]
         none = make_records("breakpoints", [])
         return Features(segments, points, arcs, np.empty(0, np.int32), none, frame_id="map")
 
@@ -231,11 +227,10 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     rings = columns["center"][:, None] + columns["radius"][:, None, None] * ring
     sides = np.stack((rings[:, :-1], rings[:, 1:]), axis=2).reshape(-1, 2, 2)
     ends = np.concatenate((np.stack((walls["start"], walls["end"]), axis=1), sides))
-    along = ends[:, 1] - ends[:, 0]
-    lengths = np.linalg.norm(along, axis=1)
+    along, n = ends[:, 1] - ends[:, 0], len(walls)
     table = np.zeros((len(ends), WALL_COLUMNS))
-    table[:, :2], table[:, 2:4], table[:, 4] = ends[:, 0], along / lengths[:, None], lengths
-    n = len(walls)
+    table[:, 4] = np.linalg.norm(along, axis=1)
+    table[:, :2], table[:, 2:4] = ends[:, 0], along / table[:, 4:5]
     table[:n, 5], table[n:, 5] = walls["side"], 1
     # The covariance is moved along the wall to the middle between its ends.
     lever = ((ends[:n].mean(axis=1) - walls["centroid"]) * table[:n, 2:4]).sum(axis=1)
@@ -246,8 +241,7 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0
     cell = max(_CELL, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
     counts = np.ceil((high - low) / cell)
-    grid = np.array([*low, cell, *counts])
-    begins = np.zeros(int(np.prod(counts)) + 1, np.int64)
+    grid, begins = np.array([*low, cell, *counts]), np.zeros(int(np.prod(counts)) + 1, np.int64)
     list_walls(table, grid, _AROUND, begins[:-1], np.empty(0, np.int64))
     begins = np.concatenate(([0], np.cumsum(begins[:-1])))
     members = np.empty(begins[-1], np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features import Features
-from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
+from ..kernels.mapping.layout import BEAM_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
@@ -51,12 +51,9 @@ class Query:
     def table(self) -> Array:
         """The walls as the kernels take them, shape (n, LOCAL_COLUMNS)."""
         walls = self.walls
-        table = np.empty((len(walls), LOCAL_COLUMNS))
-        table[:, :2], table[:, 2] = walls["centroid"], walls["angle"]
-        table[:, 3] = np.linalg.norm(walls["start"] - walls["centroid"], axis=1)
-        table[:, 4] = np.linalg.norm(walls["end"] - walls["centroid"], axis=1)
-        table[:, 5:7], table[:, 7] = walls["covariance"][:, 0], walls["covariance"][:, 1, 1]
-        return table
+        reach = [np.linalg.norm(walls[end] - walls["centroid"], axis=1) for end in ("start", "end")]
+        spread = walls["covariance"].reshape(-1, 4)[:, (0, 1, 3)]
+        return np.column_stack((walls["centroid"], walls["angle"], *reach, spread))
 
     def mirrored(self) -> "Query":
         """Return its mirror image, which is as rich but belongs nowhere on a plan."""
@@ -142,8 +139,8 @@ class LocalMap:
         if odometry is not None and before.odometry is not None:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
         way, turn = math.hypot(*moved[:2]), abs(moved[2])
-        deviations = [a + b * c for (a, b), c in zip(sure, (way, way, turn), strict=True)]
-        spread = np.diag(np.square(deviations))
+        least, growth = np.array(sure).T
+        spread = np.diag(np.square(least + growth * (way, way, turn)))
         if sure is UNSURE:
             spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
         of_pose, of_motion = compose_jacobians(before.motion, moved)

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 
 from ..scan import Array, LaserScan, Pose
-from .drive import drive_poses
+from .drive import course
 from .layouts import (
     DOOR,
     RECESS,
@@ -123,23 +123,28 @@ class Building:
         rate: float | None = None,
         wheels: Wheels | None = None,
         people: int = 0,
+        moving: bool = False,
     ) -> tuple[Iterator[LaserScan], list[Pose]]:
         """Simulate the scans of a drive along the way, among people who walk about.
+
+        `moving` is whether the sensor moves while it sweeps, as for `drive`.
 
         Returns the scans, whose poses are the odometry of the wheels, from the origin on (None
         without wheels), and the true poses in the world, kept apart.
         """
-        stamps, poses = drive_poses(
-            self.waypoints, speed=speed, rate=sensor.rate if rate is None else rate
+        stamps, poses, twists = course(
+            self.waypoints, speed, 1.0, sensor.rate if rate is None else rate
         )
+        twists *= moving
         truth: list[Pose] = [(x, y, theta) for x, y, theta in poses.tolist()]
         believed = [None] * len(truth) if wheels is None else wheels.odometry(truth, seed)
 
         def scans() -> Iterator[LaserScan]:
-            along = zip(stamps.tolist(), truth, believed, strict=True)
-            for i, (stamp, pose, odometry) in enumerate(along):
+            along = zip(stamps.tolist(), truth, believed, twists.tolist(), strict=True)
+            for i, (stamp, pose, odometry, twist) in enumerate(along):
                 world = self.with_people(seed, stamp, pose, people) if people else self.world
-                scan = sensor.scan(world, pose, np.random.default_rng([seed, i]), stamp)
+                rng = np.random.default_rng([seed, i])
+                scan = sensor.scan(world, pose, rng, stamp, tuple(twist))
                 yield scan.with_pose(odometry)
 
         return scans(), truth

@@ -43,7 +43,7 @@ def drive_poses(
     >>> stamps[-1], poses[3].round(3).tolist()
     (np.float64(2.5), [1.0, 0.0, 1.571])
     """
-    stamps, poses, _ = _course(waypoints, speed, turn_rate, rate)
+    stamps, poses, _ = course(waypoints, speed, turn_rate, rate)
     return stamps, poses
 
 
@@ -93,7 +93,7 @@ def drive(
     if seed < 0:
         raise ValueError(f"seed is {seed}, expected a number ≥ 0")
     rate = sensor.rate if rate is None else rate
-    stamps, poses, twists = _course(waypoints, speed, turn_rate, rate)
+    stamps, poses, twists = course(waypoints, speed, turn_rate, rate)
     if not moving:
         twists[:] = 0.0
     states = zip(stamps.tolist(), poses.tolist(), twists.tolist(), strict=True)
@@ -103,7 +103,7 @@ def drive(
     )
 
 
-def _course(
+def course(
     waypoints: ArrayLike, speed: float, turn_rate: float, rate: float
 ) -> tuple[Array, Array, Array]:
     """Stamps (N,), poses (N, 3) and twists (N, 3) at equal steps of time."""

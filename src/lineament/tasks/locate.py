@@ -66,6 +66,7 @@ def locate_log(
     layers: Sequence[str] | None = None,
     units: str | None = None,
     odometry: bool = True,
+    deskewed: bool = True,
     track: Track = untracked,
     **reading: Any,
 ) -> Located:
@@ -86,6 +87,8 @@ def locate_log(
         As for `LineMap.read`.
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
+    deskewed : bool
+        Whether scans are deskewed that say how long their sweep takes.
     track : callable
         ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
@@ -118,9 +121,8 @@ def locate_log(
     if log.topic is None and len(log.topics) > 1:
         raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
     scans = track((scan for _, scan in log.items()), Path(log.name).name, len(log))
-    found = [
-        (scan.stamp, where) for scan, where in follow(scans, drawn, extractor, odometry=odometry)
-    ]
+    followed = follow(scans, drawn, extractor, odometry=odometry, deskewed=deskewed)
+    found = [(scan.stamp, where) for scan, where in followed]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
     if ending == ".tum":
