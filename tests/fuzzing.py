@@ -32,6 +32,8 @@ from random import Random
 from types import CodeType, FrameType
 from typing import Any
 
+from lineament.methods import method_names
+
 #: Bounds for each input: processor time [s], wall clock [s], address space [bytes].
 SECONDS, PATIENCE, MEMORY = 5.0, 90, 6 << 30
 #: What is fuzzed, and in how many of a hundred inputs.
@@ -74,20 +76,38 @@ class Lines:
         return self._ran
 
 
-def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None:
-    """Check the inputs of one worker, from where its state ends."""
+def targets_in(scratch: Path) -> dict[str, Any]:
+    """Return what is fuzzed, by the names of `SHARES`."""
     from fuzz_readers import Readers
     from fuzz_targets import Messages, Methods, Viewer, Writers
 
-    scratch = Path(tempfile.mkdtemp(prefix="fuzzing-"))
     recordings = os.environ.get("LINEAMENT_DATA")
-    targets = {
+    return {
         "methods": Methods(scratch),
         "messages": Messages(scratch),
         "viewer": Viewer(scratch),
         "writers": Writers(scratch),
         "readers": Readers(scratch, Path(recordings) if recordings else None),
     }
+
+
+def check_again(kept: Path) -> str:
+    """Check an input that was kept: what came of it, or what it raises."""
+    warnings.simplefilter("error")
+    with tempfile.TemporaryDirectory(prefix="fuzzing-") as scratch:
+        target = targets_in(Path(scratch))[kept.stem.partition("-")[2]]
+        try:
+            return str(target.check(pickle.loads(kept.read_bytes())))
+        finally:
+            target.close()
+
+
+def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None:
+    """Check the inputs of one worker, from where its state ends."""
+    from fuzz_readers import Readers
+
+    scratch = Path(tempfile.mkdtemp(prefix="fuzzing-"))
+    targets = targets_in(scratch)
     corpus = state / f"corpus-{worker}"
     corpus.mkdir(exist_ok=True)
     for path in sorted(corpus.iterdir()):
@@ -247,6 +267,9 @@ def main() -> None:
     parser.add_argument("--state", type=Path, default=Path("build/fuzzing"))
     parser.add_argument("--again", type=Path, help="check one kept input (.pickle) alone")
     given = parser.parse_args()
+    if given.again:
+        print(check_again(given.again))
+        return
     run(given.state, given.seed, given.workers, given.inputs)
     print(table(given.state))
     sys.exit(bool(list(given.state.glob("faults/*.txt"))))

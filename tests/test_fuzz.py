@@ -2,6 +2,7 @@
 
 import gc
 import json
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -105,3 +106,9 @@ def test_a_run_goes_on_where_it_was_interrupted(tmp_path):
         assert f"{inputs} inputs in " in done.stdout
     state = json.loads((tmp_path / "worker-0.json").read_text())
     assert state["next"] == sum(state["counts"].values()) == 60
+    number, name, made = pickle.loads((tmp_path / "worker-0.now").read_bytes())
+    kept = tmp_path / f"{number:08}-{name}.pickle"
+    kept.write_bytes(pickle.dumps(made))
+    words = [sys.executable, str(script), "--again", str(kept)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert f"{name}/{done.stdout.strip()}" in state["counts"]
