@@ -357,3 +357,13 @@ def test_lengths_and_noise_scale_together(scale):
             two.corners["covariance"], scale**2 * one.corners["covariance"], rtol=1e-5, atol=1e-12
         )
         assert two.clusters.tolist() == one.clusters.tolist()
+
+
+def test_a_vertex_of_a_map_is_not_beyond_all_bounds():
+    """A line along the ray of its vertex, six measurements of a nanometre: it was at 5000 km."""
+    ranges = [9.381522315907185e-10, 9.514869517520805e-10, 9.642356304067797e-10]
+    ranges += [9.398491119881507e-10, 9.642236086075349e-10, 9.645831849580405e-10]
+    scan = LaserScan(ranges, -math.pi, math.pi / 3)
+    features = Extractor("optimal", noise=0.0, max_missing=3, max_vertices=40)(scan)
+    assert features.counts()["segments"]
+    assert np.abs(features.segments["end"]).max() < 1.0

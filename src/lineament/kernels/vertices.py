@@ -19,6 +19,8 @@ from .writing import write_end, write_opening
 BEGIN, HELD, _OPEN, _AFTER, _BEFORE = 0, 1, 2, 3, 4
 #: Points between the vertices of a line that is free.
 _ENOUGH = 3
+#: A vertex at 10⁹ times the range of its measurement, or behind the scanner, is put on that.
+_FAR = 1e-9
 
 
 @helper
@@ -106,8 +108,8 @@ def _move_points(work, bearings, count, ring):
             tangent, u = _meeting(work, bearings, k, m)
             if kind[k] == HELD or math.isnan(tangent):
                 tangent, u = 0.0, 0.5 * (before[k] + after[m])
-        if not u > 0.0:
-            u = 1.0 / work.points[at.RHO, i]
+        if not u * work.points[at.RHO, i] > _FAR:
+            u, tangent = 1.0 / work.points[at.RHO, i], 0.0
         x[i] = (bearings[0, b] - tangent * bearings[1, b]) / u
         y[i] = (bearings[1, b] + tangent * bearings[0, b]) / u
     if ring:
