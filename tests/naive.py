@@ -13,6 +13,7 @@ from naive_fit import (
     breakpoints,
     corner_at_beam,
     fit_line,
+    has_length,
     intersection,
     misfit,
     opening_and_side,
@@ -66,7 +67,7 @@ def paper_of(method, noise_sigma=math.nan):
     return Paper(**own | {"noise_floor": method.noise_floor * math.sqrt(2) * noise_sigma})
 
 
-def liu(scan, method, filtered, noise=None):
+def liu(scan, method, filtered, noise=None):  # noqa: C901
     """All of the method, from filtered ranges."""
     if noise is None:
         noise = noise_of(scan)
@@ -82,7 +83,7 @@ def liu(scan, method, filtered, noise=None):
         examined = primary_corners(seen[beams], found.closed, paper)
         candidates += [(beams[i], distance, value) for i, distance, value in examined]
         strong = {i: value for i, _, value in examined if value > method.threshold}
-        base, pieces = len(segments), pieces_of(len(beams), strong, found.closed)
+        numbers, pieces = [], pieces_of(len(beams), strong, found.closed)
         for k, (first, last) in enumerate(pieces):
             own = beams[first : last + 1]
             # After the last piece comes the first again, or nothing.
@@ -98,12 +99,14 @@ def liu(scan, method, filtered, noise=None):
             line |= {"start": along(line, points[own[0]]), "end": along(line, points[own[-1]])}
             line["n_points"] = len(own)
             line["misfit"] = misfit(line, measured[own], noise)
-            segments.append(line)
+            numbers.append(len(segments) if has_length(line) else None)
+            if has_length(line):
+                segments.append(line)
         for k, (first, _) in enumerate(pieces):
-            if first in strong:
-                before = (k - 1) % len(pieces)
+            joined = numbers[k - 1], numbers[k]
+            if first in strong and None not in joined:
                 around = [beams[first + 1], beams[first - 1] if first else beams[-2]]
-                corner = {"segments": (base + before, base + k), "beam": beams[first]}
+                corner = {"segments": joined, "beam": beams[first]}
                 corner["response"] = strong[first]
                 corner["spacing"] = np.linalg.norm(points[around] - points[beams[first]], axis=1)
                 corners.append(corner)

@@ -119,6 +119,12 @@ def jacobian_covariance(bearings, rho, noise, fit):
     return total
 
 
+def has_length(line):
+    """Whether the ends are apart, by more than rounding: along their beams they may not be."""
+    ahead = (line["end"] - line["start"]) @ [math.cos(line["angle"]), math.sin(line["angle"])]
+    return ahead > 1e-12 * np.abs([line["start"], line["end"]]).sum()
+
+
 def offset_variance(line, point):
     lever = (point - line["centroid"]) @ [math.cos(line["angle"]), math.sin(line["angle"])]
     return np.array([1.0, lever]) @ line["covariance"] @ [1.0, lever]

@@ -62,6 +62,11 @@ def by_the_paper(scan, filtered, paper):
     return liu_2023(filtered, scan.angles, scan.angle_increment, scan.is_full_circle, paper)
 
 
+def has_length(points, piece, _, direction):
+    first, last = points[piece[0]], points[piece[-1]]
+    return abs((last - first) @ direction) > 1e-12 * np.hypot(*direction) * np.abs(first).sum()
+
+
 def assert_reproduced(scan, may_tie=False, **changes):
     """Compare each stage on the ranges that the kernels filtered, and the corners end to end.
 
@@ -88,13 +93,18 @@ def assert_reproduced(scan, may_tie=False, **changes):
     equal(trace.candidates["response"], responses)
     points = polar(trace.filtered, scan.angles)
     np.testing.assert_array_equal(trace.cuts, np.sort(found.corners))
-    if found.lines:  # A corner is between two lines; a ring with one corner has none.
+    # A corner is between two lines; a ring with one corner has none. What begins and ends at the
+    # same place of its line is a line of the paper, but no segment.
+    lines = [line for line in found.lines if has_length(points, *line)]
+    if lines and len(lines) == len(found.lines):
         np.testing.assert_array_equal(np.sort(features.corners["beam"]), trace.cuts)
+    else:
+        assert set(features.corners["beam"]) <= set(trace.cuts)
     corners = points[features.corners["beam"]]
     equal(features.corners["position"], corners)
 
-    assert len(features.segments) == len(found.lines)
-    for segment, (piece, centroid, direction) in zip(features.segments, found.lines, strict=True):
+    assert len(features.segments) == len(lines)
+    for segment, (piece, centroid, direction) in zip(features.segments, lines, strict=True):
         assert (segment["first_beam"], segment["last_beam"]) == (piece[0], piece[-1])
         assert segment["n_points"] == len(piece)
         equal(segment["centroid"], centroid)
