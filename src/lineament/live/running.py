@@ -61,6 +61,7 @@ def run_live(
             with compiling([Tracker.__call__] if config.track else [], [Tracker]):
                 for frame in (pipeline("", WALL), pipeline("", WALL)):
                     feature_points(frame.features, frame.tracks)
+        is_stopped()  # From here on a signal ends a node that runs, and not a start.
         write(f"{config.name} finds features on {config.scan_topic} by {config.method}")
         return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
 
