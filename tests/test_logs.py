@@ -349,3 +349,8 @@ def check_log(path, expected):
             assert np.abs(first.ranges[first.valid] - given).min() < 1e-12
         else:
             assert given is None or first.pose == given
+
+
+def test_a_problem_as_long_as_a_file_is_cut():
+    problem = str(LogError("a.npz", "x" * 7000)).removeprefix("a.npz: ")
+    assert problem == "x" * 998 + " …"
