@@ -141,7 +141,16 @@ def test_a_pipe_is_not_replaced_by_a_file(capsys):
 # Signals
 
 
+@pytest.fixture
+def no_nohup():
+    """SIGHUP as where it is not ignored: what runs the tests may be started by ``nohup``."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 @posix
+@pytest.mark.usefixtures("no_nohup")
 @pytest.mark.parametrize(
     ("command", "name"),
     [(one, "SIGTERM") for one in RUNS if not one.startswith("live")]
