@@ -163,7 +163,8 @@ def _reference(page: str, module: str) -> str:
             home = f"{value.__module__}.{value.__qualname__}"
         if home not in _PLACES:  # else it is on an earlier page
             if isinstance(value, np.dtype):
-                text.append(f"## `{home}` {{ #{home} }}\n\n{_fields(value)}")
+                fields = _fields(value) if value in TABLES.values() else _columns(name, package)
+                text.append(f"## `{home}` {{ #{home} }}\n\n{fields}")
             elif inspect.isclass(value) or inspect.isfunction(value):
                 text.append(f"::: {module}.{name}")
             else:
@@ -214,6 +215,15 @@ def _fields(dtype: np.dtype[Any]) -> str:
     ]
     head = f"A record of `{table}`.\n\n| field | type | unit | meaning |\n|---|---|---|---|\n"
     return head + "\n".join(rows)
+
+
+def _columns(name: str, package: Any) -> str:
+    """Return the comment above a record that no table of features has, and its fields."""
+    dtype, comments = getattr(package, name), re.compile(rf"((?:^#: .*\n)+){name} = ", re.MULTILINE)
+    sources = (path.read_text("utf-8") for path in Path(package.__file__).parent.glob("*.py"))
+    about = next(found[1] for source in sources if (found := comments.search(source)))
+    rows = [f"| `{field}` | `{dtype[field]}` |" for field in dtype.names]
+    return "\n".join([about.replace("#: ", ""), "| field | type |", "|---|---|", *rows])
 
 
 def _commands() -> str:
