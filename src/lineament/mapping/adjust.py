@@ -128,7 +128,7 @@ def optimise(
         own = _inverse(summed(by_wall @ of_wall, w, count) + 1e-6 * np.eye(2))
         blocks = [(by_a @ of_b, a, b), (by_b @ of_a, b, a), (by_a @ of_a, a, a)]
         blocks += [(by_b @ of_b, b, b), (by_pose @ of_pose, frames, frames)]
-        blocks.append((1e9 * np.eye(3)[None], here, here))
+        blocks.append((1e12 * np.eye(3)[None], here, here))
         both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
         gain = both @ _matrix([(own, every, every)], count, count, dense)
         matrix = _matrix(blocks, n, n, dense) - gain @ both.T

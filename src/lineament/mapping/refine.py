@@ -71,7 +71,7 @@ def adjusted(
         whole[pairs[used, None] != pairs[used]] = 0.0
         rows = (2 * used[:, None] + np.arange(2)).ravel()
         sign = np.column_stack((same, np.ones(n))).ravel()
-        spread = query.covariance[np.ix_(rows, rows)] * np.outer(sign, sign) + 1e-10 * np.eye(2 * n)
+        spread = query.covariance[np.ix_(rows, rows)] * np.outer(sign, sign) + 1e-14 * np.eye(2 * n)
         spread += whole.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
         weighted = np.linalg.solve(spread, jacobian)
         information = jacobian.T @ weighted

@@ -207,8 +207,12 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
 
 
 def bowed(walls: Records, sights: Records) -> Records:
-    """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
-    misfits = np.bincount(sights["wall"], sights["misfit"]) / np.bincount(sights["wall"])
+    """Return walls, whole and in order, whose covariances hold the median misfit of their sights.
+
+    Noise feigns a misfit of some sights of a straight wall; one that bows has it in all of them.
+    """
+    counts, order = np.bincount(sights["wall"]), np.lexsort((sights["misfit"], sights["wall"]))
+    misfits = sights["misfit"][order[np.cumsum(counts) - counts + (counts - 1) // 2]]
     walls["covariance"] += _bent(misfits, np.linalg.norm(walls["end"] - walls["start"], axis=1))
     return walls
 
