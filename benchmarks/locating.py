@@ -79,7 +79,7 @@ def places(seed: int, most: int | None = None) -> list[Place]:
         wheels=Wheels() if seed % 4 < 2 else None,
     )
     tracker, extract = ln.Tracker(roughness=0.0), ln.Extractor()
-    maps = [LocalMap(way) for way in WAYS]
+    maps = [LocalMap(way, roughness=0.0) for way in WAYS]
     found: list[Place] = []
     since = 0.0
     for k, (scan, pose) in enumerate(zip(scans, truth, strict=True)):

@@ -37,7 +37,7 @@ def storey_plan():
 def local_map(world, way, seed=0, odometry=None, step=0.2):
     """Drive along a way; returns the local map and the last pose."""
     stamps, poses = drive_poses(way, speed=1.0, rate=1 / step)
-    tracker, local, extract = ln.Tracker(roughness=0.0), LocalMap(), ln.Extractor()
+    tracker, local, extract = ln.Tracker(roughness=0.0), LocalMap(roughness=0.0), ln.Extractor()
     for k, (stamp, pose) in enumerate(zip(stamps, poses, strict=True)):
         scan = SENSOR.scan(world, tuple(pose), np.random.default_rng([seed, k]), stamp)
         features, at = extract(scan), tuple(pose) if odometry else None

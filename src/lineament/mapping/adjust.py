@@ -128,7 +128,7 @@ def optimise(
         own = _inverse(summed(by_wall @ of_wall, w, count) + 1e-6 * np.eye(2))
         blocks = [(by_a @ of_b, a, b), (by_b @ of_a, b, a), (by_a @ of_a, a, a)]
         blocks += [(by_b @ of_b, b, b), (by_pose @ of_pose, frames, frames)]
-        blocks.append((1e12 * np.eye(3)[None], here, here))
+        blocks.append((1e11 * np.eye(3)[None], here, here))
         both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
         gain = both @ _matrix([(own, every, every)], count, count, dense)
         matrix = _matrix(blocks, n, n, dense) - gain @ both.T
@@ -148,14 +148,15 @@ def adjust(
     poses: Sequence[Pose],
     motions: Sequence[tuple[Pose, Array]],
     seen: Sequence[tuple[Records, Numbers]],
+    rough: float = 0.0,
 ) -> tuple[list[Pose], Array, Records, Array]:
     """Adjust the poses of a few scans, the last of which stays, and the walls that they saw.
 
     There is a motion with its covariance from each scan to the next, and segments of each scan with
-    the number of the wall of each. Returns the poses, their covariances (n, 3, 3), the walls, and
-    the covariance (2m, 2m) of (offset, angle) of all walls.
+    the number of the wall of each; their surfaces are `rough` [m]. Returns the poses, their
+    covariances (n, 3, 3), the walls, and the covariance (2m, 2m) of (offset, angle) of all walls.
     """
-    n, sights = len(poses), sights_of(seen)
+    n, sights = len(poses), sights_of(seen, rough)
     names, sights["wall"] = np.unique(sights["wall"], return_inverse=True)
     m, pairs = len(names), [(k, k + 1) for k in range(n - 1)]
     chain = edges_of(pairs, [motion for motion, _ in motions], [spread for _, spread in motions])

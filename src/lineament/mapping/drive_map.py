@@ -218,7 +218,7 @@ class Drive:
         for name in ("start", "end", "centroid", "angle", "covariance"):
             segments[name] = walls[name]
         segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-        segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
+        segments["misfit"][seen["wall"]] = np.sqrt(np.maximum(seen["misfit"], 0.0))
         place = {number: k for k, number in enumerate(self._numbers.tolist())}
         mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
         corners = last.features.corners.copy()

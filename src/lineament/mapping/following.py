@@ -16,7 +16,7 @@ from ..scan.poses import Twist, compose, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, UNOBSERVED, Location, locate
+from .locate import LOCATED, LOST, SURE, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -215,7 +215,10 @@ class Follower:
             self._missed = 0.0
             return found
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
-        self._missed += 1.0 if found.verdict == LOST else -min(TAKEN_BACK, self._missed)
+        # It takes more to leave a place than to believe it at first.
+        odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
+        is_missed = found.verdict == LOST and (odds < SURE or contradicted > DENIED)
+        self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
             spread = found.covariance + blurred
             if found.unobserved is not None:

@@ -78,6 +78,8 @@ class LocalMap:
     ----------
     way : float
         What was seen before the last so many metres is forgotten [m].
+    roughness : float
+        How far surfaces are off straight lines, elsewhere in each scan [m]: 0 for simulated ones.
 
     Examples
     --------
@@ -91,10 +93,11 @@ class LocalMap:
     LocalMap(4 scans, 1.0 m)
     """
 
-    def __init__(self, way: float = 5.0) -> None:
-        if not way >= 0:
-            raise ValueError(f"way is {way}, expected a length ≥ 0")
-        self.way = way
+    def __init__(self, way: float = 5.0, *, roughness: float = 0.005) -> None:
+        for name, value in (("way", way), ("roughness", roughness)):
+            if not value >= 0:
+                raise ValueError(f"{name} is {value}, expected a length ≥ 0")
+        self.way, self.roughness = way, roughness
         self._kept: deque[_Sight] = deque()
         self._last: _Sight | None = None
 
@@ -169,7 +172,7 @@ class LocalMap:
             poses.append(compose(poses[-1], inverse(sight.motion)))
         motions = [(sight.motion, sight.covariance) for sight in sights[1:]]
         seen = [(sight.segments, sight.numbers) for sight in sights]
-        placed, spreads, walls, covariance = adjust(poses[::-1], motions, seen)
+        placed, spreads, walls, covariance = adjust(poses[::-1], motions, seen, self.roughness)
         beams = [
             moved_beams(sight.beams, pose, spread)
             for sight, pose, spread in zip(sights, placed, spreads, strict=True)

@@ -30,7 +30,7 @@ _FEWEST_BEAMS, _FEW_BEAMS = 12, 40
 #: The best is compared with poses so far off [m].
 _SLIDES = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
 #: Poses nearer to each other are one, before and after they are refined [m, rad].
-_NEAR, _SAME = (0.3, 0.12), (0.06, 0.02)
+_NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance: that of a wrong
 #: pose, times the number of poses that a plan has room for.
 SURE = math.log(1000)
@@ -215,6 +215,8 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
         for pose, other in zip(poses[1:], rest, strict=True)
         if first.log_odds - other.log_odds < SURE
     ]
+    if len(distinct(np.stack((best, poses[0])), np.zeros(2), _SAME, 2)) == 2:
+        others.insert(0, (_pose(poses[0]), first))  # walls that depend on each other disagree
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     x, y = vectors[:, 1].tolist()
     verdict, unobserved = AMBIGUOUS if others else LOCATED, None

@@ -16,6 +16,8 @@ ROUGH = 0.01
 _ROUNDS = 6
 #: Squared deviation beyond which a pair is left out.
 GATE = chi_square(0.999, 2)
+#: What is known of the pose before: 10 m and 10 rad.
+_WEAK = 1e-2 * np.eye(3)
 
 
 def refined(
@@ -39,47 +41,77 @@ def adjusted(
 ) -> tuple[Array, Array]:
     """Return a pose and its information (3, 3) by pairs of walls, with all their covariances.
 
-    Pairs beyond the gate are left out: furniture in front of a wall is not the wall.
+    Pairs that contradict the others are left out: furniture in front of a wall is not the wall.
     """
-    used, information = np.flatnonzero(pairs >= 0), np.zeros((3, 3))
-    for step in range(3):
-        n = len(used)
-        if not n:
-            break
-        walls, local = index.walls[pairs[used]], query.walls[used]
-        v, angle = walls[:, 2:4], pose[2] + local["angle"]
-        normal, u = (
-            np.column_stack((-v[:, 1], v[:, 0])),
-            np.column_stack((np.cos(angle), np.sin(angle))),
-        )
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        arm = local["centroid"] @ np.array([[c, s], [-s, c]])
-        off = arm + pose[:2] - walls[:, :2]
-        # Signs are those of the plan's walls: the local ones may lead the other way.
-        same = np.where((u * v).sum(axis=1) >= 0, 1.0, -1.0)
-        turn = np.arctan2(same * (u * normal).sum(axis=1), same * (u * v).sum(axis=1))
-        error = np.column_stack(((normal * off).sum(axis=1), turn)).ravel()
-        slopes = np.zeros((n, 2, 3))
-        slopes[:, 0, :2], slopes[:, 1, 2] = normal, 1.0
-        slopes[:, 0, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
-        jacobian = slopes.reshape(-1, 3)
-        # All pairs with a wall of the plan have its error.
-        lever = np.tile(np.eye(2), (n, 1, 1))
-        lever[:, 0, 1] = (v * off).sum(axis=1) - 0.5 * walls[:, 4]
-        shared = lever @ walls[:, (6, 7, 7, 8)].reshape(-1, 2, 2)
-        whole = shared[:, None] @ lever.transpose(0, 2, 1)
-        whole[pairs[used, None] != pairs[used]] = 0.0
-        rows = (2 * used[:, None] + np.arange(2)).ravel()
-        sign = np.column_stack((same, np.ones(n))).ravel()
-        spread = query.covariance[np.ix_(rows, rows)] * np.outer(sign, sign) + 1e-14 * np.eye(2 * n)
-        spread += whole.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    used, information = _consistent(pose, pairs, query, index), np.zeros((3, 3))
+    for _ in range(2):
+        error, jacobian, spread = _equations(pose, pairs, used, query, index)
         weighted = np.linalg.solve(spread, jacobian)
         information = jacobian.T @ weighted
-        change = np.linalg.solve(information + 1e-2 * np.eye(3), weighted.T @ error)
-        pose = pose - change
-        if step < 2:
-            left = (error - jacobian @ change).reshape(-1, 2)
-            own = spread.reshape(n, 2, n, 2)[np.arange(n), :, np.arange(n)]
-            d2 = np.einsum("ni,nij,nj->n", left, np.linalg.inv(own), left)
-            used = used[d2 <= max(GATE, np.sort(d2)[n // 2])]
+        pose = pose - np.linalg.solve(information + _WEAK, weighted.T @ error)
     return pose, information
+
+
+def _consistent(
+    pose: Array, pairs: NDArray[np.int64], query: Query, index: Index
+) -> NDArray[np.intp]:
+    """Return the local walls whose pairs agree with all others: data snooping (Baarda 1968).
+
+    One by one the pair is left out that is the farthest from where the others expect it.
+    """
+    used = np.flatnonzero(pairs >= 0)
+    error, jacobian, spread = _equations(pose, pairs, used, query, index)
+    weights = np.linalg.inv(spread)
+    by_pose = weights @ jacobian
+    left = weights - by_pose @ np.linalg.inv(jacobian.T @ by_pose + _WEAK) @ by_pose.T
+    least = 1e-9 * np.diag(weights)
+    while n := len(used):
+        own = (left + np.diag(least)).reshape(n, 2, n, 2)[np.arange(n), :, np.arange(n)]
+        off = (left @ error).reshape(n, 2)
+        squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(own), off)
+        worst = int(squares.argmax())
+        if squares[worst] <= GATE:
+            break
+        rest, out = np.arange(2 * n) // 2 != worst, slice(2 * worst, 2 * worst + 2)
+        left -= left[:, out] @ np.linalg.inv(own[worst]) @ left[out]
+        left, error, least = left[np.ix_(rest, rest)], error[rest], least[rest]
+        used = np.delete(used, worst)
+    return used
+
+
+def _equations(
+    pose: Array,
+    pairs: NDArray[np.int64],
+    used: NDArray[np.intp],
+    query: Query,
+    index: Index,
+) -> tuple[Array, Array, Array]:
+    """Return how far n local walls are off their pairs, by offset and angle (2n,).
+
+    Then the derivatives by the pose (2n, 3), and the covariance (2n, 2n).
+    """
+    n, walls, local = len(used), index.walls[pairs[used]], query.walls[used]
+    v, angle = walls[:, 2:4], pose[2] + local["angle"]
+    normal = np.column_stack((-v[:, 1], v[:, 0]))
+    u = np.column_stack((np.cos(angle), np.sin(angle)))
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    arm = local["centroid"] @ np.array([[c, s], [-s, c]])
+    off = arm + pose[:2] - walls[:, :2]
+    # Signs are those of the plan's walls: the local ones may lead the other way.
+    same = np.where((u * v).sum(axis=1) >= 0, 1.0, -1.0)
+    turn = np.arctan2(same * (u * normal).sum(axis=1), same * (u * v).sum(axis=1))
+    slopes = np.zeros((n, 2, 3))
+    slopes[:, 0, :2], slopes[:, 1, 2] = normal, 1.0
+    slopes[:, 0, 2] = normal[:, 1] * arm[:, 0] - normal[:, 0] * arm[:, 1]
+    # All pairs with a wall of the plan have its error.
+    lever = np.tile(np.eye(2), (n, 1, 1))
+    lever[:, 0, 1] = (v * off).sum(axis=1) - 0.5 * walls[:, 4]
+    shared = lever @ walls[:, (6, 7, 7, 8)].reshape(-1, 2, 2)
+    whole = shared[:, None] @ lever.transpose(0, 2, 1)
+    whole[pairs[used, None] != pairs[used]] = 0.0
+    rows = (2 * used[:, None] + np.arange(2)).ravel()
+    sign = np.column_stack((same, np.ones(n))).ravel()
+    spread = query.covariance[np.ix_(rows, rows)] * np.outer(sign, sign) + 1e-14 * np.eye(2 * n)
+    spread += whole.transpose(0, 2, 1, 3).reshape(2 * n, 2 * n)
+    error = np.column_stack(((normal * off).sum(axis=1), turn)).ravel()
+    return error, slopes.reshape(-1, 3), spread

@@ -30,7 +30,7 @@ COLUMN = np.dtype(
     align=True,
 )
 #: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
-#: it from its centroid [m], and how far its surface is off a straight line [m²].
+#: it from its centroid [m], and how far its surface is off a straight line [m²], below 0 by noise.
 SIGHT = np.dtype(
     [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
      ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8")]
@@ -67,7 +67,10 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
-    sights["misfit"] = segments["misfit"] ** 2
+    # Noise feigns a misfit of half of the straight walls: what is expected of it is taken off.
+    noise = segments["rms"] ** 2 - segments["misfit"] ** 2
+    feigned = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
+    sights["misfit"] = segments["misfit"] ** 2 - feigned
     return sights[segments["length"] > _SHORT]
 
 
@@ -176,7 +179,8 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     np.minimum.at(first, w, low)
     np.maximum.at(last, w, high)
     views = np.bincount(w, minlength=count)
-    bent = np.bincount(w, sights["misfit"], count) / np.maximum(views, 1) + apart**2 / 2
+    bent = np.maximum(np.bincount(w, sights["misfit"], count) / np.maximum(views, 1), 0.0)
+    bent += apart**2 / 2
     order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
     kept = np.zeros(count, dtype=bool)
@@ -207,13 +211,10 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
 
 
 def bowed(walls: Records, sights: Records) -> Records:
-    """Return walls, whole and in order, whose covariances hold the median misfit of their sights.
-
-    Noise feigns a misfit of some sights of a straight wall; one that bows has it in all of them.
-    """
-    counts, order = np.bincount(sights["wall"]), np.lexsort((sights["misfit"], sights["wall"]))
-    misfits = sights["misfit"][order[np.cumsum(counts) - counts + (counts - 1) // 2]]
-    walls["covariance"] += _bent(misfits, np.linalg.norm(walls["end"] - walls["start"], axis=1))
+    """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
+    misfits = np.bincount(sights["wall"], sights["misfit"]) / np.bincount(sights["wall"])
+    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+    walls["covariance"] += _bent(np.maximum(misfits, 0.0), lengths)
     return walls
 
 
