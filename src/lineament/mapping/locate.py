@@ -35,9 +35,9 @@ _NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 #: pose, times the number of poses that a plan has room for.
 SURE = math.log(1000)
 #: The same over the best pose of the mirror image.
-NOT_MIRRORED = 3.0
-#: If more of the beams are contradicted, it is not this map.
-MOST_CONTRADICTED = 0.05
+NOT_MIRRORED = 6.0
+#: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
+MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
 #: A direction in which the pose is known no better is unobserved [m].
 UNSURE = 0.15
 #: Errors of beams and walls beside their covariances [m]: where poses are tried, and judged.
@@ -140,8 +140,10 @@ def locate(
         image = query.mirrored()
         _, feigned = _searched(_tried(image, plan), image, plan)
         control = feigned[:, 0].max(initial=-math.inf)
-        if control > odds - NOT_MIRRORED:
-            where = replace(where, verdict=LOST if control > odds + SURE else AMBIGUOUS)
+        if control > odds + SURE or where.evidence.contradicted > LESS_CONTRADICTED:
+            where = replace(where, verdict=LOST)
+        elif control > odds - NOT_MIRRORED:
+            where = replace(where, verdict=AMBIGUOUS)
     return where
 
 

@@ -41,31 +41,15 @@ def adjusted(
 ) -> tuple[Array, Array]:
     """Return a pose and its information (3, 3) by pairs of walls, with all their covariances.
 
-    Pairs that contradict the others are left out: furniture in front of a wall is not the wall.
+    Pairs that contradict the others, as furniture in front of a wall does, are left out by data
+    snooping (Baarda 1968): one by one, that which is the farthest from where the others expect it.
     """
-    used, information = _consistent(pose, pairs, query, index), np.zeros((3, 3))
-    for _ in range(2):
-        error, jacobian, spread = _equations(pose, pairs, used, query, index)
-        weighted = np.linalg.solve(spread, jacobian)
-        information = jacobian.T @ weighted
-        pose = pose - np.linalg.solve(information + _WEAK, weighted.T @ error)
-    return pose, information
-
-
-def _consistent(
-    pose: Array, pairs: NDArray[np.int64], query: Query, index: Index
-) -> NDArray[np.intp]:
-    """Return the local walls whose pairs agree with all others: data snooping (Baarda 1968).
-
-    One by one the pair is left out that is the farthest from where the others expect it.
-    """
-    used = np.flatnonzero(pairs >= 0)
-    error, jacobian, spread = _equations(pose, pairs, used, query, index)
+    error, jacobian, spread = _equations(pose, pairs, query, index)
     weights = np.linalg.inv(spread)
     by_pose = weights @ jacobian
     left = weights - by_pose @ np.linalg.inv(jacobian.T @ by_pose + _WEAK) @ by_pose.T
     least = 1e-9 * np.diag(weights)
-    while n := len(used):
+    while n := len(error) // 2:
         own = (left + np.diag(least)).reshape(n, 2, n, 2)[np.arange(n), :, np.arange(n)]
         off = (left @ error).reshape(n, 2)
         squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(own), off)
@@ -74,22 +58,22 @@ def _consistent(
             break
         rest, out = np.arange(2 * n) // 2 != worst, slice(2 * worst, 2 * worst + 2)
         left -= left[:, out] @ np.linalg.inv(own[worst]) @ left[out]
-        left, error, least = left[np.ix_(rest, rest)], error[rest], least[rest]
-        used = np.delete(used, worst)
-    return used
+        weights -= weights[:, out] @ np.linalg.inv(weights[out, out]) @ weights[out]
+        left, weights = left[rest][:, rest], weights[rest][:, rest]
+        error, jacobian, least = error[rest], jacobian[rest], least[rest]
+    by_pose = weights @ jacobian
+    information = jacobian.T @ by_pose
+    return pose - np.linalg.solve(information + _WEAK, by_pose.T @ error), information
 
 
 def _equations(
-    pose: Array,
-    pairs: NDArray[np.int64],
-    used: NDArray[np.intp],
-    query: Query,
-    index: Index,
+    pose: Array, pairs: NDArray[np.int64], query: Query, index: Index
 ) -> tuple[Array, Array, Array]:
-    """Return how far n local walls are off their pairs, by offset and angle (2n,).
+    """Return how far the n local walls that have a pair are off it, by offset and angle (2n,).
 
     Then the derivatives by the pose (2n, 3), and the covariance (2n, 2n).
     """
+    used = np.flatnonzero(pairs >= 0)
     n, walls, local = len(used), index.walls[pairs[used]], query.walls[used]
     v, angle = walls[:, 2:4], pose[2] + local["angle"]
     normal = np.column_stack((-v[:, 1], v[:, 0]))
