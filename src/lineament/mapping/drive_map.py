@@ -9,7 +9,7 @@ from ..features import SEGMENT, Features
 from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import compose, inverse, poses_along, relative, twist_between
+from ..scan.poses import compose, inverse, relative
 from .evidence import evidence_of
 from .local_map import Query, beams_of
 from .locate import distinct
@@ -34,9 +34,9 @@ REMEMBERED = 30
 #: Deviations of the motion by odometry [m, rad], and their growth with way and turn.
 _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 #: The same where it goes on as it did: robots turn at once.
-_CONTINUED = (0.25, 0.35), (0.3, 0.3)
-#: A robot is not thought to go on faster [m/s, rad/s].
-_FAST = 1.2
+_CONTINUED = (0.3, 0.3)
+#: A robot is not thought to go on faster [m/s, rad/s]; longest time from scan to scan [s].
+_FAST, _SLOWEST = 1.2, 3.0
 _ROUNDS = 4
 #: With at least this share of the beams explained, less contradicted, a place is taken at once;
 #: more where the deviation of what is expected is larger than that [m].
@@ -85,11 +85,11 @@ class Drive:
         self._numbers, self._next = np.empty(0, np.int64), 0
         self._gone: set[int] = set()
         self._first = 0
-        #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its twist.
+        #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its step.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
-        self._twist = (0.0, 0.0, 0.0)
-        #: Time from scan to scan, on average: stamps of logs come in bunches.
-        self._pace = 0.1
+        self._step: Pose = (0.0, 0.0, 0.0)
+        #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
+        self._pace = 1.0
 
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
@@ -108,11 +108,11 @@ class Drive:
 
     def _go_on(self, stamp: float, pose: Pose) -> None:
         duration = stamp - self._last[0]
-        self._pace += 0.1 * (min(max(duration, 0.0), 1.0) - self._pace)
-        if duration > 0.02:
-            twist = twist_between(self._last[2], pose, duration)
-            x, y, turn = (max(-_FAST, min(_FAST, speed)) for speed in twist)
-            self._twist = x, y, turn
+        if duration > 0:
+            self._pace += 0.1 * (min(duration, _SLOWEST) - self._pace)
+        x, y, turn = relative(self._last[2], pose)
+        most = _FAST * self._pace
+        self._step = max(-most, min(most, x)), max(-most, min(most, y)), max(-most, min(most, turn))
 
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
@@ -121,12 +121,11 @@ class Drive:
             (least_way, least_turn), (by_way, by_turn) = _ODOMETRY
             step = relative(self._last[1], odometry)
         else:
-            _, (by_way, by_turn) = _CONTINUED
+            by_way, by_turn = _CONTINUED
             duration = max(duration, self._pace)
             least_way = min(0.02 + 0.4 * duration, 0.3)
-            least_turn = min(0.02 + 0.8 * duration, 2.0)
-            x, y, turn = poses_along(self._twist, [min(max(duration, 0.0), 0.5)])[0].tolist()
-            step = x, y, turn
+            least_turn = min(0.02 + 0.8 * duration, 0.7)
+            step = self._step
         way = least_way + by_way * math.hypot(step[0], step[1])
         turned = least_turn + by_turn * abs(step[2])
         return compose(before, step), np.diag((way, way, turned)) ** 2
@@ -218,7 +217,7 @@ class Drive:
         for name in ("start", "end", "centroid", "angle", "covariance"):
             segments[name] = walls[name]
         segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-        segments["misfit"][seen["wall"]] = np.sqrt(np.maximum(seen["misfit"], 0.0))
+        segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
         place = {number: k for k, number in enumerate(self._numbers.tolist())}
         mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
         corners = last.features.corners.copy()

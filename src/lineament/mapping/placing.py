@@ -74,11 +74,11 @@ def likely_turns(
 
 
 def unlikely(poses: Array, prior: Pose, way: float, turn: float) -> Array:
-    """How unlikely poses (n, 3) are by what is expected [nats]; far off no worse than unlikely."""
+    """How unlikely poses (n, 3) are by what is expected [nats]."""
     off = poses - prior
     off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
     far = (off[:, 0] ** 2 + off[:, 1] ** 2) / (2 * way**2)
-    return np.asarray(far + np.log1p((off[:, 2] / turn) ** 2 / 2))
+    return np.asarray(far + off[:, 2] ** 2 / (2 * turn**2))
 
 
 def passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:

@@ -30,10 +30,11 @@ COLUMN = np.dtype(
     align=True,
 )
 #: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
-#: it from its centroid [m], and how far its surface is off a straight line [m²], below 0 by noise.
+#: it from its centroid [m], how far its surface is off a straight line, and what noise feigns [m²].
 SIGHT = np.dtype(
     [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
-     ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8")]
+     ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8"),
+     ("feigned", "f8")]
 )  # fmt: skip
 
 #: Walls on one line are one wall if no more lies between them [m]: a door is wider; whole ones.
@@ -67,10 +68,9 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
-    # Noise feigns a misfit of half of the straight walls: what is expected of it is taken off.
-    noise = segments["rms"] ** 2 - segments["misfit"] ** 2
-    feigned = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
-    sights["misfit"] = segments["misfit"] ** 2 - feigned
+    sights["misfit"] = segments["misfit"] ** 2
+    noise, count = segments["rms"] ** 2 - sights["misfit"], np.maximum(segments["n_points"], 1)
+    sights["feigned"] = noise / np.sqrt(math.pi * count)
     return sights[segments["length"] > _SHORT]
 
 
@@ -179,8 +179,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     np.minimum.at(first, w, low)
     np.maximum.at(last, w, high)
     views = np.bincount(w, minlength=count)
-    bent = np.maximum(np.bincount(w, sights["misfit"], count) / np.maximum(views, 1), 0.0)
-    bent += apart**2 / 2
+    bent = misfits(sights, count) + apart**2 / 2
     order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
     kept = np.zeros(count, dtype=bool)
@@ -210,11 +209,16 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     return result
 
 
+def misfits(sights: Records, count: int) -> Array:
+    """Return the mean squared misfit of each wall [m²], without that of straight ones by noise."""
+    w, views = sights["wall"], np.maximum(np.bincount(sights["wall"], minlength=count), 1)
+    return np.maximum(np.bincount(w, sights["misfit"] - sights["feigned"], count) / views, 0.0)
+
+
 def bowed(walls: Records, sights: Records) -> Records:
     """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
-    misfits = np.bincount(sights["wall"], sights["misfit"]) / np.bincount(sights["wall"])
     lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-    walls["covariance"] += _bent(np.maximum(misfits, 0.0), lengths)
+    walls["covariance"] += _bent(misfits(sights, len(walls)), lengths)
     return walls
 
 
