@@ -96,10 +96,7 @@ def roughness(sights: Records, poses: Array, lines: Records) -> float:
     often = np.bincount(sights["wall"])[sights["wall"]] >= _OFTEN
     if not often.any():
         return _ROUGH
-    # Poses and walls take their part of the errors.
-    free = 3 * len(poses) + 2 * len(lines)
-    left = max(1.0 - free / (2 * len(often)), 0.2)
-    squares = errors(sights, poses, lines)[0][often, 0] ** 2 / left
+    squares = errors(sights, poses, lines)[0][often, 0] ** 2
     own = sights["covariance"][often, 0, 0] - _ROUGH**2
     tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
     right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
