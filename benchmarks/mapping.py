@@ -1,7 +1,7 @@
 """Maps of logs, without odometry, beside ICP with the same loops: ``python benchmarks/mapping.py``.
 
-Recordings are looked for in ``LINEAMENT_DATA``. ``--storey SEED`` adds a simulated storey, with
-odometry and without.
+Recordings are looked for in ``LINEAMENT_DATA``. ``--storey SEED`` is a simulated storey instead,
+with odometry and without; ``--storeys 12 --storey 61`` many smaller ones, with odometry.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import sys
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -141,16 +142,19 @@ def nees(made, truth, segments):
 
 
 def against_truth(found, made, truth, segments):
-    """Print what is known of a simulated storey alone."""
-    off = loops_off(found, made, truth)
-    wrong = (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
+    """Return how far loops are off, spans of over 10 m by their lengths, and `nees` of walls."""
     a, b = (np.array(poses)[::20, None, :2] for poses in (made.poses, truth))
     a, b = (np.linalg.norm(of - of[:, 0], axis=2) for of in (a, b))
-    spans = a[b > 20] / b[b > 20] - 1
-    squares = nees(made, truth, segments)
+    far = b > 10
+    return loops_off(found, made, truth), a[far] / b[far] - 1, nees(made, truth, segments)
+
+
+def print_truth(off, spans, squares):
+    """Print what is known of simulated storeys alone."""
+    wrong = (np.hypot(off[:, 0], off[:, 1]) > 0.2) | (abs(off[:, 2]) > math.radians(1))
     mean, median = squares.mean(axis=0), np.median(squares, axis=0)
     print(
-        f"<!-- {len(off)} loops, {wrong.sum()} wrong; spans over 20 m off by "
+        f"<!-- {len(off)} loops, {wrong.sum()} wrong; spans over 10 m off by "
         f"{100 * np.std(spans):.4f} %, at most {100 * abs(spans).max():.4f} %; squares of "
         f"{len(squares)} walls over their variances: offsets {mean[0]:.2f} (median "
         f"{median[0]:.2f}), angles {mean[1]:.2f} ({median[1]:.2f}) -->",
@@ -177,28 +181,50 @@ def corrected(found, truth):
     return LineMap.from_features(features, poses, min_views=3).ends
 
 
+def driven(seed, size, rate):
+    """Return a building, the scans of a drive with wheels that slip, and where they were taken."""
+    building = office(seed, size)
+    scans, truth = building.drive(
+        SENSORS["utm30lx"], seed=seed, rate=rate, people=8, wheels=Wheels()
+    )
+    return building, list(scans), truth
+
+
 def storey(seed, rate, pictures):
+    building, scans, truth = driven(seed, (60.0, 40.0), rate)
     for odometry in (True, False):
-        building = office(seed)
-        scans, truth = building.drive(
-            SENSORS["utm30lx"], seed=seed, rate=rate, people=8, wheels=Wheels()
-        )
         about = f"storey {seed}, {'wheels' if odometry else 'no odometry'}"
-        found, made = rows(about, list(scans), truth, None, odometry)
-        against_truth(found, made, truth, building.world.segments)
+        found, made = rows(about, scans, truth, None, odometry)
+        print_truth(*against_truth(found, made, truth, building.world.segments))
         if pictures and odometry:
             walls = moved(walls_of(building.world.segments.reshape(-1, 2, 2)), truth[0])
             ends = np.stack((walls["start"], walls["end"]), axis=1)
             draw(pictures / "map_storey.png", made, ends, "the building")
 
 
+def storeys(first, count, rate):
+    """Print what many storeys of 30 m x 20 m say together, with wheels."""
+    parts = []
+    for seed in range(first, first + count):
+        building, scans, truth = driven(seed, (30.0, 20.0), rate)
+        found = drive(scans, odometry=True)
+        made = make_map(found.frames, found.scans)
+        parts.append(against_truth(found, made, truth, building.world.segments))
+        print(f"{len(parts)} of {count} storeys", file=sys.stderr)
+    print_truth(*(np.concatenate(of) for of in zip(*parts, strict=True)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--storey", type=int, help="seed of a simulated storey of 60 m x 40 m")
+    parser.add_argument("--storeys", type=int, help="so many of 30 m x 20 m, the seed is the first")
     parser.add_argument("--rate", type=float, default=5.0, help="scans of it in a second")
     parser.add_argument("--log", choices=LOGS, help="this log alone")
     parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
     chosen = parser.parse_args()
+    if chosen.storeys is not None:
+        storeys(chosen.storey or 1, chosen.storeys, chosen.rate)
+        return
     print("|" + "|".join(COLUMNS) + "|\n" + "|---" * len(COLUMNS) + "|")
     if chosen.storey is not None:
         storey(chosen.storey, chosen.rate, chosen.pictures)
