@@ -134,7 +134,7 @@ def nees(made, truth, segments):
         arm = wall["centroid"] - segments[:, :2]
         along, off = (arm * u).sum(axis=1), u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
         turn = wrapped(wall["angle"] - angles)
-        near = (abs(turn) < 0.2) & (abs(off) < 0.15) & (along > -0.1) & (along < lengths + 0.1)
+        near = (abs(turn) < 0.2) & (abs(off) < 0.05) & (along > -0.1) & (along < lengths + 0.1)
         if near.any() and math.dist(wall["start"], wall["end"]) > 0.3:
             k = np.where(near, abs(off), np.inf).argmin()
             found.append(np.square((off[k], turn[k])) / np.diag(wall["covariance"]))

@@ -73,7 +73,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         weak["information"] /= _TWICE
         weak["loop"] = False
         for _ in range(_MERGED):
-            found = optimise(found.poses, np.append(chain, weak), sights, _count(sights))
+            found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
             sights = merged(sights, found.poses, found.lines, _APART)
         found = optimise(found.poses, chain, sights, _count(sights))
     survey = Survey(frames, found.poses, sights, found.with_poses())
