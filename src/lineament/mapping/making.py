@@ -91,12 +91,13 @@ def roughness(sights: Records, poses: Array, lines: Records) -> float:
     """Return how far surfaces are from straight [m], by how far sights are off their walls.
 
     With it, the median of the squared offsets over their variances is that of χ², of the sights of
-    walls that were seen often: of these, the wall itself takes little off.
+    walls that were seen often; the wall itself takes its part of them.
     """
-    often = np.bincount(sights["wall"])[sights["wall"]] >= _OFTEN
+    views = np.bincount(sights["wall"])[sights["wall"]]
+    often = views >= _OFTEN
     if not often.any():
         return _ROUGH
-    squares = errors(sights, poses, lines)[0][often, 0] ** 2
+    squares = errors(sights, poses, lines)[0][often, 0] ** 2 / (1 - 1 / views[often])
     own = sights["covariance"][often, 0, 0] - _ROUGH**2
     tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
     right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
