@@ -17,9 +17,9 @@ from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map, onto_plan, roughness
-from lineament.mapping.walls import SIGHT, lines_of, merged, walls_along, wrapped
+from lineament.mapping.walls import SIGHT, lines_of, merged, misfits, walls_along, wrapped
 from lineament.scan.poses import compose, relative
-from lineament.simulation import SENSORS, Wheels, drive, office, room
+from lineament.simulation import SENSORS, Wheels, World, drive, office, room
 
 
 def edges(poses, pairs, sigma=0.05, loop=False):
@@ -112,6 +112,34 @@ def test_dense_and_sparse_equations_are_the_same(monkeypatch):
     small = a.with_poses()["covariance"]
     monkeypatch.setattr("lineament.mapping.adjust._DENSE", 0)
     np.testing.assert_allclose(a.with_poses()["covariance"], small, rtol=1e-6)
+
+
+def test_noise_is_no_misfit_of_a_wall_but_a_bow_is():
+    """Of a straight wall half of the fits have a misfit, by the positive part of their χ²."""
+    rng, sights = np.random.default_rng(4), np.zeros(4000, SIGHT)
+    squares = rng.chisquare(50, 4000) / 50 * 1e-4  # 10 mm, 50 points
+    bow = np.repeat((0.0, 4e-4), 2000)  # 0 and 20 mm
+    sights["wall"], sights["misfit"] = np.repeat((0, 1), 2000), np.maximum(squares - 1e-4 + bow, 0)
+    sights["feigned"] = 1e-4 / math.sqrt(math.pi * 50)
+    straight, bent = misfits(sights, 2)
+    assert straight < 3e-7 < sights["misfit"][:2000].mean() / 20
+    assert bent == pytest.approx(4e-4, rel=0.03)
+
+
+@pytest.mark.parametrize("stamps", ["same", "bunched"])
+def test_a_way_is_found_whatever_the_stamps_are(stamps):
+    """Half a metre from scan to scan, with one stamp for all, or two scans at a time."""
+    poses = [(-3.0 + 0.5 * k, 0.2, 0.05 * k) for k in range(12)]
+    ring = np.array([(-4, -2), (4, -2), (4, 1), (3, 1), (3, 2), (-1, 2), (-1, 3), (-4, 3)])
+    world = World(np.column_stack((ring, np.roll(ring, -1, axis=0))), [])
+    found, extract = Drive(), Extractor()
+    for k, pose in enumerate(poses):
+        stamp = 0.0 if stamps == "same" else 1.0 * (k // 2 * 2)
+        scan = SENSORS["utm30lx"].scan(world, pose, np.random.default_rng(k), stamp)
+        found.add(scan, extract(scan))
+    at = [compose(found.frames[k].pose, pose) for k, pose in found.scans]
+    assert not any(frame.is_lost for frame in found.frames)
+    assert absolute_errors(at, poses).summary()["way_rmse"] < 0.02
 
 
 def test_roughness_is_found_and_parts_of_one_wall_are_merged():

@@ -1,15 +1,17 @@
 """Where am I on this plan: the four verdicts, poses by their covariances, and what is no query."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import lineament as ln
-from lineament.mapping import LineMap, LocalMap, locate
+from lineament.mapping import LineMap, LocalMap, Query, locate
 from lineament.mapping.evidence import evidence_of
 from lineament.mapping.local_map import query_of_scan
+from lineament.mapping.refine import adjusted
 from lineament.motion import compose, relative
 from lineament.reproduce.scans import archived_scans
 from lineament.simulation import SENSORS, World, drive, drive_poses
@@ -239,6 +241,43 @@ def test_walls_of_a_local_map_are_off_by_their_covariance():
         count += len(errors)
     assert count > 60
     assert 0.4 < squares / count < 1.4
+
+
+def test_the_walls_of_one_scan_are_as_sure_as_its_segments():
+    """The pose that they are seen from is held, and adds nothing: 30 m away, 1e-5 rad is 0.3 mm."""
+    world = World([[-30, -1, 30, -1], [30, -1, 30, 1], [30, 1, -30, 1], [-30, 1, -30, -1]], [])
+    features = ln.extract(SENSOR.scan(world, (0.3, 0.1, 0.2), np.random.default_rng(1)))
+    own = features.segments.copy()
+    own["misfit"] = 0.0
+    walls = query_of_scan(replace(features, segments=own)).walls
+    assert len(walls) == len(own) > 1
+    assert own["covariance"][:, 1, 1].min() < 2e-9
+    np.testing.assert_allclose(walls["covariance"], own["covariance"], rtol=0.05, atol=1e-10)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.03, 0.06])
+def test_a_pair_that_contradicts_the_others_is_left_out(off):
+    """Six walls of a room, each known to 1 mm; a cupboard in front of one of them is not it."""
+    plan = LineMap.from_lines(
+        [
+            [-4, -3, 0, -3],
+            [0, -3, 4, -3],
+            [4, -3, 4, 3],
+            [4, 3, 0, 3],
+            [0, 3, -4, 3],
+            [-4, 3, -4, -3],
+        ]
+    )
+    walls = plan.walls.copy()
+    walls["covariance"] = np.diag((0.001, 0.001)) ** 2
+    walls["centroid"][0, 1] += off
+    spread = np.kron(np.eye(6), np.diag((0.001, 0.001)) ** 2)
+    query = Query(walls, spread, np.zeros((0, 10)))
+    pose, information = adjusted(np.zeros(3), np.arange(6), query, plan.index)
+    np.testing.assert_allclose(pose, 0.0, atol=1e-6)
+    # Of the walls along y = -3 and y = 3, four or three say what y is.
+    along = 4 - (off > 0)
+    assert information[1, 1] == pytest.approx(along * 1e6, rel=1e-6)
 
 
 def test_evidence_counts_beams_as_a_slow_twin_does():
