@@ -16,8 +16,8 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.making import make_map, onto_plan, roughness
-from lineament.mapping.walls import SIGHT, lines_of, merged, misfits, walls_along, wrapped
+from lineament.mapping.making import make_map, onto_plan, roughness, single
+from lineament.mapping.walls import SIGHT, lines_of, merged, misfits, walls_along, walls_of, wrapped
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
 
@@ -112,6 +112,21 @@ def test_dense_and_sparse_equations_are_the_same(monkeypatch):
     small = a.with_poses()["covariance"]
     monkeypatch.setattr("lineament.mapping.adjust._DENSE", 0)
     np.testing.assert_allclose(a.with_poses()["covariance"], small, rtol=1e-6)
+
+
+def test_what_another_wall_hides_is_left_out():
+    """A wall of 9 m; in front of it and behind, 10 cm off, parts that no beam could have seen."""
+    ends = [(0, 0, 9, 0), (4, 0.1, 6, 0.1), (8, -0.1, 12, -0.1), (-1, 0.1, 10, 0.1)]
+    stay = [(9, 0.1, 0, 0.1), (3, 0.3, 5, 0.3), (2, 0, 2, 3)]  # faces away, farther off, across
+    walls = walls_of(np.array([*ends, *stay], float).reshape(-1, 2, 2), covariance=np.eye(2) * 1e-4)
+    walls["views"] = 20, 9, 8, 7, 6, 5, 4
+    found = single(walls)
+    lines = np.concatenate((found["start"], found["end"]), axis=1)
+    expected = [(0, 0, 9, 0), (9, -0.1, 12, -0.1), (-1, 0.1, 0, 0.1), (9, 0.1, 10, 0.1), *stay]
+    np.testing.assert_allclose(lines, expected, atol=1e-12)
+    np.testing.assert_allclose(found["centroid"], (found["start"] + found["end"]) / 2, atol=1e-12)
+    # Its direction is known to 10 mrad, 0.5 m farther on than the centroid was.
+    assert found["covariance"][1, 0, 0] == pytest.approx(1e-4 * (1 + 0.5**2))
 
 
 def test_noise_is_no_misfit_of_a_wall_but_a_bow_is():

@@ -35,7 +35,7 @@ _NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 #: pose, times the number of poses that a plan has room for.
 SURE = math.log(1000)
 #: The same over the best pose of the mirror image.
-NOT_MIRRORED = 6.0
+NOT_MIRRORED = 3.0
 #: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
 MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
 #: A direction in which the pose is known no better is unobserved [m].

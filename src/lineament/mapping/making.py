@@ -1,5 +1,6 @@
 """`make_map`: a drive to a map, with its loops closed and its walls adjusted."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from .drive_map import KeyFrame
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey, moved
-from .walls import Records, errors, merged, sights_of, walls_along, wrapped
+from .walls import SHORTEST, Records, cut, errors, merged, sights_of, unit, walls_along, wrapped
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -29,6 +30,8 @@ _MERGED, _APART = 2, 0.03
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: A wall was seen by so many key frames.
 _VIEWS = 3
+#: Surfaces that lie so close, and along each other (10°), hide each other [m].
+_HIDDEN, _ALONG = 0.15, math.cos(math.radians(10))
 
 
 @dataclass(slots=True, eq=False)
@@ -78,9 +81,35 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         found = optimise(found.poses, chain, sights, _count(sights))
     survey = Survey(frames, found.poses, sights, found.with_poses())
     least = min(_VIEWS, len(frames))
-    walls = walls_along(sights, found.poses, survey.lines, views=least)
+    walls = single(walls_along(sights, found.poses, survey.lines, views=least))
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     return DriveMap(LineMap(walls), every, survey, loops, refused)
+
+
+def single(walls: Records) -> Records:
+    """Return walls without the stretches that another hides, which was seen more often.
+
+    Of two surfaces that face the same way, so close, the one behind cannot be seen: they are one,
+    drawn twice, as the chords of a wall that bends are.
+    """
+    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+    kept = walls[:0]
+    for k in np.lexsort((-lengths, -walls["views"])).tolist():
+        u, before = unit(walls["angle"][[k]])[0], unit(kept["angle"])
+        from_start = [(kept[name] - walls["start"][k]) @ u for name in ("start", "end")]
+        low = np.maximum(np.minimum(*from_start), 0.0)
+        high = np.minimum(np.maximum(*from_start), lengths[k])
+        arm = walls["start"][k] + ((low + high) / 2)[:, None] * u - kept["start"]
+        off = abs(before[:, 0] * arm[:, 1] - before[:, 1] * arm[:, 0])
+        hides = (before @ u > _ALONG) & (off < _HIDDEN) & (high > low)
+        ends = np.sort(np.concatenate(([0.0, lengths[k]], low[hides], high[hides])))
+        middles = (ends[1:] + ends[:-1]) / 2
+        free = ((middles < low[hides, None]) | (middles > high[hides, None])).all(axis=0)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], free, [False]))))
+        first, last = ends[edges.reshape(-1, 2)].T
+        long = last - first >= np.minimum(SHORTEST, lengths[k])
+        kept = np.append(kept, cut(walls[k], first[long], last[long]))
+    return kept
 
 
 def _count(sights: Records) -> int:

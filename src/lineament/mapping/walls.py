@@ -276,6 +276,15 @@ def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Reco
     return walls
 
 
+def cut(wall: np.void, first: Array, last: Array) -> Records:
+    """Return parts of a wall, so far from its start [m]."""
+    parts, (u,) = np.repeat(wall, len(first)), unit(wall["angle"][None])
+    for name, along in (("start", first), ("end", last), ("centroid", (first + last) / 2)):
+        parts[name] = wall["start"] + along[:, None] * u
+    parts["covariance"] = _at(parts["covariance"], (parts["centroid"] - wall["centroid"]) @ u)
+    return parts
+
+
 def unit(angles: Array) -> Array:
     """Return unit vectors (n, 2) of these directions."""
     return np.column_stack((np.cos(angles), np.sin(angles)))
