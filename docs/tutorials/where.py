@@ -61,7 +61,7 @@ import numpy as np
 from lineament.motion import relative
 
 truth = relative(monday_truth[0], tuesday_truth[229])
-x, y, turn = np.subtract(where.pose, truth)
+x, y, turn = relative(truth, where.pose)
 print(f"off by {1000 * np.hypot(x, y):.1f} mm and {np.degrees(turn):.2f}°")
 
 # %% [markdown]
@@ -125,7 +125,7 @@ print(f"largest {1000 * off.max():.0f} mm")
 
 # %% [markdown]
 # The plan holds Monday’s furniture. Where all of it has been moved, too many beams
-# pass through what was there; the verdict is then that this is not the map:
+# pass through what was there; the verdict there is that this is not the map:
 
 # %%
 wednesday, _ = record("wednesday", storey.refurnished(7), seed=3)
