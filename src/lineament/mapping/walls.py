@@ -69,8 +69,8 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
     sights["misfit"] = segments["misfit"] ** 2
-    noise, count = segments["rms"] ** 2 - sights["misfit"], np.maximum(segments["n_points"], 1)
-    sights["feigned"] = noise / np.sqrt(math.pi * count)
+    noise = np.maximum(segments["rms"] ** 2 - sights["misfit"], 0.0)
+    sights["feigned"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
     return sights[segments["length"] > _SHORT]
 
 
