@@ -141,6 +141,7 @@ def test_noise_is_no_misfit_of_a_wall_but_a_bow_is():
     assert bent == pytest.approx(4e-4, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stamps", ["same", "bunched"])
 def test_a_way_is_found_whatever_the_stamps_are(stamps):
     """Half a metre from scan to scan, with one stamp for all, or two scans at a time."""
