@@ -135,7 +135,7 @@ def test_noise_is_no_misfit_of_a_wall_but_a_bow_is():
     squares = rng.chisquare(50, 4000) / 50 * 1e-4  # 10 mm, 50 points
     bow = np.repeat((0.0, 4e-4), 2000)  # 0 and 20 mm
     sights["wall"], sights["misfit"] = np.repeat((0, 1), 2000), np.maximum(squares - 1e-4 + bow, 0)
-    sights["feigned"] = 1e-4 / math.sqrt(math.pi * 50)
+    sights["noise"] = 1e-4 / math.sqrt(math.pi * 50)
     straight, bent = misfits(sights, 2)
     assert straight < 3e-7 < sights["misfit"][:2000].mean() / 20
     assert bent == pytest.approx(4e-4, rel=0.03)

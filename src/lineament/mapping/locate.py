@@ -14,7 +14,7 @@ from .evidence import Evidence, evidence_of
 from .hypotheses import BOX, TURN, anchors, directions, hypotheses
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan
-from .refine import COARSE, FINE, adjusted, refined
+from .refine import COARSE, FINE, WEAK, adjusted, refined
 
 #: What `Location.verdict` may be.
 LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
@@ -190,8 +190,9 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     slid = np.tile(best, (2 * len(_SLIDES), 1))
     along = np.array([(math.cos(main), math.sin(main)), (-math.sin(main), math.cos(main))])
     slid[:, :2] += np.kron(along.T, _SLIDES).T
-    poses = np.concatenate((poses, refined(slid, query, plan.index, FINE)[0]))
-    found = evidence_of(poses, query.beams, plan.index, _TIGHT)
+    slid, _, _ = refined(slid, query, plan.index, FINE)
+    found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
+    poses = np.concatenate((poses, slid))
     kept = distinct(poses, found[:, 0], _SAME, JUDGED)
     return poses[kept], found[kept]
 
@@ -209,7 +210,7 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     """Give the verdict on the best of some poses."""
     _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
     best, information = adjusted(poses[0], pairs[0], query, plan.index)
-    covariance = np.asarray(np.linalg.inv(information + 1e-2 * np.eye(3)), np.float64)
+    covariance = np.asarray(np.linalg.inv(information + WEAK), np.float64)
     chance, n = math.log(max(room, 1.0)), len(query.beams)
     first, *rest = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     others = [

@@ -87,10 +87,10 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
 
 
 def single(walls: Records) -> Records:
-    """Return walls without the stretches that another hides, which was seen more often.
+    """Return the walls without the stretches beside a wall that was seen more often.
 
-    Of two surfaces that face the same way, so close, the one behind cannot be seen: they are one,
-    drawn twice, as the chords of a wall that bends are.
+    Of two surfaces so close that face the same way, the one behind could not be seen: they are one
+    surface, drawn twice, like the chords of a wall that bends.
     """
     lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
     kept = walls[:0]

@@ -17,7 +17,7 @@ _ROUNDS = 6
 #: Squared deviation beyond which a pair is left out.
 GATE = chi_square(0.999, 2)
 #: What is known of the pose before: 10 m and 10 rad.
-_WEAK = 1e-2 * np.eye(3)
+WEAK = 1e-2 * np.eye(3)
 
 
 def refined(
@@ -47,7 +47,7 @@ def adjusted(
     error, jacobian, spread = _equations(pose, pairs, query, index)
     weights = np.linalg.inv(spread)
     by_pose = weights @ jacobian
-    left = weights - by_pose @ np.linalg.inv(jacobian.T @ by_pose + _WEAK) @ by_pose.T
+    left = weights - by_pose @ np.linalg.inv(jacobian.T @ by_pose + WEAK) @ by_pose.T
     least = 1e-9 * np.diag(weights)
     while n := len(error) // 2:
         own = (left + np.diag(least)).reshape(n, 2, n, 2)[np.arange(n), :, np.arange(n)]
@@ -63,7 +63,7 @@ def adjusted(
         error, jacobian, least = error[rest], jacobian[rest], least[rest]
     by_pose = weights @ jacobian
     information = jacobian.T @ by_pose
-    return pose - np.linalg.solve(information + _WEAK, by_pose.T @ error), information
+    return pose - np.linalg.solve(information + WEAK, by_pose.T @ error), information
 
 
 def _equations(

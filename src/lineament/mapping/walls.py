@@ -30,11 +30,11 @@ COLUMN = np.dtype(
     align=True,
 )
 #: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
-#: it from its centroid [m], how far its surface is off a straight line, and what noise feigns [m²].
+#: it from its centroid [m], its squared misfit, and how much of that noise alone explains [m²].
 SIGHT = np.dtype(
     [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
      ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8"),
-     ("feigned", "f8")]
+     ("noise", "f8")]
 )  # fmt: skip
 
 #: Walls on one line are one wall if no more lies between them [m]: a door is wider; whole ones.
@@ -70,7 +70,7 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
     sights["misfit"] = segments["misfit"] ** 2
     noise = np.maximum(segments["rms"] ** 2 - sights["misfit"], 0.0)
-    sights["feigned"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
+    sights["noise"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
     return sights[segments["length"] > _SHORT]
 
 
@@ -210,9 +210,9 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
 
 
 def misfits(sights: Records, count: int) -> Array:
-    """Return the mean squared misfit of each wall [m²], without that of straight ones by noise."""
+    """Return the mean squared misfit of each wall [m²], less what noise alone explains."""
     w, views = sights["wall"], np.maximum(np.bincount(sights["wall"], minlength=count), 1)
-    return np.maximum(np.bincount(w, sights["misfit"] - sights["feigned"], count) / views, 0.0)
+    return np.maximum(np.bincount(w, sights["misfit"] - sights["noise"], count) / views, 0.0)
 
 
 def bowed(walls: Records, sights: Records) -> Records:
