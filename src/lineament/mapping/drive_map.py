@@ -48,7 +48,7 @@ _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
-_LOST = 0.25
+_LOST = 0.35
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 
@@ -58,7 +58,7 @@ class KeyFrame:
     """A scan that stands for those around it: number `index` of the log.
 
     `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
-    first key frame, `motion` that since the one before: a guess where nothing explains the scan.
+    first key frame, `motion` that since the one before: a guess where the way is lost.
     """
 
     index: int
@@ -156,9 +156,7 @@ class Drive:
         found = scored(np.array([motion.pose, best.pose]), beams, self._index, _TIGHT)
         if found[1] > found[0] + 1.0:
             motion = best
-        if self._explained(motion, beams, PASSED) < _LOST:
-            return Motion(*prior, spread), True  # what is expected is better than a guess
-        return motion, False
+        return motion, self._explained(motion, beams, PASSED) < _LOST
 
     def _explained(self, motion: Motion, beams: Array, less: float) -> float:
         """Return the share of the beams that are explained, less those that pass through walls."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..features import Features
+from ..features import SEGMENT, Features
 from ..motion.association import chi_square
 from ..scan import Array
 
@@ -58,7 +58,7 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
 
     Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
     """
-    segments = np.concatenate([of_frame for of_frame, _ in seen])
+    segments = np.concatenate([of_frame for of_frame, _ in seen], dtype=SEGMENT)
     sights = np.zeros(len(segments), SIGHT)
     sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
     sights["wall"] = np.concatenate([walls for _, walls in seen])
