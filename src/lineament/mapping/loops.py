@@ -21,7 +21,7 @@ _QUERY, _PLAN = 5.0, 5.0
 #: Key frames are looked for after so much way; others are at least so much way before them [m].
 _EVERY, _BEFORE = 2.0, 12.0
 #: Stretches of the way that are looked at for each; key frames whose beams a query has.
-_STRETCHES, _SCANS = 3, 6
+_STRETCHES, _SCANS = 2, 6
 #: Errors of a loop beside those that `locate` knows [m, rad].
 _FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
 
