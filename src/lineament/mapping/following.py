@@ -199,8 +199,7 @@ class Follower:
 
     def _judge(self, features: Features) -> Evidence:
         """Return what the beams of a scan alone say of the pose."""
-        assert features.scan is not None
-        beams = thinned(beams_of(features, features.scan))
+        beams = thinned(beams_of(features))
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
         odds, explained, short, contradicted = found[0].tolist()

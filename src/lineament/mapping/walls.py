@@ -217,8 +217,7 @@ def misfits(sights: Records, count: int) -> Array:
 
 def bowed(walls: Records, sights: Records) -> Records:
     """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
-    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-    walls["covariance"] += _bent(misfits(sights, len(walls)), lengths)
+    walls["covariance"] += _bent(misfits(sights, len(walls)), lengths_of(walls))
     return walls
 
 
@@ -285,9 +284,14 @@ def cut(wall: np.void, first: Array, last: Array) -> Records:
     return parts
 
 
+def lengths_of(walls: Records) -> Array:
+    """Lengths of walls (n,) [m]."""
+    return np.asarray(np.linalg.norm(walls["end"] - walls["start"], axis=1))
+
+
 def unit(angles: Array) -> Array:
-    """Return unit vectors (n, 2) of these directions."""
-    return np.column_stack((np.cos(angles), np.sin(angles)))
+    """Return unit vectors (..., 2) of these directions."""
+    return np.stack((np.cos(angles), np.sin(angles)), axis=-1)
 
 
 def summed(values: Array, at: Numbers, count: int) -> Array:
