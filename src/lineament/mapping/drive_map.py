@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..features import SEGMENT, Features
 from ..motion.association import associate, is_landmark
@@ -11,22 +12,30 @@ from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from .evidence import evidence_of
-from .local_map import Query, beams_of
-from .locate import distinct
-from .placing import (
-    PASSED,
-    ROUGHNESS,
-    as_walls,
-    index_of,
-    likely_turns,
-    passed,
-    scored,
-    some,
-    unlikely,
-)
+from .line_map import make_index
+from .local_map import Query, beams_of, some
+from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .walls import WHOLE, Numbers, lines_of, sights_of, walls_along
+from .walls import (
+    COLUMN,
+    WALL,
+    WHOLE,
+    Numbers,
+    lengths_of,
+    lines_of,
+    shared,
+    sights_of,
+    walls_along,
+    walls_of,
+    wrapped,
+)
 
+#: How surfaces are off straight lines [m].
+_ROUGHNESS = 0.01
+#: Bins of turns, and how many of them are tried.
+_BINS, _TURNS = 120, 12
+#: What a beam that passes through a wall says [nats], and what it takes off those explained.
+_MILD, _PASSED = -0.8, 0.5
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
 #: Key frames through which a wall is remembered that is not seen.
@@ -51,6 +60,8 @@ _APART = (0.15, 0.06)
 _LOST = 0.25
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
+#: A wall where no beam ends [m]: of it is the index where there are no walls.
+_NOWHERE = walls_of(np.array([[(999.0, 999.0), (999.1, 999.0)]]))
 
 
 @dataclass(slots=True, eq=False)
@@ -140,23 +151,25 @@ class Drive:
         if self._explained(motion, beams, 1.0) >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = scored(tried, some(beams, _FEW), self._index, _WIDE)
-        few -= unlikely(tried, prior, way, turn)
+        few = evidence_of(tried, some(beams, _FEW), self._index, _WIDE, _MILD)[:, 0]
+        few -= 0.5 * squares_off(tried, prior, spread)
         poses = np.concatenate((tried[distinct(tried, few, _APART, _TRIED)], [motion.pose]))
-        walls = as_walls(features.segments)
+        walls = _as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = scored(poses, beams, self._index, _TIGHT) - unlikely(poses, prior, way, turn)
+        scores = evidence_of(poses, beams, self._index, _TIGHT, _MILD)[:, 0]
+        scores -= 0.5 * squares_off(poses, prior, spread)
         scores[-1] += 0.5
         x, y, theta = poses[scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
-        found = scored(np.array([motion.pose, best.pose]), beams, self._index, _TIGHT)
-        if found[1] > found[0] + 1.0:
+        both = np.array([motion.pose, best.pose])
+        odds = evidence_of(both, beams, self._index, _TIGHT, _MILD)[:, 0]
+        if odds[1] > odds[0] + 1.0:
             motion = best
-        if self._explained(motion, beams, PASSED) < _LOST:
+        if self._explained(motion, beams, _PASSED) < _LOST:
             return Motion(*prior, spread), True  # what is expected is better than a guess
         return motion, False
 
@@ -169,7 +182,7 @@ class Drive:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
         steps = np.arange(-2, 3) * min(max(way, 0.1), 0.3)
         turns = prior[2] + np.arange(-3, 4) * min(max(turn / 2, 0.05), 0.1)
-        turns = np.append(turns, likely_turns(self._around, features, prior[2], turn))
+        turns = np.append(turns, _likely_turns(self._around, features, prior[2], turn))
         x, y, theta = np.meshgrid(prior[0] + steps, prior[1] + steps, turns, indexing="ij")
         return np.column_stack((x.ravel(), y.ravel(), theta.ravel()))
 
@@ -177,12 +190,12 @@ class Drive:
         motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
             found = associate(
-                self._around, features, motion.pose, motion.covariance, roughness=ROUGHNESS
+                self._around, features, motion.pose, motion.covariance, roughness=_ROUGHNESS
             )
             if matches is not None and found.same_as(matches):
                 break
             matches = found
-            motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
+            motion = estimate_motion(matches, prior, spread, roughness=_ROUGHNESS)
         return motion
 
     def _key(self, features: Features, motion: Motion, scan: LaserScan, is_lost: bool) -> None:
@@ -193,9 +206,9 @@ class Drive:
             self._first = len(self.frames)
         elif self.frames:
             around = self._around.transform(*inverse(motion.pose))
-            before, now = associate(around, features, roughness=ROUGHNESS).segments.T
+            before, now = associate(around, features, roughness=_ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
-            is_gone = passed(around.segments, scan)
+            is_gone = _passed(around.segments, scan)
             is_gone[before] = False
             self._gone.update(self._numbers[is_gone].tolist())
         is_unknown = walls < 0
@@ -208,15 +221,13 @@ class Drive:
     def _look_around(self) -> None:
         """Find the walls of the last key frames, in the frame of the last one."""
         last, frames = self.frames[-1], self.frames[self._first :][-REMEMBERED:]
-        seen = sights_of([(frame.features.segments, frame.walls) for frame in frames], ROUGHNESS)
+        seen = sights_of([(frame.features.segments, frame.walls) for frame in frames], _ROUGHNESS)
         seen = seen[~np.isin(seen["wall"], [*self._gone])]
         self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
         poses = np.array([relative(last.pose, frame.pose) for frame in frames])
         walls = walls_along(seen, poses, lines_of(seen, poses, len(self._numbers)), WHOLE)
-        segments = np.zeros(len(walls), SEGMENT)
-        for name in ("start", "end", "centroid", "angle", "covariance"):
-            segments[name] = walls[name]
-        segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+        segments = shared(walls, SEGMENT)
+        segments["length"] = lengths_of(walls)
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
         place = {number: k for k, number in enumerate(self._numbers.tolist())}
         mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
@@ -224,4 +235,47 @@ class Drive:
         corners["segments"] = mine[corners["segments"]]
         arcs = last.features.arcs[:0]  # people
         self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
-        self._index = index_of(as_walls(segments))
+        walls = _as_walls(segments)
+        self._index = make_index(walls if len(walls) else _NOWHERE, np.zeros(0, COLUMN), 0.0)
+
+
+def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
+    """Segments as walls that are seen from their left."""
+    walls = shared(segments, WALL)
+    walls["side"] = walls["views"] = 1
+    walls["covariance"][:, 0, 0] += segments["misfit"] ** 2
+    length = np.maximum(segments["length"], 1e-3)
+    walls["covariance"][:, 1, 1] += 4 * (segments["misfit"] / length) ** 2
+    return walls[segments["length"] > 0.05]
+
+
+def _likely_turns(around: Features, features: Features, expected: float, spread: float) -> Array:
+    """Return the turns by which segments lie along walls around, the likeliest first [rad]."""
+    before, now = around.segments, features.segments
+    off = before["angle"][:, np.newaxis] - now["angle"]
+    weight = np.minimum(before["length"][:, np.newaxis], now["length"])
+    bins = np.floor(np.mod(off, 2 * math.pi) / (2 * math.pi) * _BINS).astype(int) % _BINS
+    votes = np.bincount(bins.ravel(), weight.ravel(), _BINS)
+    votes = votes + 0.5 * (np.roll(votes, 1) + np.roll(votes, -1))
+    # Large turns are less likely.
+    turns = wrapped((np.arange(_BINS) + 0.5) / _BINS * 2 * math.pi)
+    votes = votes * np.exp(-0.5 * (wrapped(turns - expected) / max(spread, 0.5)) ** 2)
+    peaks = (votes >= np.roll(votes, 1)) & (votes > np.roll(votes, -1))
+    order = np.argsort(-np.where(peaks, votes, 0.0), kind="stable")[:_TURNS]
+    return np.asarray(turns[order[votes[order] > 0]])
+
+
+def _passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:
+    """Whether beams pass through each wall, away from its ends, and end far behind."""
+    valid = scan.valid
+    bearing, ranges = scan.angles[valid][:, np.newaxis], scan.ranges[valid][:, np.newaxis]
+    ux, uy = np.cos(bearing), np.sin(bearing)
+    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
+    wx, wy = qx - px, qy - py
+    length = np.maximum(np.hypot(wx, wy), 1e-9)
+    ex, ey = ranges * ux - px, ranges * uy - py
+    off = (wx * ey - wy * ex) / length
+    margin = np.minimum(0.1, 0.2 * length) * (ux * wy - uy * wx) / length
+    # The start lies to the right of a beam that passes, the end to its left.
+    passes = (ux * py - uy * px < -abs(margin)) & (ux * qy - uy * qx > abs(margin)) & (off < -0.3)
+    return np.asarray(passes.sum(axis=0) >= 3)

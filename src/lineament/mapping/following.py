@@ -26,9 +26,9 @@ SEEN = 1.0
 GAP, JUMP = 5.0, 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
 WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
-#: So many scans in a row that chance explains as well are enough; of looks at the plan that say
-#: that it is not there, three: each that says otherwise takes back a part of one.
-MOST_DOUBTS, MOST_MISSED, TAKEN_BACK = 4, 2.0, 0.25
+#: So many looks at the plan that say that the sensor is not there are too many; each that says
+#: otherwise takes back a part of one.
+MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says.
 DENIED = 0.12
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -79,7 +79,7 @@ class Follower:
 
     The last metres are looked for on the whole plan until they are located. From then on the pose
     moves on with the tracker, and each few decimetres the plan is looked at near it. The sensor is
-    lost where scan after scan contradicts the plan, and where nothing fixes the pose any more: its
+    lost where look after look contradicts the plan, and where nothing fixes the pose any more: its
     covariance grows. It is then looked for on the whole plan again, by what was seen since.
 
     Parameters
@@ -110,9 +110,8 @@ class Follower:
         """Forget what was seen, and where."""
         self._tracker, self._local = Tracker(), LocalMap(self.way)
         self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), _UNKNOWN
-        self._doubts, self._missed = 0, 0.0
+        self._missed, self._looked = 0.0, math.nan
         self._since = self._turned = math.inf
-        self._looked = math.nan
 
     @property
     def is_known(self) -> bool:
@@ -145,12 +144,10 @@ class Follower:
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
-        c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
-        off = np.array((c * skew[0] - s * skew[1], s * skew[0] + c * skew[1], skew[2]))
-        blurred = np.outer(off, off)
+        x, y, _ = compose((0.0, 0.0, self._pose[2]), skew)
+        blurred = np.outer(off := (x, y, skew[2]), off)
         evidence = self._judge(features)
-        self._doubts = self._doubts + 1 if self.is_known and evidence.log_odds < 0 else 0
-        if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
+        if self._missed > MOST_MISSED or was_known > self.is_known:
             # What was seen before may be of another place: this scan begins anew.
             self._restart()
             self._local.add(features, self._tracker(features, odometry))

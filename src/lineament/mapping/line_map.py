@@ -18,7 +18,7 @@ from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
 from .plans import read_drawing, read_table
-from .walls import COLUMN, Merger, lengths_of, walls_of
+from .walls import COLUMN, Merger, lengths_of, shared, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -208,18 +208,12 @@ class LineMap:
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""
-        walls, corners, columns = self.walls, self.corners, self.columns
-        segments, points, arcs = (
-            np.zeros(len(of), dtype)
-            for of, dtype in ((walls, SEGMENT), (corners, CORNER), (columns, ARC))
-        )
-        for records, of in ((segments, walls), (points, corners), (arcs, columns)):
-            for name in {*(records.dtype.names or ())} & {*(of.dtype.names or ())}:
-                records[name] = of[name]
-        segments["length"] = lengths_of(walls)
-        segments["n_points"], arcs["n_points"] = walls["views"], columns["views"]
-        points["convex"], points["kind"] = corners["solid"] == 1, "corner"
-        points["segments"] = corners["walls"]
+        segments, arcs = shared(self.walls, SEGMENT), shared(self.columns, ARC)
+        points = shared(self.corners, CORNER)
+        segments["length"] = lengths_of(self.walls)
+        segments["n_points"], arcs["n_points"] = self.walls["views"], self.columns["views"]
+        points["convex"], points["kind"] = self.corners["solid"] == 1, "corner"
+        points["segments"] = self.corners["walls"]
         none = make_records("breakpoints", [])
         return Features(segments, points, arcs, np.empty(0, np.int32), none, frame_id="map")
 

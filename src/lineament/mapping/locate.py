@@ -168,10 +168,14 @@ def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap
         steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
     tried = _tried(query, plan)
-    off = tried - guess
+    return np.vstack((guess, tried[squares_off(tried, guess, spread) < 16.0]))
+
+
+def squares_off(poses: Array, guess: Pose, covariance: Array) -> Array:
+    """Return the squares of poses (n, 3) off a guess, over its covariance."""
+    off = poses - guess
     off[:, 2] = wrapped(off[:, 2])
-    near = np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) < 16.0
-    return np.vstack((guess, tried[near]))
+    return np.asarray(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off))
 
 
 def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:

@@ -59,11 +59,9 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
     """
     segments = np.concatenate([of_frame for of_frame, _ in seen])
-    sights = np.zeros(len(segments), SIGHT)
+    sights = shared(segments, SIGHT)
     sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
     sights["wall"] = np.concatenate([walls for _, walls in seen])
-    for name in ("centroid", "angle", "covariance"):
-        sights[name] = segments[name]
     sights["covariance"] += _bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
@@ -282,6 +280,14 @@ def cut(wall: np.void, first: Array, last: Array) -> Records:
         parts[name] = wall["start"] + along[:, None] * u
     parts["covariance"] = _at(parts["covariance"], (parts["centroid"] - wall["centroid"]) @ u)
     return parts
+
+
+def shared(records: Records, dtype: np.dtype[np.void]) -> Records:
+    """Return records of another kind, of which the fields that both have are set."""
+    found = np.zeros(len(records), dtype)
+    for name in {*(dtype.names or ())} & {*(records.dtype.names or ())}:
+        found[name] = records[name]
+    return found
 
 
 def lengths_of(walls: Records) -> Array:
