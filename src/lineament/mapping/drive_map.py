@@ -21,10 +21,12 @@ from .walls import (
     WALL,
     WHOLE,
     Numbers,
+    bent,
     lengths_of,
     lines_of,
     shared,
     sights_of,
+    unit,
     walls_along,
     walls_of,
     wrapped,
@@ -90,8 +92,8 @@ class Drive:
     def __init__(self) -> None:
         self.frames: list[KeyFrame] = []
         self.scans: list[tuple[int, Pose]] = []
-        #: Walls of the last metres, corners and arcs, in the frame of the last key frame; numbers
-        #: of the walls, that of the next, those that are gone, and the first key frame since lost.
+        #: Walls of the last metres and its corners, in the frame of the last key frame; numbers of
+        #: the walls, that of the next, those that are gone, and the first key frame since lost.
         self._around: Features
         self._numbers, self._next = np.empty(0, np.int64), 0
         self._gone: set[int] = set()
@@ -121,9 +123,9 @@ class Drive:
         duration = stamp - self._last[0]
         if duration > 0:
             self._pace += 0.1 * (min(duration, _SLOWEST) - self._pace)
-        x, y, turn = relative(self._last[2], pose)
-        most = _FAST * self._pace
-        self._step = max(-most, min(most, x)), max(-most, min(most, y)), max(-most, min(most, turn))
+        most, step = _FAST * self._pace, relative(self._last[2], pose)
+        x, y, turn = (max(-most, min(most, part)) for part in step)
+        self._step = x, y, turn
 
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
@@ -151,23 +153,25 @@ class Drive:
         if self._explained(motion, beams, 1.0) >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = evidence_of(tried, some(beams, _FEW), self._index, _WIDE, _MILD)[:, 0]
-        few -= 0.5 * squares_off(tried, prior, spread)
-        poses = np.concatenate((tried[distinct(tried, few, _APART, _TRIED)], [motion.pose]))
+
+        def scores(poses: Array, beams: Array, wide: float) -> Array:
+            odds = evidence_of(poses, beams, self._index, wide, _MILD)[:, 0]
+            return np.asarray(odds - 0.5 * squares_off(poses, prior, spread))
+
+        kept = distinct(tried, scores(tried, some(beams, _FEW), _WIDE), _APART, _TRIED)
+        poses = np.concatenate((tried[kept], [motion.pose]))
         walls = _as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = evidence_of(poses, beams, self._index, _TIGHT, _MILD)[:, 0]
-        scores -= 0.5 * squares_off(poses, prior, spread)
-        scores[-1] += 0.5
-        x, y, theta = poses[scores.argmax()].tolist()
+        fine_scores = scores(poses, beams, _TIGHT)
+        fine_scores[-1] += 0.5
+        x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
-        both = np.array([motion.pose, best.pose])
-        odds = evidence_of(both, beams, self._index, _TIGHT, _MILD)[:, 0]
-        if odds[1] > odds[0] + 1.0:
+        matched, found = scores(np.array([motion.pose, best.pose]), beams, _TIGHT)
+        if found > matched + 1.0:
             motion = best
         if self._explained(motion, beams, _PASSED) < _LOST:
             return Motion(*prior, spread), True  # what is expected is better than a guess
@@ -229,11 +233,10 @@ class Drive:
         segments = shared(walls, SEGMENT)
         segments["length"] = lengths_of(walls)
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
-        place = {number: k for k, number in enumerate(self._numbers.tolist())}
-        mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
-        corners = last.features.corners.copy()
-        corners["segments"] = mine[corners["segments"]]
-        arcs = last.features.arcs[:0]  # people
+        numbers = np.searchsorted(self._numbers, last.walls)
+        numbers = np.append(np.where(np.isin(last.walls, self._numbers), numbers, -1), -1)
+        corners, arcs = last.features.corners.copy(), last.features.arcs[:0]  # people
+        corners["segments"] = numbers[corners["segments"]]
         self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
         walls = _as_walls(segments)
         self._index = make_index(walls if len(walls) else _NOWHERE, np.zeros(0, COLUMN), 0.0)
@@ -243,9 +246,7 @@ def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
     """Segments as walls that are seen from their left."""
     walls = shared(segments, WALL)
     walls["side"] = walls["views"] = 1
-    walls["covariance"][:, 0, 0] += segments["misfit"] ** 2
-    length = np.maximum(segments["length"], 1e-3)
-    walls["covariance"][:, 1, 1] += 4 * (segments["misfit"] / length) ** 2
+    walls["covariance"] += bent(segments["misfit"] ** 2, segments["length"])
     return walls[segments["length"] > 0.05]
 
 
@@ -267,15 +268,12 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
 
 def _passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:
     """Whether beams pass through each wall, away from its ends, and end far behind."""
-    valid = scan.valid
-    bearing, ranges = scan.angles[valid][:, np.newaxis], scan.ranges[valid][:, np.newaxis]
-    ux, uy = np.cos(bearing), np.sin(bearing)
+    ux, uy = unit(scan.angles[scan.valid]).T[:, :, None]
     (px, py), (qx, qy) = walls["start"].T, walls["end"].T
-    wx, wy = qx - px, qy - py
-    length = np.maximum(np.hypot(wx, wy), 1e-9)
-    ex, ey = ranges * ux - px, ranges * uy - py
-    off = (wx * ey - wy * ex) / length
-    margin = np.minimum(0.1, 0.2 * length) * (ux * wy - uy * wx) / length
-    # The start lies to the right of a beam that passes, the end to its left.
-    passes = (ux * py - uy * px < -abs(margin)) & (ux * qy - uy * qx > abs(margin)) & (off < -0.3)
+    length = np.maximum(lengths_of(walls), 1e-9)
+    # How far the start and the end lie to the left of each beam, and its end behind the wall.
+    start, end = ux * py - uy * px, ux * qy - uy * qx
+    behind = (scan.ranges[scan.valid][:, None] * (end - start) + qx * py - qy * px) / length
+    margin = np.minimum(0.1 / length, 0.2) * (end - start)
+    passes = (start < -margin) & (end > margin) & (behind > 0.3)
     return np.asarray(passes.sum(axis=0) >= 3)

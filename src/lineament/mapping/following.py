@@ -216,16 +216,8 @@ class Follower:
         is_missed = found.verdict == LOST and (odds < SURE or contradicted > DENIED)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
-            spread = found.covariance + blurred
-            if found.unobserved is not None:
-                # As wide as its alternatives lie apart.
-                along = np.array(found.unobserved)
-                for pose, _ in found.alternatives:
-                    off = along @ np.subtract(pose[:2], found.pose[:2])
-                    spread[:2, :2] += off**2 * np.outer(along, along)
-            self._pose, self._covariance = combined(
-                (self._pose, self._covariance), (found.pose, spread)
-            )
+            known, other = (self._pose, self._covariance), (found.pose, found.covariance + blurred)
+            self._pose, self._covariance = combined(known, other)
             self._verdict = self._by_covariance()
         return found
 

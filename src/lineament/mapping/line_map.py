@@ -18,7 +18,7 @@ from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
 from .plans import read_drawing, read_table
-from .walls import COLUMN, Merger, lengths_of, shared, walls_of
+from .walls import COLUMN, columns_shown, lengths_of, shared, walls_of, walls_shown
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -165,11 +165,15 @@ class LineMap:
         sigma : float
             As for the map.
         """
-        merger = Merger()
         at = (repeat(None) if of is None else of for of in (poses, pose_covariances))
+        tables = [(make_records("segments", []), make_records("arcs", []))]
         for seen, pose, spread in zip(features, *at, strict=False):
-            merger.add(seen if pose is None else seen.transform(*pose, spread))
-        return cls(*merger.result(min_views), sigma=sigma)
+            placed = seen if pose is None else seen.transform(*pose, spread)
+            tables.append((placed.segments, placed.arcs))
+        segments, arcs = map(np.concatenate, zip(*tables, strict=True))
+        walls, columns = walls_shown(segments), columns_shown(arcs)
+        often = (of[of["views"] >= min_views] for of in (walls, columns))
+        return cls(*often, sigma=sigma)
 
     @classmethod
     def read(

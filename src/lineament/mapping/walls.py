@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..features import Features
 from ..motion.association import chi_square
 from ..scan import Array
 
@@ -62,7 +61,7 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     sights = shared(segments, SIGHT)
     sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
     sights["wall"] = np.concatenate([walls for _, walls in seen])
-    sights["covariance"] += _bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
+    sights["covariance"] += bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
@@ -177,7 +176,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     np.minimum.at(first, w, low)
     np.maximum.at(last, w, high)
     views = np.bincount(w, minlength=count)
-    bent = misfits(sights, count) + apart**2 / 2
+    bows = misfits(sights, count) + apart**2 / 2
     order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
     kept = np.zeros(count, dtype=bool)
@@ -198,7 +197,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
         spread = _at(lines["covariance"][near], shared)
         spread += _at(lines["covariance"][[k]], (arm * u[k]).sum(axis=1))
         shorter = np.minimum(last[near] - first[near], last[k] - first[k])
-        spread += _bent(bent[near] + bent[k], shorter)
+        spread += bent(bows[near] + bows[k], shorter)
         squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
         if squares.min() < chi_square(_GATE, 2):
             labels[k], kept[k] = near[squares.argmin()], False
@@ -215,29 +214,30 @@ def misfits(sights: Records, count: int) -> Array:
 
 def bowed(walls: Records, sights: Records) -> Records:
     """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
-    walls["covariance"] += _bent(misfits(sights, len(walls)), lengths_of(walls))
+    walls["covariance"] += bent(misfits(sights, len(walls)), lengths_of(walls))
     return walls
 
 
-class Merger:
-    """Walls and columns of features that are added, all in the frame of the map."""
+def walls_shown(segments: Records) -> Records:
+    """Return the walls that segments in the frame of the map show; parts of one are joined."""
+    with np.errstate(invalid="ignore"):
+        sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
+    segments = segments[sure & (segments["length"] >= SHORTEST)]
+    if not len(segments):
+        return np.zeros(0, WALL)
+    sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
+    pose = np.zeros((1, 3))
+    while (count := int(sights["wall"].max()) + 1) != before:
+        lines, before = lines_of(sights, pose, count), count
+        sights = merged(sights, pose, lines, 0.0)
+    return bowed(walls_along(sights, pose, lines, WHOLE), sights)
 
-    def __init__(self) -> None:
-        self._segments: list[Records] = []
-        self._columns: list[Records] = []
 
-    def add(self, features: Features) -> None:
-        """Add the features of a scan."""
-        segments = features.segments
-        with np.errstate(invalid="ignore"):
-            sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
-        self._segments.append(segments[sure & (segments["length"] >= SHORTEST)])
-        for arc in features.arcs:
-            self._see(arc)
-
-    def _see(self, arc: np.void) -> None:
-        """Make an arc part of a column, or a new one."""
-        for column in self._columns:
+def columns_shown(arcs: Records) -> Records:
+    """Return the columns that arcs in the frame of the map show, by Kalman's update."""
+    columns: list[Records] = []
+    for arc in arcs:
+        for column in columns:
             e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
             if e @ inverse @ e < chi_square(_GATE, 3):
@@ -246,22 +246,10 @@ class Merger:
                 column["radius"] += (gain @ e)[2]
                 column["covariance"] -= gain @ column["covariance"]
                 column["views"] += 1
-                return
-        new = (arc["center"], arc["radius"], arc["covariance"], 1)
-        self._columns.append(np.array(new, COLUMN))
-
-    def result(self, min_views: int = 1) -> tuple[Records, Records]:
-        """Return walls and columns that were seen often enough; parts of one wall are joined."""
-        columns = np.array([c for c in self._columns if c["views"] >= min_views], COLUMN)
-        if not sum(map(len, self._segments)):
-            return np.zeros(0, WALL), columns
-        segments, pose = np.concatenate(self._segments), np.zeros((1, 3))
-        sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
-        while (count := int(sights["wall"].max()) + 1) != before:
-            lines, before = lines_of(sights, pose, count), count
-            sights = merged(sights, pose, lines, 0.0)
-        walls = bowed(walls_along(sights, pose, lines, WHOLE), sights)
-        return walls[walls["views"] >= min_views], columns
+                break
+        else:
+            columns.append(np.array((arc["center"], arc["radius"], arc["covariance"], 1), COLUMN))
+    return np.array(columns, COLUMN)
 
 
 def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Records:
@@ -319,7 +307,7 @@ def _at(covariances: Array, along: Array) -> Array:
     return np.asarray(lever @ covariances @ lever.transpose(0, 2, 1))
 
 
-def _bent(variance: Array | float, length: Array) -> Array:
+def bent(variance: Array | float, length: Array) -> Array:
     """Covariances of parts of walls that bow: each lies beside the whole, and is turned."""
     spread = np.zeros((len(length), 2, 2))
     spread[:, 0, 0] = variance
