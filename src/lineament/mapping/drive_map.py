@@ -6,31 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import SEGMENT, Features
+from ..features import Features
 from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from .evidence import evidence_of
-from .line_map import make_index
+from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .walls import (
-    COLUMN,
-    WALL,
-    WHOLE,
-    Numbers,
-    bent,
-    lengths_of,
-    lines_of,
-    shared,
-    sights_of,
-    unit,
-    walls_along,
-    walls_of,
-    wrapped,
-)
+from .walls import WHOLE, Numbers, as_walls, lines_of, segments_of, sights_of, walls_along, wrapped
 
 #: How surfaces are off straight lines [m].
 _ROUGHNESS = 0.01
@@ -62,8 +48,8 @@ _APART = (0.15, 0.06)
 _LOST = 0.25
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
-#: A wall where no beam ends [m]: of it is the index where there are no walls.
-_NOWHERE = walls_of(np.array([[(999.0, 999.0), (999.1, 999.0)]]))
+#: A plan of one wall where no beam ends [m], for where there are no walls.
+_NOWHERE = LineMap.from_lines([[999.0, 999.0, 999.1, 999.0]])
 
 
 @dataclass(slots=True, eq=False)
@@ -160,7 +146,7 @@ class Drive:
 
         kept = distinct(tried, scores(tried, some(beams, _FEW), _WIDE), _APART, _TRIED)
         poses = np.concatenate((tried[kept], [motion.pose]))
-        walls = _as_walls(features.segments)
+        walls = as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
@@ -212,7 +198,7 @@ class Drive:
             around = self._around.transform(*inverse(motion.pose))
             before, now = associate(around, features, roughness=_ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
-            is_gone = _passed(around.segments, scan)
+            is_gone = _passed(around.segments, beams_of(features, scan))
             is_gone[before] = False
             self._gone.update(self._numbers[is_gone].tolist())
         is_unknown = walls < 0
@@ -229,25 +215,16 @@ class Drive:
         seen = seen[~np.isin(seen["wall"], [*self._gone])]
         self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
         poses = np.array([relative(last.pose, frame.pose) for frame in frames])
-        walls = walls_along(seen, poses, lines_of(seen, poses, len(self._numbers)), WHOLE)
-        segments = shared(walls, SEGMENT)
-        segments["length"] = lengths_of(walls)
+        lines = lines_of(seen, poses, len(self._numbers))
+        segments = segments_of(walls_along(seen, poses, lines, WHOLE))
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
         numbers = np.searchsorted(self._numbers, last.walls)
         numbers = np.append(np.where(np.isin(last.walls, self._numbers), numbers, -1), -1)
         corners, arcs = last.features.corners.copy(), last.features.arcs[:0]  # people
         corners["segments"] = numbers[corners["segments"]]
         self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
-        walls = _as_walls(segments)
-        self._index = make_index(walls if len(walls) else _NOWHERE, np.zeros(0, COLUMN), 0.0)
-
-
-def _as_walls(segments: NDArray[np.void]) -> NDArray[np.void]:
-    """Segments as walls that are seen from their left."""
-    walls = shared(segments, WALL)
-    walls["side"] = walls["views"] = 1
-    walls["covariance"] += bent(segments["misfit"] ** 2, segments["length"])
-    return walls[segments["length"] > 0.05]
+        walls = as_walls(segments)
+        self._index = (LineMap(walls) if len(walls) else _NOWHERE).index
 
 
 def _likely_turns(around: Features, features: Features, expected: float, spread: float) -> Array:
@@ -266,14 +243,14 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
     return np.asarray(turns[order[votes[order] > 0]])
 
 
-def _passed(walls: NDArray[np.void], scan: LaserScan) -> NDArray[np.bool_]:
+def _passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
     """Whether beams pass through each wall, away from its ends, and end far behind."""
-    ux, uy = unit(scan.angles[scan.valid]).T[:, :, None]
+    ux, uy, ranges = beams[:, 2:5].T[:, :, None]
     (px, py), (qx, qy) = walls["start"].T, walls["end"].T
-    length = np.maximum(lengths_of(walls), 1e-9)
+    length = np.maximum(np.hypot(qx - px, qy - py), 1e-9)
     # How far the start and the end lie to the left of each beam, and its end behind the wall.
     start, end = ux * py - uy * px, ux * qy - uy * qx
-    behind = (scan.ranges[scan.valid][:, None] * (end - start) + qx * py - qy * px) / length
+    behind = (ranges * (end - start) + qx * py - qy * px) / length
     margin = np.minimum(0.1 / length, 0.2) * (end - start)
     passes = (start < -margin) & (end > margin) & (behind > 0.3)
     return np.asarray(passes.sum(axis=0) >= 3)

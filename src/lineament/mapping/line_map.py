@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LineamentError
-from ..features import ARC, CORNER, SEGMENT, Features, make_records
+from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
 from .plans import read_drawing, read_table
-from .walls import COLUMN, columns_shown, lengths_of, shared, walls_of, walls_shown
+from .walls import COLUMN, columns_shown, lengths_of, segments_of, shared, walls_of, walls_shown
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -166,14 +166,12 @@ class LineMap:
             As for the map.
         """
         at = (repeat(None) if of is None else of for of in (poses, pose_covariances))
-        tables = [(make_records("segments", []), make_records("arcs", []))]
-        for seen, pose, spread in zip(features, *at, strict=False):
-            placed = seen if pose is None else seen.transform(*pose, spread)
-            tables.append((placed.segments, placed.arcs))
-        segments, arcs = map(np.concatenate, zip(*tables, strict=True))
-        walls, columns = walls_shown(segments), columns_shown(arcs)
-        often = (of[of["views"] >= min_views] for of in (walls, columns))
-        return cls(*often, sigma=sigma)
+        placed = [
+            seen if pose is None else seen.transform(*pose, spread)
+            for seen, pose, spread in zip(features, *at, strict=False)
+        ]
+        shown = walls_shown([of.segments for of in placed]), columns_shown(of.arcs for of in placed)
+        return cls(*(records[records["views"] >= min_views] for records in shown), sigma=sigma)
 
     @classmethod
     def read(
@@ -212,14 +210,13 @@ class LineMap:
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""
-        segments, arcs = shared(self.walls, SEGMENT), shared(self.columns, ARC)
-        points = shared(self.corners, CORNER)
-        segments["length"] = lengths_of(self.walls)
-        segments["n_points"], arcs["n_points"] = self.walls["views"], self.columns["views"]
+        points, arcs = shared(self.corners, CORNER), shared(self.columns, ARC)
+        arcs["n_points"] = self.columns["views"]
         points["convex"], points["kind"] = self.corners["solid"] == 1, "corner"
         points["segments"] = self.corners["walls"]
         none = make_records("breakpoints", [])
-        return Features(segments, points, arcs, np.empty(0, np.int32), none, frame_id="map")
+        labels = np.empty(0, np.int32)
+        return Features(segments_of(self.walls), points, arcs, labels, none, frame_id="map")
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""

@@ -1,11 +1,13 @@
 """Walls and columns: their records, the segments that show them, and which of these are one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..features import SEGMENT
 from ..motion.association import chi_square
 from ..scan import Array
 
@@ -218,8 +220,9 @@ def bowed(walls: Records, sights: Records) -> Records:
     return walls
 
 
-def walls_shown(segments: Records) -> Records:
+def walls_shown(tables: Sequence[Records]) -> Records:
     """Return the walls that segments in the frame of the map show; parts of one are joined."""
+    segments = np.concatenate([np.zeros(0, SEGMENT), *tables])
     with np.errstate(invalid="ignore"):
         sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
     segments = segments[sure & (segments["length"] >= SHORTEST)]
@@ -233,10 +236,10 @@ def walls_shown(segments: Records) -> Records:
     return bowed(walls_along(sights, pose, lines, WHOLE), sights)
 
 
-def columns_shown(arcs: Records) -> Records:
+def columns_shown(tables: Iterable[Records]) -> Records:
     """Return the columns that arcs in the frame of the map show, by Kalman's update."""
     columns: list[Records] = []
-    for arc in arcs:
+    for arc in chain.from_iterable(tables):
         for column in columns:
             e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
@@ -259,6 +262,21 @@ def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Reco
     walls["angle"] = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1])
     walls["covariance"], walls["side"], walls["views"] = covariance, side, 1
     return walls
+
+
+def segments_of(walls: Records) -> Records:
+    """Return walls as segments."""
+    segments = shared(walls, SEGMENT)
+    segments["length"], segments["n_points"] = lengths_of(walls), walls["views"]
+    return segments
+
+
+def as_walls(segments: Records) -> Records:
+    """Return segments as walls that are seen from their left."""
+    walls = shared(segments, WALL)
+    walls["side"] = walls["views"] = 1
+    walls["covariance"] += bent(segments["misfit"] ** 2, segments["length"])
+    return walls[segments["length"] > 0.05]
 
 
 def cut(wall: np.void, first: Array, last: Array) -> Records:
