@@ -220,6 +220,22 @@ def test_a_drive_becomes_a_map(driven, storey):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("carried", "first"), [(100, 20), (150, 40)])
+def test_a_robot_that_is_carried_is_found_where_it_was_before(driven, carried, first):
+    scans, truth, _ = driven
+    order, extract, placed = [*range(carried), *range(first, first + 40)], Extractor(), Drive()
+    for k in order:
+        placed.add(scans[k], extract(scans[k]))
+    assert [frame.index for frame in placed.frames if frame.is_lost] == [carried]
+    made = make_map(placed.frames, placed.scans)
+    off = [
+        relative(truth[k], compose(truth[0], pose))
+        for k, pose in zip(order, made.poses, strict=True)
+    ]
+    assert np.hypot(*np.array(off)[:, :2].T).max() < 0.05
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["dxf", "svg", "parquet"])
 def test_the_command_writes_map_and_poses(tmp_path, ending):
     scans = list(drive(room(), [(-2, 0), (1, 0.5)], SENSORS["lms181"], speed=0.5, rate=4, seed=2))

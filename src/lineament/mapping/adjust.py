@@ -80,7 +80,7 @@ class Adjusted:
         """Return the lines with covariances that hold those of the poses."""
         lines, is_small = self.lines.copy(), self.matrix.shape[0] <= _DENSE
         # One inverse is quicker than a solution for each wall.
-        solve = _solver(self.matrix.toarray() if is_small else self.matrix)
+        solve = _inverse_of(self.matrix) if is_small else _solver(self.matrix)
         for first in range(0, len(lines), _BATCH):
             gain = self.gain[:, 2 * first : 2 * (first + _BATCH)]
             columns = gain.toarray()
@@ -194,6 +194,16 @@ def _matrix(blocks: list[tuple[Array, Any, Any]], n: int, m: int, dense: bool) -
 
 def _inverse(matrices: Array) -> Array:
     return np.asarray(np.linalg.inv(matrices), np.float64)
+
+
+def _inverse_of(matrix: Any) -> Callable[[Array], Array]:
+    """Return what multiplies by the inverse of a positive definite matrix, by Cholesky."""
+    from scipy.linalg.lapack import dpotrf, dpotri
+
+    lower = dpotri(dpotrf(matrix.toarray(), lower=1)[0], lower=1)[0]
+    inverse = lower + lower.T
+    np.fill_diagonal(inverse, lower.diagonal())
+    return lambda right: inverse @ right
 
 
 def _solver(matrix: Any) -> Callable[[Array], Array]:

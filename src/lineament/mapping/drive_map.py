@@ -45,7 +45,7 @@ _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
-_LOST = 0.25
+_LOST = 0.35
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 #: A plan of one wall where no beam ends [m], for where there are no walls.
@@ -57,7 +57,7 @@ class KeyFrame:
     """A scan that stands for those around it: number `index` of the log.
 
     `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
-    first key frame, `motion` that since the one before: a guess where nothing explains the scan.
+    first key frame, `motion` that since the one before: a guess where the way is lost.
     """
 
     index: int
@@ -159,9 +159,7 @@ class Drive:
         matched, found = scores(np.array([motion.pose, best.pose]), beams, _TIGHT)
         if found > matched + 1.0:
             motion = best
-        if self._explained(motion, beams, _PASSED) < _LOST:
-            return Motion(*prior, spread), True  # what is expected is better than a guess
-        return motion, False
+        return motion, self._explained(motion, beams, _PASSED) < _LOST
 
     def _explained(self, motion: Motion, beams: Array, less: float) -> float:
         """Return the share of the beams that are explained, less those that pass through walls."""

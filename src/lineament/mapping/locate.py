@@ -211,11 +211,13 @@ def distinct(
 
 def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float) -> Location:
     """Give the verdict on the best of some poses."""
-    _, pairs, _ = refined(poses[:1], query, plan.index, FINE)
-    best, information = adjusted(poses[0], pairs[0], query, plan.index)
-    covariance = np.asarray(np.linalg.inv(information + WEAK), np.float64)
+    (refit, *_), (pairs, *_), (information, *_) = refined(poses[:1], query, plan.index, FINE)
     chance, n = math.log(max(room, 1.0)), len(query.beams)
     first, *rest = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
+    if first.log_odds < SURE or first.contradicted > MOST_CONTRADICTED:
+        return Location(LOST, _pose(refit), np.linalg.inv(information + WEAK), first)
+    best, information = adjusted(poses[0], pairs, query, plan.index)
+    covariance = np.asarray(np.linalg.inv(information + WEAK), np.float64)
     others = [
         (_pose(pose), other)
         for pose, other in zip(poses[1:], rest, strict=True)
@@ -225,12 +227,9 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
         others.insert(0, (_pose(poses[0]), first))  # walls that depend on each other disagree
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     x, y = vectors[:, 1].tolist()
-    verdict, unobserved = AMBIGUOUS if others else LOCATED, None
-    if first.log_odds < SURE or first.contradicted > MOST_CONTRADICTED:
-        verdict = LOST
-    elif values[1] > UNSURE**2:
-        verdict, unobserved = UNOBSERVED, (x, y)
-    return Location(verdict, _pose(best), covariance, first, unobserved, others)
+    if values[1] > UNSURE**2:
+        return Location(UNOBSERVED, _pose(best), covariance, first, (x, y), others)
+    return Location(AMBIGUOUS if others else LOCATED, _pose(best), covariance, first, None, others)
 
 
 def _pose(row: Array) -> Pose:

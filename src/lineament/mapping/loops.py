@@ -19,7 +19,7 @@ from .walls import Records, walls_along, wrapped
 #: What is looked for is of this way before a key frame; where, of this way around another [m].
 _QUERY, _PLAN = 5.0, 5.0
 #: Key frames are looked for after so much way; others are at least so much way before them [m].
-_EVERY, _BEFORE = 1.0, 12.0
+_EVERY, _BEFORE = 2.0, 12.0
 #: Stretches of the way that are looked at for each; key frames whose beams a query has.
 _STRETCHES, _SCANS = 3, 6
 #: Errors of a loop beside those that `locate` knows [m, rad].
@@ -37,8 +37,10 @@ class Survey:
 
     @property
     def way(self) -> Array:
-        """Way to each key frame [m]."""
-        return np.append(0.0, np.cumsum(np.hypot(*np.diff(self.poses[:, :2], axis=0).T)))
+        """Way to each key frame [m]; where it was lost, what was seen before is far."""
+        steps = np.hypot(*np.diff(self.poses[:, :2], axis=0, prepend=self.poses[:1, :2]).T)
+        steps[[frame.is_lost for frame in self.frames]] = _BEFORE
+        return np.cumsum(steps)
 
     def pose(self, k: int) -> Pose:
         """Pose of a key frame."""

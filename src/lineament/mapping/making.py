@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +14,18 @@ from .drive_map import KeyFrame
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey, moved
-from .walls import SHORTEST, Records, cut, errors, merged, sights_of, unit, walls_along, wrapped
+from .walls import (
+    SHORTEST,
+    Records,
+    cut,
+    errors,
+    lines_of,
+    merged,
+    sights_of,
+    unit,
+    walls_along,
+    wrapped,
+)
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -22,11 +34,13 @@ _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-4, 0.05, 0.4549
 #: What walls say of a motion is known by the walls already: of motions and loops, a 25th counts,
 #: and nothing of motions below these deviations [m, m, rad].
 _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
+#: Covariance of the motion to a key frame that was lost [m, m, rad].
+_UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
-#: Walls are merged so many times after each search; so much off are one [m].
+#: Walls are merged so many times once loops are closed; so much off are one [m].
 _MERGED, _APART = 2, 0.03
-#: A drive is looked for on a plan from places so far apart [m]; places that agree [m, rad].
+#: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: A wall was seen by so many key frames.
 _VIEWS = 3
@@ -54,10 +68,12 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
 
     Key frames and scans are those of `Drive`. LineamentError if there are no walls.
     """
-    motions = [frame.motion for frame in frames[1:]]
-    spreads = [_TWICE * motion.covariance + _LEAST for motion in motions]
-    pairs = [(k, k + 1) for k in range(len(motions))]
-    chain = edges_of(pairs, [motion.pose for motion in motions], spreads)
+    pairs = [(k, k + 1) for k in range(len(frames) - 1)]
+    spreads = [
+        _UNKNOWN if frame.is_lost else _TWICE * frame.motion.covariance + _LEAST
+        for frame in frames[1:]
+    ]
+    chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
@@ -65,20 +81,22 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     found = optimise(poses, chain, sights, _count(sights))
     sights = sights_of(seen, roughness(sights, found.poses, found.lines))
     loops, refused = edges_of([], [], []), 0
-    for spread in _SPREADS:
+    for k, spread in enumerate(_SPREADS):
+        if k:
+            found.poses = joined(Survey(frames, found.poses, sights, found.lines))
+            found.lines = lines_of(sights, found.poses, _count(sights))
         near = Survey(frames, found.poses, sights, found.lines).loops(spread)
-        if not len(near):
-            break
-        found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
-        right = found.weights[len(chain) :] > 0.5
-        loops, refused = near[right], int((~right).sum())
-        weak = loops.copy()
-        weak["information"] /= _TWICE
-        weak["loop"] = False
-        for _ in range(_MERGED):
-            found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
-            sights = merged(sights, found.poses, found.lines, _APART)
-        found = optimise(found.poses, chain, sights, _count(sights))
+        if len(near):
+            found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
+            right = found.weights[len(chain) :] > 0.5
+            loops, refused = near[right], int((~right).sum())
+    weak = loops.copy()
+    weak["information"] /= _TWICE
+    weak["loop"] = False
+    for _ in range(_MERGED if len(loops) else 0):
+        found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
+        sights = merged(sights, found.poses, found.lines, _APART)
+    found = optimise(found.poses, chain, sights, _count(sights), rounds=3)
     survey = Survey(frames, found.poses, sights, found.with_poses())
     least = min(_VIEWS, len(frames))
     walls = single(walls_along(sights, found.poses, survey.lines, views=least))
@@ -133,24 +151,49 @@ def roughness(sights: Records, poses: Array, lines: Records) -> float:
     return next(right, _ROUGHEST)
 
 
+def joined(survey: Survey) -> Array:
+    """Return the poses, with what follows each lost key frame put where it was seen before."""
+    frames, poses, sights = survey.frames, survey.poses.copy(), survey.sights
+    lost = [k for k, frame in enumerate(frames) if frame.is_lost]
+    for first, last in pairwise([*lost, len(frames)]):
+        lines = lines_of(sights, poses, _count(sights))
+        before = Survey(frames, poses, sights, lines).walls((0.0, 0.0, 0.0), np.arange(first))
+        if len(before):
+            part = Survey(frames[:last], poses[:last], sights, lines)
+            move = found_on(LineMap(before), part, first)
+            if move is not None:
+                poses[first:] = [compose(move, tuple(pose)) for pose in poses[first:].tolist()]
+    return poses
+
+
+def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
+    """Return the motion that puts the key frames from the first on where the plan shows them.
+
+    Places along the way are looked for without a first guess; that on which most of those agree
+    which are located.
+    """
+    found = []
+    for q, query in survey.queries(_PLACES):
+        if q >= first and (where := locate(query, plan)):
+            found.append(compose(where.pose, inverse(survey.pose(q))))
+    if not found:
+        return None
+    # Compared where the key frames are, not at their origin.
+    x, y = survey.poses[first:, :2].mean(axis=0).tolist()
+    moves, places = np.array(found), np.array([compose(move, (x, y, 0.0)) for move in found])
+    agree = np.abs(wrapped(moves[:, None, 2] - moves[:, 2])) < _AGREE[1]
+    agree &= np.linalg.norm(places[:, None, :2] - places[:, :2], axis=2) < _AGREE[0]
+    return found[int(agree.sum(axis=1).argmax())]
+
+
 def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
     """Move a map into the frame of a plan, on which it is located without a first guess.
 
     Places along the way are looked for on the plan; the motion on which most of those that are
     located agree is taken. LineamentError if none is located.
     """
-    survey, found = made.survey, []
-    for q, query in survey.queries(_PLACES):
-        where = locate(query, plan)
-        if where:
-            found.append(compose(where.pose, inverse(survey.pose(q))))
-    if not found:
+    best = found_on(plan, made.survey, 0)
+    if best is None:
         raise LineamentError("the drive is not on the plan, or the plan does not say where")
-    # Compared where the map is, not at its origin.
-    x, y = survey.poses[:, :2].mean(axis=0).tolist()
-    moves, places = np.array(found), np.array([compose(move, (x, y, 0.0)) for move in found])
-    agree = np.abs(wrapped(moves[:, None, 2] - moves[:, 2])) < _AGREE[1]
-    agree &= np.linalg.norm(places[:, None, :2] - places[:, :2], axis=2) < _AGREE[0]
-    best = found[int(agree.sum(axis=1).argmax())]
     poses = [compose(best, pose) for pose in made.poses]
     return replace(made, map=LineMap(moved(made.map.walls, inverse(best))), poses=poses)

@@ -59,7 +59,7 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
 
     Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
     """
-    segments = np.concatenate([of_frame for of_frame, _ in seen])
+    segments = np.concatenate([of_frame for of_frame, _ in seen], dtype=SEGMENT)
     sights = shared(segments, SIGHT)
     sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
     sights["wall"] = np.concatenate([walls for _, walls in seen])
