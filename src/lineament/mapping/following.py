@@ -16,7 +16,7 @@ from ..scan.poses import Twist, compose, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, SURE, UNOBSERVED, Location, locate
+from .locate import LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -37,7 +37,6 @@ _DRIFT, _TURN_DRIFT = 0.005, 0.002
 _TIGHT = 0.03
 #: Velocity that a sensor may have at first [m/s, m/s, rad/s]; share by which it is off later.
 _USUAL, _UNEVEN = np.array((1.0, 0.0, 1.0)), 0.1
-_UNKNOWN = np.diag((1e6, 1e6, 10.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +108,7 @@ class Follower:
     def _restart(self) -> None:
         """Forget what was seen, and where."""
         self._tracker, self._local = Tracker(), LocalMap(self.way)
-        self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), _UNKNOWN
+        self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), UNKNOWN
         self._missed, self._looked = 0.0, math.nan
         self._since = self._turned = math.inf
 
@@ -207,7 +206,7 @@ class Follower:
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
-            self._covariance = found.covariance + blurred if found else _UNKNOWN
+            self._covariance = found.covariance + blurred if found else UNKNOWN
             self._missed = 0.0
             return found
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)

@@ -133,7 +133,7 @@ def locate(
     tried = _tried(query, plan) if guess is None else _near(guess, covariance, query, plan)
     poses, found = _searched(tried, query, plan)
     if not len(poses):
-        return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
+        return Location(LOST, guess or (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
     room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
     odds, where = found[0, 0], _judged(poses, found, query, plan, room)
     if where.verdict == LOCATED and guess is None:
@@ -148,7 +148,8 @@ def locate(
     return where
 
 
-#: Covariance of a guess for which none is given.
+#: Covariance of a pose of which nothing is known, and of a guess for which none is given.
+UNKNOWN = np.diag((1e6, 1e6, 10.0))
 _GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 

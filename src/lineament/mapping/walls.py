@@ -276,7 +276,7 @@ def as_walls(segments: Records) -> Records:
     walls = shared(segments, WALL)
     walls["side"] = walls["views"] = 1
     walls["covariance"] += bent(segments["misfit"] ** 2, segments["length"])
-    return walls[segments["length"] > 0.05]
+    return walls[segments["length"] > _SHORT]
 
 
 def cut(wall: np.void, first: Array, last: Array) -> Records:
