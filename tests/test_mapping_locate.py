@@ -212,6 +212,8 @@ def test_local_map_keeps_the_way_and_needs_the_scan():
         none.query()
     with pytest.raises(ValueError, match="features have no scan"):
         none.add(features.transform(0, 0, 0), tracks)
+    with pytest.raises(ValueError, match="features have no scan"):
+        locate(features.transform(0, 0, 0), storey_plan())
     with pytest.raises(ValueError, match="way is -1"):
         LocalMap(-1)
 

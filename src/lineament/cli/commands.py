@@ -8,8 +8,7 @@ import click
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
-from .locate import LAYERS, UNITS, locate
-from .mapping import map_command
+from .mapping import LAYERS, UNITS, locate, map_command
 from .options import (
     HUSH,
     LOG,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .locate import UNITS
+from .mapping import UNITS
 from .options import (
     LIMITS,
     METHOD,

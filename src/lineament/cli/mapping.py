@@ -1,15 +1,32 @@
-"""The command that makes a map of a log."""
-
-from __future__ import annotations
+"""The commands that make a map of a log, and that find a log on one."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import LOG, METHOD, NOISE, PATH, QUIET, SET, check_ending, make_extractor
+from .options import (
+    LOG,
+    METHOD,
+    NOISE,
+    PATH,
+    QUIET,
+    SET,
+    check_ending,
+    complain,
+    make_extractor,
+)
 from .options import reading_odometry as reading
 
+MAP = click.option("--map", "plan", type=PATH, required=True, help="The plan: .dxf or .parquet.")
+LAYERS = click.option(
+    "--layers",
+    metavar="NAMES",
+    callback=lambda _context, _option, names: names.split(",") if names else None,
+    help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
+)
+UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
+_NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
 #: Formats that a map is written in.
 _ENDINGS = (".dxf", ".svg", ".parquet")
 
@@ -19,7 +36,7 @@ _ENDINGS = (".dxf", ".svg", ".parquet")
 @click.option("-o", "--output", required=True, type=PATH, help="The map: .dxf, .svg or .parquet.")
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is: .dxf or .parquet.")
-@click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
+@_NO_ODOMETRY
 @METHOD
 @SET
 @NOISE
@@ -47,11 +64,10 @@ def map_command(
     check_ending(output, _ENDINGS)
     if poses is not None:
         check_ending(poses, (".tum", ".txt"))
-    extractor = make_extractor(method, settings, noise)
     done = map_log(
         log,
         output,
-        extractor,
+        make_extractor(method, settings, noise),
         poses=poses,
         onto=onto,
         odometry=not no_odometry,
@@ -60,3 +76,54 @@ def map_command(
     )
     if not quiet:
         click.echo(str(done))
+
+
+@click.command()
+@LOG
+@MAP
+@click.option("-o", "--output", required=True, type=PATH, help="Poses: .tum, .csv or .parquet.")
+@LAYERS
+@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@_NO_ODOMETRY
+@click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
+@METHOD
+@SET
+@NOISE
+@reading
+@QUIET
+def locate(
+    log: Path | str,
+    plan: Path,
+    output: Path,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    no_odometry: bool,
+    no_deskew: bool,
+    quiet: bool,
+    reading: dict[str, Any],
+    **drawn: Any,
+) -> None:
+    """Find where each scan of LOG was taken on a plan, and where that is not known.
+
+    Poses of the log are taken as odometry: their changes, not where they are.
+    """
+    from ..tasks.locate import ENDINGS, locate_log
+    from .progress import tracker
+
+    check_ending(output, ENDINGS)
+    found = locate_log(
+        log,
+        plan,
+        output,
+        make_extractor(method, settings, noise),
+        odometry=not no_odometry,
+        deskewed=not no_deskew,
+        track=tracker(quiet),
+        **drawn,
+        **reading,
+    )
+    if found.warning:
+        complain(f"lineament: {found.warning}")
+    if not quiet:
+        click.echo(str(found))

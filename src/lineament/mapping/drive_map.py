@@ -4,29 +4,26 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..features import SEGMENT, Features
+from ..features import Features
 from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from .evidence import evidence_of
-from .local_map import Query, beams_of
-from .locate import distinct
-from .placing import (
-    PASSED,
-    ROUGHNESS,
-    as_walls,
-    index_of,
-    likely_turns,
-    passed,
-    scored,
-    some,
-    unlikely,
-)
+from .line_map import LineMap
+from .local_map import Query, beams_of, some
+from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .walls import WHOLE, Numbers, lines_of, sights_of, walls_along
+from .walls import WHOLE, Numbers, as_walls, lines_of, segments_of, sights_of, walls_along, wrapped
 
+#: How surfaces are off straight lines [m].
+_ROUGHNESS = 0.01
+#: Bins of turns, and how many of them are tried.
+_BINS, _TURNS = 120, 12
+#: What a beam that passes through a wall says [nats], and what it takes off those explained.
+_MILD, _PASSED = -0.8, 0.5
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
 #: Key frames through which a wall is remembered that is not seen.
@@ -51,6 +48,8 @@ _APART = (0.15, 0.06)
 _LOST = 0.35
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
+#: A plan of one wall where no beam ends [m], for where there are no walls.
+_NOWHERE = LineMap.from_lines([[999.0, 999.0, 999.1, 999.0]])
 
 
 @dataclass(slots=True, eq=False)
@@ -79,8 +78,8 @@ class Drive:
     def __init__(self) -> None:
         self.frames: list[KeyFrame] = []
         self.scans: list[tuple[int, Pose]] = []
-        #: Walls of the last metres, corners and arcs, in the frame of the last key frame; numbers
-        #: of the walls, that of the next, those that are gone, and the first key frame since lost.
+        #: Walls of the last metres and its corners, in the frame of the last key frame; numbers of
+        #: the walls, that of the next, those that are gone, and the first key frame since lost.
         self._around: Features
         self._numbers, self._next = np.empty(0, np.int64), 0
         self._gone: set[int] = set()
@@ -110,9 +109,9 @@ class Drive:
         duration = stamp - self._last[0]
         if duration > 0:
             self._pace += 0.1 * (min(duration, _SLOWEST) - self._pace)
-        x, y, turn = relative(self._last[2], pose)
-        most = _FAST * self._pace
-        self._step = max(-most, min(most, x)), max(-most, min(most, y)), max(-most, min(most, turn))
+        most, step = _FAST * self._pace, relative(self._last[2], pose)
+        x, y, turn = (max(-most, min(most, part)) for part in step)
+        self._step = x, y, turn
 
     def _expected(self, stamp: float, odometry: Pose | None) -> tuple[Pose, Array]:
         """Pose in the frame of the last key frame as it is expected, and its covariance."""
@@ -140,23 +139,27 @@ class Drive:
         if self._explained(motion, beams, 1.0) >= sure and motion.observable:
             return motion, False
         tried = self._tried(features, prior, way, turn)
-        few = scored(tried, some(beams, _FEW), self._index, _WIDE)
-        few -= unlikely(tried, prior, way, turn)
-        poses = np.concatenate((tried[distinct(tried, few, _APART, _TRIED)], [motion.pose]))
+
+        def scores(poses: Array, beams: Array, wide: float) -> Array:
+            odds = evidence_of(poses, beams, self._index, wide, _MILD)[:, 0]
+            return np.asarray(odds - 0.5 * squares_off(poses, prior, spread))
+
+        kept = distinct(tried, scores(tried, some(beams, _FEW), _WIDE), _APART, _TRIED)
+        poses = np.concatenate((tried[kept], [motion.pose]))
         walls = as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        scores = scored(poses, beams, self._index, _TIGHT) - unlikely(poses, prior, way, turn)
-        scores[-1] += 0.5
-        x, y, theta = poses[scores.argmax()].tolist()
+        fine_scores = scores(poses, beams, _TIGHT)
+        fine_scores[-1] += 0.5
+        x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
-        found = scored(np.array([motion.pose, best.pose]), beams, self._index, _TIGHT)
-        if found[1] > found[0] + 1.0:
+        matched, found = scores(np.array([motion.pose, best.pose]), beams, _TIGHT)
+        if found > matched + 1.0:
             motion = best
-        return motion, self._explained(motion, beams, PASSED) < _LOST
+        return motion, self._explained(motion, beams, _PASSED) < _LOST
 
     def _explained(self, motion: Motion, beams: Array, less: float) -> float:
         """Return the share of the beams that are explained, less those that pass through walls."""
@@ -167,7 +170,7 @@ class Drive:
         """Poses around the expected one, and with the turns that walls suggest, shape (n, 3)."""
         steps = np.arange(-2, 3) * min(max(way, 0.1), 0.3)
         turns = prior[2] + np.arange(-3, 4) * min(max(turn / 2, 0.05), 0.1)
-        turns = np.append(turns, likely_turns(self._around, features, prior[2], turn))
+        turns = np.append(turns, _likely_turns(self._around, features, prior[2], turn))
         x, y, theta = np.meshgrid(prior[0] + steps, prior[1] + steps, turns, indexing="ij")
         return np.column_stack((x.ravel(), y.ravel(), theta.ravel()))
 
@@ -175,12 +178,12 @@ class Drive:
         motion, matches = Motion(*prior, spread), None
         for _ in range(_ROUNDS):
             found = associate(
-                self._around, features, motion.pose, motion.covariance, roughness=ROUGHNESS
+                self._around, features, motion.pose, motion.covariance, roughness=_ROUGHNESS
             )
             if matches is not None and found.same_as(matches):
                 break
             matches = found
-            motion = estimate_motion(matches, prior, spread, roughness=ROUGHNESS)
+            motion = estimate_motion(matches, prior, spread, roughness=_ROUGHNESS)
         return motion
 
     def _key(self, features: Features, motion: Motion, scan: LaserScan, is_lost: bool) -> None:
@@ -191,9 +194,9 @@ class Drive:
             self._first = len(self.frames)
         elif self.frames:
             around = self._around.transform(*inverse(motion.pose))
-            before, now = associate(around, features, roughness=ROUGHNESS).segments.T
+            before, now = associate(around, features, roughness=_ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
-            is_gone = passed(around.segments, scan)
+            is_gone = _passed(around.segments, beams_of(features, scan))
             is_gone[before] = False
             self._gone.update(self._numbers[is_gone].tolist())
         is_unknown = walls < 0
@@ -206,20 +209,46 @@ class Drive:
     def _look_around(self) -> None:
         """Find the walls of the last key frames, in the frame of the last one."""
         last, frames = self.frames[-1], self.frames[self._first :][-REMEMBERED:]
-        seen = sights_of([(frame.features.segments, frame.walls) for frame in frames], ROUGHNESS)
+        seen = sights_of([(frame.features.segments, frame.walls) for frame in frames], _ROUGHNESS)
         seen = seen[~np.isin(seen["wall"], [*self._gone])]
         self._numbers, seen["wall"] = np.unique(seen["wall"], return_inverse=True)
         poses = np.array([relative(last.pose, frame.pose) for frame in frames])
-        walls = walls_along(seen, poses, lines_of(seen, poses, len(self._numbers)), WHOLE)
-        segments = np.zeros(len(walls), SEGMENT)
-        for name in ("start", "end", "centroid", "angle", "covariance"):
-            segments[name] = walls[name]
-        segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+        lines = lines_of(seen, poses, len(self._numbers))
+        segments = segments_of(walls_along(seen, poses, lines, WHOLE))
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
-        place = {number: k for k, number in enumerate(self._numbers.tolist())}
-        mine = np.array([*(place.get(number, -1) for number in last.walls.tolist()), -1], np.int32)
-        corners = last.features.corners.copy()
-        corners["segments"] = mine[corners["segments"]]
-        arcs = last.features.arcs[:0]  # people
+        numbers = np.searchsorted(self._numbers, last.walls)
+        numbers = np.append(np.where(np.isin(last.walls, self._numbers), numbers, -1), -1)
+        corners, arcs = last.features.corners.copy(), last.features.arcs[:0]  # people
+        corners["segments"] = numbers[corners["segments"]]
         self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
-        self._index = index_of(as_walls(segments))
+        walls = as_walls(segments)
+        self._index = (LineMap(walls) if len(walls) else _NOWHERE).index
+
+
+def _likely_turns(around: Features, features: Features, expected: float, spread: float) -> Array:
+    """Return the turns by which segments lie along walls around, the likeliest first [rad]."""
+    before, now = around.segments, features.segments
+    off = before["angle"][:, np.newaxis] - now["angle"]
+    weight = np.minimum(before["length"][:, np.newaxis], now["length"])
+    bins = np.floor(np.mod(off, 2 * math.pi) / (2 * math.pi) * _BINS).astype(int) % _BINS
+    votes = np.bincount(bins.ravel(), weight.ravel(), _BINS)
+    votes = votes + 0.5 * (np.roll(votes, 1) + np.roll(votes, -1))
+    # Large turns are less likely.
+    turns = wrapped((np.arange(_BINS) + 0.5) / _BINS * 2 * math.pi)
+    votes = votes * np.exp(-0.5 * (wrapped(turns - expected) / max(spread, 0.5)) ** 2)
+    peaks = (votes >= np.roll(votes, 1)) & (votes > np.roll(votes, -1))
+    order = np.argsort(-np.where(peaks, votes, 0.0), kind="stable")[:_TURNS]
+    return np.asarray(turns[order[votes[order] > 0]])
+
+
+def _passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
+    """Whether beams pass through each wall, away from its ends, and end far behind."""
+    ux, uy, ranges = beams[:, 2:5].T[:, :, None]
+    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
+    length = np.maximum(np.hypot(qx - px, qy - py), 1e-9)
+    # How far the start and the end lie to the left of each beam, and its end behind the wall.
+    start, end = ux * py - uy * px, ux * qy - uy * qx
+    behind = (ranges * (end - start) + qx * py - qy * px) / length
+    margin = np.minimum(0.1 / length, 0.2) * (end - start)
+    passes = (start < -margin) & (end > margin) & (behind > 0.3)
+    return np.asarray(passes.sum(axis=0) >= 3)

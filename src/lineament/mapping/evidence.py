@@ -45,15 +45,18 @@ class Evidence:
     beams: int
 
 
-def evidence_of(poses: Array, beams: Array, index: Index, spread: float) -> Array:
+def evidence_of(
+    poses: Array, beams: Array, index: Index, spread: float, through: float = _THROUGH
+) -> Array:
     """Judge poses (n, 3) by beams: log-likelihood ratios and the shares of the beams, (n, 4).
 
-    `spread` is a deviation [m] that is added to those of beams and walls.
+    `spread` is a deviation [m] that is added to those of beams and walls; `through`, what a beam
+    says that passes through a wall [nats].
     """
     found = np.zeros((len(poses), 4))
     if not len(beams):
         return found
-    settings = (_EXPLAINED + 0.5, _SHORT, _THROUGH, spread**2, MARGIN + spread, SHY + spread)
+    settings = (_EXPLAINED + 0.5, _SHORT, through, spread**2, MARGIN + spread, SHY + spread)
     judge(np.ascontiguousarray(poses), beams, *index, settings, found)
     found[:, 0] /= TOGETHER
     found[:, 1:] /= max(beams[:, 6].sum(), 1e-12)

@@ -16,7 +16,7 @@ from ..scan.poses import Twist, compose, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, SURE, UNOBSERVED, Location, locate
+from .locate import LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -26,9 +26,9 @@ SEEN = 1.0
 GAP, JUMP = 5.0, 2.0
 #: A pose that is known no better is lost [m, rad]; one direction of it unobserved [m].
 WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
-#: So many scans in a row that chance explains as well are enough; of looks at the plan that say
-#: that it is not there, three: each that says otherwise takes back a part of one.
-MOST_DOUBTS, MOST_MISSED, TAKEN_BACK = 4, 2.0, 0.25
+#: So many looks at the plan that say that the sensor is not there are too many; each that says
+#: otherwise takes back a part of one.
+MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says.
 DENIED = 0.12
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -37,7 +37,6 @@ _DRIFT, _TURN_DRIFT = 0.005, 0.002
 _TIGHT = 0.03
 #: Velocity that a sensor may have at first [m/s, m/s, rad/s]; share by which it is off later.
 _USUAL, _UNEVEN = np.array((1.0, 0.0, 1.0)), 0.1
-_UNKNOWN = np.diag((1e6, 1e6, 10.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +78,7 @@ class Follower:
 
     The last metres are looked for on the whole plan until they are located. From then on the pose
     moves on with the tracker, and each few decimetres the plan is looked at near it. The sensor is
-    lost where scan after scan contradicts the plan, and where nothing fixes the pose any more: its
+    lost where look after look contradicts the plan, and where nothing fixes the pose any more: its
     covariance grows. It is then looked for on the whole plan again, by what was seen since.
 
     Parameters
@@ -109,10 +108,9 @@ class Follower:
     def _restart(self) -> None:
         """Forget what was seen, and where."""
         self._tracker, self._local = Tracker(), LocalMap(self.way)
-        self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), _UNKNOWN
-        self._doubts, self._missed = 0, 0.0
+        self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), UNKNOWN
+        self._missed, self._looked = 0.0, math.nan
         self._since = self._turned = math.inf
-        self._looked = math.nan
 
     @property
     def is_known(self) -> bool:
@@ -145,12 +143,10 @@ class Follower:
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
-        c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
-        off = np.array((c * skew[0] - s * skew[1], s * skew[0] + c * skew[1], skew[2]))
-        blurred = np.outer(off, off)
+        x, y, _ = compose((0.0, 0.0, self._pose[2]), skew)
+        blurred = np.outer(off := (x, y, skew[2]), off)
         evidence = self._judge(features)
-        self._doubts = self._doubts + 1 if self.is_known and evidence.log_odds < 0 else 0
-        if self._doubts > MOST_DOUBTS or self._missed > MOST_MISSED or was_known > self.is_known:
+        if self._missed > MOST_MISSED or was_known > self.is_known:
             # What was seen before may be of another place: this scan begins anew.
             self._restart()
             self._local.add(features, self._tracker(features, odometry))
@@ -199,8 +195,7 @@ class Follower:
 
     def _judge(self, features: Features) -> Evidence:
         """Return what the beams of a scan alone say of the pose."""
-        assert features.scan is not None
-        beams = thinned(beams_of(features, features.scan))
+        beams = thinned(beams_of(features))
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
         odds, explained, short, contradicted = found[0].tolist()
@@ -211,7 +206,7 @@ class Follower:
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
-            self._covariance = found.covariance + blurred if found else _UNKNOWN
+            self._covariance = found.covariance + blurred if found else UNKNOWN
             self._missed = 0.0
             return found
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
@@ -220,16 +215,8 @@ class Follower:
         is_missed = found.verdict == LOST and (odds < SURE or contradicted > DENIED)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         if found.verdict in (LOCATED, UNOBSERVED):
-            spread = found.covariance + blurred
-            if found.unobserved is not None:
-                # As wide as its alternatives lie apart.
-                along = np.array(found.unobserved)
-                for pose, _ in found.alternatives:
-                    off = along @ np.subtract(pose[:2], found.pose[:2])
-                    spread[:2, :2] += off**2 * np.outer(along, along)
-            self._pose, self._covariance = combined(
-                (self._pose, self._covariance), (found.pose, spread)
-            )
+            known, other = (self._pose, self._covariance), (found.pose, found.covariance + blurred)
+            self._pose, self._covariance = combined(known, other)
             self._verdict = self._by_covariance()
         return found
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..kernels.mapping.votes import vote
 from ..scan import Array
+from .walls import lengths_of, unit
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
 #: there, below π; `solid` is 1 where that is inside a wall, 0 where it is free, -1 if not known.
@@ -41,13 +42,13 @@ def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
     # Only walls whose boxes overlap can meet.
     beside = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
     pairs = np.column_stack(np.nonzero(np.triu(beside, 1)))
-    u = np.column_stack((np.cos(walls["angle"]), np.sin(walls["angle"])))
+    u = unit(walls["angle"])
     sine = _cross(u[pairs[:, 0]], u[pairs[:, 1]])
     crossing = np.abs(sine) > LEAST_SINE
     pairs, sine = pairs[crossing], sine[crossing]
     between = walls["start"][pairs[:, 1]] - walls["start"][pairs[:, 0]]
     along = np.column_stack([_cross(between, u[k]) for k in pairs.T[::-1]]) / sine[:, None]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[pairs]
+    length = lengths_of(walls)[pairs]
     near = (np.minimum(np.abs(along), np.abs(length - along)) <= REACH).any(axis=1)
     near &= ((along >= -REACH) & (along <= length + REACH)).all(axis=1)
     found = [np.zeros(0, MEETING)]
@@ -75,7 +76,7 @@ def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
 
 def _spread(walls: NDArray[np.void], at: Array) -> Array:
     """Covariances of places (n, 2) where two lines meet, from those of both, (n, 2)."""
-    u = np.stack((np.cos(walls["angle"]), np.sin(walls["angle"])), axis=-1)
+    u = unit(walls["angle"])
     lever = np.ones(u.shape)
     lever[:, :, 1] = ((at[:, None] - walls["centroid"]) * u).sum(axis=2)
     variances = np.einsum("nwi,nwij,nwj->nw", lever, walls["covariance"], lever)
@@ -87,7 +88,7 @@ def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
     """Votes of the walls for each turn of the local map, by degrees, shape (360,), at most 1."""
     spectra = []
     for table in (local, walls):
-        lengths = np.minimum(np.linalg.norm(table["end"] - table["start"], axis=1), 10.0)
+        lengths = np.minimum(lengths_of(table), 10.0)
         degrees = np.rint(np.degrees(table["angle"])).astype(np.int64) % 360
         histogram = np.bincount(degrees, lengths, minlength=360)
         both = table["side"] == 0
@@ -106,7 +107,7 @@ def anchors(walls: NDArray[np.void], corners: NDArray[np.void]) -> Array:
     """
     names = ("bisector", "solid", "opening")
     tables = [np.column_stack((corners["position"], *(corners[name] for name in names)))]
-    long = walls[np.linalg.norm(walls["end"] - walls["start"], axis=1) > LONG]
+    long = walls[lengths_of(walls) > LONG]
     for turn, of in ((0.0, long), (math.pi, long[long["side"] == 0])):
         for kind, name in ((2, "start"), (3, "end")):
             rest = of["angle"] + turn, np.full(len(of), 5.0 - kind if turn else kind)

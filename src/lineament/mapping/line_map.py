@@ -5,19 +5,20 @@ import os
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import repeat
+from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LineamentError
-from ..features import ARC, CORNER, SEGMENT, Features, make_records
+from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
-from .plans import read_plan
-from .walls import COLUMN, Merger, walls_of
+from .plans import read_drawing, read_table
+from .walls import COLUMN, columns_shown, lengths_of, segments_of, shared, walls_of, walls_shown
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -67,23 +68,22 @@ class LineMap:
         sigma: float = 0.0,
     ) -> None:
         ends = np.concatenate((walls["start"], walls["end"]), axis=1)
-        lengths = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
-        good = np.isfinite(ends).all(axis=1) & (lengths > 1e-6)
+        good = np.isfinite(ends).all(axis=1) & (lengths_of(walls) > 1e-6)
         good &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
         if not good.any():
             raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")
-        extent = max(np.ptp(ends[good].reshape(-1, 2), axis=0))
+        self.walls = walls[good]
+        extent = max(self.size)
         if extent > LONGEST:
             raise LineamentError(
                 f"the plan is {extent:.0f} m wide, expected a building: is it drawn in metres?"
             )
-        self.walls = walls[good]
         self.columns = np.zeros(0, COLUMN) if columns is None else columns
         self.sigma = sigma
         self.walls.flags.writeable = self.columns.flags.writeable = False
 
     def __repr__(self) -> str:
-        wide, deep = np.ptp(self.ends.reshape(-1, 2), axis=0)
+        wide, deep = self.size
         return (
             f"LineMap({len(self.walls)} walls, {len(self.corners)} corners, "
             f"{len(self.columns)} columns, {wide:.1f} m x {deep:.1f} m)"
@@ -98,9 +98,15 @@ class LineMap:
         return np.stack((self.walls["start"], self.walls["end"]), axis=1)
 
     @property
+    def size(self) -> tuple[float, float]:
+        """Width and depth of the rectangle around all walls [m]."""
+        width, depth = np.ptp(self.ends.reshape(-1, 2), axis=0).tolist()
+        return width, depth
+
+    @property
     def area(self) -> float:
-        """Area of the rectangle around all walls [m²]."""
-        return float(np.prod(np.ptp(self.ends.reshape(-1, 2), axis=0)))
+        """Area of that rectangle [m²]."""
+        return math.prod(self.size)
 
     @cached_property
     def corners(self) -> NDArray[np.void]:
@@ -125,10 +131,10 @@ class LineMap:
 
         `side` is 1 for lines that are seen from their left alone.
         """
+        circles = np.array(columns, np.float64).reshape(-1, 3)
+        found = np.zeros(len(circles), COLUMN)
+        found["center"], found["radius"], found["views"] = circles[:, :2], circles[:, 2], 1
         lines = np.array(ends, np.float64).reshape(-1, 2, 2)
-        round_ones = np.array(columns, np.float64).reshape(-1, 3)
-        found = np.zeros(len(round_ones), COLUMN)
-        found["center"], found["radius"] = round_ones[:, :2], round_ones[:, 2]
         return cls(walls_of(lines, side=side), found, sigma=sigma)
 
     @classmethod
@@ -159,13 +165,13 @@ class LineMap:
         sigma : float
             As for the map.
         """
-        merger, none = Merger(), repeat(None)
-        spreads = none if pose_covariances is None else pose_covariances
-        for seen, pose, spread in zip(
-            features, none if poses is None else poses, spreads, strict=False
-        ):
-            merger.add(seen if pose is None else seen.transform(*pose, spread))
-        return cls(*merger.result(min_views), sigma=sigma)
+        at = (repeat(None) if of is None else of for of in (poses, pose_covariances))
+        placed = [
+            seen if pose is None else seen.transform(*pose, spread)
+            for seen, pose, spread in zip(features, *at, strict=False)
+        ]
+        shown = walls_shown([of.segments for of in placed]), columns_shown(of.arcs for of in placed)
+        return cls(*(records[records["views"] >= min_views] for records in shown), sigma=sigma)
 
     @classmethod
     def read(
@@ -195,24 +201,22 @@ class LineMap:
         LineamentError
             If the file cannot be read or has no walls.
         """
-        return cls(*read_plan(path, layers, units), sigma=sigma)
+        ending = Path(path).suffix.lower()
+        if ending == ".dxf":
+            return cls.from_lines(*read_drawing(path, layers, units), sigma=sigma)
+        if ending == ".parquet":
+            return cls.from_features([read_table(path)], sigma=sigma)
+        raise LineamentError(f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}")
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""
-        walls, corners, columns = self.walls, self.corners, self.columns
-        segments, points, arcs = (
-            np.zeros(len(of), dtype)
-            for of, dtype in ((walls, SEGMENT), (corners, CORNER), (columns, ARC))
-        )
-        for records, of in ((segments, walls), (points, corners), (arcs, columns)):
-            for name in {*(records.dtype.names or ())} & {*(of.dtype.names or ())}:
-                records[name] = of[name]
-        segments["length"] = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-        segments["n_points"], arcs["n_points"] = walls["views"], columns["views"]
-        points["convex"], points["kind"] = corners["solid"] == 1, "corner"
-        points["segments"] = corners["walls"]
+        points, arcs = shared(self.corners, CORNER), shared(self.columns, ARC)
+        arcs["n_points"] = self.columns["views"]
+        points["convex"], points["kind"] = self.corners["solid"] == 1, "corner"
+        points["segments"] = self.corners["walls"]
         none = make_records("breakpoints", [])
-        return Features(segments, points, arcs, np.empty(0, np.int32), none, frame_id="map")
+        labels = np.empty(0, np.int32)
+        return Features(segments_of(self.walls), points, arcs, labels, none, frame_id="map")
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""

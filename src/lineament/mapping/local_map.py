@@ -1,8 +1,8 @@
 """`LocalMap`: what was seen on the last metres of the way, in one frame."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from .adjust import adjust
 from .hypotheses import meetings
-from .walls import SHORTEST
+from .walls import SHORTEST, unit, wrapped
 
 #: A scan is kept after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, 0.26
@@ -60,7 +60,7 @@ class Query:
         walls, beams = self.walls.copy(), self.beams * (1, -1, 1, -1, 1, 1, 1, 1, -1, 1)
         for name, of in (("start", "end"), ("end", "start"), ("centroid", "centroid")):
             walls[name] = self.walls[of] * (1, -1)
-        walls["angle"] = np.remainder(2 * math.pi - self.walls["angle"], 2 * math.pi) - math.pi
+        walls["angle"] = wrapped(math.pi - self.walls["angle"])
         walls["covariance"] *= [[1, -1], [-1, 1]]
         signs = np.tile([1.0, -1.0], len(walls))
         return Query(walls, self.covariance * np.outer(signs, signs), beams)
@@ -98,15 +98,10 @@ class LocalMap:
             if not value >= 0:
                 raise ValueError(f"{name} is {value}, expected a length ≥ 0")
         self.way, self.roughness = way, roughness
-        self._kept: deque[_Sight] = deque()
-        self._last: _Sight | None = None
+        self._sights: list[_Sight] = []
 
     def __repr__(self) -> str:
         return f"LocalMap({len(self._sights)} scans, {self._way:.1f} m)"
-
-    @property
-    def _sights(self) -> list["_Sight"]:
-        return [*self._kept, *([self._last] if self._last else [])]
 
     @property
     def _way(self) -> float:
@@ -125,19 +120,17 @@ class LocalMap:
         not show the motion, and people who walk there feign one. `scan` is needed where the
         features do not have it themselves: those of a batch.
         """
-        scan = features.scan if scan is None else scan
-        if scan is None:
-            raise ValueError("the features have no scan, expected it as the third argument")
-        before, motion = self._last, tracks.motion
+        beams, motion, sights = beams_of(features, scan), tracks.motion, self._sights
         long = features.segments["length"] >= SHORTEST
-        seen = features.segments[long], tracks.segments[long], beams_of(features, scan), odometry
-        if before is None or motion is None:
-            self._kept.clear()
-            self._last = _Sight(*seen)
+        here = _Sight(features.segments[long], tracks.segments[long], beams, odometry)
+        if not sights or motion is None:
+            self._sights = [here]
             return
-        if not self._kept or before.way > SPACING or before.turn > TURN:
-            self._kept.append(before)
-            before = _Sight(*seen[:3], before.odometry)
+        before = sights[-1]
+        if len(sights) == 1 or before.way > SPACING or before.turn > TURN:
+            before = _Sight(before.segments, before.numbers, before.beams, before.odometry)
+        else:
+            sights.pop()
         moved, sure = motion.pose, UNSURE
         if odometry is not None and before.odometry is not None:
             moved, sure = relative(before.odometry, odometry), ODOMETRY
@@ -147,24 +140,21 @@ class LocalMap:
         if sure is UNSURE:
             spread += FASTEST**2 * motion.unobserved.T @ motion.unobserved
         of_pose, of_motion = compose_jacobians(before.motion, moved)
-        self._last = _Sight(
-            *seen,
-            compose(before.motion, moved),
-            of_pose @ before.covariance @ of_pose.T + of_motion @ spread @ of_motion.T,
-            before.way + way,
-            before.turn + turn,
-        )
-        while self._kept and self._way > self.way:
-            self._kept.popleft()
+        here.covariance = of_pose @ before.covariance @ of_pose.T + of_motion @ spread @ of_motion.T
+        here.motion = compose(before.motion, moved)
+        here.way, here.turn = before.way + way, before.turn + turn
+        sights.append(here)
+        while len(sights) > 1 and self._way > self.way:
+            del sights[0]
 
     def query(self, way: float = math.inf) -> Query:
         """Return walls and beams of the last metres of way, in the frame of the last scan.
 
         ValueError before there is a scan.
         """
-        if self._last is None:
-            raise ValueError("the local map is empty, expected a scan")
         sights = self._sights
+        if not sights:
+            raise ValueError("the local map is empty, expected a scan")
         gone = np.cumsum([sight.way for sight in sights[:0:-1]])
         sights = sights[len(sights) - 1 - int((gone <= way).sum()) :]
         poses: list[Pose] = [(0.0, 0.0, 0.0)]
@@ -180,14 +170,14 @@ class LocalMap:
         return Query(walls, covariance, thinned(np.concatenate(beams[::-1])))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class _Sight:
     """What a scan shows, the numbers of its segments, and the motion since the one kept before."""
 
     segments: NDArray[np.void]
     numbers: NDArray[np.int64]
     beams: Array
-    odometry: Pose | None = None
+    odometry: Pose | None
     motion: Pose = (0.0, 0.0, 0.0)
     covariance: Array = field(default_factory=lambda: np.zeros((3, 3)))
     way: float = 0.0
@@ -196,31 +186,34 @@ class _Sight:
 
 def query_of_scan(features: Features, scan: LaserScan | None = None) -> Query:
     """Return walls and beams of one scan."""
-    scan = features.scan if scan is None else scan
     segments = features.segments[features.segments["length"] >= SHORTEST]
-    beams = np.zeros((0, BEAM_COLUMNS)) if scan is None else beams_of(features, scan)
     _, _, walls, covariance = adjust([(0.0, 0.0, 0.0)], [], [(segments, np.arange(len(segments)))])
-    return Query(walls, covariance, thinned(beams))
+    return Query(walls, covariance, thinned(beams_of(features, scan)))
+
+
+def some(rows: NDArray[Any], count: int) -> NDArray[Any]:
+    """Return so many of the rows, evenly spread, or all if there are no more."""
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.intp)])
 
 
 def thinned(beams: Array) -> Array:
     """Return one beam for each square in which beams end, the first."""
     ends = np.floor((beams[:, :2] + beams[:, 4:5] * beams[:, 2:4]) / _SQUARE).astype(np.int64)
     _, first = np.unique(ends[:, 0] * 1_000_003 + ends[:, 1], return_index=True)
-    first = np.sort(first)
-    if len(first) > MOST_BEAMS:
-        first = first[np.linspace(0, len(first) - 1, MOST_BEAMS).astype(np.intp)]
-    return np.ascontiguousarray(beams[first])
+    return np.asarray(beams[some(np.sort(first), MOST_BEAMS)])
 
 
-def beams_of(features: Features, scan: LaserScan) -> Array:
+def beams_of(features: Features, scan: LaserScan | None = None) -> Array:
     """Return the valid beams of a scan, shape (n, BEAM_COLUMNS)."""
+    scan = features.scan if scan is None else scan
+    if scan is None:
+        raise ValueError("the features have no scan, expected it as an argument")
     valid, noise = scan.valid, features.noise
     r, bearings = scan.ranges[valid], scan.angles[valid]
     beams = np.zeros((len(r), BEAM_COLUMNS))
-    beams[:, 2], beams[:, 3], beams[:, 4] = np.cos(bearings), np.sin(bearings), r
+    beams[:, 2:4], beams[:, 4], beams[:, 6] = unit(bearings), r, 1.0
     sigma = 0.02 if noise is None else np.hypot(noise.sigma, noise.proportional * r)
-    beams[:, 5], beams[:, 6] = np.square(sigma), 1.0
+    beams[:, 5] = np.square(sigma)
     return beams
 
 

@@ -13,8 +13,9 @@ from ..scan.fields import covariance_of_pose
 from .evidence import Evidence, evidence_of
 from .hypotheses import BOX, TURN, anchors, directions, hypotheses
 from .line_map import LineMap
-from .local_map import LocalMap, Query, query_of_scan
+from .local_map import LocalMap, Query, query_of_scan, some
 from .refine import COARSE, FINE, WEAK, adjusted, refined
+from .walls import lengths_of, unit, wrapped
 
 #: What `Location.verdict` may be.
 LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
@@ -132,7 +133,7 @@ def locate(
     tried = _tried(query, plan) if guess is None else _near(guess, covariance, query, plan)
     poses, found = _searched(tried, query, plan)
     if not len(poses):
-        return Location(LOST, guess or (0.0, 0.0, 0.0), np.diag((1e6, 1e6, 10.0)), _NOTHING)
+        return Location(LOST, guess or (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
     room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
     odds, where = found[0, 0], _judged(poses, found, query, plan, room)
     if where.verdict == LOCATED and guess is None:
@@ -147,7 +148,8 @@ def locate(
     return where
 
 
-#: Covariance of a guess for which none is given.
+#: Covariance of a pose of which nothing is known, and of a guess for which none is given.
+UNKNOWN = np.diag((1e6, 1e6, 10.0))
 _GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 
@@ -167,10 +169,14 @@ def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap
         steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
     tried = _tried(query, plan)
-    off = tried - guess
-    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
-    near = np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) < 16.0
-    return np.vstack((guess, tried[near]))
+    return np.vstack((guess, tried[squares_off(tried, guess, spread) < 16.0]))
+
+
+def squares_off(poses: Array, guess: Pose, covariance: Array) -> Array:
+    """Return the squares of poses (n, 3) off a guess, over its covariance."""
+    off = poses - guess
+    off[:, 2] = wrapped(off[:, 2])
+    return np.asarray(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off))
 
 
 def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
@@ -178,18 +184,16 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     if not len(tried):
         return tried, np.zeros((0, 4))
     for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
-        few = np.linspace(0, len(query.beams) - 1, min(count, len(query.beams))).astype(np.intp)
-        found = evidence_of(tried, query.beams[few], plan.index, _WIDE)
+        found = evidence_of(tried, some(query.beams, count), plan.index, _WIDE)
         tried = tried[distinct(tried, found[:, 0], _NEAR, most)]
     poses, _, _ = refined(refined(tried, query, plan.index, COARSE)[0], query, plan.index, FINE)
     found = evidence_of(poses, query.beams, plan.index, _TIGHT)
     # Poses some way off along both axes of the local map may look alike.
     best = poses[found[:, 0].argmax()]
-    lengths = np.linalg.norm(query.walls["end"] - query.walls["start"], axis=1)
-    main = np.angle((lengths * np.exp(4j * query.walls["angle"])).sum()) / 4 + best[2]
+    main = np.angle((lengths_of(query.walls) * np.exp(4j * query.walls["angle"])).sum()) / 4
     slid = np.tile(best, (2 * len(_SLIDES), 1))
-    along = np.array([(math.cos(main), math.sin(main)), (-math.sin(main), math.cos(main))])
-    slid[:, :2] += np.kron(along.T, _SLIDES).T
+    axes = unit(best[2] + main + np.array((0.0, math.pi / 2)))
+    slid[:, :2] += np.kron(axes.T, _SLIDES).T
     slid, _, _ = refined(slid, query, plan.index, FINE)
     found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
     poses = np.concatenate((poses, slid))

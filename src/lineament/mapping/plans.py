@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import LineamentError, needed_by
 from ..features import ARC, SEGMENT, Features, make_records
-from .walls import COLUMN, Merger, walls_of
+from ..scan import Array
 
 #: Metres of the units that $INSUNITS of a DXF names.
 UNITS = {
@@ -32,26 +31,11 @@ _FIELDS = {
     "radius": ("radius",),
 }  # fmt: skip
 
-Plan = tuple[NDArray[np.void], NDArray[np.void]]
 
-
-def read_plan(
-    path: str | os.PathLike[str],
-    layers: Sequence[str] | None = None,
-    units: str | None = None,
-) -> Plan:
-    """Return walls and columns of a plan by the ending of its path; see `LineMap.read`."""
-    ending = Path(path).suffix.lower()
-    if ending == ".dxf":
-        return _read_dxf(path, layers, units)
-    if ending == ".parquet":
-        return _read_table(path)
-    raise LineamentError(f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}")
-
-
-def _read_dxf(
+def read_drawing(
     path: str | os.PathLike[str], layers: Sequence[str] | None, units: str | None
-) -> Plan:
+) -> tuple[Array, Array]:
+    """Return lines (n, 2, 2) and circles ``x y r`` (m, 3) of a DXF; see `LineMap.read`."""
     with needed_by(f"{path}:"):
         import ezdxf
     try:
@@ -87,9 +71,7 @@ def _read_dxf(
         raise LineamentError(
             f"{path}: has no walls: {len(entities)} entities on {len(names)} layers, no line"
         )
-    columns, circles = np.zeros(len(rings), COLUMN), unit * np.array(rings).reshape(-1, 3)
-    columns["center"], columns["radius"], columns["views"] = circles[:, :2], circles[:, 2], 1
-    return walls_of(ends), columns
+    return ends, unit * np.array(rings).reshape(-1, 3)
 
 
 def _exploded(entities: Any, block: str = "0") -> Iterator[tuple[str, Any]]:
@@ -102,12 +84,13 @@ def _exploded(entities: Any, block: str = "0") -> Iterator[tuple[str, Any]]:
             yield layer, entity
 
 
-def _read_table(path: str | os.PathLike[str]) -> Plan:
+def read_table(path: str | os.PathLike[str]) -> Features:
+    """Return the segments and arcs of all scans of a table."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     names = {name: None for columns in _FIELDS.values() for name in columns}
-    columns = [*names, "scan", *(f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22"))]
+    columns = [*names, *(f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22"))]
     try:
         table = pq.read_table(path, columns=["kind", *columns])
     except OSError as error:
@@ -116,19 +99,13 @@ def _read_table(path: str | os.PathLike[str]) -> Plan:
         raise LineamentError(f"{path}: is no table of features: {error}") from None
     values = {name: table[name].to_numpy() for name in columns}
     kinds = np.asarray(table["kind"].to_pylist())
-    merger = Merger()
-    for scan in np.unique(values["scan"]):
-        of_scan = values["scan"] == scan
-        merger.add(
-            Features(
-                _records(SEGMENT, values, of_scan & (kinds == "segment")),
-                make_records("corners", []),
-                _records(ARC, values, of_scan & (kinds == "arc")),
-                np.empty(0, np.int32),
-                make_records("breakpoints", []),
-            )
-        )
-    return merger.result()
+    return Features(
+        _records(SEGMENT, values, kinds == "segment"),
+        make_records("corners", []),
+        _records(ARC, values, kinds == "arc"),
+        np.empty(0, np.int32),
+        make_records("breakpoints", []),
+    )
 
 
 def _records(

@@ -1,12 +1,13 @@
 """Walls and columns: their records, the segments that show them, and which of these are one."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..features import SEGMENT, Features
+from ..features import SEGMENT
 from ..motion.association import chi_square
 from ..scan import Array
 
@@ -59,12 +60,10 @@ def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Re
     Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
     """
     segments = np.concatenate([of_frame for of_frame, _ in seen], dtype=SEGMENT)
-    sights = np.zeros(len(segments), SIGHT)
+    sights = shared(segments, SIGHT)
     sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
     sights["wall"] = np.concatenate([walls for _, walls in seen])
-    for name in ("centroid", "angle", "covariance"):
-        sights[name] = segments[name]
-    sights["covariance"] += _bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
+    sights["covariance"] += bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
     for k, name in enumerate(("start", "end")):
         arm = segments[name] - segments["centroid"]
         sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
@@ -179,7 +178,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     np.minimum.at(first, w, low)
     np.maximum.at(last, w, high)
     views = np.bincount(w, minlength=count)
-    bent = misfits(sights, count) + apart**2 / 2
+    bows = misfits(sights, count) + apart**2 / 2
     order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
     kept = np.zeros(count, dtype=bool)
@@ -200,7 +199,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
         spread = _at(lines["covariance"][near], shared)
         spread += _at(lines["covariance"][[k]], (arm * u[k]).sum(axis=1))
         shorter = np.minimum(last[near] - first[near], last[k] - first[k])
-        spread += _bent(bent[near] + bent[k], shorter)
+        spread += bent(bows[near] + bows[k], shorter)
         squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
         if squares.min() < chi_square(_GATE, 2):
             labels[k], kept[k] = near[squares.argmin()], False
@@ -217,30 +216,31 @@ def misfits(sights: Records, count: int) -> Array:
 
 def bowed(walls: Records, sights: Records) -> Records:
     """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
-    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
-    walls["covariance"] += _bent(misfits(sights, len(walls)), lengths)
+    walls["covariance"] += bent(misfits(sights, len(walls)), lengths_of(walls))
     return walls
 
 
-class Merger:
-    """Walls and columns of features that are added, all in the frame of the map."""
+def walls_shown(tables: Sequence[Records]) -> Records:
+    """Return the walls that segments in the frame of the map show; parts of one are joined."""
+    segments = np.concatenate([np.zeros(0, SEGMENT), *tables])
+    with np.errstate(invalid="ignore"):
+        sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
+    segments = segments[sure & (segments["length"] >= SHORTEST)]
+    if not len(segments):
+        return np.zeros(0, WALL)
+    sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
+    pose = np.zeros((1, 3))
+    while (count := int(sights["wall"].max()) + 1) != before:
+        lines, before = lines_of(sights, pose, count), count
+        sights = merged(sights, pose, lines, 0.0)
+    return bowed(walls_along(sights, pose, lines, WHOLE), sights)
 
-    def __init__(self) -> None:
-        self._segments: list[Records] = []
-        self._columns: list[Records] = []
 
-    def add(self, features: Features) -> None:
-        """Add the features of a scan."""
-        segments = features.segments
-        with np.errstate(invalid="ignore"):
-            sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
-        self._segments.append(segments[sure & (segments["length"] >= SHORTEST)])
-        for arc in features.arcs:
-            self._see(arc)
-
-    def _see(self, arc: np.void) -> None:
-        """Make an arc part of a column, or a new one."""
-        for column in self._columns:
+def columns_shown(tables: Iterable[Records]) -> Records:
+    """Return the columns that arcs in the frame of the map show, by Kalman's update."""
+    columns: list[Records] = []
+    for arc in chain.from_iterable(tables):
+        for column in columns:
             e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
             if e @ inverse @ e < chi_square(_GATE, 3):
@@ -249,22 +249,10 @@ class Merger:
                 column["radius"] += (gain @ e)[2]
                 column["covariance"] -= gain @ column["covariance"]
                 column["views"] += 1
-                return
-        new = (arc["center"], arc["radius"], arc["covariance"], 1)
-        self._columns.append(np.array(new, COLUMN))
-
-    def result(self, min_views: int = 1) -> tuple[Records, Records]:
-        """Return walls and columns that were seen often enough; parts of one wall are joined."""
-        columns = np.array([c for c in self._columns if c["views"] >= min_views], COLUMN)
-        if not sum(map(len, self._segments)):
-            return np.zeros(0, WALL), columns
-        segments, pose = np.concatenate(self._segments), np.zeros((1, 3))
-        sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
-        while (count := int(sights["wall"].max()) + 1) != before:
-            lines, before = lines_of(sights, pose, count), count
-            sights = merged(sights, pose, lines, 0.0)
-        walls = bowed(walls_along(sights, pose, lines, WHOLE), sights)
-        return walls[walls["views"] >= min_views], columns
+                break
+        else:
+            columns.append(np.array((arc["center"], arc["radius"], arc["covariance"], 1), COLUMN))
+    return np.array(columns, COLUMN)
 
 
 def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Records:
@@ -276,6 +264,21 @@ def walls_of(ends: Array, *, side: int = 0, covariance: ArrayLike = 0.0) -> Reco
     return walls
 
 
+def segments_of(walls: Records) -> Records:
+    """Return walls as segments."""
+    segments = shared(walls, SEGMENT)
+    segments["length"], segments["n_points"] = lengths_of(walls), walls["views"]
+    return segments
+
+
+def as_walls(segments: Records) -> Records:
+    """Return segments as walls that are seen from their left."""
+    walls = shared(segments, WALL)
+    walls["side"] = walls["views"] = 1
+    walls["covariance"] += bent(segments["misfit"] ** 2, segments["length"])
+    return walls[segments["length"] > _SHORT]
+
+
 def cut(wall: np.void, first: Array, last: Array) -> Records:
     """Return parts of a wall, so far from its start [m]."""
     parts, (u,) = np.repeat(wall, len(first)), unit(wall["angle"][None])
@@ -285,9 +288,22 @@ def cut(wall: np.void, first: Array, last: Array) -> Records:
     return parts
 
 
+def shared(records: Records, dtype: np.dtype[np.void]) -> Records:
+    """Return records of another kind, of which the fields that both have are set."""
+    found = np.zeros(len(records), dtype)
+    for name in {*(dtype.names or ())} & {*(records.dtype.names or ())}:
+        found[name] = records[name]
+    return found
+
+
+def lengths_of(walls: Records) -> Array:
+    """Lengths of walls (n,) [m]."""
+    return np.asarray(np.linalg.norm(walls["end"] - walls["start"], axis=1))
+
+
 def unit(angles: Array) -> Array:
-    """Return unit vectors (n, 2) of these directions."""
-    return np.column_stack((np.cos(angles), np.sin(angles)))
+    """Return unit vectors (..., 2) of these directions."""
+    return np.stack((np.cos(angles), np.sin(angles)), axis=-1)
 
 
 def summed(values: Array, at: Numbers, count: int) -> Array:
@@ -309,7 +325,7 @@ def _at(covariances: Array, along: Array) -> Array:
     return np.asarray(lever @ covariances @ lever.transpose(0, 2, 1))
 
 
-def _bent(variance: Array | float, length: Array) -> Array:
+def bent(variance: Array | float, length: Array) -> Array:
     """Covariances of parts of walls that bow: each lies beside the whole, and is turned."""
     spread = np.zeros((len(length), 2, 2))
     spread[:, 0, 0] = variance

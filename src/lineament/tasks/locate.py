@@ -147,7 +147,7 @@ def locate_log(
 
 def plan_warning(plan: LineMap, name: object) -> str:
     """Return a line about a plan of a size that no building has, or ""."""
-    wide, deep = np.ptp(plan.ends.reshape(-1, 2), axis=0).tolist()
+    wide, deep = plan.size
     if _SMALL <= max(wide, deep) <= _LARGE:
         return ""
     return f"{name}: is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)"
