@@ -12,11 +12,12 @@ from lineament import Extractor, LaserScan
 from lineament.cli import cli, run
 from lineament.errors import LineamentError
 from lineament.evaluation.maps import absolute_errors
+from lineament.features import SEGMENT
 from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.making import make_map, onto_plan, roughness, single
+from lineament.mapping.making import bent, make_map, onto_plan, roughness, single
 from lineament.mapping.walls import SIGHT, lines_of, merged, misfits, walls_along, walls_of, wrapped
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
@@ -96,11 +97,35 @@ def test_walls_have_the_covariance_that_they_scatter_by():
     for seed in range(60):
         poses = POSES + np.random.default_rng([seed, 1]).normal(0, 0.02, POSES.shape)
         poses[0] = POSES[0]
-        lines = optimise(poses, LOOSE, sights_of_a_square(seed, 0.01, POSES), 8).with_poses()
+        sights = sights_of_a_square(seed, 0.01, POSES)
+        lines = optimise(poses, LOOSE, sights, 8).with_poses(sights)
         off = (lines["centroid"] * normals).sum(axis=1) + 4
         e = np.column_stack((off, wrapped(lines["angle"] - true_angle)))
         found.append(np.einsum("ni,nij,nj->n", e, np.linalg.inv(lines["covariance"]), e) / 2)
     assert np.mean(found) == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_segment_is_less_sure_by_its_misfit():
+    """Squares of 25 points: 4 mm² of noise and 12 of misfit; as much as noise explains; exact."""
+    segments = np.zeros(3, SEGMENT)
+    segments["rms"], segments["misfit"] = (4e-3, 1e-3, 0.0), (math.sqrt(12) * 1e-3, 2e-4, 0.0)
+    segments["n_points"], segments["covariance"] = 25, np.diag((2.0, 3.0))
+    excess = 12 / 4 - 1 / math.sqrt(25 * math.pi)
+    expected = np.array((1 + excess, 1, 1))[:, None, None] * np.diag((2.0, 3.0))
+    np.testing.assert_allclose(bent(segments)["covariance"], expected)
+
+
+def test_a_wall_whose_sights_contradict_each_other_is_less_sure():
+    """Two walls seen from two poses that are held: 1 σ to either side of one, 2 σ of the other."""
+    poses, sights = np.zeros((2, 3)), np.zeros(4, SIGHT)
+    sights["frame"], sights["wall"], sights["ends"] = (0, 1, 0, 1), (0, 0, 1, 1), (-1, 1)
+    sights["centroid"][:, 1] = np.array((-1, 1, -2, 2)) * 0.01
+    sights["covariance"] = np.eye(2) * 0.01**2
+    held = edges(poses, [(0, 1)], sigma=1e-6)
+    lines = optimise(poses, held, sights, 2).with_poses(sights)
+    # χ² of 2 and 8 with two degrees of freedom.
+    half = np.eye(2) * 0.01**2 / 2
+    np.testing.assert_allclose(lines["covariance"], [half, 4 * half], rtol=1e-4, atol=1e-9)
 
 
 def test_dense_and_sparse_equations_are_the_same(monkeypatch):
@@ -109,9 +134,9 @@ def test_dense_and_sparse_equations_are_the_same(monkeypatch):
     np.testing.assert_allclose(a.poses, b.poses, atol=1e-9)
     np.testing.assert_allclose(a.lines["centroid"], b.lines["centroid"], atol=1e-9)
     np.testing.assert_allclose(a.matrix.toarray(), b.matrix, rtol=1e-6, atol=1e-3)
-    small = a.with_poses()["covariance"]
+    small = a.with_poses(sights)["covariance"]
     monkeypatch.setattr("lineament.mapping.adjust._DENSE", 0)
-    np.testing.assert_allclose(a.with_poses()["covariance"], small, rtol=1e-6)
+    np.testing.assert_allclose(a.with_poses(sights)["covariance"], small, rtol=1e-6)
 
 
 def test_what_another_wall_hides_is_left_out():

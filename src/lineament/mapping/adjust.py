@@ -76,9 +76,17 @@ class Adjusted:
     gain: Any
     matrix: Any
 
-    def with_poses(self) -> Records:
-        """Return the lines with covariances that hold those of the poses."""
+    def with_poses(self, sights: Records) -> Records:
+        """Return the lines with covariances that hold those of the poses.
+
+        Walls whose sights contradict each other are less sure, by their χ² (Birge).
+        """
         lines, is_small = self.lines.copy(), self.matrix.shape[0] <= _DENSE
+        off, w = errors(sights, self.poses, lines)[0], sights["wall"]
+        sure = robust(off, np.linalg.inv(sights["covariance"]))
+        squares = np.bincount(w, np.einsum("ni,nij,nj->n", off, sure, off), len(lines))
+        freedom = 2.0 * np.maximum(np.bincount(w, minlength=len(lines)) - 1, 1)
+        lines["covariance"] *= np.maximum(squares / freedom, 1.0)[:, None, None]
         # One inverse is quicker than a solution for each wall.
         solve = _inverse_of(self.matrix) if is_small else _solver(self.matrix)
         for first in range(0, len(lines), _BATCH):

@@ -27,10 +27,11 @@ from .walls import (
     wrapped,
 )
 
-#: Surfaces are thought to be off straight lines by so much at first [m].
-_ROUGH = 0.01
+#: Surfaces are thought to be off straight lines by so much at first [m]; how much they are is found
+#: so many times: where the first is wrong, the poses are off too.
+_ROUGH, _SETTLED = 0.01, 2
 #: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
-_OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-4, 0.05, 0.4549
+_OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of a motion is known by the walls already: of motions and loops, a 25th counts,
 #: and nothing of motions below these deviations [m, m, rad].
 _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
@@ -39,7 +40,7 @@ _UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Walls are merged so many times once loops are closed; so much off are one [m].
-_MERGED, _APART = 2, 0.03
+_MERGED, _APART = 2, 0.015
 #: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: A wall was seen by so many key frames.
@@ -74,12 +75,15 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         for frame in frames[1:]
     ]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
-    seen = [(frame.features.segments, frame.walls) for frame in frames]
+    seen = [(bent(frame.features.segments), frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
         raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
-    found = optimise(poses, chain, sights, _count(sights))
-    sights = sights_of(seen, roughness(sights, found.poses, found.lines))
+    rough = _ROUGH
+    for _ in range(_SETTLED):
+        found = optimise(poses, chain, sights, _count(sights))
+        rough = roughness(sights, found.poses, found.lines, rough)
+        sights, poses = sights_of(seen, rough), found.poses
     loops, refused = edges_of([], [], []), 0
     for k, spread in enumerate(_SPREADS):
         if k:
@@ -97,11 +101,23 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
         sights = merged(sights, found.poses, found.lines, _APART)
     found = optimise(found.poses, chain, sights, _count(sights), rounds=3)
-    survey = Survey(frames, found.poses, sights, found.with_poses())
+    survey = Survey(frames, found.poses, sights, found.with_poses(sights))
     least = min(_VIEWS, len(frames))
     walls = single(walls_along(sights, found.poses, survey.lines, views=least))
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     return DriveMap(LineMap(walls), every, survey, loops, refused)
+
+
+def bent(segments: Records) -> Records:
+    """Return segments whose covariances, of noise alone, are larger by their misfits (Birge).
+
+    What noise alone explains of a misfit, on average, does not count.
+    """
+    result, misfit = segments.copy(), segments["misfit"] ** 2
+    noise = np.maximum(segments["rms"] ** 2 - misfit, 1e-18)
+    excess = misfit / noise - 1 / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
+    result["covariance"] *= 1 + np.maximum(excess, 0.0)[:, None, None]
+    return result
 
 
 def single(walls: Records) -> Records:
@@ -134,18 +150,19 @@ def _count(sights: Records) -> int:
     return int(sights["wall"].max()) + 1
 
 
-def roughness(sights: Records, poses: Array, lines: Records) -> float:
+def roughness(sights: Records, poses: Array, lines: Records, before: float = _ROUGH) -> float:
     """Return how far surfaces are from straight [m], by how far sights are off their walls.
 
     With it, the median of the squared offsets over their variances is that of χ², of the sights of
-    walls that were seen often; the wall itself takes its part of them.
+    walls that were seen often; the wall itself takes its part of them. Their variances hold what
+    was thought before [m].
     """
     views = np.bincount(sights["wall"])[sights["wall"]]
     often = views >= _OFTEN
     if not often.any():
         return _ROUGH
     squares = errors(sights, poses, lines)[0][often, 0] ** 2 / (1 - 1 / views[often])
-    own = sights["covariance"][often, 0, 0] - _ROUGH**2
+    own = sights["covariance"][often, 0, 0] - before**2
     tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
     right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
     return next(right, _ROUGHEST)
