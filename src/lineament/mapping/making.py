@@ -75,7 +75,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         for frame in frames[1:]
     ]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
-    seen = [(bent(frame.features.segments), frame.walls) for frame in frames]
+    seen = [(widened(frame.features.segments), frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
         raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
@@ -108,7 +108,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     return DriveMap(LineMap(walls), every, survey, loops, refused)
 
 
-def bent(segments: Records) -> Records:
+def widened(segments: Records) -> Records:
     """Return segments whose covariances, of noise alone, are larger by their misfits (Birge).
 
     What noise alone explains of a misfit, on average, does not count.
