@@ -39,7 +39,7 @@ _ROUNDS = 4
 #: more where the deviation of what is expected is larger than that [m].
 _SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
 #: Poses are tried by so many beams; so many of them are refined.
-_BEAMS, _FEW, _TRIED = 120, 40, 32
+_BEAMS, _SIFTED = 120, ((12, 100), (40, 32))
 #: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
 _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
@@ -140,23 +140,27 @@ class Drive:
             return motion, False
         tried = self._tried(features, prior, way, turn)
 
-        def scores(poses: Array, beams: Array, wide: float) -> Array:
-            odds = evidence_of(poses, beams, self._index, wide, _MILD)[:, 0]
-            return np.asarray(odds - 0.5 * squares_off(poses, prior, spread))
+        def scores(poses: Array, count: int, wide: float) -> Array:
+            """Of so many of the beams, which are weighed against that share of the prior."""
+            few = some(beams, count)
+            odds = evidence_of(poses, few, self._index, wide, _MILD)[:, 0]
+            share = len(few) / max(len(beams), 1)
+            return np.asarray(odds - 0.5 * share * squares_off(poses, prior, spread))
 
-        kept = distinct(tried, scores(tried, some(beams, _FEW), _WIDE), _APART, _TRIED)
-        poses = np.concatenate((tried[kept], [motion.pose]))
+        for count, most in _SIFTED:
+            tried = tried[distinct(tried, scores(tried, count, _WIDE), _APART, most)]
+        poses = np.concatenate((tried, [motion.pose]))
         walls = as_walls(features.segments)
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        fine_scores = scores(poses, beams, _TIGHT)
+        fine_scores = scores(poses, _BEAMS, _TIGHT)
         fine_scores[-1] += 0.5
         x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
-        matched, found = scores(np.array([motion.pose, best.pose]), beams, _TIGHT)
+        matched, found = scores(np.array([motion.pose, best.pose]), _BEAMS, _TIGHT)
         if found > matched + 1.0:
             motion = best
         return motion, self._explained(motion, beams, _PASSED) < _LOST
