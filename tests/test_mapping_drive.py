@@ -17,7 +17,7 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.making import bent, make_map, onto_plan, roughness, single
+from lineament.mapping.making import make_map, onto_plan, roughness, single, widened
 from lineament.mapping.walls import SIGHT, lines_of, merged, misfits, walls_along, walls_of, wrapped
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
@@ -112,7 +112,7 @@ def test_a_segment_is_less_sure_by_its_misfit():
     segments["n_points"], segments["covariance"] = 25, np.diag((2.0, 3.0))
     excess = 12 / 4 - 1 / math.sqrt(25 * math.pi)
     expected = np.array((1 + excess, 1, 1))[:, None, None] * np.diag((2.0, 3.0))
-    np.testing.assert_allclose(bent(segments)["covariance"], expected)
+    np.testing.assert_allclose(widened(segments)["covariance"], expected)
 
 
 def test_a_wall_whose_sights_contradict_each_other_is_less_sure():
@@ -190,7 +190,7 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
             sights = sights_of_a_square(seed, 0.005, POSES, rough)
             sights["covariance"] += 0.01**2 * np.diag((1, 1))  # as surfaces are thought to be
             result = optimise(POSES, LOOSE, sights, 8)
-            found.append(roughness(sights, result.poses, result.lines))
+            found.append(roughness(sights, result.poses, 0.01))
         assert 0.75 * rough <= np.mean(found) <= 1.1 * rough + 1e-3
         # Parts that are apart are two walls: nobody has seen what is between them.
         labels = merged(sights, result.poses, result.lines, 0.03)["wall"]

@@ -45,7 +45,7 @@ _WIDE, _TIGHT = 0.12, 0.04
 #: Poses that are tried are so far from each other [m, rad].
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
-_LOST = 0.35
+_LOST = 0.38
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 #: A plan of one wall where no beam ends [m], for where there are no walls.

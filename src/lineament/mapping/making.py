@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import LineamentError
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
-from .adjust import edges_of, optimise
+from .adjust import Adjusted, edges_of, optimise
 from .drive_map import KeyFrame
 from .line_map import LineMap
 from .locate import locate
@@ -27,9 +27,8 @@ from .walls import (
     wrapped,
 )
 
-#: Surfaces are thought to be off straight lines by so much at first [m]; how much they are is found
-#: so many times: where the first is wrong, the poses are off too.
-_ROUGH, _SETTLED = 0.01, 2
+#: Surfaces are thought to be off straight lines by so much at first [m].
+_ROUGH = 0.01
 #: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
 _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of a motion is known by the walls already: of motions and loops, a 25th counts,
@@ -75,15 +74,36 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         for frame in frames[1:]
     ]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
-    seen = [(widened(frame.features.segments), frame.walls) for frame in frames]
+    seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
         raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
-    rough = _ROUGH
-    for _ in range(_SETTLED):
-        found = optimise(poses, chain, sights, _count(sights))
-        rough = roughness(sights, found.poses, found.lines, rough)
-        sights, poses = sights_of(seen, rough), found.poses
+    found = optimise(poses, chain, sights, _count(sights))
+    rough = roughness(sights, found.poses, _ROUGH)
+    sights = sights_of(seen, rough)
+    found, loops, refused = closed(frames, chain, found, sights)
+    weak = loops.copy()
+    weak["information"] /= _TWICE
+    weak["loop"] = False
+    for _ in range(_MERGED if len(loops) else 0):
+        found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
+        sights = merged(sights, found.poses, found.lines, _APART)
+    # Misfits say how sure walls are; which are one, and where loops are, is known without them.
+    bent = [(widened(segments), walls) for segments, walls in seen]
+    again = relabelled(sights_of(bent, rough), sights)
+    sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
+    found = optimise(found.poses, chain, sights, _count(sights), rounds=3)
+    survey = Survey(frames, found.poses, sights, found.with_poses(sights))
+    least = min(_VIEWS, len(frames))
+    walls = single(walls_along(sights, found.poses, survey.lines, views=least))
+    every = [compose(survey.pose(k), pose) for k, pose in scans]
+    return DriveMap(LineMap(walls), every, survey, loops, refused)
+
+
+def closed(
+    frames: list[KeyFrame], chain: Records, found: Adjusted, sights: Records
+) -> tuple[Adjusted, Records, int]:
+    """Return the poses with their loops closed, these loops, and how many others contradict."""
     loops, refused = edges_of([], [], []), 0
     for k, spread in enumerate(_SPREADS):
         if k:
@@ -94,18 +114,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
             found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
             right = found.weights[len(chain) :] > 0.5
             loops, refused = near[right], int((~right).sum())
-    weak = loops.copy()
-    weak["information"] /= _TWICE
-    weak["loop"] = False
-    for _ in range(_MERGED if len(loops) else 0):
-        found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
-        sights = merged(sights, found.poses, found.lines, _APART)
-    found = optimise(found.poses, chain, sights, _count(sights), rounds=3)
-    survey = Survey(frames, found.poses, sights, found.with_poses(sights))
-    least = min(_VIEWS, len(frames))
-    walls = single(walls_along(sights, found.poses, survey.lines, views=least))
-    every = [compose(survey.pose(k), pose) for k, pose in scans]
-    return DriveMap(LineMap(walls), every, survey, loops, refused)
+    return found, loops, refused
 
 
 def widened(segments: Records) -> Records:
@@ -150,18 +159,25 @@ def _count(sights: Records) -> int:
     return int(sights["wall"].max()) + 1
 
 
-def roughness(sights: Records, poses: Array, lines: Records, before: float = _ROUGH) -> float:
+def relabelled(sights: Records, like: Records) -> Records:
+    """Return the sights with the walls of others, of the same segments."""
+    sights["wall"] = like["wall"]
+    return sights
+
+
+def roughness(sights: Records, poses: Array, before: float) -> float:
     """Return how far surfaces are from straight [m], by how far sights are off their walls.
 
     With it, the median of the squared offsets over their variances is that of χ², of the sights of
-    walls that were seen often; the wall itself takes its part of them. Their variances hold what
-    was thought before [m].
+    walls that were seen often; the wall itself takes its part of them. The covariances of the
+    sights hold what was thought `before` [m].
     """
     views = np.bincount(sights["wall"])[sights["wall"]]
     often = views >= _OFTEN
     if not often.any():
-        return _ROUGH
-    squares = errors(sights, poses, lines)[0][often, 0] ** 2 / (1 - 1 / views[often])
+        return before
+    off = errors(sights, poses, lines_of(sights, poses, _count(sights)))[0][often, 0]
+    squares = off**2 / (1 - 1 / views[often])
     own = sights["covariance"][often, 0, 0] - before**2
     tried: list[float] = np.geomspace(_SMOOTHEST, _ROUGHEST, 60).tolist()
     right = (r for r in tried if np.median(squares / (own + r**2)) <= _MEDIAN)
