@@ -33,7 +33,7 @@ EDGE = np.dtype(
 #: Loops that are off by more than so many deviations count less; at first, by so many times more,
 #: which takes so many more rounds.
 _KERNEL, _WIDE, _WIDER = 3.0, 256.0, 4
-_ROUNDS, _SMALL = 6, 1e-4
+_ROUNDS, _SMALL = 4, 1e-4
 #: Information of the pose that is held: 3 µm and 3 µrad are far below the deviations of walls.
 _HELD = 1e11
 #: Walls whose covariances are found at a time; of larger matrices no inverse is made.

@@ -38,8 +38,8 @@ _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
 _UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
-#: Walls are merged so many times once loops are closed; so much off are one [m].
-_MERGED, _APART = 2, 0.015
+#: Surfaces that are so much off a common line are one wall [m].
+_APART = 0.015
 #: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
 _PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: A wall was seen by so many key frames.
@@ -82,17 +82,17 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
     found, loops, refused = closed(frames, chain, found, sights)
-    weak = loops.copy()
-    weak["information"] /= _TWICE
-    weak["loop"] = False
-    for _ in range(_MERGED if len(loops) else 0):
+    if len(loops):
+        weak = loops.copy()
+        weak["information"] /= _TWICE
+        weak["loop"] = False
         found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
         sights = merged(sights, found.poses, found.lines, _APART)
     # Misfits say how sure walls are; which are one, and where loops are, is known without them.
     bent = [(widened(segments), walls) for segments, walls in seen]
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
-    found = optimise(found.poses, chain, sights, _count(sights), rounds=3)
+    found = optimise(found.poses, chain, sights, _count(sights), rounds=2)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights))
     least = min(_VIEWS, len(frames))
     walls = single(walls_along(sights, found.poses, survey.lines, views=least))
