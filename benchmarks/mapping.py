@@ -26,9 +26,8 @@ from lineament.logs import open_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.loops import moved
 from lineament.mapping.making import make_map
-from lineament.mapping.walls import walls_of, wrapped
+from lineament.mapping.walls import moved, walls_of, wrapped
 from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, Wheels, office
 

@@ -8,21 +8,8 @@ import numpy as np
 
 from ..errors import needed_by
 from ..scan import Array, Pose
-from .walls import (
-    SIGHT,
-    WHOLE,
-    Numbers,
-    Records,
-    bowed,
-    errors,
-    lines_of,
-    move,
-    robust,
-    sights_of,
-    summed,
-    walls_along,
-    wrapped,
-)
+from .sights import SIGHT, WHOLE, bowed, errors, lines_of, move, robust, sights_of, walls_along
+from .walls import Numbers, Records, summed, wrapped
 
 #: A motion between two poses: their indices, the second in the frame of the first [m, m, rad], its
 #: inverse covariance, and whether it may be wrong: a loop.

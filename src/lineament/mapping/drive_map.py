@@ -16,7 +16,8 @@ from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .walls import WHOLE, Numbers, as_walls, lines_of, segments_of, sights_of, walls_along, wrapped
+from .sights import WHOLE, lines_of, sights_of, walls_along
+from .walls import Numbers, as_walls, segments_of, wrapped
 
 #: How surfaces are off straight lines [m].
 _ROUGHNESS = 0.01

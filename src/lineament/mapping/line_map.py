@@ -18,7 +18,8 @@ from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .hypotheses import anchors, meetings
 from .plans import read_drawing, read_table
-from .walls import COLUMN, columns_shown, lengths_of, segments_of, shared, walls_of, walls_shown
+from .sights import columns_shown, walls_shown
+from .walls import COLUMN, lengths_of, segments_of, shared, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0

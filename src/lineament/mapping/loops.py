@@ -1,6 +1,5 @@
 """Loops: places that were seen before, found by `locate` alone."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,7 +13,8 @@ from .drive_map import KeyFrame
 from .line_map import LineMap
 from .local_map import Query, beams_of, moved_beams, thinned
 from .locate import locate
-from .walls import Records, walls_along, wrapped
+from .sights import walls_along
+from .walls import Records, moved
 
 #: What is looked for is of this way before a key frame; where, of this way around another [m].
 _QUERY, _PLAN = 5.0, 5.0
@@ -106,13 +106,3 @@ class Survey:
         runs = np.split(near, np.flatnonzero(np.diff(near) > 5) + 1) if len(near) else []
         best = sorted((float(away[run].min()), int(run[away[run].argmin()])) for run in runs)
         return [4 * (j // 4) for _, j in best[:_STRETCHES]]
-
-
-def moved(walls: Records, frame: Pose) -> Records:
-    """Return walls in another frame, whose pose is given."""
-    found, (x, y, theta) = walls.copy(), frame
-    c, s = math.cos(theta), math.sin(theta)
-    for name in ("start", "end", "centroid"):
-        found[name] = (walls[name] - (x, y)) @ np.array([[c, -s], [s, c]])
-    found["angle"] = wrapped(walls["angle"] - theta)
-    return found

@@ -13,19 +13,9 @@ from .adjust import Adjusted, edges_of, optimise
 from .drive_map import KeyFrame
 from .line_map import LineMap
 from .locate import locate
-from .loops import Survey, moved
-from .walls import (
-    SHORTEST,
-    Records,
-    cut,
-    errors,
-    lines_of,
-    merged,
-    sights_of,
-    unit,
-    walls_along,
-    wrapped,
-)
+from .loops import Survey
+from .sights import errors, lines_of, merged, sights_of, walls_along
+from .walls import SHORTEST, Records, cut, moved, unit, wrapped
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01

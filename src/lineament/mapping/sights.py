@@ -1,0 +1,247 @@
+"""Sights: the segments that show walls, the lines that they lie on, and which of these are one."""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import chain
+
+import numpy as np
+
+from ..features import SEGMENT
+from ..motion.association import chi_square
+from ..scan import Array
+from .walls import (
+    COLUMN,
+    SHORT,
+    SHORTEST,
+    WALL,
+    Numbers,
+    Records,
+    bent,
+    covariance_at,
+    lengths_of,
+    shared,
+    summed,
+    unit,
+    wrapped,
+)
+
+#: A segment as a key frame sees it, in the frame of the sensor: the numbers of both, its ends along
+#: it from its centroid [m], its squared misfit, and how much of that noise alone explains [m²].
+SIGHT = np.dtype(
+    [("frame", "i8"), ("wall", "i8"), ("centroid", "f8", 2), ("angle", "f8"),
+     ("covariance", "f8", (2, 2)), ("ends", "f8", 2), ("misfit", "f8"),
+     ("noise", "f8")]
+)  # fmt: skip
+
+#: Walls on one line are one wall if no more lies between them [m]: a door is wider; whole ones.
+GAP, WHOLE = 0.2, 1e4
+#: Segments that are less sure of their direction make no wall of a plan [rad].
+LEAST_SURE = 0.2
+#: Sights beyond so many deviations count less.
+_KERNEL = 3.0
+#: Where no more than this share of the most sights goes on, a wall ends.
+_SHARE = 0.2
+#: Lines whose directions differ by more are never one [rad]; share of the parts of a wall that the
+#: tests keep together.
+_TURN, _GATE = 0.35, 0.99
+
+
+def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Records:
+    """Return records of `SIGHT` of the segments of key frames, with the number of each's wall.
+
+    Their surfaces are `rough` [m], each time elsewhere; the shortest are left out.
+    """
+    segments = np.concatenate([of_frame for of_frame, _ in seen], dtype=SEGMENT)
+    sights = shared(segments, SIGHT)
+    sights["frame"] = np.repeat(np.arange(len(seen)), [len(walls) for _, walls in seen])
+    sights["wall"] = np.concatenate([walls for _, walls in seen])
+    sights["covariance"] += bent(rough**2, segments["length"]) + 1e-18 * np.eye(2)
+    for k, name in enumerate(("start", "end")):
+        arm = segments[name] - segments["centroid"]
+        sights["ends"][:, k] = (arm * unit(segments["angle"])).sum(axis=1)
+    sights["misfit"] = segments["misfit"] ** 2
+    noise = np.maximum(segments["rms"] ** 2 - sights["misfit"], 0.0)
+    sights["noise"] = noise / np.sqrt(math.pi * np.maximum(segments["n_points"], 1))
+    return sights[segments["length"] > SHORT]
+
+
+def placed(sights: Records, poses: Array) -> tuple[Array, Array]:
+    """Centroids (m, 2) and angles (m,) in the frame of the poses (n, 3)."""
+    at = poses[sights["frame"]]
+    (c, s), (x, y) = unit(at[:, 2]).T, sights["centroid"].T
+    moved = np.column_stack((at[:, 0] + c * x - s * y, at[:, 1] + s * x + c * y))
+    return moved, at[:, 2] + sights["angle"]
+
+
+def errors(sights: Records, poses: Array, lines: Records) -> tuple[Array, Array, Array]:
+    """Offsets and angles (m, 2) off the walls, and their derivatives by pose and wall."""
+    (places, angles), line = placed(sights, poses), lines[sights["wall"]]
+    u, arm = unit(line["angle"]), places - line["centroid"]
+    of_pose, of_wall = np.zeros((len(u), 2, 3)), np.zeros((len(u), 2, 2))
+    of_pose[:, 0, 0], of_pose[:, 0, 1], of_pose[:, 1, 2] = -u[:, 1], u[:, 0], 1.0
+    of_pose[:, 0, 2] = (u * (places - poses[sights["frame"], :2])).sum(axis=1)
+    of_wall[:, 0, 0] = of_wall[:, 1, 1] = -1.0
+    of_wall[:, 0, 1] = -(u * arm).sum(axis=1)
+    offsets = u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
+    return np.column_stack((offsets, wrapped(angles - line["angle"]))), of_pose, of_wall
+
+
+def extents(sights: Records, poses: Array, lines: Records) -> tuple[Array, Array]:
+    """From where to where along its wall each sight goes, from the wall's centroid on [m]."""
+    (places, angles), line = placed(sights, poses), lines[sights["wall"]]
+    along = ((places - line["centroid"]) * unit(line["angle"])).sum(axis=1)
+    ends = along[:, None] + sights["ends"] * np.cos(angles - line["angle"])[:, None]
+    return ends.min(axis=1), ends.max(axis=1)
+
+
+def lines_of(sights: Records, poses: Array, count: int) -> Records:
+    """Return the line of each wall, a `WALL` without ends, as if the poses were known.
+
+    From the mean of its sights on, by robust least squares.
+    """
+    (places, angles), w, lines = placed(sights, poses), sights["wall"], np.zeros(count, WALL)
+    sure, firm = (1.0 / sights["covariance"][:, k, k, None] for k in range(2))
+    lines["angle"] = np.arctan2(*summed(firm * unit(angles), w, count).T[::-1])
+    total = np.maximum(summed(sure, w, count), 1e-12)
+    lines["centroid"] = summed(sure * places, w, count) / total
+    information = np.linalg.inv(sights["covariance"])
+    for _ in range(2):
+        off, _, of_wall = errors(sights, poses, lines)
+        weighted = of_wall.transpose(0, 2, 1) @ robust(off, information)
+        own = summed(weighted @ of_wall, w, count)
+        lines["covariance"] = np.linalg.inv(own + 1e-6 * np.eye(2))
+        step = lines["covariance"] @ summed(weighted @ off[:, :, None], w, count)
+        move(lines, -step[:, :, 0])
+    return lines
+
+
+def move(lines: Records, steps: Array) -> None:
+    """Move lines by offsets and turns (w, 2)."""
+    u = unit(lines["angle"])
+    lines["centroid"] += steps[:, :1] * np.column_stack((-u[:, 1], u[:, 0]))
+    lines["angle"] = wrapped(lines["angle"] + steps[:, 1])
+
+
+def robust(off: Array, information: Array) -> Array:
+    """Information of errors (m, k), of which those beyond 3 deviations count less."""
+    squares = np.einsum("ni,nij,nj->n", off, information, off)
+    share: Array = _KERNEL**2 / np.maximum(squares, _KERNEL**2)
+    return information * share[:, None, None]
+
+
+def walls_along(
+    sights: Records, poses: Array, lines: Records, gap: float = GAP, views: int = 1
+) -> Records:
+    """Return walls along their lines, as far as sights lie no farther apart than a gap [m].
+
+    Each part was seen so often. If that is more than once, a wall ends where hardly any sight goes
+    on: at a grazing angle, a few cross doorways.
+    """
+    low, high = extents(sights, poses, lines)
+    w, places = np.tile(sights["wall"], 2), np.concatenate((low, high + gap))
+    order = np.lexsort((places, w))
+    w, places, begins = w[order], places[order], order < len(low)
+    cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(len(lines))
+    np.maximum.at(most, w, cover)
+    edges = np.flatnonzero(np.diff(cover > (_SHARE * most[w] if views > 1 else 0), prepend=False))
+    seen: Numbers = np.cumsum(begins)[edges[1::2]] - np.cumsum(~begins)[edges[::2]]
+    first, last = edges.reshape(-1, 2)[seen >= views].T
+    walls: Records = lines[w[first]]
+    begin, end = places[first], places[last] - gap
+    middle = np.where((begin < 0) & (end > 0), 0.0, (begin + end) / 2)
+    u, origin = unit(walls["angle"]), walls["centroid"].copy()
+    for name, along in (("start", begin), ("end", end), ("centroid", middle)):
+        walls[name] = origin + along[:, None] * u
+    walls["covariance"] = covariance_at(walls["covariance"], middle)
+    walls["side"], walls["views"] = 1, seen[seen >= views]
+    return walls
+
+
+def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Records:
+    """Return the sights with a number for each wall that is the same for those that are one.
+
+    They are one if they face the same way, lie along each other or no farther apart than a gap,
+    and the χ² of their common line is within its 99 % quantile; surfaces are off it by their
+    misfits and `apart` [m]. The most often seen come first, and of these the longest.
+    """
+    count, w, points = len(lines), sights["wall"], lines["centroid"]
+    first, last = np.full(count, 1e9), np.full(count, -1e9)
+    low, high = extents(sights, poses, lines)
+    np.minimum.at(first, w, low)
+    np.maximum.at(last, w, high)
+    views = np.bincount(w, minlength=count)
+    bows = misfits(sights, count) + apart**2 / 2
+    order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
+    ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
+    kept = np.zeros(count, dtype=bool)
+    for k in order[views[order] > 0].tolist():
+        near = np.flatnonzero(kept & (abs(wrapped(lines["angle"] - lines["angle"][k])) < _TURN))
+        along = ((ends[k] - points[near, None]) * u[near, None]).sum(axis=2)
+        begin, end = along.min(axis=1), along.max(axis=1)
+        beside = (begin < last[near] + GAP) & (end > first[near] - GAP)
+        near, begin, end = near[beside], begin[beside], end[beside]
+        kept[k] = True
+        if not len(near):
+            continue
+        # The middle of what they share, or of what is between them.
+        shared = (np.maximum(begin, first[near]) + np.minimum(end, last[near])) / 2
+        arm = points[near] + shared[:, None] * u[near] - points[k]
+        off = np.column_stack((arm[:, 0] * u[k, 1] - arm[:, 1] * u[k, 0],
+                               wrapped(lines["angle"][k] - lines["angle"][near])))  # fmt: skip
+        spread = covariance_at(lines["covariance"][near], shared)
+        spread += covariance_at(lines["covariance"][[k]], (arm * u[k]).sum(axis=1))
+        shorter = np.minimum(last[near] - first[near], last[k] - first[k])
+        spread += bent(bows[near] + bows[k], shorter)
+        squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
+        if squares.min() < chi_square(_GATE, 2):
+            labels[k], kept[k] = near[squares.argmin()], False
+    result = sights.copy()
+    result["wall"] = np.unique(labels, return_inverse=True)[1][w]
+    return result
+
+
+def misfits(sights: Records, count: int) -> Array:
+    """Return the mean squared misfit of each wall [m²], less what noise alone explains."""
+    w, views = sights["wall"], np.maximum(np.bincount(sights["wall"], minlength=count), 1)
+    return np.maximum(np.bincount(w, sights["misfit"] - sights["noise"], count) / views, 0.0)
+
+
+def bowed(walls: Records, sights: Records) -> Records:
+    """Return walls, whole and in order, whose covariances hold the mean misfit of their sights."""
+    walls["covariance"] += bent(misfits(sights, len(walls)), lengths_of(walls))
+    return walls
+
+
+def walls_shown(tables: Sequence[Records]) -> Records:
+    """Return the walls that segments in the frame of the map show; parts of one are joined."""
+    segments = np.concatenate([np.zeros(0, SEGMENT), *tables])
+    with np.errstate(invalid="ignore"):
+        sure = segments["covariance"][:, 1, 1] < LEAST_SURE**2
+    segments = segments[sure & (segments["length"] >= SHORTEST)]
+    if not len(segments):
+        return np.zeros(0, WALL)
+    sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
+    pose = np.zeros((1, 3))
+    while (count := int(sights["wall"].max()) + 1) != before:
+        lines, before = lines_of(sights, pose, count), count
+        sights = merged(sights, pose, lines, 0.0)
+    return bowed(walls_along(sights, pose, lines, WHOLE), sights)
+
+
+def columns_shown(tables: Iterable[Records]) -> Records:
+    """Return the columns that arcs in the frame of the map show, by Kalman's update."""
+    columns: list[Records] = []
+    for arc in chain.from_iterable(tables):
+        for column in columns:
+            e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
+            inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
+            if e @ inverse @ e < chi_square(_GATE, 3):
+                gain = column["covariance"] @ inverse
+                column["center"] += (gain @ e)[:2]
+                column["radius"] += (gain @ e)[2]
+                column["covariance"] -= gain @ column["covariance"]
+                column["views"] += 1
+                break
+        else:
+            columns.append(np.array((arc["center"], arc["radius"], arc["covariance"], 1), COLUMN))
+    return np.array(columns, COLUMN)
