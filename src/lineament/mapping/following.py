@@ -144,7 +144,8 @@ class Follower:
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
         x, y, _ = compose((0.0, 0.0, self._pose[2]), skew)
-        blurred = np.outer(off := (x, y, skew[2]), off)
+        off = np.array((x, y, skew[2]))
+        blurred = np.outer(off, off)
         evidence = self._judge(features)
         if self._missed > MOST_MISSED or was_known > self.is_known:
             # What was seen before may be of another place: this scan begins anew.
