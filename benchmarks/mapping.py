@@ -96,10 +96,11 @@ def judged(name, about, poses, truth, relations, doubled=None):
 
 
 def rows(name, scans, truth, relations, odometry=False):
-    started = time.process_time()
+    clocks = time.process_time, time.perf_counter
+    started = [clock() for clock in clocks]
     found = drive(scans, odometry)
     made = make_map(found.frames, found.scans)
-    seconds = time.process_time() - started
+    used, seconds = (clock() - start for clock, start in zip(clocks, started, strict=True))
     ends = made.map.ends.reshape(-1, 4)
     length = np.hypot(*(ends[:, 2:] - ends[:, :2]).T).sum()
     about = f"{doubled_walls(ends):.0f} of {length:.0f}"
@@ -110,8 +111,8 @@ def rows(name, scans, truth, relations, odometry=False):
     lost = sum(frame.is_lost for frame in found.frames)
     print(
         f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
-        f"{len(made.loops)} loops, {made.refused} refused; {seconds:.0f} s of processor, played in "
-        f"{played:.0f} s: {played / seconds:.1f} x -->"
+        f"{len(made.loops)} loops, {made.refused} refused; played in {played:.0f} s; {used:.1f} s of "
+        f"processor: {played / used:.1f} x; {seconds:.1f} s by the clock: {played / seconds:.1f} x -->"
     )
     return found, made
 
