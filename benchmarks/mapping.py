@@ -111,8 +111,9 @@ def rows(name, scans, truth, relations, odometry=False):
     lost = sum(frame.is_lost for frame in found.frames)
     print(
         f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
-        f"{len(made.loops)} loops, {made.refused} refused; played in {played:.0f} s; {used:.1f} s of "
-        f"processor: {played / used:.1f} x; {seconds:.1f} s by the clock: {played / seconds:.1f} x -->"
+        f"{len(made.loops)} loops, {made.refused} refused; played in {played:.0f} s; "
+        f"{used:.1f} s of processor: {played / used:.1f} x; "
+        f"{seconds:.1f} s by the clock: {played / seconds:.1f} x -->"
     )
     return found, made
 
