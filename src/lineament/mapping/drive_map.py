@@ -39,7 +39,7 @@ _ROUNDS = 4
 #: With at least this share of the beams explained, less contradicted, a place is taken at once;
 #: more where the deviation of what is expected is larger than that [m].
 _SURE, _SURER, _NARROW = 0.75, 0.97, 0.1
-#: Poses are tried by so many beams; so many of them are refined.
+#: Beams that judge a pose; before, fewer beams, and how many poses they leave.
 _BEAMS, _SIFTED = 120, ((12, 100), (40, 32))
 #: Errors of beams and walls beside their covariances, where poses are tried, and judged [m].
 _WIDE, _TIGHT = 0.12, 0.04
@@ -142,7 +142,7 @@ class Drive:
         tried = self._tried(features, prior, way, turn)
 
         def scores(poses: Array, count: int, wide: float) -> Array:
-            """Of so many of the beams, which are weighed against that share of the prior."""
+            """Judge poses by so many of the beams, against that share of the prior."""
             few = some(beams, count)
             odds = evidence_of(poses, few, self._index, wide, _MILD)[:, 0]
             share = len(few) / max(len(beams), 1)

@@ -15,7 +15,7 @@ from .line_map import LineMap
 from .locate import locate
 from .loops import Survey
 from .sights import errors, lines_of, merged, sights_of, walls_along
-from .walls import SHORTEST, Records, cut, moved, unit, wrapped
+from .walls import SHORTEST, Records, cut, lengths_of, moved, unit, wrapped
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -78,7 +78,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         weak["loop"] = False
         found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
         sights = merged(sights, found.poses, found.lines, _APART)
-    # Misfits say how sure walls are; which are one, and where loops are, is known without them.
+    # Misfits widen the covariances only here: from the start, they have right loops refused.
     bent = [(widened(segments), walls) for segments, walls in seen]
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
@@ -125,7 +125,7 @@ def single(walls: Records) -> Records:
     Of two surfaces so close that face the same way, the one behind could not be seen: they are one
     surface, drawn twice, like the chords of a wall that bends.
     """
-    lengths = np.linalg.norm(walls["end"] - walls["start"], axis=1)
+    lengths = lengths_of(walls)
     kept = walls[:0]
     for k in np.lexsort((-lengths, -walls["views"])).tolist():
         u, before = unit(walls["angle"][[k]])[0], unit(kept["angle"])
@@ -190,10 +190,10 @@ def joined(survey: Survey) -> Array:
 
 
 def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
-    """Return the motion that puts the key frames from the first on where the plan shows them.
+    """Return the motion that puts the key frames from `first` on where the plan shows them.
 
-    Places along the way are looked for without a first guess; that on which most of those agree
-    which are located.
+    Places along the way are looked for without a first guess; most of those that are located agree
+    on this motion. None if none is located.
     """
     found = []
     for q, query in survey.queries(_PLACES):
@@ -212,8 +212,7 @@ def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
 def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
     """Move a map into the frame of a plan, on which it is located without a first guess.
 
-    Places along the way are looked for on the plan; the motion on which most of those that are
-    located agree is taken. LineamentError if none is located.
+    LineamentError if no place along the way is located.
     """
     best = found_on(plan, made.survey, 0)
     if best is None:
