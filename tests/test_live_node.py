@@ -402,6 +402,25 @@ def test_odometry_holds_for_half_a_second():
         pipeline.hear(moving(0.0, math.inf, 0.0))
 
 
+@pytest.mark.parametrize(
+    ("deskew", "times", "scans", "why"),
+    [
+        ("/odom", {}, 1, "they have neither time_increment nor scan_time"),
+        ("scans", {}, 1, "they have neither time_increment nor scan_time"),
+        ("/odom", {"scan_time": 0.1}, 20, "no odometry on /odom is within 0.5 s of their stamps"),
+        ("poses", {"scan_time": 0.1}, 20, "the log has no poses less than a second apart"),
+        ("/odom", {"scan_time": 0.1}, 19, None),
+        ("off", {}, 30, None),
+    ],
+)
+def test_scans_that_cannot_be_deskewed_are_a_line(deskew, times, scans, why):
+    log = {"log": "a.log"} if deskew == "poses" else {}
+    batches = [[wall("a", k / 10, **times)] for k in range(scans)]
+    total, _, lines = run(*batches, deskew=deskew, **log)
+    assert total.scans == scans
+    assert lines == ([] if why is None else [f"scans are not deskewed: {why}"])
+
+
 def test_poses_give_the_motion_between_scans():
     pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
     poses = [

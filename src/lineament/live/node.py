@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import chain
 
 from ..errors import one_line
 from ..scan import LaserScan
@@ -120,8 +121,8 @@ class Node:
             self._write(one_line(f"{text} (others like it are only counted)"))
 
     def _write_problems(self) -> None:
-        """Write what keeps scans from coming, each problem once."""
-        for problem in self._source.problems():
+        """Write what keeps scans from coming, or from being deskewed, each problem once."""
+        for problem in chain(self._source.problems(), self._pipeline.problems()):
             if problem not in self._problems:
                 self._problems.add(problem)
                 self._write(one_line(problem))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..extractor import Extractor
@@ -10,7 +11,7 @@ from ..features import Features
 from ..limits import Limits
 from ..methods import get_method
 from ..motion import CornerPose, Dock, Odometer, Tracker, Tracks, Travel
-from ..motion.deskew import deskew
+from ..motion.deskew import beam_times, deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
 from ..scan import LaserScan, Pose
@@ -30,6 +31,8 @@ _MOST_PUBLISHERS = 8
 _OLDEST = 0.5
 #: Poses farther apart in time give no velocity [s].
 _LONGEST = 1.0
+#: Scans in a row without a known motion after which this is a message: odometry may begin late.
+_MANY = 20
 
 
 def time_of(scan: LaserScan) -> tuple[int, int]:
@@ -96,6 +99,8 @@ class Pipeline:
         self._plan = plan_of(config)
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
+        self._unmoved = 0
+        self._problems: set[str] = set()
 
     def __call__(self, publisher: str, scan: LaserScan) -> Frame:
         """Find the features of a scan of a publisher.
@@ -109,6 +114,7 @@ class Pipeline:
         if self._config.stamp != "first":
             scan = scan.stamped(self._config.stamp)
         twist, kept.last = self._twist(kept, scan), scan
+        self._note(scan, twist)
         straight = deskew(scan, twist)
         features = kept.extractor(straight)
         tracks, travel, dock = None, None, None
@@ -136,6 +142,29 @@ class Pipeline:
                 f"its twist is {odometry.twist}, expected finite numbers, at most {FASTEST:g}"
             )
         self._odometry = odometry
+
+    def problems(self) -> Iterator[str]:
+        """Yield why scans are not deskewed although they should be, a line each."""
+        yield from sorted(self._problems)
+
+    def _note(self, scan: LaserScan, twist: Twist | None) -> None:
+        """Note what keeps a scan from being deskewed, where that was asked for."""
+        how = self._config.deskew
+        if how == "off":
+            return
+        self._unmoved = self._unmoved + 1 if twist is None else 0
+        if beam_times(scan) is None:
+            why = "they have neither time_increment nor scan_time"
+        elif self._unmoved < _MANY:
+            return
+        elif how == "poses":
+            why = "the log has no poses less than a second apart"
+        elif how == "scans":
+            why = "they do not show the motion"
+        else:
+            topic = self._config.odometry_topic
+            why = f"no odometry on {topic} is within {_OLDEST} s of their stamps"
+        self._problems.add(f"scans are not deskewed: {why}")
 
     def _twist(self, kept: _Publisher, scan: LaserScan) -> Twist | None:
         """Twist of the scanner while it takes a scan, in its own frame; None if unknown."""
