@@ -115,7 +115,11 @@ class Liu(MethodBase):
 
     @classmethod
     def paper(cls, **changes: Any) -> Self:
-        """Make the paper's literal pipeline: its fits, filtered ranges, corners on measurements."""
+        """Make the paper's own last steps: its fits, filtered ranges, corners on measurements.
+
+        The response is the reading of equation 22 by which its Figure 9 reproduces best;
+        ``response="tangent"`` is the equation's prose.
+        """
         plain = {"noise_floor": 0.0, "fit": "y_of_x", "measure": "filtered", "corner": "beam"}
         return cls(**{**plain, **changes})
 
