@@ -24,12 +24,12 @@ PDBS_LINES = "pdbs, fitted"
 PARTITION_ONLY = "pdbs"
 
 LIU_NOTE = (
-    "liu:paper has the paper’s last steps: y = kx + b through filtered ranges, corners on measured "
-    "points; the response is the reading of equation 22 by which Figure 9 reproduces best. liu fits "
-    "lines to the raw ranges, and corners are where they meet. Both "
-    "run with the paper’s numbers and with those that its experiment, Figure 9, finds best here; "
-    "liu:tuned has numbers chosen as those of its rivals were: by F1 of corners, in simulated "
-    "scenes of which nothing is reported."
+    "liu:paper has the paper’s last steps: y = kx + b through filtered ranges, corners on "
+    "measured points; the response is the reading of equation 22 by which Figure 9 reproduces "
+    "best. liu fits lines to the raw ranges, and corners are where they meet. Both run with the "
+    "paper’s numbers and with those that its experiment, Figure 9, finds best here; liu:tuned has "
+    "numbers chosen as those of its rivals were: by F1 of corners, in simulated scenes of which "
+    "nothing is reported."
 )
 RIVALS_NOTE = (
     "Each rival has two rows: name:paper is the method as published, with its own clusters or none "
@@ -43,7 +43,7 @@ Extract = Callable[[LaserScan], Features]
 
 
 def liu_methods(setting: Setting, progress: Progress) -> dict[str, Extractor]:
-    """Make `liu` and its literal preset, with the paper's numbers, the best of Figure 9, tuned."""
+    """Make `liu` and its preset `paper`, with the paper's numbers, the best of Figure 9, tuned."""
     best = best_parameters(setting, progress)
     return {
         LITERAL: Extractor("liu:paper"),
