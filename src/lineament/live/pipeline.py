@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from .._copies import InTurn, in_turn
 from ..extractor import Extractor
 from ..features import Features
 from ..limits import Limits
@@ -66,7 +67,7 @@ class Frame(NamedTuple):
     where: Whereabouts | None = None
 
 
-class Pipeline:
+class Pipeline(InTurn):
     """Processes the scans of some publishers, with separate buffers and tracks for each.
 
     Parameters
@@ -97,6 +98,7 @@ class Pipeline:
         self._publisher("")  # An unknown method is an error at once.
         self._odometry: Odometry | None = None
 
+    @in_turn
     def __call__(self, publisher: str, scan: LaserScan) -> Frame:
         """Find the features of a scan of a publisher.
 
@@ -129,6 +131,7 @@ class Pipeline:
         where = None if kept.follower is None else kept.follower(features, scan.pose)
         return Frame(scan, straight, features, tracks, travel, dock, where)
 
+    @in_turn
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
         if not all(abs(speed) <= FASTEST for speed in odometry.twist):
