@@ -243,7 +243,8 @@ def test_a_workspace_full_of_poison_gives_the_same_features(name):
     method = made(name)
     for scan in FEW:
         fresh, used = Extractor(method)(scan), Extractor(method)
-        block = used._block = Block(scan, used._noise_row, 1, method.own_arrays(len(scan)))
+        block = Block(scan, used._noise_row, 1, method.own_arrays(len(scan)))
+        used._blocks.append(block)
         own = block.own if isinstance(block.own, tuple) else ()
         keep = own[1:] if method.name == "hough" else ()  # The directions that are voted for.
         tables = block.segments, block.corners, block.arcs, block.breakpoints, block.clusters

@@ -107,7 +107,7 @@ def test_a_ring_is_joined_over_a_few_points_without_a_piece(off, corners):
     ranges[opened] += np.where(np.arange(off) % 2, 0.05, 0.11)
     extractor = Extractor("hough", noise=NOISE)
     assert len(extractor(scan_of(ranges, ring)).corners) == corners
-    block = extractor._block
+    (block,) = extractor._blocks
     first, last = block.work.pieces[[at.FIRST, at.LAST], : block.counts[at.PIECES]]
     apart = first[0] + block.counts[at.POINTS] - 1 - last[-1]
     assert apart == {0: 1, 6: 4, 4: 5}[off]

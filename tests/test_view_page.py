@@ -251,7 +251,14 @@ def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     state = progress.Compiling(14, 40, 9.0, 18.0, is_first=False, is_last=False)
     monkeypatch.setattr(progress._compiler, "now", state)
     with served(log, ["pdbs"]) as (session, address):
-        with session._busy["pdbs"]:
+        busy, extractor = threading.Lock(), session.extractors["pdbs"]
+
+        def waiting(scan):
+            with busy:
+                return extractor(scan)
+
+        session.extractors["pdbs"] = waiting
+        with busy:
             page.driver.get(address)
             text = "document.querySelector('.panel span')?.textContent"
             page.wait(f"{text} === 'compiling kernels, once: 14 of 40, 18 s left'")

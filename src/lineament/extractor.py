@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
 from .methods import DEFAULT_METHOD, Method, get_method
 from .methods.trace import Trace
-from .methods.workspace import Block, block_capacity, run_batch
+from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 
@@ -29,7 +29,8 @@ class Extractor:
     """Extracts the features of scans by one method.
 
     It keeps the tables of the last bearings and its buffers from scan to scan, so that a scan
-    costs microseconds. One extractor serves one thread at a time; `batch` makes threads itself.
+    costs microseconds. Any number of threads may share an extractor: calls at the same time have
+    different buffers. A copy, also one that was pickled for another process, has none yet.
 
     Parameters
     ----------
@@ -67,13 +68,23 @@ class Extractor:
             method = get_method(method, **parameters)
         elif parameters:
             raise ValueError("parameters are given together with a method that was made before")
-        self.method = cast(Method, method)
-        self.noise = None if noise is None else RangeNoise.of(noise)
-        self._noise_row = noise_row(self.noise)
-        self._block: Block | None = None
-        self._workers: list[Block] = []
+        self._method = cast(Method, method)
+        self._noise = None if noise is None else RangeNoise.of(noise)
+        self._noise_row = noise_row(self._noise)
+        #: For calls with a scan, and for batches.
+        self._blocks, self._workers = Blocks(), Blocks()
         #: That of the method, once its kernels are compiled.
         self._run: Callable[[Block], None] | None = None
+
+    @property
+    def method(self) -> Method:
+        """The method, with its parameters."""
+        return self._method
+
+    @property
+    def noise(self) -> RangeNoise | None:
+        """Noise of the sensor; None if it is estimated from each scan."""
+        return self._noise
 
     def __repr__(self) -> str:
         return f"Extractor({self.method!r}, noise={self.noise!r})"
@@ -82,13 +93,11 @@ class Extractor:
         """Extract the features of one scan; a TypeError if it is something else."""
         if not isinstance(scan, LaserScan):
             raise _no_scan(scan)
-        block = self._block
-        if block is None or not block.fits(scan):
-            block = self._block = self._new_block(scan, 1)
+        block = self._blocks.take(scan) or self._new_block(scan, 1)
         block.load(scan.ranges)
         (self._run or self._first_run)(block)
         segments, corners, arcs, breakpoints = block.written()
-        return Features(
+        features = Features(
             segments,
             corners,
             arcs,
@@ -96,9 +105,11 @@ class Extractor:
             breakpoints,
             scan.stamp,
             scan.frame_id,
-            self.noise or noise_of(block.noises[0]),
+            self._noise or noise_of(block.noises[0]),
             scan,
         )
+        self._blocks.append(block)
+        return features
 
     def batch(
         self,
@@ -152,9 +163,14 @@ class Extractor:
             range_max=range_max,
             frame_id=frame_id,
         )
-        found = run_batch(
-            rows, self._blocks_of(frame, max(1, min(workers, m))), self._run or self._first_run
-        )
+        capacity = block_capacity(n)
+        # New memory costs more to touch than to fill, above all from several threads at once.
+        blocks = [
+            self._workers.take(frame) or self._new_block(frame, capacity)
+            for _ in range(max(1, min(workers, m)))
+        ]
+        found = run_batch(rows, blocks, self._run or self._first_run)
+        self._workers.extend(blocks)
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
@@ -169,29 +185,20 @@ class Extractor:
 
     def trace(self, scan: LaserScan) -> Trace:
         """Extract the features of one scan and keep every intermediate of the run."""
-        return self.method.trace(scan, self(scan), self._noise_row)
+        return self._method.trace(scan, self(scan), self._noise_row)
 
     def compiling(self) -> AbstractContextManager[None]:
         """Take the kernels that are compiled within for one piece of work, which is shown."""
-        method = type(self.method)
+        method = type(self._method)
         return compiling([method.run], [method, Block])
 
     def _first_run(self, block: Block) -> None:
         with self.compiling():
-            self.method.run(block)
-        self._run = self.method.run
-
-    def _blocks_of(self, frame: LaserScan, workers: int) -> list[Block]:
-        """Give each worker a block; those of the last batch, where they fit."""
-        # New memory costs more to touch than to fill, above all from several threads at once.
-        kept = [block for block in self._workers if block.fits(frame)]
-        capacity = block_capacity(len(frame))
-        made = [self._new_block(frame, capacity) for _ in range(workers - len(kept))]
-        self._workers = [*kept, *made]
-        return self._workers[:workers]
+            self._method.run(block)
+        self._run = self._method.run
 
     def _new_block(self, frame: LaserScan, capacity: int) -> Block:
-        return Block(frame, self._noise_row, capacity, self.method.own_arrays(len(frame)))
+        return Block(frame, self._noise_row, capacity, self._method.own_arrays(len(frame)))
 
 
 def extract(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Self, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._copies import ReadOnly, locked
 from .features import Features, Tabled, noise_of, sizes
 from .records import TABLES
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True, eq=False, repr=False)
-class FeatureBatch(Tabled):
-    """Features of many scans: the arrays of `Features`, one after the other.
+class FeatureBatch(Tabled, ReadOnly):
+    """Features of many scans: the arrays of `Features`, one after the other, read-only too.
 
     ``batch[i]`` is a view of the i-th scan's features, ``batch[i:j]`` of several as a batch;
     iterating gives them in order.
@@ -56,6 +57,10 @@ class FeatureBatch(Tabled):
     stamps: NDArray[np.float64]
     noises: NDArray[np.float64]
     frame_id: str = ""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            setattr(self, field.name, locked(getattr(self, field.name)))
 
     def __repr__(self) -> str:
         return f"FeatureBatch({len(self)} scans: {sizes(self)})"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._copies import ReadOnly
 from .._lazy import Pictured
 from ..errors import needed_by
 from ..scan import LaserScan, NoiseLike, RangeNoise
@@ -59,7 +60,7 @@ class Tabled:
 
 
 @dataclass(slots=True, eq=False, repr=False)
-class Features(Tabled, Pictured):
+class Features(Tabled, ReadOnly, Pictured):
     """All features of one scan. The arrays are read-only.
 
     ``len(features)`` counts the records of its four tables, ``features["corners"]`` is a table by

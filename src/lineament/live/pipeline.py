@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
+from .._copies import InTurn, in_turn
 from ..extractor import Extractor
 from ..features import Features
 from ..limits import Limits
@@ -69,7 +70,7 @@ class Frame(NamedTuple):
     where: Whereabouts | None = None
 
 
-class Pipeline:
+class Pipeline(InTurn):
     """Processes the scans of some publishers, with separate buffers and tracks for each.
 
     Parameters
@@ -102,6 +103,7 @@ class Pipeline:
         self._unmoved = 0
         self._problems: set[str] = set()
 
+    @in_turn
     def __call__(self, publisher: str, scan: LaserScan) -> Frame:
         """Find the features of a scan of a publisher.
 
@@ -135,6 +137,7 @@ class Pipeline:
         where = None if kept.follower is None else kept.follower(features, scan.pose)
         return Frame(scan, straight, features, tracks, travel, dock, where)
 
+    @in_turn
     def hear(self, odometry: Odometry) -> None:
         """Take the newest odometry; ValueError if nothing can move like that."""
         if not all(abs(speed) <= FASTEST for speed in odometry.twist):

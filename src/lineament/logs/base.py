@@ -4,11 +4,12 @@ import operator
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
+from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 
 from .._lazy import Pictured
 from ..errors import LogError
@@ -74,6 +75,14 @@ class Head:
     is_gzip: bool = False
 
 
+@dataclass
+class Skipped:
+    """Faults that an iteration skipped: how many, and the first messages."""
+
+    count: int = 0
+    faults: list[str] = field(default_factory=list)
+
+
 class Log(Pictured, ABC):
     """An iterable of `lineament.LaserScan`; each iteration reads from the start.
 
@@ -95,10 +104,6 @@ class Log(Pictured, ABC):
     ----------
     source, path, name
         The file as it was given, as a ``pathlib.Path``, and as messages call it.
-    skipped : int
-        How many faults the last iteration skipped; 0 unless `keep_going`.
-    faults : list of str
-        The first of these faults.
     """
 
     #: Name of the format.
@@ -128,11 +133,25 @@ class Log(Pictured, ABC):
         self.topic = topic
         self.keep_going = keep_going
         self.options, self.limits = options, options.limits
-        self.skipped = 0
-        self.faults: list[str] = []
+        self._skipped = Skipped()
         self._size = 0
         self._open()
         self._check_size()
+
+    def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
+        """Return how a copy opens the file again."""
+        open_again = partial(type(self), keep_going=self.keep_going, options=self.options)
+        return open_again, (self.source, self.topic)
+
+    @property
+    def skipped(self) -> int:
+        """How many faults the iteration that began last skipped; 0 unless `keep_going`."""
+        return self._skipped.count
+
+    @property
+    def faults(self) -> list[str]:
+        """The first of these faults."""
+        return self._skipped.faults
 
     def _open(self) -> None:
         """Read as much of the file as shows that it is a log, and has the topic."""
@@ -161,10 +180,14 @@ class Log(Pictured, ABC):
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""
-        self.skipped, self.faults = 0, []
-        self._check_size()
+        # Another iteration that begins before this one ends counts its faults by itself.
+        this = object.__new__(type(self))
+        vars(this).update(vars(self))
+        this._skipped = self._skipped = Skipped()
+        this._check_size()
+        self._size = this._size
         scans, beams, stamp = self.limits.scans, self.limits.beams, self.options.stamp
-        for count, (topic, scan) in enumerate(self._items(), 1):
+        for count, (topic, scan) in enumerate(this._items(), 1):
             n = len(scan.ranges)
             if n <= beams and count <= scans:
                 yield topic, scan if stamp == "first" else scan.stamped(stamp)
@@ -173,7 +196,7 @@ class Log(Pictured, ABC):
                 self.limits.check("scans", count)
                 self.limits.check("beams", n)  # Most readers checked it before it was made.
             except ValueError as error:
-                self._fault(LogError(self.name, f"scan {count - 1}: {error}"))
+                this._fault(LogError(self.name, f"scan {count - 1}: {error}"))
             if count > scans:
                 return
 
@@ -233,7 +256,7 @@ class Log(Pictured, ABC):
         """Raise `error`, or count it when the log keeps going."""
         if not self.keep_going:
             raise error.fresh() from None
-        self.skipped += 1
+        self._skipped.count += 1
         if len(self.faults) < MAX_FAULTS:
             self.faults.append(str(error))
 

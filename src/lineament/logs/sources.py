@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn, Self
 
 from ..errors import LogError, needs
 from ..limits import LIMITS, Limits
@@ -71,7 +72,7 @@ class LocalCopy(os.PathLike[str]):
     def __init__(self, name: str, pieces: Iterable[bytes], limits: Limits = LIMITS) -> None:
         # In a separate folder: what a reader looks for beside its log is not there.
         folder = tempfile.mkdtemp(prefix="lineament-")
-        self.remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self.remove = weakref.finalize(self, _remove, folder, os.getpid())
         self._name, self._path = name, str(Path(folder, "log"))
         size = 0
         try:
@@ -88,11 +89,25 @@ class LocalCopy(os.PathLike[str]):
             self.remove()
             raise
 
+    def __deepcopy__(self, memo: object) -> Self:
+        return self  # The file does not change.
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            f"{self} is read from a temporary copy, which ends with this process: open it in the "
+            "other one"
+        )
+
     def __fspath__(self) -> str:
         return self._path
 
     def __str__(self) -> str:
         return self._name
+
+
+def _remove(folder: str, process: int) -> None:
+    if os.getpid() == process:  # A process that was forked has the object, but the file is not its.
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def unzip(path: str | os.PathLike[str], limits: Limits, *, keep_going: bool = False) -> LocalCopy:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .._copies import InTurn, in_turn
 from ..features import Features
 from ..motion.association import associate, is_landmark
 from ..motion.estimate import Motion, estimate_motion
@@ -70,7 +71,7 @@ class KeyFrame:
     is_lost: bool
 
 
-class Drive:
+class Drive(InTurn):
     """Places the scans of a log, one after the other, by the walls of the last metres.
 
     `scans` has the key frame that each belongs to, and its pose in that one's frame.
@@ -91,6 +92,7 @@ class Drive:
         #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
         self._pace = 1.0
 
+    @in_turn
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
         features = replace(features, corners=features.corners[is_landmark(features.corners)])

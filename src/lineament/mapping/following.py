@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._copies import InTurn, in_turn
 from ..extractor import Extractor
 from ..features import Features
 from ..motion import Tracker
@@ -73,7 +74,7 @@ class Whereabouts:
         return self.verdict == LOCATED
 
 
-class Follower:
+class Follower(InTurn):
     """Follows a sensor on a plan from scan to scan, without a first guess.
 
     The last metres are looked for on the whole plan until they are located. From then on the pose
@@ -122,6 +123,7 @@ class Follower:
         """Velocity of the sensor in the last scans, as `deskew` takes it."""
         return self._tracker.twist
 
+    @in_turn
     def __call__(
         self, features: Features, odometry: Pose | None = None, skew: Pose = (0.0, 0.0, 0.0)
     ) -> Whereabouts:

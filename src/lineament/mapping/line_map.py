@@ -11,6 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._copies import ReadOnly, locked
 from ..errors import LineamentError
 from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
@@ -38,7 +39,7 @@ class Index(NamedTuple):
     members: NDArray[np.int64]
 
 
-class LineMap:
+class LineMap(ReadOnly):
     """A plan: walls, corners and columns in one frame [m, rad].
 
     Parameters
@@ -73,15 +74,14 @@ class LineMap:
         good &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
         if not good.any():
             raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")
-        self.walls = walls[good]
+        self.walls = locked(walls[good])
         extent = max(self.size)
         if extent > LONGEST:
             raise LineamentError(
                 f"the plan is {extent:.0f} m wide, expected a building: is it drawn in metres?"
             )
-        self.columns = np.zeros(0, COLUMN) if columns is None else columns
+        self.columns = locked(np.zeros(0, COLUMN) if columns is None else columns.copy())
         self.sigma = sigma
-        self.walls.flags.writeable = self.columns.flags.writeable = False
 
     def __repr__(self) -> str:
         wide, deep = self.size
@@ -112,7 +112,7 @@ class LineMap:
     @cached_property
     def corners(self) -> NDArray[np.void]:
         """Where two walls end together: records of `hypotheses.MEETING`."""
-        return meetings(self.walls)
+        return locked(meetings(self.walls))
 
     @cached_property
     def anchors(self) -> Array:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._copies import InTurn, in_turn
 from ..features import Features
 from ..kernels.mapping.layout import BEAM_COLUMNS
 from ..motion.odometry import compose_jacobians
@@ -71,7 +72,7 @@ class Query:
         return meetings(self.walls)
 
 
-class LocalMap:
+class LocalMap(InTurn):
     """Walls and beams of the last metres of the way, built scan by scan from a tracker's motions.
 
     Parameters
@@ -100,6 +101,7 @@ class LocalMap:
         self.way, self.roughness = way, roughness
         self._sights: list[_Sight] = []
 
+    @in_turn
     def __repr__(self) -> str:
         return f"LocalMap({len(self._sights)} scans, {self._way:.1f} m)"
 
@@ -107,6 +109,7 @@ class LocalMap:
     def _way(self) -> float:
         return sum(sight.way for sight in self._sights[1:])
 
+    @in_turn
     def add(
         self,
         features: Features,
@@ -147,6 +150,7 @@ class LocalMap:
         while len(sights) > 1 and self._way > self.way:
             del sights[0]
 
+    @in_turn
     def query(self, way: float = math.inf) -> Query:
         """Return walls and beams of the last metres of way, in the frame of the last scan.
 

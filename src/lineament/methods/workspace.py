@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,26 @@ class Block:
             np.frombuffer(raw, dtype) if raw else none
             for raw, (dtype, none) in zip(self.raw(), _TABLES, strict=True)
         ]
+
+
+class Blocks(list[Block]):
+    """Blocks that no call uses: each call takes one out, and puts it back if it ends well.
+
+    Threads, signal handlers and whatever else calls meanwhile find others, or none. Views of a
+    block are not views of its copy: a copy of these has no blocks.
+    """
+
+    def __reduce__(self) -> tuple[type[Self], tuple[()]]:
+        return type(self), ()
+
+    def take(self, frame: LaserScan) -> Block | None:
+        """Take out a block that fits; those that do not are dropped."""
+        try:
+            while not (block := self.pop()).fits(frame):
+                pass
+        except IndexError:
+            return None
+        return block
 
 
 def budget_scratch(beams: int, max_vertices: int) -> tuple[Array, NDArray[np.int64]]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._copies import InTurn, in_turn
 from ..features import Features
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
@@ -76,7 +77,7 @@ def corner_pose(features: Features, index: int) -> CornerPose | None:
     return CornerPose(pose, jacobian @ of_walls @ jacobian.T)
 
 
-class Dock:
+class Dock(InTurn):
     """Follows one corner from scan to scan, and returns its pose.
 
     Parameters
@@ -109,6 +110,7 @@ class Dock:
         self.track = track
         self._point = point
 
+    @in_turn
     def __call__(
         self, features: Features, tracks: Tracks, pose: Pose, covariance: Array | None = None
     ) -> CornerPose | None:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._copies import InTurn, in_turn
 from ..scan import Array, Pose
 from ..scan.poses import Twist, compose
 from .estimate import Motion
@@ -32,7 +33,7 @@ class Travel(NamedTuple):
     twist_covariance: Array
 
 
-class Odometer:
+class Odometer(InTurn):
     """Adds up the motions of one sensor: odometry by its scans.
 
     The covariance of each `Motion` is propagated to first order. Two motions that follow each other
@@ -61,6 +62,7 @@ class Odometer:
         self._skew = np.zeros(3)
         self._stamp = math.nan
 
+    @in_turn
     def __call__(self, tracks: Tracks, stamp: float, sweep: float = 0.0) -> Travel:
         """Go on by the motion to the next scan, which was taken at `stamp` [s].
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._copies import InTurn, in_turn
 from ..features import TABLES, Features, make_records
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
@@ -63,7 +64,7 @@ class Tracks:
         return f"Tracks({', '.join(sizes)}, {self.motion})"
 
 
-class Tracker:
+class Tracker(InTurn):
     """Recognises features from frame to frame, and estimates the motion of the sensor.
 
     Features are paired with the last sight of all tracks (`associate`), first under the expected
@@ -126,6 +127,7 @@ class Tracker:
         return f"Tracker({given}: {sum(map(len, self._tracks.values()))} tracks)"
 
     @property
+    @in_turn
     def twist(self) -> Twist | None:
         """Velocity of the sensor in the last frames, as `deskew` takes it.
 
@@ -138,6 +140,7 @@ class Tracker:
         (x, y, turn), (other_x, other_y, other_turn) = self._twists[0], self._twists[-1]
         return (x + other_x) / 2, (y + other_y) / 2, (turn + other_turn) / 2
 
+    @in_turn
     def __call__(self, features: Features, odometry: Pose | None = None) -> Tracks:
         """Take in the next frame.
 
@@ -170,6 +173,7 @@ class Tracker:
         numbers[kept] = tracks.corners
         return replace(tracks, corners=numbers)
 
+    @in_turn
     def again(self, features: Features) -> Tracks:
         """Take the last scan in again, deskewed by the twist that it gave.
 

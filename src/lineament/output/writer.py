@@ -7,6 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
+from .._copies import InTurn, in_turn
 from ..features import Features
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan, Pose
@@ -25,7 +26,7 @@ class Found(NamedTuple):
     pose: Pose | None = None
 
 
-class Writer(ABC):
+class Writer(InTurn, ABC):
     """Writes the features of one scan after the other to one file.
 
     The file appears under its name when the block ends; if it ends by an exception, a file that
@@ -51,6 +52,9 @@ class Writer(ABC):
         self.path, self.topics = path, tuple(topics)
         self._stack, self._files = ExitStack(), ExitStack()
         self._is_open = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        raise TypeError(f"the writer of {self.path} cannot be copied: it has an open file")
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -78,6 +82,7 @@ class Writer(ABC):
         with suppress(OSError):
             self._files.close()
 
+    @in_turn
     def write(self, features: Features, scan: LaserScan | None = None, topic: str = "") -> None:
         """Take the features of the next scan.
 
@@ -119,5 +124,5 @@ class Writer(ABC):
     def _write(self, found: list[Found], first_scan: int) -> None:
         """Write what was found in some scans, the first of which has this index."""
 
-    def _close(self) -> None:  # noqa: B027  (most formats have no end)
+    def _close(self) -> None:  # Most formats have no end.
         """Write what comes after the last scan."""

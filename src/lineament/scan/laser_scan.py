@@ -10,6 +10,7 @@ from typing import Any, Self, SupportsIndex, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._copies import ReadOnly, locked
 from .._lazy import Pictured
 from .fields import (
     NANO,
@@ -31,7 +32,7 @@ from .fields import (
 STAMPS = ("first", "middle", "last")
 
 
-class LaserScan(Pictured):
+class LaserScan(ReadOnly, Pictured):
     """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
@@ -204,9 +205,7 @@ class LaserScan(Pictured):
     def points(self) -> Array:
         """X = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN if invalid."""
         r = np.where(self.valid, self.ranges, np.nan)
-        points = np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles)))
-        points.flags.writeable = False
-        return points
+        return locked(np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles))))
 
     @property
     def is_full_circle(self) -> bool:
