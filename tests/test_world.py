@@ -171,12 +171,12 @@ def code(language):
 
 @pytest.fixture
 def world(tmp_path, log, monkeypatch):
-    """Stand where the docs have their files; return the corners without edges, by pyarrow."""
+    """Stand where the docs have their files; return the corners, by pyarrow."""
     monkeypatch.chdir(tmp_path)
     for target in ("world.parquet", "features.parquet", "out/"):
         assert run(["extract", str(log), "-o", target, "--world", "-q"]) == 0
     rows = pq.read_table("world.parquet").to_pylist()
-    corners = [row for row in rows if row["kind"] == "corner" and row["corner"] != "edge"]
+    corners = [row for row in rows if row["kind"] == "corner"]
     walls: dict[int, float] = {}
     for row in rows:
         if row["kind"] == "segment":
@@ -187,10 +187,26 @@ def world(tmp_path, log, monkeypatch):
 def test_docs_on_pandas(world):
     pytest.importorskip("pandas", reason="pandas is not installed")
     corners, walls = world
+    found = {}
     for text in code("python"):
-        exec(text, found := {})
+        exec(text, found)
     assert found["corners"]["sd_x"].tolist() == [row["cov_00"] ** 0.5 for row in corners]
     assert found["walls"].to_dict() == pytest.approx(walls)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_docs_on_tables_of_two_versions(world, version):
+    pd = pytest.importorskip("pandas", reason="pandas is not installed")
+    table = pd.read_parquet("features.parquet").astype({"kind": object, "corner": object})
+    kinds, is_edge = table["kind"].tolist(), table["kind"] == "edge"
+    assert 0 < is_edge.sum() < len(table)
+    if version == 2:
+        table.loc[is_edge, "kind"] = "corner"
+        table.loc[is_edge, "corner"] = "edge"
+        table.drop(columns=["segment", "side"]).to_parquet("features.parquet")
+    exec(code("python")[-1], found := {})
+    assert found["table"]["kind"].tolist() == kinds
+    assert len(LineMap.read("features.parquet").walls) > 0
 
 
 def test_docs_on_duckdb(world):
