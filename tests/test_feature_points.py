@@ -42,9 +42,8 @@ def test_points_are_the_rows_of_the_table(seed):
     expected = [point_of(row) for row in sorted(rows, key=lambda row: KINDS.index(row["kind"]))]
     points = feature_points(found)
     assert points.tobytes() == np.array(expected, FEATURE_POINT).tobytes()
-    assert (
-        points["kind"].tolist() == [0] * 4 + [1] * 6 + [2] * 3 + [3] * 5
-    )  # segments_a are indices
+    # Segments come first: segments_a are their indices.
+    assert points["kind"].tolist() == [0] * 4 + [1] * 6 + [2] * 3 + [3] * 5
     found.corners["kind"][2] = ""
     found.edges["side"][1] = ""
     points = feature_points(found)

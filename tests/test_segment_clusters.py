@@ -26,16 +26,15 @@ def extractor(name, vertices):
 
 
 def assert_in_their_clusters(scan, features):
-    """All usable beams of a segment are in its cluster; clusters are runs, numbered in order."""
+    """The beams at the ends of a segment are in its cluster, and all between that are in one."""
     n, measured = len(scan), np.flatnonzero(scan.valid)
     for line in features.segments:
         first, last = int(line["first_beam"]), int(line["last_beam"])
         assert features.clusters[first] == features.clusters[last] == line["cluster"] >= 0
         beams = measured[(measured - first) % n <= (last - first) % n]
-        assert set(features.clusters[beams]) == {line["cluster"]}
-    for before, after in features.corners["segments"]:
-        both = features.segments["cluster"][[before, after]]
-        assert both[0] == both[1] or features.corners["kind"].tolist().count("slit")
+        assert set(features.clusters[beams]) <= {line["cluster"], -1}  # -1: of a spike
+    for sides in features.corners["segments"][features.corners["kind"] == "corner"]:
+        assert len(set(features.segments["cluster"][sides])) == 1
     # Between two beams of a cluster is no breakpoint.
     for point in features.breakpoints:
         a, b = features.clusters[point["beam"]]
