@@ -168,7 +168,7 @@ def show_costs(logs: dict[str, tuple[Path, str]], folder: Path) -> None:
 def show_sizes(table: Path, scans: int) -> None:
     """Bytes of a scan, were less written."""
     rows = pq.read_table(table)
-    kinds = pa.array(["segment", "corner", "arc"])
+    kinds = pa.array(["segment", "corner", "edge", "arc"])
     single = [
         field.with_type(pa.float32())
         if pa.types.is_floating(field.type) and field.name != "stamp"

@@ -131,10 +131,10 @@ def _no_faces(modules: Mapping[str, Any]) -> None:
 
 def _no_edges(modules: Mapping[str, Any]) -> None:
     @helper
-    def add_edge(*given):  # type: ignore[no-untyped-def]
-        return given[-2]  # The next row of the corners, before the first of the segments.
+    def add_edge(*_):  # type: ignore[no-untyped-def]
+        return
 
-    modules["extraction"].add_edge = add_edge
+    modules["joining"]._add_edge = add_edge
 
 
 def work(name: str, sample_file: Path) -> None:

@@ -23,6 +23,7 @@ from lineament.evaluation import (
     ranked_repeats,
     standing_scores,
 )
+from lineament.evaluation.repeatability import with_edges
 from lineament.logs import find_logs
 from lineament.reproduce.arena import ARENAS, load_arena
 from lineament.reproduce.real import LOGS
@@ -108,7 +109,7 @@ def measure(extract: Extractor, sample: Sample) -> Parts:
 
 
 def _repeats(extract: Extractor, a: LaserScan, b: LaserScan) -> RankedRepeats:
-    found, others = extract(a), extract(b)
+    found, others = with_edges(extract(a)), with_edges(extract(b))
     there = ranked_repeats(a, found, b, others, others.corners["quality"])
     return there + ranked_repeats(b, others, a, found, found.corners["quality"])
 

@@ -125,16 +125,11 @@ def assert_positive_definite(covariances):
 
 
 def assert_sound(features, scan, method):
-    """Hold what is true of the features of any scan, by a method without edges and slits.
-
-    A budget of vertices joins pieces of several clusters, which stay as they are: such a segment
-    has the cluster of its first measurement.
-    """
+    """Hold what is true of the features of any scan, by a method without edges and slits."""
     for table in (getattr(features, kind) for kind in TABLES):
         for field in table.dtype.names:
             assert table[field].dtype.kind == "U" or np.isfinite(table[field]).all(), field
     segments, corners, n = features.segments, features.corners, len(scan)
-    max_vertices = getattr(method, "max_vertices", 0)  # which pdbs does without
     assert_positive_definite(segments["covariance"])
     assert_positive_definite(corners["covariance"])
     assert (segments["n_points"] >= (method.min_points if method.name == "liu" else 2)).all()
@@ -149,12 +144,11 @@ def assert_sound(features, scan, method):
         beams = valid[(valid - first) % n <= (last - first) % n]
         # On a ring, the measurement at which it was opened belongs to its first and its last line.
         assert line["n_points"] == len(beams)
-        own = {features.clusters[first]} if max_vertices else set(features.clusters[beams])
-        assert own == {line["cluster"]}
+        assert set(features.clusters[beams]) == {line["cluster"]}
     for corner in corners:
         before, after = corner["segments"]
         assert 0 <= min(before, after) <= max(before, after) < len(segments)
-        assert max_vertices or segments["cluster"][before] == segments["cluster"][after]
+        assert segments["cluster"][before] == segments["cluster"][after]
         assert corner["beam"] == segments["first_beam"][after]
         assert 0 <= corner["opening"] <= math.pi
         assert corner["kind"] == "corner"

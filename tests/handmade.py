@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, TABLES, Features
+from lineament.features import ARC, BREAKPOINT, CORNER, EDGE, SEGMENT, TABLES, Features
 
 
 def segment(start, end, first, last, *, sigma=(0.01, 0.01), n_points=None):
@@ -27,6 +27,13 @@ def corner(x, y, *, segments=(0, 0), sigma=0.01, kind="corner"):
     return row
 
 
+def edge(x, y, *, segment=0, side="end", sigma=0.01):
+    row = np.zeros((), EDGE)
+    row["position"], row["segment"], row["side"] = (x, y), segment, side
+    row["covariance"] = np.square(sigma) * np.eye(2)
+    return row
+
+
 def arc(x, y, radius, first, last, *, sigma=0.01):
     row = np.zeros((), ARC)
     row["center"], row["radius"] = (x, y), radius
@@ -41,10 +48,11 @@ def breakpoint_at(before, after, kind="jump"):
     return row
 
 
-def features(n=100, segments=(), corners=(), arcs=(), breakpoints=(), clusters=None):
+def features(n=100, segments=(), corners=(), arcs=(), breakpoints=(), clusters=None, edges=()):
     """Features of a scan of n beams, all of them in one cluster if nothing else is said."""
-    rows = {"segments": segments, "corners": corners, "arcs": arcs, "breakpoints": breakpoints}
-    tables = {name: np.array(list(rows[name]), TABLES[name]) for name in rows}
+    rows = {"segments": segments, "corners": corners, "edges": edges, "arcs": arcs}
+    rows |= {"breakpoints": breakpoints}
+    tables = {name: np.array(list(rows[name]), TABLES[name]) for name in TABLES}
     labels = np.zeros(n) if clusters is None else np.array(clusters)
     return Features(**tables, clusters=labels.astype(np.int32))
 

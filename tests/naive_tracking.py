@@ -100,7 +100,7 @@ def associate(before, now, motion=(0.0, 0.0, 0.0), covariance=None, *, gate=0.99
                 if kind == "corners":
                     sides = [k for k in b["segments"] if 0 <= k < len(now.segments)]
                     own = own + 2 * sum(now.segments["misfit"][sides] ** 2) * np.eye(2)
-                    if a["convex"] != b["convex"] or "edge" in (a["kind"], b["kind"]):
+                    if a["convex"] != b["convex"]:
                         continue
                 square = square_of(error, own)
                 if square <= limit:

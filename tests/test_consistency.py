@@ -163,8 +163,9 @@ def test_edges_know_how_far_off_they_are(incidence):
         angles = fan(15) + rng.uniform(0, STEP)
         near = wall(angles, 2.0 * math.cos(math.radians(incidence)), incidence)
         ranges = np.where(angles > 0, 12.0, near) + NOISE.sigma * rng.normal(size=len(angles))
-        (edge,) = OPTIMAL(scan_of(ranges, angles)).corners
-        assert edge["kind"] == "edge"
+        found = OPTIMAL(scan_of(ranges, angles))
+        assert len(found.corners) == 0
+        (edge,) = found.edges
         edges.append(edge)
     edges = np.array(edges)
     squares = NormalisedErrors.of(edges["position"] - (2.0, 0.0), edges["covariance"]).squares

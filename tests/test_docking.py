@@ -89,11 +89,11 @@ WALLS += [segment((2, 3), (5, 3), 20, 29), segment((5, 3), (5, 9), 30, 39)]
 PLACES = [(2, 0), (2, 3), (5, 3)]
 
 
-def room(*seen, edge=None):
-    """Features of the corners with these numbers."""
+def room(*seen, lone=None):
+    """Features of the corners with these numbers, and one of which only one wall is known."""
     corners = [corner(*PLACES[k], segments=(k, k + 1)) for k in seen]
-    if edge is not None:
-        corners.append(corner(*edge, segments=(0, -1), kind="edge"))
+    if lone is not None:
+        corners.append(corner(*lone, segments=(0, -1)))
     return features(50, WALLS, corners)
 
 
@@ -113,8 +113,8 @@ def place(found):
 def test_the_nearest_corner_is_followed_by_its_track():
     dock = Dock((2.2, 2.6))
     assert dock(room(), tracks(), HERE) is None
-    assert place(dock(room(0, edge=(2.2, 2.6)), tracks(7, -1), HERE)) is None  # 2.6 m away
-    assert place(dock(room(0, 1, 2, edge=(2.2, 2.6)), tracks(7, 8, 9, -1), HERE)) == (2, 3)
+    assert place(dock(room(0, lone=(2.2, 2.6)), tracks(7, 6), HERE)) is None  # 2.6 m away
+    assert place(dock(room(0, 1, 2, lone=(2.2, 2.6)), tracks(7, 8, 9, 6), HERE)) == (2, 3)
     assert dock.track == 8
     # By its number, wherever it is and in whatever order they come.
     assert place(dock(room(2, 1, 0), tracks(8, 7, 9), HERE)) == (5, 3)

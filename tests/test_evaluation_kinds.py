@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from handmade import SIDE, arc, corner, features, segment
+from handmade import SIDE, arc, corner, edge, features, segment
 
 from lineament.evaluation import Counts, arc_scores, corner_scores, segment_scores
 from lineament.features import ARC
@@ -97,9 +97,10 @@ def test_corner_on_a_column_or_without_a_place_is_a_mistake(position):
     assert corner_scores(corners(position), truth).by_gate[0.25] == Counts(0, 1, 1)
 
 
-def test_edges_are_no_corners():
-    found = corners((2, 0), (5, 5), (0, 2))
-    found.corners["kind"] = "corner", "edge", "slit"
+def test_slits_are_corners_and_edges_are_not():
+    found = corners((2, 0), (0, 2))
+    found.corners["kind"] = "corner", "slit"
+    found = replace(found, edges=np.array([edge(5, 5)]))
     assert corner_scores(found, corners((2, 0), (0, 2), (5, 5))).counts == Counts(2, 2, 3)
 
 

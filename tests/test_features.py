@@ -17,7 +17,7 @@ PLACES = {"start", "end", "centroid", "position", "center"}
 
 @pytest.mark.parametrize("pose", [(10.0, -5.0, math.pi / 2), (1.0, 2.0, -3.0), (0.0, 0.0, 7.0)])
 def test_each_field_moves_as_it_must(pose):
-    features, (x, y, theta) = random_features(1, counts=(9, 5, 4, 3), frame_id="laser"), pose
+    features, (x, y, theta) = random_features(1, counts=(9, 5, 6, 4, 3), frame_id="laser"), pose
     features.segments["angle"] = np.linspace(-math.pi, math.pi, 9)
     moved = features.transform(*pose, frame_id="map")
     turn = np.eye(3)
@@ -58,16 +58,25 @@ def test_dict_is_json():
 
 
 def test_reprs_and_counts():
-    features = random_features(1, counts=(3, 4, 2, 1))
-    features.corners["kind"] = ["edge", "corner", "slit", "edge"]
+    features = random_features(1, counts=(3, 4, 5, 2, 1))
     n = features.clusters.max() + 1
     assert repr(features) == (
-        f"Features(3 segments, 4 corners, 2 arcs, 1 breakpoints, {n} clusters, stamp=0.100)"
+        "Features(3 segments, 4 corners, 5 edges, 2 arcs, 1 breakpoints, "
+        f"{n} clusters, stamp=0.100)"
     )
-    counted = {"segments": 3, "corners": 2, "edges": 2, "arcs": 2, "breakpoints": 1}
-    assert features.counts() == counted  # edges apart
+    counted = {"segments": 3, "corners": 4, "edges": 5, "arcs": 2, "breakpoints": 1}
+    assert features.counts() == counted
+    assert len(features) == 15
     batch = ln.Extractor("liu").batch(np.full((2, 9), 2.0), angle_min=0.0, angle_increment=0.01)
-    assert repr(batch) == "FeatureBatch(2 scans: 2 segments, 0 corners, 0 arcs, 4 breakpoints)"
+    assert repr(batch) == (
+        "FeatureBatch(2 scans: 2 segments, 0 corners, 0 edges, 0 arcs, 4 breakpoints)"
+    )
+
+
+def test_features_are_made_by_name():
+    """As the tables are more than they were: by place, one would be taken for another."""
+    with pytest.raises(TypeError, match="positional"):
+        Features(*(make_records(name, []) for name in TABLES), np.zeros(0, np.int32))
 
 
 def test_batch_views():
@@ -113,10 +122,11 @@ def test_layout_of_the_records_is_the_one_that_others_read():
     assert offsets == {
         "segments": [0, 16, 32, 48, 56, 88, 92, 96, 104, 112, 120, 128],
         "corners": [0, 16, 48, 56, 60, 64, 72, 80, 88],
+        "edges": [0, 16, 48, 56, 60, 64],
         "arcs": [0, 16, 24, 96, 100, 104, 112],
         "breakpoints": [0, 8, 24, 56],
     }
-    assert [dtype.itemsize for dtype in TABLES.values()] == [136, 112, 120, 64]
+    assert [dtype.itemsize for dtype in TABLES.values()] == [136, 112, 88, 120, 64]
 
 
 def test_columns_of_the_kernels_are_where_the_fields_are():
@@ -129,6 +139,12 @@ def test_columns_of_the_kernels_are_where_the_fields_are():
     records["kind"] = "slit"
     words = at.words(records).view(np.int32)[1, at.C_KIND : at.C_KIND + 6]
     assert words.tolist() == at.CORNER_WORDS[at.SLIT].tolist()
+    records = np.zeros(2, at.EDGE)
+    records["side"] = "start"
+    words = at.words(records).view(np.int32)[1, at.E_SIDE : at.E_SIDE + 5]
+    assert words.tolist() == at.SIDE_WORDS[at.AT_START].tolist()
+    # A kernel writes either with the same function.
+    assert (at.E_POSITION, at.E_COVARIANCE) == (at.C_POSITION, at.C_COVARIANCE)
 
 
 def test_records_are_made_by_name():

@@ -16,7 +16,7 @@ from matplotlib.patches import Ellipse
 
 import lineament as ln
 from lineament import LineamentError
-from lineament.features import ARC, BREAKPOINT, CORNER, SEGMENT, Features
+from lineament.features import ARC, BREAKPOINT, CORNER, EDGE, SEGMENT, Features
 from lineament.methods.trace import CANDIDATE, Trace
 from lineament.output import canvas, drawing, figures, stages
 
@@ -43,16 +43,23 @@ def room() -> tuple[ln.LaserScan, Features]:
     scan = ln.LaserScan(ranges, angles=angles)
     clusters = np.where(scan.valid, np.arange(81) // 41, -1).astype(np.int32)
     clusters[60] = -1
-    segments, corners = np.zeros(2, SEGMENT), np.zeros(2, CORNER)
+    segments, corners, edges = np.zeros(2, SEGMENT), np.zeros(1, CORNER), np.zeros(1, EDGE)
     segments["start"], segments["end"] = [scan.points[0], [2, 2]], [[2, 2], scan.points[-1]]
-    corners["position"], corners["kind"] = [[2, 2], scan.points[0]], ["corner", "edge"]
-    corners["response"], corners["beam"] = [9.84e4, 0], [40, 0]
-    corners["quality"] = [0.875, 0.5]
-    corners["covariance"] = np.diag([1e-2, 4e-2])
+    corners["position"], corners["kind"], corners["quality"] = [2, 2], "corner", 0.875
+    corners["response"], corners["beam"] = 9.84e4, 40
+    edges["position"], edges["side"], edges["quality"] = scan.points[0], "start", 0.5
+    corners["covariance"] = edges["covariance"] = np.diag([1e-2, 4e-2])
     arcs, breakpoints = np.zeros(1, ARC), np.zeros(2, BREAKPOINT)
     arcs["center"], arcs["radius"], arcs["last_beam"] = [1, 1], 0.3, 8
     breakpoints["position"] = scan.points[[0, -1]]
-    return scan, Features(segments, corners, arcs, clusters, breakpoints)
+    return scan, Features(
+        segments=segments,
+        corners=corners,
+        edges=edges,
+        arcs=arcs,
+        breakpoints=breakpoints,
+        clusters=clusters,
+    )
 
 
 def trace_of(scan: ln.LaserScan, features: Features, **stages) -> Trace:

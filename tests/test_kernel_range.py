@@ -218,7 +218,7 @@ def test_segments_lead_from_their_start_to_their_end(name, recorded_scans):
     for scan in recorded_scans:
         features = extractor(scan)
         assert_directed(features.segments)
-        for corner in features.corners[features.corners["kind"] != "edge"]:
+        for corner in features.corners:
             before, after = features.segments[corner["segments"]]
             turn = math.acos(np.clip(direction_of(before) @ direction_of(after), -1, 1))
             assert corner["opening"] == pytest.approx(math.pi - turn, abs=1e-6)
@@ -247,7 +247,7 @@ def test_a_workspace_full_of_poison_gives_the_same_features(name):
         used._blocks.append(block)
         own = block.own if isinstance(block.own, tuple) else ()
         keep = own[1:] if method.name == "hough" else ()  # The directions that are voted for.
-        tables = block.segments, block.corners, block.arcs, block.breakpoints, block.clusters
+        tables = *block.features, block.clusters
         poisoned((block.floats, block.ints, block.noises, block.offsets[1:], *tables, own), keep)
         again = used(scan)
         for table in TABLES:

@@ -8,7 +8,7 @@ import pytest
 
 import lineament as ln
 from lineament.cli import run
-from lineament.features import Features, make_records
+from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.simulation import SENSORS, drive, room
@@ -35,9 +35,9 @@ def cross(a, b):
 
 
 def features(*segments, arcs=()):
-    tables = [make_records("segments", segments), make_records("corners", [])]
-    tables += [make_records("arcs", arcs), np.empty(0, np.int32), make_records("breakpoints", [])]
-    return Features(*tables)
+    rows = dict.fromkeys(TABLES, ()) | {"segments": segments, "arcs": arcs}
+    tables = {name: make_records(name, rows[name]) for name in TABLES}
+    return Features(**tables, clusters=np.empty(0, np.int32))
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ CASES = {
     "REACH": (count("corners"), (hole(3), 1), (hole(4), 0)),
     # The end of a wall is known to 8 cm, by its spacing, or it is no edge.
     "MOST_DEVIATION": (
-        lambda found: (found.corners["kind"] == "edge").sum(),
+        lambda found: len(found.edges),
         (end(8), 1),
         (end(12), 0),
     ),

@@ -91,6 +91,9 @@ def assert_sound(scan, features, extractor):
     for corner in corners:
         assert is_map or math.sqrt(np.linalg.eigvalsh(corner["covariance"])[-1]) <= MOST
         assert_joined(corner, segments)
+    for edge in features.edges:
+        assert math.sqrt(np.linalg.eigvalsh(edge["covariance"])[-1]) <= MOST
+        assert_ends(edge, segments)
 
 
 def beams_of(scan, segment):
@@ -121,6 +124,7 @@ def assert_drawn_where_it_was_measured(scan, features, segment):
     step = abs(math.sin(scan.angles[beams[1]] - scan.angles[beams[0]]))
     assert (own[-1] - own[0]) @ along >= step * rho.min()
     kinds = {tuple(corner["position"]): corner["kind"] for corner in features.corners}
+    kinds |= {tuple(place): "edge" for place in features.edges["position"]}
     for name, k in (("start", 0), ("end", -1)):
         place, nearest, error = segment[name], own[k], 3 * deviation(features, rho[k])
         kind = kinds.get(tuple(place))
@@ -135,25 +139,25 @@ def assert_drawn_where_it_was_measured(scan, features, segment):
 
 
 def assert_joined(corner, segments):
-    """It is of one of three kinds, between the right segments."""
+    """It is of one of two kinds, between the right segments."""
     assert 0 <= corner["quality"] <= 1
     a, b = corner["segments"]
-    assert min(a, b) >= -1
-    assert max(a, b) < len(segments)
-    if corner["kind"] == "edge":
-        assert min(a, b) == -1 < max(a, b)
-        assert corner["opening"] == corner["response"] == 0
-        end, beam = ("end", "last_beam") if b < 0 else ("start", "first_beam")
-        assert segments[end][max(a, b)].tolist() == corner["position"].tolist()
-        assert segments[beam][max(a, b)] == corner["beam"]
-        return
-    assert min(a, b) >= 0 != a - b
+    assert 0 <= min(a, b) < max(a, b) < len(segments)
     assert corner["beam"] == segments["first_beam"][b]
     assert 0 < corner["opening"] < math.pi
     ends = segments["end"][a].tolist(), segments["start"][b].tolist()
     at = corner["position"].tolist()
     assert corner["kind"] in ("corner", "slit")
     assert ends == (at, at) if corner["kind"] == "corner" else at not in ends
+
+
+def assert_ends(edge, segments):
+    """It is at the end of its segment that it names."""
+    assert 0 <= edge["quality"] <= 1
+    assert 0 <= edge["segment"] < len(segments)
+    segment, beam = segments[edge["segment"]], {"start": "first_beam", "end": "last_beam"}
+    assert segment[str(edge["side"])].tolist() == edge["position"].tolist()
+    assert segment[beam[edge["side"]]] == edge["beam"]
 
 
 @every_extractor
@@ -269,10 +273,13 @@ def rows_of(features, place=np.asarray, flip=False):
     variances = lines["covariance"][:, [0, 1], [0, 1]] ** 0.5
     numbers = [lines[name] for name in ("n_points", "rms", "misfit")]
     yield np.column_stack([place(lines[e]) for e in (*ends, "centroid")] + [variances, *numbers])
-    kinds = corners["kind"] == "edge"
     numbers = [corners[name] for name in ("opening", "quality", "convex", "response")]
     spread = np.sqrt(np.trace(corners["covariance"], axis1=1, axis2=2))
-    yield np.column_stack([place(corners["position"]), spread, kinds, *numbers])
+    yield np.column_stack([place(corners["position"]), spread, *numbers])
+    edges = features.edges
+    spread = np.sqrt(np.trace(edges["covariance"], axis1=1, axis2=2))
+    sides = edges["side"] == ends[0]
+    yield np.column_stack([place(edges["position"]), spread, sides, edges["quality"]])
     yield np.column_stack([place(arcs["center"]), arcs["radius"], arcs["n_points"]])
 
 

@@ -119,12 +119,11 @@ def test_a_panel_before_a_wall_ends_in_edges(extractor):
     panel = abs(np.tan(angles)) < 0.2
     ranges = np.where(panel, wall(angles, 2.0, 0.0), wall(angles, 4.0, 0.0))
     features = found_in(extractor, ranges, angles, sigma=1e-4)
-    edges, near = of_kind(features, "edge"), features.segments[1]
-    assert len(edges) == len(features.corners) == 2
-    assert edges["segments"].tolist() in ([[-1, 1], [1, -1]], [[1, -1], [-1, 1]])
-    assert (edges["opening"] == 0).all()
+    edges, near = features.edges, features.segments[1]
+    assert (len(features.corners), edges["segment"].tolist()) == (0, [1, 1])
+    assert sorted(edges["side"]) == ["end", "start"]
     for edge in edges:
-        sign = 1 if edge["segments"][0] == 1 else -1
+        sign = 1 if edge["side"] == "end" else -1
         end, beam = ("end", "last_beam") if sign > 0 else ("start", "first_beam")
         assert edge["position"].tolist() == near[end].tolist()
         assert edge["beam"] == near[beam] == np.flatnonzero(panel)[-1 if sign > 0 else 0]
@@ -255,7 +254,7 @@ def test_mixed_pixels_between_two_depths_are_noise(extractor, between):
     ranges[edge : edge + len(between)] = between
     features = found_in(extractor, ranges, angles)
     assert len(features.segments) == 2
-    assert features.corners["kind"].tolist() == ["edge"]
+    assert (len(features.corners), len(features.edges)) == (0, 1)
     assert (features.clusters[edge : edge + len(between)] == -1).all()
     assert features.segments["last_beam"][0] == edge - 1
     assert features.segments["first_beam"][1] == edge + len(between)

@@ -87,7 +87,7 @@ def test_scans_are_written_in_chunks_and_numbered(tmp_path, n):
 
 def test_log_without_scans_or_features(target):
     for n in (0, 2):
-        write(target, [random_features(0, n_beams=0, counts=(0, 0, 0, 0))] * n)
+        write(target, [random_features(0, n_beams=0, counts=(0, 0, 0, 0, 0))] * n)
         if target.suffix == ".parquet":
             table = pq.read_table(target)
             assert table.schema.equals(WRITTEN)

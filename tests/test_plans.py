@@ -8,7 +8,7 @@ from itertools import pairwise
 import ezdxf
 import numpy as np
 import pytest
-from handmade import arc, corner, features, segment
+from handmade import arc, corner, edge, features, segment
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -157,7 +157,7 @@ def test_averages_join_what_is_near_and_edges_stay_apart_from_corners():
     np.testing.assert_allclose(means.seen(2), [(0.03, 0)])
     plan = FloorPlan()
     for shift in (0.0, 0.02):
-        plan.add(features(corners=[corner(shift, 1), corner(0.05, 1 + shift, kind="edge")]))
+        plan.add(features(corners=[corner(shift, 1)], edges=[edge(0.05, 1 + shift)]))
     markers, _ = plan.markers(min_views=2)
     np.testing.assert_allclose(markers.corners, [(0.01, 1)])
     np.testing.assert_allclose(markers.edges, [(0.05, 1.01)])
@@ -252,7 +252,8 @@ def test_one_scan_is_drawn_in_its_own_frame(target, part):
     found = features(
         100,
         segments=[line((1, -0.5), (1, 2.25)), line((1, 2.25), (-0.123456, 2.25))],
-        corners=[corner(1, 2.25), corner(-0.125, 2.25, kind="edge"), corner(2, 2, sigma=0.0)],
+        corners=[corner(1, 2.25), corner(2, 2, sigma=0.0)],
+        edges=[edge(-0.125, 2.25)],
         arcs=[arc(1.0, 0.0, 1.0, beams[0], beams[-1]), arc(0.0, 5.0, 0.5, 0, 200)],
     )
     found.corners["covariance"][0] = turn @ np.diag([0.04, 0.01]) @ turn.T
@@ -411,12 +412,11 @@ def test_span_of_an_arc_is_that_of_its_unwrapped_directions(seed, first, last):
 
 
 def test_edges_are_marks_of_their_own():
-    kinds = ("corner", "edge", "slit", "edge")
-    found = features(corners=[corner(k, 1, kind=kind) for k, kind in enumerate(kinds)])
-    found.corners["position"][3] = np.nan
+    corners = [corner(0, 1), corner(2, 1, kind="slit")]
+    found = features(corners=corners, edges=[edge(1, 1), edge(math.nan, 1)])
     markers = markers_of(found)
     assert markers.points.tolist() == [[0, 1], [2, 1], [1, 1]]
-    assert markers.ellipses[:, 0].tolist() == [0, 1, 2]
+    assert markers.ellipses[:, 0].tolist() == [0, 2, 1]
     layers = {layer.name: layer for layer in layers_of(markers)}
     corners, edges = layers["corners"], layers["edges"]
     assert (corners.points.tolist(), edges.points.tolist()) == ([[0, 1], [2, 1]], [[1, 1]])

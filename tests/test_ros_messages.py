@@ -9,7 +9,7 @@ import textwrap
 import numpy as np
 import pytest
 import ros_bags
-from handmade import arc, corner, features, random_features, segment
+from handmade import arc, corner, edge, features, random_features, segment
 from mcap.reader import make_reader
 
 import lineament as ln
@@ -37,7 +37,8 @@ SCAN = LaserScan(
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
-    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3), corner(0, 3, kind="edge")],
+    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3)],
+    edges=[edge(0, 3)],
     arcs=[arc(2, 1, 0.25, 0, 1)],
 )
 
@@ -227,7 +228,7 @@ def test_corners_point_to_where_they_open(make):
 
 
 def test_feature_cloud(make):
-    numbered = Tracks(*(np.arange(n) for n in (2, 4, 1, 0, 0)), None)
+    numbered = Tracks(*(np.arange(n) for n in (2, 3, 1, 0, 0)), None)
     for tracks in (None, numbered):
         cloud = read(make, make.cloud("/scan/features", MOMENT, FOUND, tracks))
         points = columns_of(cloud)

@@ -13,7 +13,7 @@ from lineament.features.tables import SCHEMA, batch_table, features_table
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
 
 
-def random_features(seed: int, n_beams: int = 40, counts=(3, 2, 1, 2), **fields) -> Features:
+def random_features(seed: int, n_beams: int = 40, counts=(3, 2, 3, 1, 2), **fields) -> Features:
     rng = np.random.default_rng(seed)
     tables = {}
     for (name, dtype), count in zip(TABLES.items(), counts, strict=True):
@@ -27,7 +27,8 @@ def random_features(seed: int, n_beams: int = 40, counts=(3, 2, 1, 2), **fields)
                 "U": lambda shape=shape: rng.choice(["jump", "gap"], shape),
             }[kind]()
         tables[name] = table
-    tables["corners"]["kind"] = rng.choice(["corner", "slit", "edge"], counts[1])
+    tables["corners"]["kind"] = rng.choice(["corner", "slit"], counts[1])
+    tables["edges"]["side"] = rng.choice(["start", "end"], counts[2])
     clusters = (np.arange(n_beams) // 9).astype(np.int32)
     clusters[rng.random(n_beams) < 0.1] = -1
     return Features(**tables, clusters=clusters, stamp=0.1 * seed, **fields)
@@ -81,16 +82,16 @@ def naive_clusters(scan: int, features: Features) -> list[dict]:
 def test_rows_equal_those_of_the_slow_twin():
     scans = [
         random_features(1),
-        random_features(2, n_beams=7, counts=(0, 0, 0, 0)),
-        random_features(3, n_beams=0, counts=(2, 0, 4, 1)),
-        random_features(4, n_beams=90, counts=(1, 5, 0, 0)),
-        random_features(5, n_beams=1, counts=(0, 0, 0, 0)),
+        random_features(2, n_beams=7, counts=(0, 0, 0, 0, 0)),
+        random_features(3, n_beams=0, counts=(2, 0, 1, 4, 1)),
+        random_features(4, n_beams=90, counts=(1, 5, 0, 0, 0)),
+        random_features(5, n_beams=1, counts=(0, 0, 0, 0, 0)),
     ]
     table = features_table(scans, first_scan=1000)
     assert table.to_pylist() == naive_rows(scans, 1000)
     assert table.schema.equals(SCHEMA)
     table.validate(full=True)
-    for nothing in ([], [random_features(0, n_beams=0, counts=(0, 0, 0, 0))]):
+    for nothing in ([], [random_features(0, n_beams=0, counts=(0, 0, 0, 0, 0))]):
         assert features_table(nothing).num_rows == 0
         assert features_table(nothing).schema.equals(SCHEMA)
 
@@ -98,7 +99,7 @@ def test_rows_equal_those_of_the_slow_twin():
 @pytest.mark.parametrize("seed", range(20))
 def test_clusters_lie_over_the_seam_of_scans_without_ends(seed):
     rng = np.random.default_rng(seed)
-    scans = [random_features(k, counts=(0, 0, 0, k % 3)) for k in range(20)]
+    scans = [random_features(k, counts=(0, 0, 0, 0, k % 3)) for k in range(20)]
     for scan in scans:
         # Few labels, with gaps between them, in runs or beam by beam.
         labels = rng.choice([-1, -1, 0, 1, 3], rng.integers(0, 12))
@@ -110,7 +111,7 @@ def test_clusters_lie_over_the_seam_of_scans_without_ends(seed):
 
 
 def test_batch_gives_the_same_table_as_its_scans():
-    scans = [random_features(i, counts=(i, 2, 0, i % 3), frame_id="laser") for i in range(5)]
+    scans = [random_features(i, counts=(i, 2, i % 2, 0, i % 3), frame_id="laser") for i in range(5)]
     offsets = np.zeros(6, [(name, "i8") for name in TABLES])
     for name in TABLES:
         offsets[name][1:] = np.cumsum([len(getattr(f, name)) for f in scans])
@@ -129,13 +130,17 @@ def test_batch_gives_the_same_table_as_its_scans():
 
 
 @pytest.mark.parametrize(
-    ("table", "expected"),
-    [("corners", "corner, slit, edge"), ("breakpoints", "jump, gap, scan_end")],
+    ("table", "field", "expected"),
+    [
+        ("corners", "kind", "corner, slit"),
+        ("edges", "side", "start, end"),
+        ("breakpoints", "kind", "jump, gap, scan_end"),
+    ],
 )
-def test_unknown_kind_is_refused(table, expected):
+def test_unknown_text_is_refused(table, field, expected):
     features = random_features(0)
-    getattr(features, table)["kind"][1] = "cliff"
-    message = f"^{table[:-1]} kind is 'cliff', expected one of {expected}$"
+    getattr(features, table)[field][1] = "cliff"
+    message = f"^{table[:-1]} {field} is 'cliff', expected one of {expected}$"
     with pytest.raises(ValueError, match=message):
         features_table([features])
 
@@ -158,7 +163,7 @@ def test_docs_list_every_column_with_its_unit_and_type():
     assert table.pop() == ""  # no column more than the schema has
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     filled = features_table([random_features(1)]).to_pylist()
-    order = ["segment", "corner", "arc", "breakpoint", "cluster"]
+    order = ["segment", "corner", "edge", "arc", "breakpoint", "cluster"]
     for field, (name, unit, kind, about, by) in zip(SCHEMA, rows, strict=True):
         metadata = {key.decode(): value.decode() for key, value in field.metadata.items()}
         assert name == f"`{field.name}`"

@@ -7,7 +7,7 @@ from itertools import pairwise
 import naive_tracking as naive
 import numpy as np
 import pytest
-from handmade import arc, corner, features, random_features, segment, shaken
+from handmade import arc, corner, edge, features, random_features, segment, shaken
 
 import lineament as ln
 from lineament.motion import Tracker, associate, estimate_motion
@@ -53,7 +53,6 @@ CONVEX["convex"] = True
         ({"corners": [corner(2.05, 1)]}, {"covariance": 4 * NEAR}, 1),
         ({"corners": [CONVEX]}, {}, 0),
         ({"corners": [corner(2, 1, sigma=math.nan)]}, {}, 0),
-        ({"corners": [corner(2, 1, kind="edge")]}, {}, 0),
         ({"corners": [corner(2, 1, kind="slit")]}, {}, 1),
         ({"arcs": [arc(0.02, -2, 0.31, 70, 80)]}, {}, 1),
         ({"arcs": [arc(0, -2, 0.37, 70, 80)]}, {}, 0),
@@ -114,7 +113,7 @@ def varied(seed):
         table["covariance"][rng.random(len(table)) < 0.05] = math.nan
     frame.segments["misfit"] = rng.choice([0.0, 0.01], len(frame.segments))
     frame.corners["convex"] = rng.random(len(frame.corners)) < 0.3
-    frame.corners["kind"] = rng.choice(["corner", "slit", "edge"], len(frame.corners))
+    frame.corners["kind"] = rng.choice(["corner", "slit"], len(frame.corners))
     frame.corners["segments"][:, 0] -= rng.random(len(frame.corners)) < 0.3
     return frame
 
@@ -237,11 +236,9 @@ def test_edges_are_ignored():
     plain, tracker, pose = Tracker(), Tracker(), (0.0, 0.0, 0.0)
     for i in range(4):
         frame = at(FRAME.transform(*inverse(pose)), 0.1 * i)
-        silhouettes = [corner(0.3, -2, segments=(-1, 1), kind="edge"), frame.corners[0]]
-        silhouettes.append(corner(-0.3, -2, segments=(1, -1), kind="edge"))
-        expected, tracks = plain(frame), tracker(replace(frame, corners=np.array(silhouettes)))
-        assert tracks.corners.tolist() == [-1, *expected.corners, -1]
-        assert_same_tracks(replace(tracks, corners=expected.corners), expected)
+        silhouettes = [edge(0.3, -2, side="start"), edge(-0.3, -2, side="end")]
+        seen = replace(frame, edges=np.array(silhouettes))
+        assert_same_tracks(tracker(seen), plain(frame))
         pose = compose(pose, (0.05, 0.01, 0.02))
     assert len(tracker._seen.corners) == 1
 

@@ -569,8 +569,8 @@ const scan = {
   arcs: [{ center: [2, 2], radius: 1.3, ...spread }],
   segments: [{ start: [-3, 1], end: [-1, 2.5] }],
   breakpoints: [{ position: [-2, -1] }],
-  corners: [{ kind: "corner", position: [1, -2], covariance },
-            { kind: "edge", position: [-3, -2], covariance }],
+  corners: [{ kind: "corner", position: [1, -2], covariance }],
+  edges: [{ side: "end", position: [-3, -2], covariance }],
 };
 placeBeams(scan);
 const size = { width: 400, height: 400 }, plane = Object.assign(new Plane(), { scale: 45 });

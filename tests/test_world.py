@@ -10,11 +10,12 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 import ros_bags
-from handmade import arc, corner, features, segment
+from handmade import arc, corner, edge, features, segment
 
 import lineament as ln
 from lineament.cli import run
 from lineament.logs import open_log, save_npz
+from lineament.mapping import LineMap
 from lineament.simulation import SENSORS, drive, room
 from lineament.tasks.extract import extract_log, in_world
 
@@ -23,6 +24,7 @@ FOUND = features(
     100,
     segments=[segment((1, -4), (2, 3), 0, 9), segment((3, 0), (-1, -5), 10, 30)],
     corners=[corner(2.0, 3.0, sigma=0.02), corner(-6.0, 0.1)],
+    edges=[edge(2.0, 3.0, sigma=0.03)],
     arcs=[arc(1.0, 4.0, 0.3, 40, 50)],
 )
 
@@ -31,10 +33,11 @@ def test_covariances_with_that_of_the_pose_hold_by_monte_carlo():
     """Of 20 000 draws a variance is known to 1 %: white, what was drawn has unit covariance."""
     known, rng, n = FOUND.transform(*POSE, SPREAD), np.random.default_rng(1), 20_000
     still = FOUND.transform(*POSE)
-    errors: dict[str, list] = {"segments": [], "corners": [], "arcs": []}
+    errors: dict[str, list] = {"segments": [], "corners": [], "edges": [], "arcs": []}
     for pose in rng.multivariate_normal(POSE, SPREAD, n):
         moved = FOUND.transform(*pose)
-        errors["corners"].append(moved.corners["position"] - still.corners["position"])
+        for name in ("corners", "edges"):
+            errors[name].append(moved[name]["position"] - still[name]["position"])
         center = moved.arcs["center"] - still.arcs["center"]
         errors["arcs"].append(np.column_stack((center, np.zeros(len(center)))))
         # Of a segment: how far its line is off at the old centroid, and its turn.
@@ -52,7 +55,7 @@ def test_covariances_with_that_of_the_pose_hold_by_monte_carlo():
 
 
 def test_a_pose_that_is_known_exactly_adds_nothing():
-    for name in ("segments", "corners", "arcs"):
+    for name in ("segments", "corners", "edges", "arcs"):
         exact = getattr(FOUND.transform(*POSE, np.zeros((3, 3))), name)
         np.testing.assert_array_equal(exact, getattr(FOUND.transform(*POSE), name))
 
@@ -171,12 +174,12 @@ def code(language):
 
 @pytest.fixture
 def world(tmp_path, log, monkeypatch):
-    """Stand where the docs have their files; return the corners without edges, by pyarrow."""
+    """Stand where the docs have their files; return the corners, by pyarrow."""
     monkeypatch.chdir(tmp_path)
     for target in ("world.parquet", "features.parquet", "out/"):
         assert run(["extract", str(log), "-o", target, "--world", "-q"]) == 0
     rows = pq.read_table("world.parquet").to_pylist()
-    corners = [row for row in rows if row["kind"] == "corner" and row["corner"] != "edge"]
+    corners = [row for row in rows if row["kind"] == "corner"]
     walls: dict[int, float] = {}
     for row in rows:
         if row["kind"] == "segment":
@@ -187,10 +190,27 @@ def world(tmp_path, log, monkeypatch):
 def test_docs_on_pandas(world):
     pytest.importorskip("pandas", reason="pandas is not installed")
     corners, walls = world
+    found = {}
     for text in code("python"):
-        exec(text, found := {})
+        exec(text, found)
     assert found["corners"]["sd_x"].tolist() == [row["cov_00"] ** 0.5 for row in corners]
     assert found["walls"].to_dict() == pytest.approx(walls)
+
+
+@pytest.mark.usefixtures("world")
+@pytest.mark.parametrize("version", [2, 3])
+def test_docs_on_tables_of_two_versions(version):
+    pd = pytest.importorskip("pandas", reason="pandas is not installed")
+    table = pd.read_parquet("features.parquet").astype({"kind": object, "corner": object})
+    kinds, is_edge = table["kind"].tolist(), table["kind"] == "edge"
+    assert 0 < is_edge.sum() < len(table)
+    if version == 2:
+        table.loc[is_edge, "kind"] = "corner"
+        table.loc[is_edge, "corner"] = "edge"
+        table.drop(columns=["segment", "side"]).to_parquet("features.parquet")
+    exec(code("python")[-1], found := {})
+    assert found["table"]["kind"].tolist() == kinds
+    assert len(LineMap.read("features.parquet").walls) > 0
 
 
 def test_docs_on_duckdb(world):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from handmade import arc, corner, features, segment
+from handmade import arc, corner, edge, features, segment
 from mcap.reader import make_reader
 from protobuf import decode, messages_of
 from rosbags.rosbag2.storage_mcap import McapReader
@@ -22,7 +22,8 @@ LAYERS = ["segments", "arcs", "corners", "edges", "ellipses"]
 FOUND = features(
     6,
     segments=[segment((1, 0), (1, 2), 0, 1), segment((0, 3), (-1, 3), 1, 3)],
-    corners=[corner(1, 2), corner(np.nan, 0), corner(-1, 3, kind="edge")],
+    corners=[corner(1, 2), corner(np.nan, 0)],
+    edges=[edge(-1, 3)],
     arcs=[arc(2, 1, 0.25, 0, 1)],
 )
 EMPTY = features(6)

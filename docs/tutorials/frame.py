@@ -80,7 +80,7 @@ scans.describe().loc[["mean", "std", "min", "max"]].round(2)
 # away to some centimetres. The axis is logarithmic.
 
 # %% alt="Histogram of the standard deviations of the corners"
-corners = frame.query("kind == 'corner' and corner != 'edge'")
+corners = frame.query("kind == 'corner'")
 error = 1000 * (corners.cov_00 + corners.cov_11) ** 0.5
 axes = error.plot.hist(
     bins=[0.5 * 1.3**k for k in range(22)], logx=True, figsize=(7, 3)

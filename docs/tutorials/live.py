@@ -85,9 +85,9 @@ for cloud in reader.take_iter(timeout=duration(seconds=20)):
         break
 
 for stamp, points in clouds[::10]:
-    kinds = np.bincount(points["kind"], minlength=3)
+    kinds = np.bincount(points["kind"], minlength=4)
     time = stamp.sec + stamp.nanosec / 1e9
-    print(f"{time:.1f} s:", *kinds, "segments, corners and edges, arcs")
+    print(f"{time:.1f} s:", *kinds, "segments, corners, arcs, edges")
 
 # %% [markdown]
 # ## Tracks
@@ -106,7 +106,7 @@ for wall in last[last["kind"] == 0]:
     x, y = wall[["start_x", "end_x"]].item(), wall[["start_y", "end_y"]].item()
     axes.plot(x, y, color="#1b1f24")
 corners = [points[points["kind"] == 1] for _, points in clouds]
-for corner in corners[-1][corners[-1]["corner"] != 2]:
+for corner in corners[-1]:
     way = np.concatenate(
         [scan[scan["track"] == corner["track"]] for scan in corners]
     )

@@ -8,7 +8,7 @@ Examples
 >>> import lineament as ln
 >>> scan = ln.LaserScan([2.0] * 5, angle_min=-0.01, angle_increment=0.01)
 >>> ln.extract(scan)
-Features(1 segments, 0 corners, 0 arcs, 2 breakpoints, 1 clusters, stamp=0.000)
+Features(1 segments, 0 corners, 0 edges, 0 arcs, 2 breakpoints, 1 clusters, stamp=0.000)
 """
 
 from typing import TYPE_CHECKING

@@ -96,17 +96,18 @@ class Extractor:
         block = self._blocks.take(scan) or self._new_block(scan, 1)
         block.load(scan.ranges)
         (self._run or self._first_run)(block)
-        segments, corners, arcs, breakpoints = block.written()
+        segments, corners, edges, arcs, breakpoints = block.written()
         features = Features(
-            segments,
-            corners,
-            arcs,
-            np.frombuffer(block.clusters.tobytes(), np.int32),
-            breakpoints,
-            scan.stamp,
-            scan.frame_id,
-            self._noise or noise_of(block.noises[0]),
-            scan,
+            segments=segments,
+            corners=corners,
+            edges=edges,
+            arcs=arcs,
+            breakpoints=breakpoints,
+            clusters=np.frombuffer(block.clusters.tobytes(), np.int32),
+            stamp=scan.stamp,
+            frame_id=scan.frame_id,
+            noise=self._noise or noise_of(block.noises[0]),
+            scan=scan,
         )
         self._blocks.append(block)
         return features
@@ -234,7 +235,7 @@ def extract(
     Examples
     --------
     >>> extract([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01, method="liu", min_points=4)
-    Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
+    Features(0 segments, 0 corners, 0 edges, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
     made = _scan_of(scan, (angle_min, angle_increment, angles), (range_min, range_max))
     return Extractor(method, noise=noise, **parameters)(made)

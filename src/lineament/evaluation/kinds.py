@@ -4,11 +4,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import TABLES, Features
+from ..features import TABLES, Features, make_records
 from ..scan import Array
 from .beams import (
     MIN_BEAMS,
@@ -63,8 +64,8 @@ class FeatureScores(Summable):
     def none(cls, kind: str) -> "FeatureScores":
         """Return those of no scan, of "corners", "segments" or "arcs"."""
         score = {"corners": corner_scores, "segments": segment_scores, "arcs": arc_scores}[kind]
-        segments, corners, arcs, breakpoints = (np.empty(0, dtype) for dtype in TABLES.values())
-        nothing = Features(segments, corners, arcs, np.empty(0, np.int32), breakpoints)
+        tables: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
+        nothing = Features(**tables, clusters=np.empty(0, np.int32))
         return score(nothing, nothing)
 
     @property
@@ -94,7 +95,7 @@ def corner_scores(found: Features, truth: Features) -> FeatureScores:
     more: no estimate can be asked to be nearer. A true corner is demanded if both its segments
     have at least `MIN_BEAMS` beams; demanded ones are matched first, and a found corner that is
     then matched with one of the others is left out of the count. All others that are found, on a
-    round column or anywhere else, are mistakes. Edges at jumps are not compared.
+    round column or anywhere else, are mistakes.
 
     Examples
     --------
@@ -105,7 +106,7 @@ def corner_scores(found: Features, truth: Features) -> FeatureScores:
     >>> corner_scores(features, features).counts
     Counts(correct=1, found=1, true=1)
     """
-    corners, true = vertices(found), truth.corners
+    corners, true = found.corners, truth.corners
     apart = distances(corners["position"], true["position"])
     spread = tolerance(largest_variance(true["covariance"]))
     large = np.append(truth.segments["n_points"] >= MIN_BEAMS, False)
@@ -234,8 +235,3 @@ def line_errors(found: NDArray[np.void], true: NDArray[np.void]) -> tuple[Array,
     offset = apart[..., 1] * np.cos(true["angle"]) - apart[..., 0] * np.sin(true["angle"])
     turn = found["angle"] - true["angle"]
     return offset, (turn + math.pi) % (2 * math.pi) - math.pi
-
-
-def vertices(features: Features) -> NDArray[np.void]:
-    """Corners without the edges at jumps, which are ends of segments and no vertices."""
-    return np.asarray(features.corners[features.corners["kind"] != "edge"])

@@ -1,17 +1,17 @@
 """Whether features are found again from another place, in logs with known poses."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import Features
+from ..features import CORNER, Features
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import relative
 from .beams import nearest_beams, with_neighbours
 from .counts import Summable, ratio, rms
-from .kinds import ANGLE, vertices
+from .kinds import ANGLE
 from .matching import distances, distances_from_segments, match, match_points
 
 #: Places on a segment at which it is looked for, and the share of them that must be in view, and
@@ -126,7 +126,7 @@ def repeatability(
     found again within the gate, and expected even if only one of its sides is in sight. A segment
     is expected if it shows this scanner its front, and at least half of 16 places along it are in
     sight; it is found again as one whose direction differs by at most 10° and which is within the
-    gate of at least half of those in sight. Both are matched one to one, edges at jumps left out.
+    gate of at least half of those in sight. Both are matched one to one.
 
     The gate [m] must allow for the errors of the poses. Raises ValueError if a scan has no pose,
     or the gate is not more than 0.
@@ -144,13 +144,21 @@ def repeatability(
     if not gate > 0:
         raise ValueError(f"gate is {gate}, expected a distance > 0")
     moved = other_features.transform(*_motion(scan, other_scan))
-    others = vertices(moved)["position"]
+    others = moved.corners["position"]
     others = others[in_sight(scan, others, gate)]
-    *_, apart = match_points(vertices(features)["position"], others, gate)
+    *_, apart = match_points(features.corners["position"], others, gate)
     return Repeatability(
         Repeats(len(others), apart),
         _segments_again(scan, features.segments, moved.segments, gate),
     )
+
+
+def with_edges(features: Features) -> Features:
+    """Return features with the edges among the corners: both have a quality."""
+    corners = np.zeros(len(features.corners) + len(features.edges), CORNER)
+    for name in ("position", "covariance", "quality"):
+        corners[name] = np.concatenate((features.corners[name], features.edges[name]))
+    return replace(features, corners=corners)
 
 
 def ranked_repeats(

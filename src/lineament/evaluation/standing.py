@@ -13,7 +13,7 @@ from ..scan import Array
 from .beams import beams_of, overlap_ratios
 from .consistency import NormalisedErrors, largest_variance, usable_covariances
 from .counts import Summable, ratio
-from .kinds import line_errors, vertices
+from .kinds import line_errors
 from .matching import Indices, match, match_points
 
 #: Fewest measurements of the shorter arm of each bin; the next bin begins where it ends.
@@ -70,7 +70,6 @@ def standing_scores(scans: Iterable[Features]) -> StandingScores:
     their covariances, whatever the truth is: it holds what is random alone. Segments are matched
     by the overlap of their beams, at least half; corners by distance, within 0.1 m or 5
     deviations. The shorter arm of a corner is the shorter of its two segments in either scan.
-    Edges at jumps are left out.
 
     All are in the sensor's frame. Raises ValueError if two in a row have different numbers of
     beams.
@@ -113,7 +112,7 @@ def _segments(features: Features, after: Features) -> ScatterScores:
 
 
 def _corners(features: Features, after: Features) -> ScatterScores:
-    one, other = vertices(features), vertices(after)
+    one, other = features.corners, after.corners
     variances = largest_variance(one["covariance"])[:, np.newaxis]
     spread = np.sqrt(variances + largest_variance(other["covariance"]))
     gate = np.maximum(GATE, DEVIATIONS * spread)
@@ -140,4 +139,4 @@ def _scores(
 def _shorter_arms(features: Features) -> NDArray[np.int32]:
     """Measurements of the shorter segment of each vertex; 0 if it has not two."""
     counts = np.append(features.segments["n_points"], np.int32(0))
-    return np.asarray(counts[vertices(features)["segments"]].min(axis=1))
+    return np.asarray(counts[features.corners["segments"]].min(axis=1))

@@ -102,8 +102,7 @@ def track_scores(
     The features of a frame are moved by the known poses into the frame before. Corners are the
     same within 0.10 m; segments if the centroids of both are within 0.10 m of the other's line,
     the directions within 10°, and they lie side by side along half of the shorter one. They are
-    matched one to one, without any of the tracker's own gates. Features without a track, the edges,
-    are left out.
+    matched one to one, without any of the tracker's own gates.
     """
     scores = {}
     for kind, same in (("segments", _same_segments), ("corners", _same_corners)):

@@ -1,14 +1,14 @@
 """What is found in a scan, and its fields: their types, units and columns are declared once."""
 
 from .batch import FeatureBatch
-from .features import COUNTED, Features, noise_of, noise_row
-from .records import ARC, BREAKPOINT, CORNER, SEGMENT, TABLES, make_records
+from .features import Features, noise_of, noise_row
+from .records import ARC, BREAKPOINT, CORNER, EDGE, SEGMENT, TABLES, make_records
 
 __all__ = [
     "ARC",
     "BREAKPOINT",
     "CORNER",
-    "COUNTED",
+    "EDGE",
     "SEGMENT",
     "TABLES",
     "FeatureBatch",

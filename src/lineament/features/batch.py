@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-@dataclass(slots=True, eq=False, repr=False)
+@dataclass(slots=True, eq=False, repr=False, kw_only=True)
 class FeatureBatch(Tabled, ReadOnly):
     """Features of many scans: the arrays of `Features`, one after the other, read-only too.
 
@@ -26,13 +26,13 @@ class FeatureBatch(Tabled, ReadOnly):
 
     Attributes
     ----------
-    segments, corners, arcs, breakpoints : structured arrays
+    segments, corners, edges, arcs, breakpoints : structured arrays
         As in `Features`; indices into a scan's segments count within that scan.
     clusters : int32 array, shape (m, n)
         Cluster of each beam of each scan.
     offsets : structured array, shape (m + 1,)
         ``offsets["segments"][i]`` is where the segments of scan i begin, and likewise for
-        "corners", "arcs" and "breakpoints".
+        the other tables.
     stamps : float64 array, shape (m,)
         Stamp of each scan [s].
     noises : float64 array, shape (m, 4)
@@ -50,9 +50,10 @@ class FeatureBatch(Tabled, ReadOnly):
 
     segments: NDArray[np.void]
     corners: NDArray[np.void]
+    edges: NDArray[np.void]
     arcs: NDArray[np.void]
-    clusters: NDArray[np.int32]
     breakpoints: NDArray[np.void]
+    clusters: NDArray[np.int32]
     offsets: NDArray[np.void]
     stamps: NDArray[np.float64]
     noises: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What is found in a scan: segments, corners, arcs, clusters, breakpoints, with covariances."""
+"""What is found in a scan: segments, corners, edges, arcs, breakpoints, clusters."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
     from matplotlib.axes import Axes
-
-#: What is counted: edges apart from the corners.
-COUNTED = ("segments", "corners", "edges", "arcs", "breakpoints")
 
 
 class Tabled:
@@ -59,18 +56,19 @@ class Tabled:
         return pl.from_arrow(self.to_arrow(scan))
 
 
-@dataclass(slots=True, eq=False, repr=False)
+@dataclass(slots=True, eq=False, repr=False, kw_only=True)
 class Features(Tabled, ReadOnly, Pictured):
     """All features of one scan. The arrays are read-only.
 
-    ``len(features)`` counts the records of its four tables, ``features["corners"]`` is a table by
+    ``len(features)`` counts the records of its five tables, ``features["corners"]`` is a table by
     name, iterating gives the names; in a notebook they are a picture.
+    They are made with all fields by name.
 
     Attributes
     ----------
-    segments, corners, arcs, breakpoints : structured arrays
-        One record a feature, of dtypes `SEGMENT`, `CORNER`, `ARC`, `BREAKPOINT`; metres and
-        radians, in the frame of the scan.
+    segments, corners, edges, arcs, breakpoints : structured arrays
+        One record a feature, of dtypes `SEGMENT`, `CORNER`, `EDGE`, `ARC`, `BREAKPOINT`; metres
+        and radians, in the frame of the scan.
     clusters : int32 array, shape (n,)
         Cluster of each beam, -1 for none (invalid, noise).
     stamp : float
@@ -86,14 +84,15 @@ class Features(Tabled, ReadOnly, Pictured):
     --------
     >>> import lineament as ln
     >>> ln.extract(ln.LaserScan([], angle_min=0.0, angle_increment=0.1))
-    Features(0 segments, 0 corners, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
+    Features(0 segments, 0 corners, 0 edges, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
 
     segments: NDArray[np.void]
     corners: NDArray[np.void]
+    edges: NDArray[np.void]
     arcs: NDArray[np.void]
-    clusters: NDArray[np.int32]
     breakpoints: NDArray[np.void]
+    clusters: NDArray[np.int32]
     stamp: float = 0.0
     frame_id: str = ""
     noise: RangeNoise | None = None
@@ -124,7 +123,7 @@ class Features(Tabled, ReadOnly, Pictured):
         return f"Features({sizes(self)}, {n_clusters} clusters, stamp={self.stamp:.3f})"
 
     def counts(self) -> dict[str, int]:
-        """Return how many features there are, by the names of `COUNTED`.
+        """Return how many features there are, by table.
 
         Examples
         --------
@@ -132,10 +131,7 @@ class Features(Tabled, ReadOnly, Pictured):
         >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).counts()
         {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
         """
-        edges = int(np.count_nonzero(self.corners["kind"] == "edge"))
-        corners = len(self.corners) - edges
-        found = len(self.segments), corners, edges, len(self.arcs), len(self.breakpoints)
-        return dict(zip(COUNTED, found, strict=True))
+        return {name: len(self[name]) for name in TABLES}
 
     def transform(
         self,
@@ -177,19 +173,20 @@ class Features(Tabled, ReadOnly, Pictured):
             return np.asarray(points @ rotation.T + shift)
 
         tables = {name: getattr(self, name).copy() for name in TABLES}
-        segments, corners, arcs, breakpoints = tables.values()
+        segments, corners, edges, arcs, breakpoints = tables.values()
         for name in ("start", "end", "centroid"):
             segments[name] = moved(segments[name])
         segments["angle"] = np.angle(np.exp(1j * (segments["angle"] + theta)))
-        corners["position"] = moved(corners["position"])
-        corners["covariance"] = rotation @ corners["covariance"] @ rotation.T
+        for points in (corners, edges):
+            points["position"] = moved(points["position"])
+            points["covariance"] = rotation @ points["covariance"] @ rotation.T
         with_radius = np.eye(3)
         with_radius[:2, :2] = rotation
         arcs["center"] = moved(arcs["center"])
         arcs["covariance"] = with_radius @ arcs["covariance"] @ with_radius.T
         breakpoints["position"] = moved(breakpoints["position"])
         if covariance is not None:
-            _add_pose_covariance(segments, corners, arcs, shift, covariance_of_pose(covariance))
+            _add_pose_covariance(tables, shift, covariance_of_pose(covariance))
         for table in tables.values():
             table.flags.writeable = False
         name = self.frame_id if frame_id is None else frame_id
@@ -243,9 +240,7 @@ def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
 
 
 def _add_pose_covariance(
-    segments: NDArray[np.void],
-    corners: NDArray[np.void],
-    arcs: NDArray[np.void],
+    tables: dict[str, NDArray[np.void]],
     shift: NDArray[np.float64],
     covariance: NDArray[np.float64],
 ) -> None:
@@ -262,7 +257,9 @@ def _add_pose_covariance(
     def added(of_pose: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(of_pose @ covariance @ of_pose.transpose(0, 2, 1))
 
-    corners["covariance"] += added(jacobian(corners["position"]))
+    for points in (tables["corners"], tables["edges"]):
+        points["covariance"] += added(jacobian(points["position"]))
+    segments, arcs = tables["segments"], tables["arcs"]
     arcs["covariance"][:, :2, :2] += added(jacobian(arcs["center"]))
     # The offset of a segment is along its normal; its angle is the pose's.
     of_segment = np.zeros((len(segments), 2, 3))

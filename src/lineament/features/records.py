@@ -35,9 +35,11 @@ class Field(NamedTuple):
 #: is what the surface itself is off a straight line, the same in every scan. Beams run from
 #: `first_beam` to `last_beam`, over the seam of a full circle where the first is larger.
 #:
-#: A corner is a vertex between two segments. `kind` is "corner", "slit" (the segments end beside a
-#: hole at their vertex) or "edge" (a segment ends, and few measurements show its face, before a
-#: jump); `response` is the rise of χ² or a length, as the method has it.
+#: A corner is a vertex between two segments. `kind` is "corner" or "slit" (the segments end beside
+#: a hole at their vertex); `response` is the rise of χ² or a length, as the method has it.
+#:
+#: An edge is where a segment ends before a jump, and few measurements show its face. It may be a
+#: silhouette, which moves with the sensor. `side` is the end of its segment: "start" or "end".
 #:
 #: An arc is a circular piece of a surface; its covariance is that of (x, y, radius).
 #:
@@ -73,7 +75,15 @@ FIELDS = tuple(
          "segment_before segment_after", "segment_a segment_b"),
         ("corners", "quality", "f8", "", "share found again from another place, 0 to 1",
          "quality", "quality"),
-        ("corners", "kind", "U6", "", "corner, slit or edge", "corner", "corner"),
+        ("corners", "kind", "U6", "", "corner or slit", "corner", "corner"),
+        ("edges", "position", "(2,)f8", "m", "position", "x y", "x y"),
+        ("edges", "covariance", "(2,2)f8", "m²", "of x and y", "cov_00 cov_01 cov_11",
+         "c00 c01 c11"),
+        ("edges", "quality", "f8", "", "share found again from another place, 0 to 1",
+         "quality", "quality"),
+        ("edges", "beam", "i4", "", "its beam", "beam", "first_beam last_beam"),
+        ("edges", "segment", "i4", "", "index of its segment", "segment", "segment_a"),
+        ("edges", "side", "U5", "", "which end of its segment: start or end", "side", "side"),
         ("arcs", "center", "(2,)f8", "m", "center", "x y", "x y"),
         ("arcs", "radius", "f8", "m", "", "radius", "radius"),
         ("arcs", "covariance", "(3,3)f8", "m²", "of x, y and radius",
@@ -95,7 +105,9 @@ TABLES = {
     table: np.dtype([(f.name, f.form) for f in FIELDS if f.table == table], align=True)
     for table in dict.fromkeys(field.table for field in FIELDS)
 }
-SEGMENT, CORNER, ARC, BREAKPOINT = TABLES.values()
+SEGMENT, CORNER, EDGE, ARC, BREAKPOINT = TABLES.values()
+#: The number of each table in that order.
+SEGMENTS, CORNERS, EDGES, ARCS, BREAKPOINTS = range(len(TABLES))
 
 #: The columns of the table of features in their order; those of other fields follow.
 COLUMNS = (
@@ -105,18 +117,20 @@ COLUMNS = (
 )
 #: Unit and meaning of the columns that are not those of one field.
 SHARED_COLUMNS = {
-    "kind": ("", "segment, corner, arc, breakpoint or cluster"),
+    "kind": ("", "segment, corner, edge, arc, breakpoint or cluster"),
     "scan": ("", "index of the scan in its log, from 0"),
     "stamp": ("s", "stamp of the scan"),
     "index": ("", "index among the features of its kind in its scan"),
-    "x": ("m", "segment: centroid; corner, breakpoint: position; arc: center"),
+    "x": ("m", "segment: centroid; corner, edge, breakpoint: position; arc: center"),
     "y": ("m", "as x"),
-    "cov_00": ("m²", "of segment (offset, angle), corner (x, y), arc (x, y, radius)"),
+    "cov_00": ("m²", "of segment (offset, angle), corner, edge (x, y), arc (x, y, radius)"),
     "cov_01": ("m² or m·rad", "as cov_00; of a segment m·rad"),
     "cov_11": ("m² or rad²", "as cov_00; of a segment rad²"),
     "cov_02": ("m²", "of arc (x, y, radius)"),
     "cov_12": ("m²", "as cov_02"),
     "cov_22": ("m²", "as cov_02"),
+    "quality": ("", "corner, edge: share found again from another place, 0 to 1"),
+    "beam": ("", "corner, edge: its beam"),
     "segment_before": ("", "corner: index of the segment before it, or -1"),
     "segment_after": ("", "corner: index of the segment after it, or -1"),
     "first_beam": ("", "segment, arc, cluster: first beam; breakpoint: beam before"),
@@ -132,12 +146,15 @@ POINTS = (
 
 KIND_NAMES = ("jump", "gap", "scan_end")
 JUMP, GAP, SCAN_END = 0, 1, 2
-CORNER_KINDS = ("corner", "slit", "edge")
-SHARP, SLIT, EDGE = 0, 1, 2
-#: The values of the field `kind`, by table, and as the int32 words of its text.
-KINDS = {"corners": CORNER_KINDS, "breakpoints": KIND_NAMES}
+CORNER_KINDS = ("corner", "slit")
+SHARP, SLIT = 0, 1
+SIDES = ("start", "end")
+AT_START, AT_END = 0, 1
+#: The values of the field that is text, by table, and as the int32 words of its text.
+TEXTS = {"corners": CORNER_KINDS, "edges": SIDES, "breakpoints": KIND_NAMES}
 KIND_WORDS = np.array(KIND_NAMES, "U8").view(np.int32).reshape(3, 8)
-CORNER_WORDS = np.array(CORNER_KINDS, "U6").view(np.int32).reshape(3, 6)
+CORNER_WORDS = np.array(CORNER_KINDS, "U6").view(np.int32).reshape(2, 6)
+SIDE_WORDS = np.array(SIDES, "U5").view(np.int32).reshape(2, 5)
 
 
 def words(records: NDArray[np.void]) -> NDArray[np.float64]:
@@ -161,11 +178,11 @@ def numbers(shape: tuple[int, ...]) -> list[int]:
     return [i for i, place in places if len(place) < 2 or place[0] <= place[1]]
 
 
-def kind_codes(table: str, kinds: NDArray[np.str_]) -> NDArray[np.int32]:
-    """Return the index of each kind among those of its table, -1 of one that is not there."""
-    codes = np.full(len(kinds), -1, np.int32)
-    for code, name in enumerate(KINDS[table]):
-        codes[kinds == name] = code
+def text_codes(table: str, texts: NDArray[np.str_]) -> NDArray[np.int32]:
+    """Return the index of each text among those of its table, -1 of one that is not there."""
+    codes = np.full(len(texts), -1, np.int32)
+    for code, name in enumerate(TEXTS[table]):
+        codes[texts == name] = code
     return codes
 
 
@@ -183,6 +200,8 @@ C_POSITION, C_COVARIANCE, C_OPENING, C_RESPONSE, C_QUALITY = _at(
     CORNER, "position covariance opening response quality"
 )
 C_CONVEX, C_BEAM, C_SEGMENTS, C_KIND = _at(CORNER, "convex beam segments kind")
+E_POSITION, E_COVARIANCE, E_QUALITY = _at(EDGE, "position covariance quality")
+E_BEAM, E_SEGMENT, E_SIDE = _at(EDGE, "beam segment side")
 A_CENTER, A_RADIUS, A_COVARIANCE, A_RMS = _at(ARC, "center radius covariance rms")
 A_FIRST, A_LAST, A_POINTS = _at(ARC, "first_beam last_beam n_points")
 B_POSITION, B_BEAM, B_KIND, B_OCCLUDER = _at(BREAKPOINT, "position beam kind occluder")

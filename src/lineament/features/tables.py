@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..scan.fields import nanoseconds
-from .records import COLUMNS, FIELDS, KINDS, SHARED_COLUMNS, TABLES, Field, kind_codes, numbers
+from .records import COLUMNS, FIELDS, SHARED_COLUMNS, TABLES, TEXTS, Field, numbers, text_codes
 
 if TYPE_CHECKING:
     from .batch import FeatureBatch
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 #: Values of the column `kind`, in the order in which the rows of a scan come.
 _ROWS = (*(table[:-1] for table in TABLES), "cluster")
 #: Values of the columns of text.
-_TEXTS = {f.columns: KINDS[f.table] for f in FIELDS if f.form[0] == "U"}
+_TEXTS = {f.columns: TEXTS[f.table] for f in FIELDS if f.form[0] == "U"}
 
 Columns = dict[str, NDArray[Any]]
 
@@ -43,7 +43,7 @@ def _schema() -> pa.Schema:
     for name in dict.fromkeys((*COLUMNS.split(), *forms)):
         unit, meaning = about[name]
         fields.append(pa.field(name, forms[name], metadata={"unit": unit, "description": meaning}))
-    return pa.schema(fields, metadata={"lineament.schema": "2", "lineament.version": __version__})
+    return pa.schema(fields, metadata={"lineament.schema": "3", "lineament.version": __version__})
 
 
 SCHEMA = _schema()
@@ -53,7 +53,7 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     """Make the table of some scans, numbered from `first_scan`; their beam counts may differ.
 
     Its schema is `SCHEMA`, its metadata name the frames of the scans, and its rows are ordered by
-    scan, then kind. Raises ValueError for a corner or a breakpoint of a kind that is not known.
+    scan, then kind. Raises ValueError for a kind or a side that is not known.
 
     Examples
     --------
@@ -163,13 +163,13 @@ def _columns(table: str, records: NDArray[np.void]) -> Columns:
     return columns
 
 
-def _codes(field: Field, kinds: NDArray[np.str_]) -> NDArray[np.int32]:
-    """Return the index of each kind among those of its table."""
-    codes = kind_codes(field.table, kinds)
+def _codes(field: Field, texts: NDArray[np.str_]) -> NDArray[np.int32]:
+    """Return the index of each text among those of its table."""
+    codes = text_codes(field.table, texts)
     if codes.min(initial=0) < 0:
         raise ValueError(
-            f"{field.columns} kind is {str(kinds[codes.argmin()])!r}, "
-            f"expected one of {', '.join(KINDS[field.table])}"
+            f"{field.table[:-1]} {field.name} is {str(texts[codes.argmin()])!r}, "
+            f"expected one of {', '.join(TEXTS[field.table])}"
         )
     return codes
 

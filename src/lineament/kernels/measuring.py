@@ -48,19 +48,20 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
     options : tuple
         See `Options`.
     tables : tuple of arrays
-        Results. ``segments, corners, arcs, breaks`` as words, see `records`, with room for n + 1
-        features of each kind a row; ``clusters``, int32, shape (m, n); ``offsets``, int64, shape
-        (m + 1, 4), where the rows begin in the tables: the first is 0.
+        Results. ``segments, corners, edges, arcs, breaks`` as words, see `records`, with room for
+        n + 1 features of each kind a row; ``clusters``, int32, shape (m, n); ``offsets``, int64,
+        shape (m + 1, 5), where the rows begin in the tables: the first is 0.
     """
     work, how = at.named(floats, ints), Options(*options)
-    segments, corners, _, breaks, labels, offsets = tables
+    segments, corners, _, _, breaks, labels, offsets = tables
     counts, cut = work.counts, work.pieces
+    _join_clusters(work)
     _place_measured(work.beams[how.source], work.points, work.marks, counts, bearings, labels[row])
     places, beam = work.points[at.MEASURED_X : at.MEASURED_RHO + 1], work.marks[at.BEAM]
     x, y, rho = places[0], places[1], places[2]
     segment_ints, corner_ints = segments.view(np.int32), corners.view(np.int32)
     pieces, kept, number = counts[at.PIECES], np.int64(0), work.waiting[at.FIRST]
-    segment, corner = offsets[row, 0], offsets[row, 1]
+    segment, corner = offsets[row, col.SEGMENTS], offsets[row, col.CORNERS]
     for k in range(pieces):
         first, last, n = cut[at.FIRST, k], cut[at.LAST, k], segment + kept
         # The first point of a ring is repeated at its end, and counts once.
@@ -96,15 +97,39 @@ def measure(floats, ints, row, bearings, circular, noise, options, tables):
             variance = range_variance(rho[i], noise)
             _place_at_beam(x[i], y[i], rho[i], spacing, variance, corners, corner)
         corner += 1
-    offsets[row + 1, 0] = segment + pieces
-    offsets[row + 1, 1] = corner
-    offsets[row + 1, 2] = offsets[row, 2]
+    offsets[row + 1, col.SEGMENTS] = segment + pieces
+    offsets[row + 1, col.CORNERS] = corner
+    for table in (col.EDGES, col.ARCS):
+        offsets[row + 1, table] = offsets[row, table]
     clusters = 0 if counts[at.CLOSED] else counts[at.CLUSTERS]  # All around, nothing ends.
     first, last = work.clusters[at.FIRST], work.clusters[at.LAST]
-    offsets[row + 1, 3] = write_breaks(
+    offsets[row + 1, col.BREAKPOINTS] = write_breaks(
         places, beam, first, last, clusters, circular, how.gap, bearings.shape[1], breaks,
-        offsets[row, 3],
+        offsets[row, col.BREAKPOINTS],
     )  # fmt: skip
+
+
+@helper
+def _join_clusters(work):
+    """Join the clusters that a piece runs over: no surface ends within a line.
+
+    The pieces of a map go over jumps, and over points that are in no cluster.
+    """
+    label, clusters, cut = work.marks[at.LABEL], work.clusters, work.pieces
+    before, n, piece, reached = np.int64(-1), np.int64(0), np.int64(0), np.int64(-1)
+    for i in range(work.counts[at.POINTS]):
+        own, goes_on = label[i], i <= reached or (label[i] >= 0 and label[i] == before)
+        while piece < work.counts[at.PIECES] and cut[at.FIRST, piece] <= i:
+            reached = max(reached, cut[at.LAST, piece])
+            piece += 1
+        before = own
+        if own < 0 and i > reached:
+            continue
+        if not goes_on:
+            clusters[at.FIRST, n] = i
+            n += 1
+        label[i], clusters[at.LAST, n - 1] = n - 1, i
+    work.counts[at.CLUSTERS] = n
 
 
 @helper

@@ -204,7 +204,8 @@ def hold_together(floats, ints, row, segments, corners, offsets):
     """
     work = at.named(floats, ints)
     pieces, x, y = work.pieces, work.points[at.X], work.points[at.Y]
-    before, begin, corner = pieces[at.BEFORE], offsets[row, 0], offsets[row, 1]
+    before, begin = pieces[at.BEFORE], offsets[row, col.SEGMENTS]
+    corner = offsets[row, col.CORNERS]
     for k in range(work.counts[at.PIECES]):
         first, last, segment = pieces[at.FIRST, k], pieces[at.LAST, k], begin + k
         x1, y1, x2, y2 = x[first], y[first], x[last], y[last]

@@ -92,7 +92,10 @@ def intersect(lines, a, b, x, y, near, corners, k):
 
 @helper
 def write_place(corners, k, x, y, first, ax, ay, second, bx, by):
-    """Write where a corner is, with variances along two unit vectors: Σ = v₁ a aᵀ + v₂ b bᵀ."""
+    """Write where a corner is, with variances along two unit vectors: Σ = v₁ a aᵀ + v₂ b bᵀ.
+
+    Also of an edge: both tables begin with these fields.
+    """
     corners[k, at.C_POSITION], corners[k, at.C_POSITION + 1] = x, y
     xx, yy = ax * ax * first + bx * bx * second, ay * ay * first + by * by * second
     xy = as_covariance(ax * ay * first + bx * by * second, xx, yy)
@@ -127,24 +130,21 @@ def grade_corner(corners, ints, k, kind, n, m):
     """
     spread = math.sqrt(1.0 / n + 1.0 / m) / max(math.sin(corners[k, at.C_OPENING]), 1e-9)
     corners[k, at.C_QUALITY] = 1.0 / (1.0 + (spread / _SPREAD) ** _FALL)
-    _write_kind(ints, k, kind)
-
-
-@helper
-def grade_edge(corners, ints, k, prominence):
-    """Write that a corner is an edge at a jump, and its quality.
-
-    By its prominence: the measurements of its segment, times the jump in deviations of the edge,
-    times the cosine of incidence.
-    """
-    corners[k, at.C_QUALITY] = 1.0 / (1.0 + (_PROMINENCE / prominence) ** _RISE)
-    _write_kind(ints, k, np.int64(at.EDGE))
-
-
-@helper
-def _write_kind(ints, k, kind):
     for letter in range(6):
         ints[k, at.C_KIND + letter] = at.CORNER_WORDS[kind, letter]
+
+
+@helper
+def write_edge(beam, segment, side, prominence, edges, ints, k):
+    """Write which end of which segment an edge is, its beam, and its quality.
+
+    That goes by its prominence: the measurements of its segment, times the jump in deviations of
+    the edge, times the cosine of incidence.
+    """
+    edges[k, at.E_QUALITY] = 1.0 / (1.0 + (_PROMINENCE / prominence) ** _RISE)
+    ints[k, at.E_BEAM], ints[k, at.E_SEGMENT] = beam, segment
+    for letter in range(5):
+        ints[k, at.E_SIDE + letter] = at.SIDE_WORDS[side, letter]
 
 
 @helper

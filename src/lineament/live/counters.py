@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..features import COUNTED, Features
+from ..features import TABLES, Features
 from ..scan import LaserScan
 
 #: Latencies that are kept for a report: those of the last scans.
@@ -122,7 +122,7 @@ class Counters:
         self._reported, self._total = now, total
         self._latencies: deque[float] = deque(maxlen=_MOST)
         self._beams = self._invalid = 0
-        self._found = dict.fromkeys(COUNTED, 0)
+        self._found = dict.fromkeys(TABLES, 0)
 
     def add(self, scan: LaserScan, features: Features, latency: float) -> None:
         """Count a scan whose features were published `latency` seconds after it came."""

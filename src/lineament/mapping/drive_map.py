@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
 from ..features import Features
-from ..motion.association import associate, is_landmark
+from ..motion.association import associate
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
@@ -95,7 +95,6 @@ class Drive(InTurn):
     @in_turn
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
-        features = replace(features, corners=features.corners[is_landmark(features.corners)])
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         if self.frames:
             motion, is_lost = self._place(scan, features, *self._expected(scan.stamp, odometry))
@@ -225,9 +224,13 @@ class Drive(InTurn):
         segments["misfit"][seen["wall"]] = np.sqrt(seen["misfit"])
         numbers = np.searchsorted(self._numbers, last.walls)
         numbers = np.append(np.where(np.isin(last.walls, self._numbers), numbers, -1), -1)
-        corners, arcs = last.features.corners.copy(), last.features.arcs[:0]  # people
+        corners = last.features.corners.copy()
         corners["segments"] = numbers[corners["segments"]]
-        self._around = replace(last.features, segments=segments, corners=corners, arcs=arcs)
+        # Edges may be silhouettes, arcs people.
+        edges, arcs = last.features.edges[:0], last.features.arcs[:0]
+        self._around = replace(
+            last.features, segments=segments, corners=corners, edges=edges, arcs=arcs
+        )
         walls = as_walls(segments)
         self._index = (LineMap(walls) if len(walls) else _NOWHERE).index
 

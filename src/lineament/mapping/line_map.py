@@ -215,9 +215,15 @@ class LineMap(ReadOnly):
         arcs["n_points"] = self.columns["views"]
         points["convex"], points["kind"] = self.corners["solid"] == 1, "corner"
         points["segments"] = self.corners["walls"]
-        none = make_records("breakpoints", [])
-        labels = np.empty(0, np.int32)
-        return Features(segments_of(self.walls), points, arcs, labels, none, frame_id="map")
+        return Features(
+            segments=segments_of(self.walls),
+            corners=points,
+            edges=make_records("edges", []),
+            arcs=arcs,
+            breakpoints=make_records("breakpoints", []),
+            clusters=np.empty(0, np.int32),
+            frame_id="map",
+        )
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""

@@ -100,11 +100,12 @@ def read_table(path: str | os.PathLike[str]) -> Features:
     values = {name: table[name].to_numpy() for name in columns}
     kinds = np.asarray(table["kind"].to_pylist())
     return Features(
-        _records(SEGMENT, values, kinds == "segment"),
-        make_records("corners", []),
-        _records(ARC, values, kinds == "arc"),
-        np.empty(0, np.int32),
-        make_records("breakpoints", []),
+        segments=_records(SEGMENT, values, kinds == "segment"),
+        corners=make_records("corners", []),
+        edges=make_records("edges", []),
+        arcs=_records(ARC, values, kinds == "arc"),
+        breakpoints=make_records("breakpoints", []),
+        clusters=np.empty(0, np.int32),
     )
 
 

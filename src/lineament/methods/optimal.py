@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..features.records import CORNERS, SEGMENTS
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.optimal import layout as at
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
@@ -59,7 +60,7 @@ class Optimal(MethodBase):
     >>> from lineament.simulation import SENSORS, room
     >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
     >>> corners = ln.extract(scan, method="optimal").corners
-    >>> corners["position"][corners["kind"] == "corner"].round(2).tolist()
+    >>> corners["position"].round(2).tolist()
     [[1.4, -0.5], [3.0, 2.0]]
     """
 
@@ -112,7 +113,7 @@ class Optimal(MethodBase):
         limits = follow.shape[1] - 1, self.max_missing, _LINK, _WORST
         fit_polylines(block.floats, block.ints, block.bearings, *limits, costs, follow)
         block.measure(fit=WEIGHTED, reach=_NEAR, gap=float(self.max_missing))
-        tables = block.segments, block.corners, block.offsets
+        tables = block.features[SEGMENTS], block.features[CORNERS], block.offsets
         hold_together(block.floats, block.ints, block.row, *tables)
 
     def intermediates(self, block: Block) -> dict[str, Any]:
@@ -137,7 +138,7 @@ class Optimal(MethodBase):
         limit[beam] = np.where(missing, np.nan, _largest_spacing(xy, rho, before, work.noise))
         if not block.circular and count:
             spacing[beam[0]] = limit[beam[0]] = np.nan
-        corners = block.written()[1]
+        corners = block.written()[CORNERS]
         return {
             "filtered": filtered,
             "spacing": spacing,
@@ -145,7 +146,7 @@ class Optimal(MethodBase):
             "density_threshold": np.full(n, np.nan),
             "candidates": np.zeros(0, CANDIDATE),
             "threshold": self.evidence,
-            "cuts": np.sort(corners["beam"][corners["kind"] != "edge"]),
+            "cuts": np.sort(corners["beam"]),
             "evidence": _evidence(work, int(block.counts[2])) | {"corners": corners["response"]},
             "scale": TAU,
         }

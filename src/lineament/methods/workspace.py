@@ -64,7 +64,7 @@ class Block:
         self.counts = self.work.counts
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
         self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
-        self.segments, self.corners, self.arcs, self.breakpoints = map(words, self._records)
+        self.features = tuple(map(words, self._records))
         self.clusters = np.empty((capacity, n), np.int32)
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
 
@@ -126,8 +126,7 @@ class Block:
     @property
     def tables(self) -> tuple[NDArray[Any], ...]:
         """Results of the kernels, as in `kernels.optimal.layout.Tables`."""
-        features = self.segments, self.corners, self.arcs, self.breakpoints
-        return *features, self.clusters, self.offsets
+        return *self.features, self.clusters, self.offsets
 
     def raw(self) -> list[bytes]:
         """Copy the records that the last run wrote, as bytes, in the order of the tables."""

@@ -1,6 +1,6 @@
 """How the sensor moves: scans without its motion, features followed from scan to scan.
 
-The world is taken to stand still, and corners of kind "edge" are ignored. The velocity of the
+The world is taken to stand still, and edges are ignored. The velocity of the
 sensor, `Tracker.twist`, is what `lineament.deskew` needs for the next scan.
 
 Examples

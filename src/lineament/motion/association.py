@@ -17,8 +17,6 @@ Pairs = NDArray[np.intp]
 
 #: The tables whose features are tracked.
 KINDS = ("segments", "corners", "arcs")
-#: What stands for an edge among the sides to which corners point: none is equal to another.
-_EDGE_BEFORE, _EDGE_NOW = -1, -2
 #: Words of segments, corners and arcs (see `kernels.records`).
 Words = tuple[Array, Array, Array]
 
@@ -66,7 +64,8 @@ def associate(
     convexity, e is their distance (2 degrees); for arcs, that of their centres and radii (3); for
     segments, the offset from the earlier line and the angle (2), if they lie side by side along
     half of the shorter one. The pairs are one to one and at the least total cost, where to leave a
-    feature alone costs as much as the gate. Corners of kind "edge" have no pair: see `is_landmark`.
+    feature alone costs as much as the gate. Edges have no pair: they may be silhouettes, which move
+    with the sensor.
 
     Parameters
     ----------
@@ -103,25 +102,9 @@ def associate(
     moved[1][:, C_COVARIANCE] += both
     moved[1][:, C_COVARIANCE + 3] += both
     move(*moved, x, y, theta)
-    sides = _sides(before.corners, _EDGE_BEFORE), _sides(now.corners, _EDGE_NOW)
+    sides = before.corners["convex"].astype(np.int8), now.corners["convex"].astype(np.int8)
     owners = kernel(earlier, moved, sides, spread, (x, y), float(roughness), gates)
     return Matches(before, now, *map(_pairs, owners))
-
-
-def is_landmark(corners: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Whether each corner stays where it is: all but the edges.
-
-    An edge is where a segment ends before a jump. On a round or turned surface that is a
-    silhouette, which moves with the sensor.
-    """
-    return np.asarray(corners["kind"] != "edge")
-
-
-def _sides(corners: NDArray[np.void], edge: int) -> NDArray[np.int8]:
-    """Return 1 for convex corners, 0 for others, and `edge` for edges."""
-    sides = corners["convex"].astype(np.int8)
-    sides[~is_landmark(corners)] = edge
-    return sides
 
 
 def words_of(features: Features) -> Words:

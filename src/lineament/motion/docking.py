@@ -152,7 +152,7 @@ class Dock(InTurn):
                 return None
         corners = features.corners
         away = np.hypot(*(corners["position"] - (x, y)).T)
-        away[(corners["segments"] < 0).any(axis=1)] = math.inf  # edges too, which have no track
+        away[(corners["segments"] < 0).any(axis=1)] = math.inf
         if away.min(initial=math.inf) > _REACH:
             return None
         return int(tracks.corners[away.argmin()])

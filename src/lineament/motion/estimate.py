@@ -90,7 +90,7 @@ def estimate_motion(
     Parameters
     ----------
     matches : Matches
-        Of two frames; `associate` leaves edges out.
+        Of two frames.
     prior : (x, y, theta)
         The motion as known before [m, m, rad]: from odometry or from the last frames.
     covariance : array_like, shape (3, 3), optional

@@ -13,7 +13,7 @@ from ..features import TABLES, Features, make_records
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
 from ..scan.poses import Twist, inverse, poses_along, relative
-from .association import KINDS, Matches, associate, chi_square, is_landmark, words_of
+from .association import KINDS, Matches, associate, chi_square, words_of
 from .estimate import Motion, estimate_motion
 from .relocation import is_contradicted, relocated
 
@@ -43,7 +43,7 @@ class Tracks:
     ----------
     segments, corners, arcs : ndarray of int64
         Number of the track of each feature, parallel to the tables of the frame. A number belongs
-        to one track alone, of whatever kind, for good. Corners of kind "edge" have -1.
+        to one track alone, of whatever kind, for good.
     born : ndarray of int64
         Tracks that begin with this frame.
     ended : ndarray of int64
@@ -72,7 +72,7 @@ class Tracker(InTurn):
     (`estimate_motion`, from the tracks seen in the very last frame). A feature without a pair
     begins a track; a track ends when it is missed in more than `max_missed` frames in a row. The
     world is taken to stand still: what moves by more than its gate from frame to frame gets a new
-    number. Corners of kind "edge" are ignored: they may be silhouettes, which move with the sensor.
+    number. Edges are ignored: they may be silhouettes, which move with the sensor.
 
     After a pause of more than a second or so, a jump of the clock, or where hardly any wall is near
     one of before, the sensor may be anywhere: it is looked for by its walls. If there is more than
@@ -164,29 +164,6 @@ class Tracker(InTurn):
             raise TypeError(f"features is of type {kind}, expected Features: what extract returns")
         if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
             raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
-        corners = features.corners
-        kept = is_landmark(corners)
-        if kept.all():
-            return self._take(features, odometry)
-        tracks = self._take(replace(features, corners=corners[kept]), odometry)
-        numbers = np.full(len(corners), -1, np.int64)
-        numbers[kept] = tracks.corners
-        return replace(tracks, corners=numbers)
-
-    @in_turn
-    def again(self, features: Features) -> Tracks:
-        """Take the last scan in again, deskewed by the twist that it gave.
-
-        The next motion would else be that between a scan that is skewed and one that is not. The
-        twist stays, and the motion is that by which the two differ.
-        """
-        twists, step = self._twists.copy(), self._step
-        tracks = self(features)
-        self._twists, self._step = twists, step
-        return tracks
-
-    def _take(self, features: Features, odometry: Pose | None) -> Tracks:
-        """Take in a frame without edges."""
         motion = None
         if self._stamp is None:
             matches = associate(self._seen, features)
@@ -201,6 +178,18 @@ class Tracker(InTurn):
                 self._twists.clear()
         self._stamp, self._odometry = features.stamp, odometry
         return self._renew(features, matches, motion)
+
+    @in_turn
+    def again(self, features: Features) -> Tracks:
+        """Take the last scan in again, deskewed by the twist that it gave.
+
+        The next motion would else be that between a scan that is skewed and one that is not. The
+        twist stays, and the motion is that by which the two differ.
+        """
+        twists, step = self._twists.copy(), self._step
+        tracks = self(features)
+        self._twists, self._step = twists, step
+        return tracks
 
     def _moved(
         self, features: Features, odometry: Pose | None, duration: float

@@ -45,8 +45,8 @@ def points_to_show(
     low, high = everything.min(axis=0), everything.max(axis=0)
     marks = [sensor]
     for features in found:
-        segments, corners = features.segments, features.corners
-        marks += [segments["start"], segments["end"], corners["position"]]
+        segments, corners, edges = features.segments, features.corners, features.edges
+        marks += [segments["start"], segments["end"], corners["position"], edges["position"]]
     known = np.vstack(marks)
     pad = 0.05 * (high - low).max()
     known = known[((known >= low - pad) & (known <= high + pad)).all(axis=1)]
@@ -143,21 +143,20 @@ def draw_segments(axes: Axes, segments: NDArray[np.void]) -> None:
         axes.plot(*ends, color=ink, lw=1.0, marker=(2, 0, across), ms=6, mew=1.0, zorder=4)
 
 
-def draw_corners(axes: Axes, corners: NDArray[np.void], extent: float) -> None:
-    """Draw corners, with 3 σ ellipses where they can be seen in a plan of some extent [m].
+def draw_points(axes: Axes, features: Features, extent: float) -> None:
+    """Draw edges and corners, with 3 σ ellipses where they can be seen in a plan of an extent [m].
 
     Edges are smaller and lighter than corners, and have no ellipse.
     """
     from matplotlib.patches import Ellipse
 
-    theme, is_edge = theme_of(axes), corners["kind"] == "edge"
+    theme, corners = theme_of(axes), features.corners
     for drawn, size, color, name in (
-        (corners[is_edge], 4.0, theme.edge, "edge"),
-        (corners[~is_edge], 5.5, theme.corner, "corner"),
+        (features.edges, 4.0, theme.edge, "edge"),
+        (corners, 5.5, theme.corner, "corner"),
     ):
         shape = {"marker": "D", "ms": size, "mfc": "none", "mec": color, "mew": size / 4}
         _draw_points(axes, drawn["position"], name, **shape, zorder=5)
-    corners = corners[~is_edge]
     label = f"3 σ of a corner, at most {LARGEST_ELLIPSE} m"
     for x, y, a, b, turn in ellipses_of(corners["position"], corners["covariance"], THREE_SIGMA):
         if a > 0.012 * extent:  # else hidden by the marker
@@ -196,7 +195,7 @@ def draw_features(axes: Axes, features: Features, scan: LaserScan, extent: float
     draw_arcs(axes, features.arcs, scan)
     draw_segments(axes, features.segments)
     draw_breakpoints(axes, features.breakpoints)
-    draw_corners(axes, features.corners, extent)
+    draw_points(axes, features, extent)
 
 
 def draw_errors(axes: Axes, scan: LaserScan, errors: Array) -> None:

@@ -161,9 +161,8 @@ def note_outside(axes: Axes, outside: int) -> None:
 
 
 def numbered(features: Features) -> NDArray[np.void]:
-    """Return the corners that have a number: not edges, nor those of methods without quality."""
-    corners = features.corners
-    kept: NDArray[np.void] = corners[(corners["kind"] != "edge") & np.isfinite(corners["quality"])]
+    """Return the corners that have a number: not those of methods without quality."""
+    kept: NDArray[np.void] = features.corners[np.isfinite(features.corners["quality"])]
     return kept
 
 

@@ -49,10 +49,8 @@ class FloorPlan:
         is_sure = offset + (lengths / 2) ** 2 * angle <= OFFSET**2
         good = is_sure & (lengths >= SHORTEST) & (lengths <= LONGEST)  # NaN fails all of these
         self._add_lines(lines[good], 3 * np.sqrt(np.maximum(angle[good], (ANGLE / 3) ** 2)))
-        corners = features.corners
-        is_edge = corners["kind"] == "edge"
-        self._corners.add(corners["position"][~is_edge])
-        self._edges.add(corners["position"][is_edge])
+        self._corners.add(features.corners["position"])
+        self._edges.add(features.edges["position"])
         self._arcs.add(np.column_stack((features.arcs["center"], features.arcs["radius"])))
         if len(self._walls) > MOST:
             self._merge()

@@ -23,10 +23,10 @@ _COSINES, _SINES = (wave(np.linspace(0, 2 * math.pi, TURN + 1)) for wave in (np.
 class Markers:
     """What is drawn of the features of a scan [m, rad], in their frame. All of it is finite.
 
-    Edges are corners of kind "edge", which are drawn lighter. An arc is x, y of its centre, radius,
-    and the directions in which what was seen begins and ends, counter-clockwise; a whole turn apart
-    where that is not known. An ellipse is x, y, half axes (the longer first), direction of the
-    longer: within them lie 95 % of the errors of the corners and edges, then of the arcs' centres.
+    An arc is x, y of its centre, radius, and the directions in which what was seen begins and ends,
+    counter-clockwise; a whole turn apart where that is not known. An ellipse is x, y, half axes
+    (the longer first), direction of the longer: within them lie 95 % of the errors of the corners,
+    then of the edges, then of the arcs' centres.
     """
 
     segments: Array
@@ -66,21 +66,24 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
 
     Without the scan, in whose frame the features must be, arcs are drawn as whole circles.
     """
-    segments, corners, arcs = features.segments, features.corners, features.arcs
+    segments, arcs = features.segments, features.arcs
     lines = np.empty((len(segments), 2, 2))  # faster than stacked, as below
     lines[:, 0], lines[:, 1] = segments["start"], segments["end"]
-    drawn = corners[is_drawn(corners["position"])]
-    is_edge = drawn["kind"] == "edge"
+    corners, edges = (
+        table[is_drawn(table["position"])] for table in (features.corners, features.edges)
+    )
     arcs = arcs[is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
     spans = [(0.0, 2 * math.pi) if scan is None else arc_span(arc, scan) for arc in arcs]
     return Markers(
         segments=lines[is_drawn(lines)],
-        corners=drawn["position"][~is_edge],
-        edges=drawn["position"][is_edge],
+        corners=corners["position"],
+        edges=edges["position"],
         arcs=np.column_stack((arcs["center"], arcs["radius"], np.reshape(spans, (-1, 2)))),
         ellipses=ellipses_of(
-            np.concatenate((corners["position"], arcs["center"])),
-            np.concatenate((corners["covariance"], arcs["covariance"][:, :2, :2])),
+            np.concatenate((corners["position"], edges["position"], arcs["center"])),
+            np.concatenate(
+                (corners["covariance"], edges["covariance"], arcs["covariance"][:, :2, :2])
+            ),
         ),
     )
 

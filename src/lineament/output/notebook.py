@@ -288,17 +288,17 @@ def _about(scan: LaserScan) -> dict[str, str]:
 
 
 def _rows(features: Features) -> str:
-    """Make the table of the longest segments, the best corners and the largest arcs."""
+    """Make the table of the longest segments, the best corners and edges, the largest arcs."""
     rows, total = [], 0
     for name, by, at, deviation in (
         ("segments", "length", "centroid", (0, 0)),
         ("corners", "quality", "position", None),
+        ("edges", "quality", "position", None),
         ("arcs", "radius", "center", (2, 2)),
     ):
         table = features[name]
         total += len(table)
-        last = table["kind"] == "edge" if name == "corners" else np.zeros(len(table))
-        for one in table[np.lexsort((-table[by], last))[:MOST_ROWS]]:
+        for one in table[np.argsort(-table[by], kind="stable")[:MOST_ROWS]]:
             spread = one["covariance"]
             variance = np.trace(spread) / 2 if deviation is None else spread[deviation]
             sigma = f"{1000 * math.sqrt(variance):.1f}" if variance >= 0 else ""
@@ -318,8 +318,9 @@ def _what(name: str, one: np.void) -> str:
         )
     if name == "arcs":
         return f"radius {one['radius']:.3f} m, {one['n_points']} beams"
-    opening = f"{math.degrees(one['opening']):.1f}°, " if one["kind"] != "edge" else ""
-    return f"{opening}quality {one['quality']:.2f}"
+    if name == "edges":
+        return f"{one['side']} of segment {one['segment']}, quality {one['quality']:.2f}"
+    return f"{math.degrees(one['opening']):.1f}°, quality {one['quality']:.2f}"
 
 
 def _counts(features: Features) -> str:

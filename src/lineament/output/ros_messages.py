@@ -129,7 +129,7 @@ class RosMessages(SceneMessages):
         """``geometry_msgs/PoseArray`` of the corners that are finite.
 
         The x axis of each points to where the corner opens: halfway between its two sides. A
-        corner with one segment, as an edge, looks along it; one without segments is not turned.
+        corner with one segment looks along it; one without segments is not turned.
         """
         corners = features.corners[is_drawn(features.corners["position"])]
         yaw = _yaws(corners["position"], corners["segments"], features.segments["centroid"])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluation.counts import quantile, ratio
-from ..evaluation.kinds import FeatureScores, corner_scores, vertices
+from ..evaluation.kinds import FeatureScores, corner_scores
 from ..extractor import Extractor
 from ..features import Features
 from ..output import canvas
@@ -110,12 +110,12 @@ def arena_scores(arena: Arena, extractor: Extractor) -> tuple[dict[str, float], 
     """Score a method on the scans of the arena.
 
     Returns the numbers, among them `false`, the share of the found corners that are at no real
-    one, and the positions of all found corners but edges in the world frame [m], shape (m, 2).
+    one, and the positions of all found corners in the world frame [m], shape (m, 2).
     """
     found = batch_of(extractor, arena.scans)
     positions = np.concatenate(
         [
-            vertices(features.transform(*scan.pose))["position"]
+            features.transform(*scan.pose).corners["position"]
             for features, scan in zip(found, arena.scans, strict=True)
             if scan.pose is not None
         ]

@@ -112,13 +112,12 @@ def _scan() -> Drawn:
     axes.plot(*noise, "x", ms=6, color="#57606a", zorder=4)
     drawing.draw_sensor(axes)
     drawing.draw_breakpoints(axes, found.breakpoints)
-    drawing.draw_corners(axes, found.corners, extent=5.0)
+    drawing.draw_points(axes, found, extent=5.0)
     _note(axes, "corner", _CORNER, (-34, 26), _RED)
     _note(axes, "noise point", noise, (-20, 26), "#57606a")
     for edge, by in zip(_EDGES, ((-52, -8), (44, 4), (20, -18)), strict=True):
         _note(axes, "breakpoint", edge, by, canvas.BREAK_COLOR)
-    corners = found.corners["position"][found.corners["kind"] != "edge"]
-    breaks = found.breakpoints["position"]
+    corners, breaks = found.corners["position"], found.breakpoints["position"]
     off = [_away(corners, _CORNER), *(_away(breaks, edge) for edge in _EDGES)]
     labelled = float(found.clusters[_NOISE[0]] < 0)
     caption = (

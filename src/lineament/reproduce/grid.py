@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..evaluation.counts import Counts, ratio
-from ..evaluation.kinds import corner_scores, vertices
+from ..evaluation.kinds import corner_scores
 from ..evaluation.matching import match
 from ..extractor import Extractor
 from ..features import Features
@@ -110,7 +110,7 @@ def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
         else:
             counts.append(corner_scores(features, true).by_gate[GATE])
             repeated.append(average_repetition(before, features, turn))
-            turned.append(float(len(vertices(features))))
+            turned.append(float(len(features.corners)))
     return {
         "of_actual": _mean([0.5 * (c.recall + c.precision) for c in counts if c.true]),
         "among_found": _mean(repeated),
@@ -121,8 +121,8 @@ def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
 
 def average_repetition(before: Features, after: Features, turn: float) -> float:
     """Return AR of one view after a turn [rad]; 0 if only one view has corners, NaN if none has."""
-    position = vertices(before)["position"]
-    others = vertices(after.transform(0.0, 0.0, turn))["position"]
+    position = before.corners["position"]
+    others = after.transform(0.0, 0.0, turn).corners["position"]
     distance = np.linalg.norm(position[:, np.newaxis] - others, axis=2)
     repeated = len(match(distance, distance <= GATE)[0])
     if repeated == 0:

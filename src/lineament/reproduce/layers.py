@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation.kinds import vertices
 from ..evaluation.partition import PartitionScores, partition_scores
 from ..extractor import Extractor
 from ..features import Features
@@ -65,7 +64,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     counts = numbers["example"] = {
         name: {
             "clusters": len(np.unique(features.clusters[features.clusters >= 0])),
-            "corners": len(vertices(features)),
+            "corners": len(features.corners),
         }
         for name, features in found.items()
     }
@@ -75,7 +74,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
             "Figure 10: clusters and corners of a scene with as many as the paper’s",
             rows,
             {"clusters": ("clusters", 1), "corners": ("corners", 1)},
-            "The paper’s scene is not available. Edges are not counted.",
+            "The paper’s scene is not available.",
         )
     )
     about = (
@@ -109,7 +108,7 @@ def like_figure_10(seed: int) -> Frame:
     """Return the first scene with the counts of Figure 10, or that which is nearest to them."""
 
     def off(frame: Frame) -> int:
-        counts = int(frame.truth.clusters.max(initial=-1)) + 1, len(vertices(frame.truth))
+        counts = int(frame.truth.clusters.max(initial=-1)) + 1, len(frame.truth.corners)
         return sum(abs(a - b) for a, b in zip(counts, PAPER_COUNTS, strict=True))
 
     frames = simulated_frames(SENSORS["paper"], ["layers"], scene_numbers(SOUGHT, seed))

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..evaluation.kinds import vertices
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
 from ..extractor import Extractor
 from ..features import Features
@@ -116,7 +115,7 @@ def _measured(
     return scores, {
         "clusters": float(np.mean([f.clusters.max(initial=-1) + 1 for f in found])),
         "segments": float(np.mean([len(f.segments) for f in found])),
-        "corners": float(np.mean([len(vertices(f)) for f in found])),
+        "corners": float(np.mean([len(f.corners) for f in found])),
         "mean": total.mean,
         "largest": total.maximum,
         "explained": total.explained,

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 from ..errors import LogError
 from ..evaluation.counts import Summable
 from ..evaluation.free_space import FreeSpaceScores, free_space_scores
-from ..evaluation.kinds import vertices
 from ..evaluation.repeatability import (
     RankedRepeats,
     Repeatability,
     ranked_repeats,
     repeatability,
+    with_edges,
 )
 from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
 from ..extractor import Extractor
@@ -80,11 +80,11 @@ REPEATS: Columns = {
     "Corners: repeated by chance [%]": ("chance", 100),
     "Corners: AUC of the quality": ("auc", 1),
     f"Corners: {_AT}": ("count", 1),
-    "Corners but edges: AUC of the quality": ("auc_without_edges", 1),
-    f"Corners but edges: {_AT}": ("count_without_edges", 1),
-    "Corners but edges: in a scan": ("corners_per_scan", 1),
-    "Corners but edges: repeated [%]": ("corner_rate", 100),
-    "Corners but edges: distance, RMS [mm]": ("corner_rmse", 1e3),
+    "Corners alone: AUC of the quality": ("auc_without_edges", 1),
+    f"Corners alone: {_AT}": ("count_without_edges", 1),
+    "Corners alone: in a scan": ("corners_per_scan", 1),
+    "Corners alone: repeated [%]": ("corner_rate", 100),
+    "Corners alone: distance, RMS [mm]": ("corner_rmse", 1e3),
     "Segments: repeated [%]": ("segment_rate", 100),
     "Segments: distance, RMS [mm]": ("segment_rmse", 1e3),
 }
@@ -251,7 +251,7 @@ def _repeats(
             ranked_repeats(a, of(fa), b, of(fb), of(fb).corners["quality"])
             for a, fa, b, fb in views
         )
-        for of in (replace, lambda features: replace(features, corners=vertices(features)))
+        for of in (with_edges, replace)
     )
     return every, {
         "expected": len(every.scores),
@@ -261,8 +261,7 @@ def _repeats(
         "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
         "count_without_edges": alone.count_at(RATE),
         "auc_without_edges": alone.auc,
-        "corners_per_scan": sum(len(vertices(features)) for _, features, _, _ in found)
-        / len(found),
+        "corners_per_scan": sum(len(features.corners) for _, features, _, _ in found) / len(found),
         "corners_expected": again.corners.expected,
         "corner_rate": again.corners.rate,
         "corner_rmse": again.corners.rmse,

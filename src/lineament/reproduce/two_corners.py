@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..evaluation.counts import rms
-from ..evaluation.kinds import vertices
 from ..extractor import Extractor
 from ..features import Features
 from ..output import canvas, drawing
@@ -109,7 +108,7 @@ def found_distances(views: Iterable[Features], pose: Pose) -> Array:
 
 def distance_found(features: Features, a: Array, b: Array) -> float:
     """Return the distance of the corners that are nearest to two places [m]; NaN without one."""
-    positions = vertices(features)["position"]
+    positions = features.corners["position"]
     away = [np.hypot(*(positions - place).T) for place in (a, b)]
     if not all((distance <= GATE).any() for distance in away):
         return math.nan

@@ -48,7 +48,8 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
         beam passes it by; else half-way to the next beam, which an occluder took; or to the last
         beam of the scan. Its `centroid` is that of the information of its measurements.
 
-        `corners` are the vertices between two neighbouring beams that meet its two walls.
+        `corners` are the vertices between two neighbouring beams that meet its two walls; `edges`
+        are not listed.
         `clusters` are neighbouring beams on surfaces that are connected, 3 or more; `breakpoints`
         lie between neighbouring clusters and at the ends of the scan.
 
@@ -57,7 +58,7 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
     >>> from lineament.simulation import SENSORS, room
     >>> features = truth(room(), (0.0, 0.0, 0.0), SENSORS["paper"])
     >>> features
-    Features(5 segments, 2 corners, 0 arcs, 4 breakpoints, 3 clusters, stamp=0.000)
+    Features(5 segments, 2 corners, 0 edges, 0 arcs, 4 breakpoints, 3 clusters, stamp=0.000)
     >>> features.corners["position"].round(6).tolist(), features.corners["convex"].tolist()
     ([[1.4, -0.5], [3.0, 2.0]], [True, False])
     """
@@ -77,6 +78,7 @@ def truth(world: World, pose: Pose, sensor: Sensor) -> Features:
     tables = {
         "segments": [_segment(view, r, bound, label) for r, bound in bounds.items()],
         "corners": _corners(view, runs, bounds),
+        "edges": [],
         "arcs": [_arc(view, r, sensor.noise) for r in listed if r.surface >= n_walls],
         "breakpoints": _breakpoints(view, label, turn),
     }

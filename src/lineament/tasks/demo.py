@@ -160,8 +160,8 @@ def _drive(
     kept = set(np.linspace(0, total - 1, _MOMENTS).round().astype(int).tolist())
     for index, scan in enumerate(open_log(log, limits=limits)):
         features = extractor(scan)
-        corners, explained = features.corners, features.segments["n_points"].sum()
-        quality = float(np.nansum(corners["quality"][corners["kind"] != "edge"] ** 2))
+        explained = features.segments["n_points"].sum()
+        quality = float(np.nansum(features.corners["quality"] ** 2))
         quality *= (explained / max(int(scan.valid.sum()), 1)) ** 2  # not one full of clutter
         if quality > most:
             most, best = quality, (index, scan, features)

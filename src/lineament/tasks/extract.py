@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import LogError
 from ..extractor import Extractor, load_kernels
-from ..features import COUNTED, TABLES, Features, make_records
+from ..features import TABLES, Features, make_records
 from ..logs import open_log
 from ..output import open_writer
 from ..output.scene import WORLD_FRAME
@@ -114,7 +114,7 @@ def extract_log(
     if topic_column is None:
         topic_column = len(topics) > 1
     scans, beams, valid, unplaced = 0, 0, 0, 0
-    found = dict.fromkeys(COUNTED, 0)
+    found = dict.fromkeys(TABLES, 0)
     writer = open_writer(output, topics if topic_column else ())
     if world and writer.needs_scan:
         raise ValueError(f"world is for tables; {output} has scans at their poses in any case")

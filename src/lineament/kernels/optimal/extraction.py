@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .. import inlined, kernel
-from ...features.records import S_CLUSTER
+from ...features import records as to
 from ..noise import LEAST_SIGMA, fit_noise
 from ..writing import write_arc, write_breaks, write_segment
 from . import layout as at
@@ -66,7 +66,7 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
         scan = at.Scan(row, n, count, circular, evidence, missing)
         lines = merge_lines(work, lines, evidence)
         surfaces = measure(work, find_arcs(work, scan, lines), estimated)
-        for table in range(4):
+        for table in range(tables.offsets.shape[1]):
             tables.offsets[row + 1, table] = tables.offsets[row, table]
         _write_surfaces(work, tables, scan, surfaces)
         join_all(work, tables, scan, surfaces, closed)
@@ -100,20 +100,20 @@ def _write_surfaces(work, tables, scan, surfaces):
     segments, ints = tables.segments, tables.segments.view(np.int32)
     for k in range(surfaces):
         p, first, last = work.pieces[k], spans[at.FIRST, k], spans[at.LAST, k]
-        count, segment = spans[at.COUNT, k], following[0]
+        count, segment = spans[at.COUNT, k], following[to.SEGMENTS]
         spans[at.SEGMENT, k], spans[at.START, k], spans[at.END, k] = segment, 0, 0
         if spans[at.KIND, k] == at.LINE:
             line = p[at.CX], p[at.CY], p[at.UX], p[at.UY], p[at.OO], p[at.OA], p[at.AA], p[at.RMS]
             write_segment(
                 work.points, beam, first, last, count, line, p[at.MISFIT], segments, ints, segment
             )
-            following[0] += 1
+            following[to.SEGMENTS] += 1
         else:
             spread = p[at.XX], p[at.XY], p[at.XR], p[at.YY], p[at.YR], p[at.RR]
             x, y, radius, rms = p[at.CX], p[at.CY], p[at.RADIUS], p[at.RMS]
-            first, last = beam[first], beam[last]
-            write_arc(x, y, radius, rms, spread, first, last, count, tables.arcs, following[2])
-            following[2] += 1
+            first, last, arc = beam[first], beam[last], following[to.ARCS]
+            write_arc(x, y, radius, rms, spread, first, last, count, tables.arcs, arc)
+            following[to.ARCS] += 1
 
 
 @inlined
@@ -125,9 +125,9 @@ def _write_clusters(work, tables, scan, surfaces, closed):
     for k in range(surfaces):
         if spans[at.KIND, k] == at.LINE:
             first = beams[at.BEAM, spans[at.FIRST, k]]
-            ints[spans[at.SEGMENT, k], S_CLUSTER] = clusters[first]
-    following[3] = write_breaks(
+            ints[spans[at.SEGMENT, k], to.S_CLUSTER] = clusters[first]
+    following[to.BREAKPOINTS] = write_breaks(
         work.points, beams[at.BEAM], beams[at.CLUSTER_FIRST], beams[at.CLUSTER_LAST],
         found if not closed or beams[at.BROKEN, 0] or found > 1 else 0, scan.circular,
-        scan.missing, scan.beams, tables.breakpoints, following[3],
+        scan.missing, scan.beams, tables.breakpoints, following[to.BREAKPOINTS],
     )  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import helper, inlined
 from ...features import records as to
-from ..writing import grade_corner, grade_edge, write_end, write_opening, write_place
+from ..writing import grade_corner, write_edge, write_end, write_opening, write_place
 from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
@@ -131,7 +131,8 @@ def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
 
     Where they meet, their segments then end there.
     """
-    spans, p, q, row = work.spans, work.pieces[k], work.pieces[m], tables.offsets[scan + 1, 1]
+    spans, p, q = work.spans, work.pieces[k], work.pieces[m]
+    row = tables.offsets[scan + 1, to.CORNERS]
     segments, a, b = tables.segments, spans[at.SEGMENT, k], spans[at.SEGMENT, m]
     sine = p[at.UX] * q[at.UY] - p[at.UY] * q[at.UX]
     first, second = _variance_at(p, x, y) / (sine * sine), _variance_at(q, x, y) / (sine * sine)
@@ -142,14 +143,14 @@ def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
     write_opening(segments, a, b, corners, ints, row)
     corners[row, to.C_RESPONSE] = rise
     ints[row, to.C_BEAM] = work.beams[at.BEAM, spans[at.FIRST, m]]
-    ints[row, to.C_SEGMENTS] = a - tables.offsets[scan, 0]
-    ints[row, to.C_SEGMENTS + 1] = b - tables.offsets[scan, 0]
+    ints[row, to.C_SEGMENTS] = a - tables.offsets[scan, to.SEGMENTS]
+    ints[row, to.C_SEGMENTS + 1] = b - tables.offsets[scan, to.SEGMENTS]
     grade_corner(corners, ints, row, kind, spans[at.COUNT, k], spans[at.COUNT, m])
     if kind == to.SHARP:
         write_end(segments, a, to.S_END, x, y)
         write_end(segments, b, to.S_START, x, y)
     spans[at.END, k] = spans[at.START, m] = 1
-    tables.offsets[scan + 1, 1] += 1
+    tables.offsets[scan + 1, to.CORNERS] += 1
 
 
 @helper
@@ -189,15 +190,12 @@ def _add_edge(work, tables, scan, k, way):
     lengthwise += (noise[0] + noise[1] * rho[i] * rho[i]) * sine * sine
     if across + lengthwise > MOST_DEVIATION * MOST_DEVIATION:
         return
-    corners, ints = tables.corners, tables.corners.view(np.int32)
-    segment, row = spans[at.SEGMENT, k], tables.offsets[scan.row + 1, 1]
+    edges, segment, row = tables.edges, spans[at.SEGMENT, k], tables.offsets[scan.row + 1, to.EDGES]
     write_end(tables.segments, segment, to.S_END if way > 0 else to.S_START, px, py)
-    write_place(corners, row, px, py, lengthwise, ux, uy, across, -uy, ux)
-    corners[row, to.C_OPENING], corners[row, to.C_RESPONSE] = 0.0, 0.0
-    ints[row, to.C_CONVEX], ints[row, to.C_BEAM] = 1, beam[i]
-    segment -= tables.offsets[scan.row, 0]
-    ints[row, to.C_SEGMENTS] = segment if way > 0 else -1
-    ints[row, to.C_SEGMENTS + 1] = segment if way < 0 else -1
+    write_place(edges, row, px, py, lengthwise, ux, uy, across, -uy, ux)
     prominence = jump * abs(ux * y[i] - uy * x[i]) / (rho[i] * math.sqrt(max(lengthwise, across)))
-    grade_edge(corners, ints, row, spans[at.COUNT, k] * prominence)
-    tables.offsets[scan.row + 1, 1] += 1
+    prominence *= spans[at.COUNT, k]
+    segment -= tables.offsets[scan.row, to.SEGMENTS]
+    side = np.int64(to.AT_END if way > 0 else to.AT_START)
+    write_edge(beam[i], segment, side, prominence, edges, edges.view(np.int32), row)
+    tables.offsets[scan.row + 1, to.EDGES] += 1

@@ -55,6 +55,7 @@ class Tables(NamedTuple):
 
     segments: NDArray[np.float64]
     corners: NDArray[np.float64]
+    edges: NDArray[np.float64]
     arcs: NDArray[np.float64]
     breakpoints: NDArray[np.float64]
     clusters: NDArray[np.int32]

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from ..._version import __version__
 from ...extractor import Extractor, load_kernels
-from ...features import COUNTED
+from ...features import TABLES
 from ...files import alone_in, made_folder
 from ...limits import Limits
 from ...logs import find_logs, open_log
@@ -160,7 +160,7 @@ def extract_logs(
         whole=len(rows) - len(todo),
         failed=sum(row.outcome != "done" for row in done),
         scans=sum(row.scans for row in done),
-        features={name: sum(row.features.get(name, 0) for row in done) for name in COUNTED},
+        features={name: sum(row.features.get(name, 0) for row in done) for name in TABLES},
         seconds=time.perf_counter() - started,
     )
 

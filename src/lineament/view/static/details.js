@@ -8,6 +8,13 @@ const millimetres = (metres) => fixed(metres === null ? NaN : 1000 * metres, 1);
 const place = ([x, y]) => `${fixed(x, 3)}, ${fixed(y, 3)}`;
 const root = (variance) => (variance === null ? NaN : Math.sqrt(Math.max(variance, 0)));
 
+/** Deviations along the axes of an ellipse [mm], and the direction of the longer one [°]. */
+function spreadOf(covariance) {
+  const unknown = { major: NaN, minor: NaN, direction: NaN };
+  const { major, minor, direction } = isKnown(covariance) ? ellipseOf(covariance) : unknown;
+  return { axes: `${millimetres(major)} ×\u00a0${millimetres(minor)}`, longer: fixed(degrees(direction), 0) };
+}
+
 /** Numbers of a feature: title, rows for the card, and cells for the table. */
 export function describe({ kind, index, feature }, scan) {
   const title = kind === "measurement" ? `beam ${index}` : `${kind} ${index}`;
@@ -36,22 +43,32 @@ const WORDS = {
     };
   },
   corner(c) {
-    const { major, minor, direction } = isKnown(c.covariance)
-      ? ellipseOf(c.covariance) : { major: NaN, minor: NaN, direction: NaN };
-    const axes = `${millimetres(major)} ×\u00a0${millimetres(minor)}`, sides = c.segments;
-    const isEdge = c.kind === "edge", opening = isEdge ? "" : fixed(degrees(c.opening), 1);
+    const { axes, longer } = spreadOf(c.covariance), opening = fixed(degrees(c.opening), 1);
     return {
       rows: [
         ["kind", c.kind],
         ["quality", fixed(c.quality, 2)],
         ["position", `${place(c.position)} m`],
-        ["1 σ", `${axes} mm, longer at ${fixed(degrees(direction), 0)}°`],
-        ...(isEdge ? [] : [["opening", `${opening}°, ${c.convex ? "convex" : "concave"}`]]),
+        ["1 σ", `${axes} mm, longer at ${longer}°`],
+        ["opening", `${opening}°, ${c.convex ? "convex" : "concave"}`],
         ["beam", c.beam],
         ["response", c.response === null ? "–" : Number(c.response.toPrecision(4))],
-        ["segments", sides.map((k) => (k < 0 ? "none" : k)).join(" and ")],
+        ["segments", c.segments.map((k) => (k < 0 ? "none" : k)).join(" and ")],
       ],
       cells: [place(c.position), "", opening, axes, ""],
+    };
+  },
+  edge(e) {
+    const { axes, longer } = spreadOf(e.covariance);
+    return {
+      rows: [
+        ["quality", fixed(e.quality, 2)],
+        ["position", `${place(e.position)} m`],
+        ["1 σ", `${axes} mm, longer at ${longer}°`],
+        ["beam", e.beam],
+        ["segment", `${e.segment}, its ${e.side}`],
+      ],
+      cells: [place(e.position), "", "", axes, ""],
     };
   },
   arc(a) {

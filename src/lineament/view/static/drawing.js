@@ -1,6 +1,6 @@
 // A scan and its features on a canvas.
 
-import { ellipseOf, isKnown, layerOf, seenOf } from "./geometry.js";
+import { ellipseOf, isKnown, seenOf } from "./geometry.js";
 import { roundLength } from "./plane.js";
 
 const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "drive", "accent", "corner", "edge", "break", "arc"];
@@ -48,9 +48,14 @@ export class Drawing {
     scan.breakpoints.forEach((breakpoint) => this.#breakpoint(breakpoint));
   }
 
-  /** The corners that are shown in a layer, with their ellipses. */
-  corners(scan, layer, sigmas) {
-    for (const c of scan.corners) if (layerOf(c) === layer) this.#corner(c, sigmas, scan.reach);
+  // A square, smaller and lighter than the diamond of a corner.
+  edges(scan, sigmas) {
+    this.#points(scan.edges, this.theme.edge, 1.2, scan.reach, sigmas, (u, v) => this.ctx.strokeRect(u - 3, v - 3, 6, 6));
+  }
+
+  corners(scan, sigmas) {
+    this.#points(scan.corners, this.theme.corner, 1.6, scan.reach, sigmas,
+      (u, v) => this.#path([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]));
   }
 
   /** Points of the scans up to one, the path up to it, and lighter the rest of the path. */
@@ -202,15 +207,18 @@ export class Drawing {
     this.#area([...upper, ...lower].map((p) => this.at(p)), this.theme.accent);
   }
 
-  // A diamond; of an edge a square, smaller and lighter.
-  #corner({ kind, position, covariance }, sigmas, reach) {
-    const { ctx, theme, plane } = this, isEdge = kind === "edge";
-    if (!isKnown(position)) return;
-    const [u, v] = this.at(position), color = isEdge ? theme.edge : theme.corner;
-    this.#pen(color, isEdge ? 1.2 : 1.6);
-    if (isEdge) ctx.strokeRect(u - 3, v - 3, 6, 6);
-    else this.#path([[u - 5, v], [u, v - 5], [u + 5, v], [u, v + 5], [u - 5, v]]);
-    if (!sigmas || !isKnown(covariance)) return;
+  // Corners or edges by their mark, with their ellipses.
+  #points(features, color, width, reach, sigmas, mark) {
+    for (const { position, covariance } of features) {
+      if (!isKnown(position)) continue;
+      this.#pen(color, width);
+      mark(...this.at(position));
+      if (sigmas && isKnown(covariance)) this.#spread(position, covariance, color, sigmas, reach);
+    }
+  }
+
+  #spread(position, covariance, color, sigmas, reach) {
+    const { ctx, plane } = this, [u, v] = this.at(position);
     const { major, minor, direction } = ellipseOf(covariance);
     const [a, b] = [major, minor].map((sigma) => sigmas * sigma * plane.scale);
     // Hidden by the marker, or no knowledge at all: then the numbers say so.

@@ -14,9 +14,6 @@ export function placeBeams(scan) {
 /** Whether all numbers of a position or a covariance are known. */
 export const isKnown = (numbers) => numbers.flat().every(Number.isFinite);
 
-/** The layer in which a row of the corners is shown. */
-export const layerOf = (corner) => (corner.kind === "edge" ? "edges" : "corners");
-
 /** Beams of a feature in order, over the seam where the first is larger than the last. */
 export function beamsOf(feature, scan) {
   const count = (feature.last_beam - feature.first_beam + scan.beams) % scan.beams + 1;

@@ -12,8 +12,8 @@ export const LAYERS = [
   { name: "arcs", key: "arc", draw: (on, d, s) => on && s.scan && d.arcs(s.scan) },
   { name: "segments", key: "segment", draw: (on, d, s) => on && s.scan && d.segments(s.scan) },
   { name: "breakpoints", key: "break", draw: (on, d, s) => on && s.scan && d.breakpoints(s.scan) },
-  { name: "edges", key: "edge", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "edges", s.sigmas) },
-  { name: "corners", key: "corner", draw: (on, d, s) => on && s.scan && d.corners(s.scan, "corners", s.sigmas) },
+  { name: "edges", key: "edge", draw: (on, d, s) => on && s.scan && d.edges(s.scan, s.sigmas) },
+  { name: "corners", key: "corner", draw: (on, d, s) => on && s.scan && d.corners(s.scan, s.sigmas) },
   { name: "plan", draw: (on, d, s) => on && s.plan && d.plan(s.plan) },
   { name: "pose", draw: (on, d, s) => on && s.plan && s.scan && d.pose(s.scan.where) },
 ];

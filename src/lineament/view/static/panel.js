@@ -3,7 +3,6 @@
 import { describe, element, listOf } from "./details.js";
 import { Backdrop } from "./drive.js";
 import { Drawing } from "./drawing.js";
-import { layerOf } from "./geometry.js";
 import { LAYERS } from "./layers.js";
 import { Frame } from "./plane.js";
 
@@ -84,10 +83,9 @@ export class Panel {
     this.scan = scan;
     const clusters = new Set(scan.clusters.filter((c) => c >= 0)).size;
     const count = (n, one) => `${n} ${one}${n === 1 ? "" : "s"}`;
-    const edges = scan.corners.filter((c) => layerOf(c) === "edges").length;
     const found = [
-      count(scan.segments.length, "segment"), count(scan.corners.length - edges, "corner"),
-      count(edges, "edge"), count(scan.arcs.length, "arc"), count(clusters, "cluster"),
+      count(scan.segments.length, "segment"), count(scan.corners.length, "corner"),
+      count(scan.edges.length, "edge"), count(scan.arcs.length, "arc"), count(clusters, "cluster"),
     ].join(", ");
     this.caption.textContent = `${found}; ${noiseOf(scan)}`;
     this.canvas.setAttribute("aria-label", `Scan ${scan.index} by ${scan.method}: ${found}`);
@@ -183,7 +181,7 @@ export class Panel {
     this.#hover(pixel);
     const picked = this.hovered;
     if (picked && picked.kind !== "measurement") this.app.pins.add(picked, this.scan);
-    const beam = picked?.kind === "corner" ? picked.feature.beam : this.#beamAt(pixel);
+    const beam = ["corner", "edge"].includes(picked?.kind) ? picked.feature.beam : this.#beamAt(pixel);
     if (beam >= 0) this.app.explain(this, beam);
   }
 
@@ -209,8 +207,8 @@ export class Panel {
       return index < 0 ? null : { kind, index, feature: features[index] };
     };
     const away = (f) => this.#distance(pixel, f.position);
-    const corners = (c) => (shown[layerOf(c)] ? away(c) : Infinity);
-    return pick("corner", scan.corners, NEAR * reach, corners)
+    return (shown.corners && pick("corner", scan.corners, NEAR * reach, away))
+      || (shown.edges && pick("edge", scan.edges, NEAR * reach, away))
       || (shown.breakpoints && pick("breakpoint", scan.breakpoints, (NEAR / 2) * reach, away))
       || (shown.arcs && pick("arc", scan.arcs, 7 * reach, (arc) => this.#offArc(pixel, arc)))
       || (shown.segments && pick("segment", scan.segments, 7 * reach, (s) => this.#offSegment(pixel, s)))
