@@ -1,6 +1,5 @@
 """What commands write: nothing that they read, nothing late, nothing by halves, and status 3."""
 
-import math
 import os
 import sys
 
@@ -14,12 +13,10 @@ import lineament as ln
 from lineament import LineamentError
 from lineament.cli import cli, run
 from lineament.cli.options import Place
-from lineament.errors import NothingFoundError
 from lineament.files import check_outputs, spare_inputs, written_beside
 from lineament.logs import open_log, save_log
 from lineament.mapping import LineMap
-from lineament.simulation import SENSORS, room
-from lineament.tasks.locate import locate_log
+from lineament.simulation import SENSORS, room, scene
 
 
 def names_of(folder):
@@ -389,14 +386,28 @@ def test_a_plan_of_another_building_says_the_usual_causes(files, capsys, ending)
     assert "--units" in line
 
 
-def test_hardly_located_in_the_wrong_units_is_a_warning(files, monkeypatch):
-    LineMap.from_lines(room().segments / UNITS["ft"]).write(files / "drawn.dxf")
-    monkeypatch.setattr("lineament.tasks.locate._HARDLY", 0.0)
-    never = locate_log("log.npz", "drawn.dxf", "a.tum")
-    assert (never.warning, never.verdicts["located"]) == ("", 0)
-    with pytest.raises(NothingFoundError, match="another building"):
-        never.check_found()
-    assert math.isnan(never.first)
+def test_hardly_located_in_the_wrong_units_is_a_warning(files, capsys):
+    # Two places, the one that was seen for longer drawn in feet, the other in metres.
+    other, at = scene("room", 3)
+    away = other.segments + 60.0
+    LineMap.from_lines([*room().segments / UNITS["ft"], *away]).write(files / "both.dxf")
+    seen = SENSORS["utm30lx"].scan(other, at, np.random.default_rng(1), -100.0)
+    save_log("both.npz", [scan.with_pose(None) for scan in (seen, *3 * [*open_log("log.npz")])])
+    assert run(["locate", "both.npz", "--map", "both.dxf", "-o", "a.csv"]) == 0
+    said = capsys.readouterr()
+    assert "13 scans: 7.7 % located" in said.out
+    assert complaints(said.err) == [
+        "lineament: both.dxf: shows where the scans were if it is drawn in ft: --units ft"
+    ]
+
+
+def test_a_plan_of_no_size_is_a_warning(files, capsys):
+    drawn = [*room().segments, [600.0, 0.0, 600.0, 1.0]]
+    LineMap.from_lines(drawn).write(files / "wide.dxf")
+    assert run(["locate", "log.npz", "--map", "wide.dxf", "-o", "a.csv", "-q"]) == 0
+    (said,) = complaints(capsys.readouterr().err)
+    assert "wide.dxf: is 603 m x " in said
+    assert said.endswith("is it drawn in other units? (--units)")
 
 
 def test_what_is_no_plan_says_how_to_make_one(files, capsys):
