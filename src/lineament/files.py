@@ -1,4 +1,4 @@
-"""Whole files or none: write beside the target, then rename."""
+"""Whole files or none: look first whether they may be written, write beside, then rename."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from typing import Any
 
 from .errors import LineamentError
 
-Place = str | os.PathLike[str]
+StrPath = str | os.PathLike[str]
 
 #: What the files of a log that is a folder, a bag of ROS 2, end with.
 _PARTS = (".yaml", ".db3", ".mcap", ".zstd")
@@ -72,7 +72,7 @@ def _made_beside(path: str | os.PathLike[str], target: Path) -> Path:
     return temporary
 
 
-def check_outputs(outputs: Iterable[Place], inputs: Iterable[Place] = ()) -> None:
+def check_outputs(outputs: Iterable[StrPath], inputs: Iterable[StrPath] = ()) -> None:
     """Refuse, before any work, outputs that cannot be written or would replace an input.
 
     Parameters
@@ -91,7 +91,7 @@ def check_outputs(outputs: Iterable[Place], inputs: Iterable[Place] = ()) -> Non
         _made_beside(output, Path(os.path.realpath(output))).unlink()
 
 
-def spare_inputs(outputs: Iterable[Place], inputs: Iterable[Place]) -> None:
+def spare_inputs(outputs: Iterable[StrPath], inputs: Iterable[StrPath]) -> None:
     """Refuse an output that is a file that is read, by whatever name, or that is written twice.
 
     Parameters
@@ -125,7 +125,7 @@ def spare_inputs(outputs: Iterable[Place], inputs: Iterable[Place]) -> None:
         taken[file] = f"{output}, which is written too"
 
 
-def _files_read(source: Place) -> Iterator[str]:
+def _files_read(source: StrPath) -> Iterator[str]:
     """Yield the files of this machine that a log or a plan is read from."""
     path = os.fspath(source)
     if "://" in path:
@@ -135,17 +135,20 @@ def _files_read(source: Place) -> Iterator[str]:
             return
     yield path
     if os.path.isdir(path):  # noqa: PTH112  (Path raises where a name is too long)
-        yield from (str(file) for file in Path(path).iterdir() if file.suffix in _PARTS)
+        with suppress(OSError):  # Reading it reports what is wrong.
+            yield from (str(file) for file in Path(path).iterdir() if file.suffix in _PARTS)
     # A member of an archive is named as if that were a folder.
     yield from (str(above) for above in Path(path).parents if os.path.isfile(above))  # noqa: PTH113
 
 
-def _identity(path: Place) -> object:
+def _identity(path: StrPath) -> object:
     """Return what all names of a file have in common; of one that is not there, its full path."""
     try:
         state = os.stat(path)  # noqa: PTH116
     except OSError:
         return os.path.normcase(os.path.realpath(path))
+    except ValueError:  # A null byte: to read or to write it reports that.
+        return path
     return state.st_dev, state.st_ino
 
 
