@@ -204,10 +204,13 @@ def test_the_command(files, capsys, log, ending):
 def test_units_and_a_plan_of_no_size(files, capsys):
     given = ["locate", str(files / "log.npz"), "--map", str(files / "plan.dxf")]
     given += ["-o", str(files / "poses.csv"), "--units"]
-    assert run([*given, "mm"]) == run([*given, "m"]) == 0
+    assert run([*given, "m"]) == 0
+    assert complaints(capsys.readouterr().err) == []
+    assert run([*given, "mm"]) == 3
     said = capsys.readouterr()
     (warning,) = complaints(said.err)
-    assert warning.endswith("plan.dxf: is 0.006 m x 0.004 m: is it drawn in other units? (--units)")
+    assert "log.npz: never located: " in warning
+    assert warning.endswith("plan.dxf: shows where the scans were if it is drawn in m: --units m")
     assert said.out.count("never located") == 1
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-#: The packages that only some commands need, each with the extra that installs it.
+#: The packages that only some commands need, each with the smallest extra that installs it.
 EXTRAS = {
     "cyclonedds": "live",
     "distributed": "dask",
@@ -15,7 +15,7 @@ EXTRAS = {
     "pandas": "pandas",
     "polars": "polars",
     "rerun": "rerun",
-    "scipy": "evaluation",
+    "scipy": "mapping",
     "shapely": "evaluation",
 }
 
@@ -33,6 +33,10 @@ def one_line(text: str) -> str:
 
 class LineamentError(Exception):
     """Something outside the program is wrong: a file, a folder, a log, an ending."""
+
+
+class NothingFoundError(LineamentError):
+    """What was asked for was done, and nothing was found; the command line ends with 3, not 1."""
 
 
 class LogError(LineamentError):
@@ -62,22 +66,18 @@ class LogError(LineamentError):
         return type(self), (self.path, self.problem, self.line)
 
 
-def needs(package: str, extra: str = "") -> str:
+def needs(package: str) -> str:
     """Return that an optional package is missing, with the command that installs it."""
-    extra = extra or EXTRAS[package]
-    return f"needs {package}, which is not installed: pip install 'lineament[{extra}]'"
+    return f"needs {package}, which is not installed: pip install 'lineament[{EXTRAS[package]}]'"
 
 
 @contextmanager
-def needed_by(who: str, extra: str = "") -> Iterator[None]:
-    """Turn the missing import of an optional package into a LineamentError.
-
-    `extra` is the one to install where several have the package, as they have scipy.
-    """
+def needed_by(who: str) -> Iterator[None]:
+    """Turn the missing import of an optional package into a LineamentError."""
     try:
         yield
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        raise LineamentError(f"{who} {needs(package, extra)}") from None
+        raise LineamentError(f"{who} {needs(package)}") from None

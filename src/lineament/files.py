@@ -1,4 +1,4 @@
-"""Whole files or none: write beside the target, then rename."""
+"""Whole files or none: look first whether they may be written, write beside, then rename."""
 
 import json
 import os
@@ -9,6 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from .errors import LineamentError
+
+StrPath = str | os.PathLike[str]
+
+#: What the files of a log that is a folder, a bag of ROS 2, end with.
+_PARTS = (".yaml", ".db3", ".mcap", ".zstd")
 
 
 @contextmanager
@@ -23,7 +28,7 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     LineamentError
-        If the folder does not exist or cannot be written to, or `path` is a folder.
+        If the folder does not exist or cannot be written to, or `path` is a folder or read-only.
 
     Examples
     --------
@@ -37,16 +42,7 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     'all of it'
     """
     target = Path(os.path.realpath(path))
-    with naming_errors(path):
-        if target.is_dir():
-            raise LineamentError(f"{path}: is a folder, expected the name of a file")
-        if target.exists() and not target.is_file():  # It would be replaced.
-            raise LineamentError(f"{path}: is a device or a pipe, expected the name of a file")
-        if not target.parent.is_dir():
-            raise LineamentError(f"{path}: the folder {target.parent} does not exist")
-        # mkstemp would make the file private to its owner; this one follows the umask.
-        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
-        temporary.touch(exist_ok=False)
+    temporary = _made_beside(path, target)
     try:
         yield temporary
         with naming_errors(path):
@@ -57,6 +53,103 @@ def written_beside(path: str | os.PathLike[str]) -> Iterator[Path]:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
+
+
+def _made_beside(path: str | os.PathLike[str], target: Path) -> Path:
+    """Make an empty temporary file beside the target that `path` leads to."""
+    with naming_errors(path):
+        if target.is_dir():
+            raise LineamentError(f"{path}: is a folder, expected the name of a file")
+        if target.exists() and not target.is_file():  # It would be replaced.
+            raise LineamentError(f"{path}: is a device or a pipe, expected the name of a file")
+        if not target.parent.is_dir():
+            raise LineamentError(f"{path}: the folder {target.parent} does not exist")
+        if target.exists() and not os.access(target, os.W_OK):  # To rename needs no permission.
+            raise LineamentError(f"{path}: is read-only, expected a file that may be replaced")
+        # mkstemp would make the file private to its owner; this one follows the umask.
+        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+        temporary.touch(exist_ok=False)
+    return temporary
+
+
+def check_outputs(outputs: Iterable[StrPath], inputs: Iterable[StrPath] = ()) -> None:
+    """Refuse, before any work, outputs that cannot be written or would replace an input.
+
+    Parameters
+    ----------
+    outputs, inputs : iterable of path-like
+        As for `spare_inputs`.
+
+    Raises
+    ------
+    LineamentError
+        If an output is an input or another output, or `written_beside` would refuse it.
+    """
+    outputs = list(outputs)
+    spare_inputs(outputs, inputs)
+    for output in outputs:
+        _made_beside(output, Path(os.path.realpath(output))).unlink()
+
+
+def spare_inputs(outputs: Iterable[StrPath], inputs: Iterable[StrPath]) -> None:
+    """Refuse an output that is a file that is read, by whatever name, or that is written twice.
+
+    Parameters
+    ----------
+    outputs : iterable of path-like
+        Files to write, which need not exist.
+    inputs : iterable of path-like
+        Logs and plans: files, folders that are one log, members of archives, addresses.
+
+    Raises
+    ------
+    LineamentError
+        If two of them are the same file.
+
+    Examples
+    --------
+    >>> spare_inputs(["features.mcap"], ["drive.mcap", "s3://bucket/features.mcap"])
+    >>> spare_inputs(["./drive.mcap"], ["drive.mcap"])
+    Traceback (most recent call last):
+    lineament.errors.LineamentError: ./drive.mcap: would replace drive.mcap, which is read
+    """
+    taken = {
+        _identity(file): f"{source}, which is read"
+        for source in inputs
+        for file in _files_read(source)
+    }
+    for output in outputs:
+        file = _identity(output)
+        if file in taken:
+            raise LineamentError(f"{output}: would replace {taken[file]}")
+        taken[file] = f"{output}, which is written too"
+
+
+def _files_read(source: StrPath) -> Iterator[str]:
+    """Yield the files of this machine that a log or a plan is read from."""
+    path = os.fspath(source)
+    if "://" in path:
+        # Of a chain, zip://a.log::file:///logs.zip, the last is what holds the others.
+        scheme, _, path = path.rpartition("::")[2].partition("://")
+        if scheme not in ("file", "local"):
+            return
+    yield path
+    if os.path.isdir(path):  # noqa: PTH112  (Path raises where a name is too long)
+        with suppress(OSError):  # Reading it reports what is wrong.
+            yield from (str(file) for file in Path(path).iterdir() if file.suffix in _PARTS)
+    # A member of an archive is named as if that were a folder.
+    yield from (str(above) for above in Path(path).parents if os.path.isfile(above))  # noqa: PTH113
+
+
+def _identity(path: StrPath) -> object:
+    """Return what all names of a file have in common; of one that is not there, its full path."""
+    try:
+        state = os.stat(path)  # noqa: PTH116
+    except OSError:
+        return os.path.normcase(os.path.realpath(path))
+    except ValueError:  # A null byte: to read or to write it reports that.
+        return path
+    return state.st_dev, state.st_ino
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from ..errors import LineamentError
+from ..errors import LineamentError, NothingFoundError
 from ..progress import compiling_shown
 from .commands import COMMANDS
 from .options import complain
@@ -26,7 +26,10 @@ _UNWRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EFBIG, errno.EDQUOT, 
 @click.version_option(package_name="lineament", message="%(package)s %(version)s")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Lines, corners, arcs and clusters from 2-D LiDAR scans, each with its covariance."""
+    """Lines, corners, arcs and clusters from 2-D LiDAR scans, each with its covariance.
+
+    Exit status: 0; 1 for an error, 2 for wrong usage, 3 if nothing was found.
+    """
     if context.invoked_subcommand != "live":  # It ends by signals, as it should.
         context.with_resource(terminating())
 
@@ -34,7 +37,7 @@ def cli(context: click.Context) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit with 0, 1 for an error (one line), 2 for wrong usage.
 
-    130 or 143 if it is stopped, by SIGINT (Ctrl-C) or SIGTERM.
+    3 if nothing was found, 130 or 143 if it is stopped, by SIGINT (Ctrl-C) or SIGTERM.
     """
     sys.exit(run(arguments))
 
@@ -72,7 +75,7 @@ def _run(arguments: list[str] | None) -> int:
     except click.ClickException as error:
         return _complain(f"lineament: {error.format_message()}", 1)
     except LineamentError as error:
-        return _complain(f"lineament: {error}", 1)
+        return _complain(f"lineament: {error}", 3 if isinstance(error, NothingFoundError) else 1)
     return 0
 
 

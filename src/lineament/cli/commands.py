@@ -65,6 +65,7 @@ def plot(
     reading: dict[str, Any],
 ) -> None:
     """Draw a scan of LOG and what is found in it."""
+    from ..files import check_outputs
     from ..logs import open_log
     from ..methods import DEFAULT_METHOD
     from ..output.canvas import PICTURE_ENDINGS
@@ -72,6 +73,7 @@ def plot(
     from ..output.stages import plot_trace
 
     check_ending(output, PICTURE_ENDINGS)
+    check_outputs([output], [log])
     names = methods or (DEFAULT_METHOD,)
     extractors = {name: make_extractor(name, settings, noise) for name in names}
     opened = open_log(log, **reading)

@@ -51,10 +51,12 @@ def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, qu
 @QUIET
 def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) -> None:
     """Put methods side by side on a scan of LOG."""
+    from ..files import check_outputs
     from ..reproduce.compare import ENDINGS, compare_log, write_comparison
     from .progress import tracker
 
     check_ending(output, ENDINGS)
+    check_outputs([output], [log])
     with wrong_usage():
         comparison = compare_log(log, index, **options, track=tracker(quiet))
     write_comparison(comparison, output)
@@ -119,12 +121,14 @@ def ple(
 ) -> None:
     """Polylines of 2-D scans: Schaefer et al., IROS 2018, beside its authors' scores."""
     from ..evaluation.ple import load_benchmark, method_map, run_benchmark, sparing_map
-    from ..files import write_text
+    from ..files import check_outputs, write_text
     from ..reproduce.report import benchmark_tables
     from .progress import tracker
 
     if output is not None and len(methods) > 1:
         raise click.UsageError("--json holds the scores of one method, expected one -m")
+    if output is not None:
+        check_outputs([output], [data])
     make_map = sparing_map if sparing else method_map
     with wrong_usage():
         makers = {method: make_map(method) for method in methods}

@@ -74,7 +74,8 @@ def extract(
 ) -> None:
     """Extract the features of LOGS into a table.
 
-    LOGS are files, folders, patterns, archives or addresses.
+    LOGS are files, folders, patterns, archives or addresses. The exit status is 3 if no scan has
+    a feature.
     """
     from ..output import ENDINGS
 
@@ -100,7 +101,7 @@ def extract(
         _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)
         return
     from ..logs import find_logs
-    from ..tasks.extract import extract_log
+    from ..tasks.extract import check_found, extract_log
     from .progress import tracker
 
     found = find_logs(logs, reading["limits"])
@@ -109,6 +110,7 @@ def extract(
     extraction = extract_log(found[0], output, extractor, track=tracker(quiet), **reading)
     if not quiet:
         click.echo(str(extraction))
+    check_found(extraction.log, extraction.scans, extraction.features)
 
 
 def _extract_into_folder(
@@ -123,6 +125,7 @@ def _extract_into_folder(
     **workers: Any,
 ) -> None:
     from ..tasks.bulk import extract_logs
+    from ..tasks.extract import check_found
     from .progress import status
 
     with _executor(**workers) as executor, status(quiet) as show:
@@ -140,6 +143,8 @@ def _extract_into_folder(
         click.echo(str(bulk))
     if bulk.failed:
         raise LineamentError(f"{bulk.failed} of {bulk.logs} logs failed, see {bulk.manifest}")
+    if not bulk.whole:  # Else what was found in those is not counted again.
+        check_found(output, bulk.scans, bulk.features)
 
 
 def _executor(

@@ -56,7 +56,8 @@ def map_command(
 ) -> None:
     """Make a map of the walls of LOG, with its loops closed.
 
-    Poses of the log are taken as odometry: their changes, not where they are.
+    Poses of the log are taken as odometry: their changes, not where they are. The exit status is 3
+    if there are no walls, or the drive is not on the plan.
     """
     from ..tasks.mapping import map_log
     from .progress import tracker
@@ -106,7 +107,8 @@ def locate(
 ) -> None:
     """Find where each scan of LOG was taken on a plan, and where that is not known.
 
-    Poses of the log are taken as odometry: their changes, not where they are.
+    Poses of the log are taken as odometry: their changes, not where they are. The exit status is 3
+    if no scan is located.
     """
     from ..tasks.locate import ENDINGS, locate_log
     from .progress import tracker
@@ -123,7 +125,8 @@ def locate(
         **drawn,
         **reading,
     )
-    if found.warning:
-        complain(f"lineament: {found.warning}")
     if not quiet:
         click.echo(str(found))
+    found.check_found()
+    if found.warning:
+        complain(f"lineament: {found.warning}")

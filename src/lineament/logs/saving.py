@@ -3,17 +3,18 @@
 import gzip
 import math
 import os
-from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..files import naming_errors, written_beside
+from ..files import naming_errors, spare_inputs, written_beside
 from ..scan import LaserScan
 from ..scan.fields import nanoseconds
+from .base import Log
 from .npz import SCALARS, SHAPES
 
 _CARMEN_HEADER = """\
@@ -26,10 +27,19 @@ timestamp ipc_hostname logger_timestamp
 """
 
 
+@contextmanager
+def _written(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> Iterator[BinaryIO]:
+    """Give a file that becomes `path`, which must not be the log that the scans are read from."""
+    if isinstance(scans, Log):
+        spare_inputs([path], [scans.name])
+    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as file:
+        yield file
+
+
 def save_carmen(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
     """Write scans as a CARMEN log, each as it comes; see `save_log`."""
     i = -1
-    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as plain:
+    with _written(path, scans) as plain:
         is_gzip = Path(path).name.lower().endswith(".gz")
         # Without name and time: the same scans give the same file.
         packed = gzip.GzipFile("", "wb", 6, plain, mtime=0) if is_gzip else nullcontext(plain)
@@ -78,7 +88,8 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
         If there are no scans or no beams, bearings differ, only some scans have intensities, or
         an extra key is one of the log's own or holds objects.
     LineamentError
-        If the file cannot be written.
+        If the file cannot be written, or `scans` is a log that is read from it: ``list(log)`` has
+        all of it in memory, and may replace it.
 
     Examples
     --------
@@ -89,14 +100,14 @@ def save_npz(path: str | os.PathLike[str], scans: Iterable[LaserScan], **extra: 
     >>> [scan.stamp for scan in open_log(path)]
     [7.0, 7.5]
     """
-    arrays = _pack(list(scans))
-    for key, value in extra.items():
-        if key in SHAPES:
-            raise ValueError(f"extra key {key} is one of the log's own")
-        arrays[key] = np.asarray(value)
-        if arrays[key].dtype.hasobject:
-            raise ValueError(f"extra key {key} holds objects, expected numbers or text")
-    with written_beside(path) as temporary, naming_errors(path), temporary.open("wb") as file:
+    with _written(path, scans) as file:  # before the first scan is asked for
+        arrays = _pack(list(scans))
+        for key, value in extra.items():
+            if key in SHAPES:
+                raise ValueError(f"extra key {key} is one of the log's own")
+            arrays[key] = np.asarray(value)
+            if arrays[key].dtype.hasobject:
+                raise ValueError(f"extra key {key} holds objects, expected numbers or text")
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
@@ -166,7 +177,8 @@ def save_log(path: str | os.PathLike[str], scans: Iterable[LaserScan]) -> None:
         If the ending is not known, before the first scan is asked for; or if the format cannot
         hold the scans.
     LineamentError
-        If the file cannot be written.
+        If the file cannot be written, or `scans` is a log that is read from it: ``list(log)`` has
+        all of it in memory, and may replace it.
 
     Examples
     --------

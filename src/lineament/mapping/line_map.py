@@ -78,7 +78,8 @@ class LineMap(ReadOnly):
         extent = max(self.size)
         if extent > LONGEST:
             raise LineamentError(
-                f"the plan is {extent:.0f} m wide, expected a building: is it drawn in metres?"
+                f"the plan is {extent:.0f} m wide, expected a building: "
+                "is it drawn in other units? (units=, --units)"
             )
         self.columns = locked(np.zeros(0, COLUMN) if columns is None else columns.copy())
         self.sigma = sigma
@@ -207,7 +208,10 @@ class LineMap(ReadOnly):
             return cls.from_lines(*read_drawing(path, layers, units), sigma=sigma)
         if ending == ".parquet":
             return cls.from_features([read_table(path)], sigma=sigma)
-        raise LineamentError(f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}")
+        raise LineamentError(
+            f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}: "
+            "`lineament map LOG -o plan.dxf` makes one of a drive"
+        )
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""

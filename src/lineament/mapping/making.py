@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import LineamentError
+from ..errors import NothingFoundError
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
 from .adjust import Adjusted, edges_of, optimise
@@ -56,7 +56,7 @@ class DriveMap:
 def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     """Close the loops of a drive, and adjust poses and walls together.
 
-    Key frames and scans are those of `Drive`. LineamentError if there are no walls.
+    Key frames and scans are those of `Drive`. NothingFoundError if there are no walls.
     """
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
     spreads = [
@@ -67,7 +67,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
-        raise LineamentError(f"no walls are seen in {len(frames)} key frames, expected some")
+        raise NothingFoundError(f"no walls are seen in {len(frames)} key frames, expected some")
     found = optimise(poses, chain, sights, _count(sights))
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
@@ -86,6 +86,8 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     survey = Survey(frames, found.poses, sights, found.with_poses(sights))
     least = min(_VIEWS, len(frames))
     walls = single(walls_along(sights, found.poses, survey.lines, views=least))
+    if not len(walls):
+        raise NothingFoundError(f"no wall is seen by {least} of {len(frames)} key frames")
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     return DriveMap(LineMap(walls), every, survey, loops, refused)
 
@@ -212,10 +214,10 @@ def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
 def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
     """Move a map into the frame of a plan, on which it is located without a first guess.
 
-    LineamentError if no place along the way is located.
+    NothingFoundError if no place along the way is located.
     """
     best = found_on(plan, made.survey, 0)
     if best is None:
-        raise LineamentError("the drive is not on the plan, or the plan does not say where")
+        raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
     poses = [compose(best, pose) for pose in made.poses]
     return replace(made, map=LineMap(moved(made.map.walls, inverse(best))), poses=poses)

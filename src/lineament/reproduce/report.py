@@ -9,7 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from ..evaluation.ple import BenchmarkResult
-from ..files import made_folder, write_text
+from ..files import check_outputs, made_folder, write_text
 from ..output.page import (
     Cell,
     contents_part,
@@ -25,6 +25,8 @@ from .claims import WORDS, Claim, bands, verdicts
 from .findings import Findings, Progress, Setting, Table, cell_text
 from .seeds import Spread
 
+#: Names of the files.
+_PAGE, _NUMBERS = "index.html", "figures.json"
 _INTRODUCTION = (
     "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
     "The values of its tables and of its Figure 12 are not available: where one stands only there, "
@@ -64,10 +66,12 @@ def reproduce(
     ValueError
         If there is no such experiment.
     LineamentError
-        If the folder cannot be written to.
+        If the folder cannot be written to, or a file in it is the museum's bag.
     """
     setting = Setting() if setting is None else setting
     chosen, target = experiment_names(names), made_folder(folder)
+    museum = () if setting.museum is None else (setting.museum,)
+    check_outputs([target / name for name in (_PAGE, _NUMBERS)], museum)
     return write_report(target, run_experiments(chosen, setting, progress), setting)
 
 
@@ -88,7 +92,7 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
         "experiments": {name: found.to_dict() for name, found in findings.items()},
     }
     text = json.dumps(written, indent=1, ensure_ascii=False)
-    write_text(folder / "figures.json", text + "\n")
+    write_text(folder / _NUMBERS, text + "\n")
     shown = {**about, "seeds": ", ".join(str(one.seed) for one in setting.by_seed())}
     facts = [(k, ("no", "yes")[v] if isinstance(v, bool) else str(v)) for k, v in shown.items()]
     entries = {"verdicts": "The paper’s figures and tables"}
@@ -99,7 +103,7 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     ]
     for name, found in findings.items():
         parts += [heading_part(name, found.title), *findings_parts(found)]
-    page = folder / "index.html"
+    page = folder / _PAGE
     write_parts(page, "lineament: the paper’s experiments", parts)
     return page
 

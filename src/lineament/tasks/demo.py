@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import LineamentError
 from ..extractor import Extractor, load_kernels
 from ..features import Features
-from ..files import made_folder
+from ..files import check_outputs, made_folder
 from ..logs import open_log
 from ..output import canvas
 from ..progress import Track, untracked
@@ -48,7 +48,12 @@ def run_demo(
     LineamentError
         If the log cannot be read or the folder cannot be written.
     """
+    if log is not None:
+        open_log(log, limits=limits)  # before a folder is made for it
     target = made_folder(folder)
+    page, table = target / "index.html", target / "features.parquet"
+    drawn = [target / f"{name}.png" for name in _PICTURES]
+    check_outputs([page, table, *drawn], () if log is None else (log,))
     load_kernels(map(Extractor, DEMO_METHODS))
     if log is None:
         from ..simulation import SENSORS, simulate_log
@@ -56,11 +61,11 @@ def run_demo(
         log = target / "drive.npz"
         simulate_log(log, "building", SENSORS["utm30lx"], rate=4.0, seed=1, track=track)
     extractor = Extractor(DEMO_METHODS[0])
-    summary = extract_log(log, target / "features.parquet", extractor, track=track, limits=limits)
+    summary = extract_log(log, table, extractor, track=track, limits=limits)
     if summary.scans == 0:
         raise LineamentError(f"{log}: has no scans")
-    for name in _PICTURES:  # of another log
-        (target / f"{name}.png").unlink(missing_ok=True)
+    for path in drawn:  # of another log
+        path.unlink(missing_ok=True)
     pictures = list(track(_draw(target, log, extractor, summary.scans, limits), "drawing", 5))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
@@ -74,7 +79,6 @@ def run_demo(
     ]
     from ..output.page import image_part, list_part, write_parts
 
-    page = target / "index.html"
     images = [image_part(caption, path.read_bytes(), dark=dark) for caption, path, dark in pictures]
     title = f"lineament: lines and corners of {Path(log).name}"
     write_parts(page, title, [*images[:1], list_part(facts), *images[1:]])

@@ -2,15 +2,17 @@
 
 import os
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import LogError
+from ..errors import LogError, NothingFoundError
 from ..extractor import Extractor, load_kernels
 from ..features import TABLES, Features, make_records
+from ..files import check_outputs
 from ..logs import open_log
 from ..output import open_writer
 from ..output.scene import WORLD_FRAME
@@ -91,8 +93,8 @@ def extract_log(
     Raises
     ------
     LineamentError
-        If the log cannot be read or the output cannot be written; no partial file stays. And if
-        they are to be in the world, but no scan has a pose.
+        If the log cannot be read, the output cannot be written or is the log; no partial file
+        stays. And if they are to be in the world, but no scan has a pose.
     ValueError
         If they are to be in the world, but the output draws scans, which it does there anyway.
 
@@ -106,10 +108,13 @@ def extract_log(
     >>> extract_log(folder / "log.npz", folder / "features.parquet", Extractor("liu")).scans
     5
     """
-    load_kernels([extractor])
-    open_writer(output)  # Imports what its format needs, which is no part of the speed either.
+    open_writer(output)  # Imports what its format needs, which is no part of the speed.
+    check_outputs([output], [path])
     started = time.perf_counter()
     log = open_log(path, **reading)
+    opened = time.perf_counter()
+    load_kernels([extractor])
+    started += time.perf_counter() - opened
     topics = log.topics if log.topic is None else [log.topic]
     if topic_column is None:
         topic_column = len(topics) > 1
@@ -145,6 +150,12 @@ def extract_log(
         unplaced=unplaced,
         faults=list(log.faults),
     )
+
+
+def check_found(name: str, scans: int, features: Mapping[str, int]) -> None:
+    """Raise a NothingFoundError if no scan has a feature, of which breakpoints are none."""
+    if not any(count for kind, count in features.items() if kind != "breakpoints"):
+        raise NothingFoundError(f"{name}: no feature in {scans} scans, expected some")
 
 
 def in_world(features: Features, scan: LaserScan) -> Features:

@@ -3,27 +3,32 @@
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import LogError
+from ..errors import LineamentError, LogError, NothingFoundError
 from ..extractor import Extractor, load_kernels
-from ..files import ending_of, naming_errors, written_beside
+from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
 from ..mapping.following import Whereabouts, follow
+from ..mapping.plans import NAMES as UNITS
 from ..progress import Track, untracked
-from .mapping import write_tum
+from ..scan import LaserScan
+from .mapping import tum_written
 
 #: Formats of the poses.
 ENDINGS = (".tum", ".csv", ".parquet")
 #: A plan smaller or larger than this is hardly a building [m].
 _SMALL, _LARGE = 3.0, 500.0
+#: Where a smaller share of the scans is located, the plan may be in other units: so many are tried.
+_HARDLY, _TRIED = 0.1, 300
 _SPREAD = ("xx", "xy", "xtheta", "yy", "ytheta", "thetatheta")
 
 
@@ -32,8 +37,8 @@ class Located:
     """Where a log is on a plan.
 
     Number of scans, and of those with each verdict; time until the first was located [s], NaN if
-    none was; how often the sensor was lost after that; wall time [s]. `warning` is a line about the
-    plan, or "".
+    none was; how often the sensor was lost after that; wall time [s]. `warning` is a line about why
+    hardly a scan is located, or about the size of the plan; or "".
     """
 
     log: str
@@ -45,6 +50,12 @@ class Located:
     lost: int
     warning: str
     seconds: float
+
+    def check_found(self) -> None:
+        """Raise a NothingFoundError if no scan is located."""
+        usual = f"{self.plan}: is it another building, or in other units (--units of a DXF)?"
+        if math.isnan(self.first):
+            raise NothingFoundError(f"{self.log}: never located: {self.warning or usual}")
 
     def __str__(self) -> str:
         shares = (f"{100 * n / self.scans:.1f} % {name}" for name, n in self.verdicts.items())
@@ -97,7 +108,8 @@ def locate_log(
     Raises
     ------
     LineamentError
-        If the log or the plan cannot be read, or the log has no scans, or those of several topics.
+        If the log or the plan cannot be read, the output cannot be written or is one of them, or
+        the log has no scans, or those of several topics.
 
     Examples
     --------
@@ -113,25 +125,40 @@ def locate_log(
     (11, 0.0)
     """
     ending = ending_of(output, ENDINGS)
+    check_outputs([output], [path, plan])
     extractor = Extractor() if extractor is None else extractor
     drawn = LineMap.read(plan, layers, units=units)
-    load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
     if log.topic is None and len(log.topics) > 1:
         raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
-    scans = track((scan for _, scan in log.items()), Path(log.name).name, len(log))
-    followed = follow(scans, drawn, extractor, odometry=odometry, deskewed=deskewed)
-    found = [(scan.stamp, where) for scan, where in followed]
+    opened = time.perf_counter()
+    load_kernels([extractor])
+    started += time.perf_counter() - opened
+
+    def followed(on: LineMap, most: int | None = None) -> Iterator[tuple[LaserScan, Whereabouts]]:
+        scans = (scan for _, scan in islice(log.items(), most))
+        shown = scans if most else track(scans, Path(log.name).name, len(log))
+        return follow(shown, on, extractor, odometry=odometry, deskewed=deskewed)
+
+    found = [(scan.stamp, where) for scan, where in followed(drawn)]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
     if ending == ".tum":
         placed = [(stamp, where.pose) for stamp, where in found if where]
-        write_tum(output, [stamp for stamp, _ in placed], [pose for _, pose in placed])
+        with tum_written(output, [stamp for stamp, _ in placed], [pose for _, pose in placed]):
+            pass
     else:
         _write_table(output, found, is_csv=ending == ".csv")
-    stamps = [stamp for stamp, _ in found]
-    known = [bool(where) for _, where in found]
+    stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
+    seconds, warning = time.perf_counter() - started, plan_warning(drawn, plan)
+    if sum(known) < _HARDLY * len(known):
+
+        def located(on: LineMap) -> float:
+            tried = [bool(where) for _, where in followed(on, _TRIED)]
+            return sum(tried) / len(tried)
+
+        warning = _units_warning(plan, layers, drawn, located) or warning
     return Located(
         log=str(path),
         plan=str(plan),
@@ -140,8 +167,8 @@ def locate_log(
         verdicts={name: sum(w.verdict == name for _, w in found) for name in VERDICTS},
         first=stamps[known.index(True)] - stamps[0] if any(known) else math.nan,
         lost=sum(was and not now for was, now in pairwise(known)),
-        warning=plan_warning(drawn, plan),
-        seconds=time.perf_counter() - started,
+        warning=warning,
+        seconds=seconds,
     )
 
 
@@ -151,6 +178,26 @@ def plan_warning(plan: LineMap, name: object) -> str:
     if _SMALL <= max(wide, deep) <= _LARGE:
         return ""
     return f"{name}: is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)"
+
+
+def _units_warning(
+    plan: str | os.PathLike[str],
+    layers: Sequence[str] | None,
+    drawn: LineMap,
+    located: Callable[[LineMap], float],
+) -> str:
+    """Return that a DXF is drawn in other units if these show where the scans were, or "".
+
+    `located` returns the share of scans that are located on a plan.
+    """
+    best, most = "", _HARDLY
+    for name in UNITS if Path(plan).suffix.lower() == ".dxf" else ():
+        with suppress(LineamentError):  # Larger than any building, say.
+            other = LineMap.read(plan, layers, units=name)
+            is_same = math.isclose(max(other.size), max(drawn.size))
+            if not is_same and not plan_warning(other, plan) and (share := located(other)) > most:
+                best, most = name, share
+    return best and f"{plan}: shows where the scans were if it is drawn in {best}: --units {best}"
 
 
 def _write_table(

@@ -3,17 +3,21 @@
 import math
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ..errors import LogError
+from ..errors import LogError, needed_by
 from ..extractor import Extractor, load_kernels
-from ..files import written_beside
+from ..files import check_outputs, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import LineMap
 from ..mapping.drive_map import Drive
 from ..mapping.making import make_map, onto_plan
+from ..output import open_writer
 from ..progress import Track, untracked
 from ..scan import Pose
 
@@ -85,7 +89,7 @@ def map_log(
     ------
     LineamentError
         If the log cannot be read or has no scans, no walls are found, the drive is not on the plan,
-        or the output cannot be written.
+        or an output cannot be written or is one of the files that are read.
 
     Examples
     --------
@@ -98,10 +102,16 @@ def map_log(
     (60, True)
     """
     extractor = Extractor() if extractor is None else extractor
+    open_writer(output)
+    with needed_by("map"):  # now, not when the drive is followed
+        import_module("scipy")
+    check_outputs(filter(None, (output, poses)), filter(None, (path, onto)))
     plan = None if onto is None else LineMap.read(onto)
-    load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
+    opened = time.perf_counter()
+    load_kernels([extractor])
+    started += time.perf_counter() - opened
     drive, stamps = Drive(), []
     # In the order of time, which is not that of every log: scans are all held in memory for that.
     scans = sorted(log, key=lambda scan: scan.stamp)
@@ -113,9 +123,9 @@ def map_log(
     made = make_map(drive.frames, drive.scans)
     if plan is not None:
         made = onto_plan(made, plan)
-    made.map.write(output)
-    if poses is not None:
-        write_tum(poses, stamps, made.poses)
+    placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
+    with placed:  # Both files, or none.
+        made.map.write(output)
     way = sum(
         math.dist(a[:2], b[:2])
         for a, b in zip(made.survey.poses, made.survey.poses[1:], strict=False)
@@ -134,11 +144,19 @@ def map_log(
     )
 
 
-def write_tum(path: str | os.PathLike[str], stamps: list[float], poses: list[Pose]) -> None:
-    """Write stamps [s] and poses as lines of ``stamp x y z qx qy qz qw``, whole or not at all."""
+@contextmanager
+def tum_written(
+    path: str | os.PathLike[str], stamps: list[float], poses: list[Pose]
+) -> Iterator[None]:
+    """Write stamps [s] and poses as lines of ``stamp x y z qx qy qz qw``, whole or not at all.
+
+    The file gets its name when the block ends; if it ends by an exception, none appears.
+    """
     lines = []
     for stamp, (x, y, theta) in zip(stamps, poses, strict=True):
         z, w = math.sin(theta / 2), math.cos(theta / 2)
         lines.append(f"{stamp:.6f} {x:.6f} {y:.6f} 0 0 0 {z:.9f} {w:.9f}\n")
     with written_beside(path) as temporary:
-        temporary.write_text("".join(lines))
+        with naming_errors(path):
+            temporary.write_text("".join(lines))
+        yield

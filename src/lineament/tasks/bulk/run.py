@@ -16,7 +16,7 @@ from typing import Any, cast
 from ..._version import __version__
 from ...extractor import Extractor, load_kernels
 from ...features import TABLES
-from ...files import alone_in, made_folder
+from ...files import alone_in, made_folder, spare_inputs
 from ...limits import Limits
 from ...logs import find_logs, open_log
 from ...logs.base import ReadOptions
@@ -107,8 +107,8 @@ def extract_logs(
     Raises
     ------
     LineamentError
-        If no logs are found, the folder or its manifest cannot be written, or another run writes
-        into it.
+        If no logs are found, one of them is a file of the data set, the folder or its manifest
+        cannot be written, or another run writes into it.
     ValueError
         If `reading` makes no sense.
 
@@ -127,9 +127,6 @@ def extract_logs(
     """
     settings = _settings(reading)
     open_writer(f"part-0{ending}")  # refuses an unknown ending before anything is computed
-    if executor is None or isinstance(executor, Threads):  # once here, not in each process
-        load_kernels([extractor])
-    started = time.perf_counter()
     found = [full_path(log) for log in find_logs(logs, settings["limits"])]
     with alone_in(made_folder(folder)):
         manifest = Manifest(folder)
@@ -145,8 +142,14 @@ def extract_logs(
             )
             for log, name in names.items()
         ]
-        todo = _unfinished(rows, manifest) if resume else rows
         home = os.path.abspath(folder)  # noqa: PTH100
+        # Those of former runs too: tables of features are no logs, whatever a folder holds.
+        parts = {row.output for row in (*manifest.rows.values(), *rows)}
+        spare_inputs([manifest.path, *(Path(home, part) for part in parts)], found)
+        if executor is None or isinstance(executor, Threads):  # once here, not in each process
+            load_kernels([extractor])
+        started = time.perf_counter()
+        todo = _unfinished(rows, manifest) if resume else rows
         method, noise = extractor.method, extractor.noise
         tasks = [Task(row, home, method, noise, settings, world) for row in todo]
         manifest.rows |= {row.log: row for row in todo}
