@@ -17,6 +17,7 @@ from .options import (
     NOISE,
     PATH,
     QUIET,
+    SCALE_HELP,
     SET,
     TEXT_PATH,
     complain,
@@ -42,6 +43,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
 @click.option("--echo", type=_ECHOES, help="Which echo.  [default: first]")
 @click.option("--stamp", type=_STAMPS, help="Beam of the header's time.  [default: first]")
+@click.option("--scale", type=float, help=SCALE_HELP + "  [default: 1]")
 @click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
 @click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
 @click.option("--localhost", **_FLAG, help="Stay on this machine.")

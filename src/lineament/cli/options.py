@@ -52,6 +52,8 @@ _ECHO = click.option(
     help="Which return of a beam that has several.",
 )
 _RING = click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud to read.")
+SCALE_HELP = "Factor on ranges and their limits: 0.001 where they are in millimetres."
+SCALE = click.option("--scale", type=float, default=1.0, show_default=True, help=SCALE_HELP)
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
@@ -109,10 +111,10 @@ def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Cal
 
         @wraps(command)
         def collecting(**given: Any) -> None:
-            names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits")
+            names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale")
             command(reading={name: given.pop(name) for name in names}, **given)
 
-        for option in (LIMITS, KEEP_GOING, poses, _RING, _ECHO, TOPIC):
+        for option in (LIMITS, KEEP_GOING, SCALE, poses, _RING, _ECHO, TOPIC):
             collecting = option(collecting)
         return collecting
 

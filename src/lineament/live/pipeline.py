@@ -108,6 +108,8 @@ class Pipeline:
         kept = self._publisher(publisher)
         if self._config.stamp != "first":
             scan = scan.stamped(self._config.stamp)
+        if self._config.scale != 1:
+            scan = scan.scaled(self._config.scale)
         twist, kept.last = self._twist(kept, scan), scan
         straight = deskew(scan, twist)
         features = kept.extractor(straight)

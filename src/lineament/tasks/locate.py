@@ -120,7 +120,7 @@ def locate_log(
     log = open_log(path, **reading)
     if log.topic is None and len(log.topics) > 1:
         raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
-    scans = track((scan for _, scan in log.items()), Path(log.name).name, len(log))
+    scans = track((scan for _, scan in log.measured()), Path(log.name).name, len(log))
     followed = follow(scans, drawn, extractor, odometry=odometry, deskewed=deskewed)
     found = [(scan.stamp, where) for scan, where in followed]
     if not found:

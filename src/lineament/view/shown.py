@@ -111,7 +111,8 @@ class ShownLog:
     def _fill(self, log: Any) -> None:
         try:
             self._about["total"] = len(log)
-            self.store.fill(log.items() if self._plan is None else self._located(log.items()))
+            items = log.measured()
+            self.store.fill(items if self._plan is None else self._located(items))
         except LineamentError as error:
             self._faults["error"] = str(error)
         except Exception as error:  # Nobody else could report it: the page does.
