@@ -62,7 +62,8 @@ def warn(message: str) -> None:
 @contextmanager
 def heard() -> Iterator[list[str]]:
     """Collect what is warned of within, in this thread; Python's own filters are not by thread."""
-    token = _heard.set(found := [])
+    found: list[str] = []
+    token = _heard.set(found)
     try:
         yield found
     finally:

@@ -130,7 +130,7 @@ def irregular_bearings(angles: Array) -> tuple[float, float]:
     if len(bad):
         i = int(bad[0]) + 1
         raise ValueError(
-            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
+            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that all increase, or all decrease"
         )
     if len(angles) == 0:
         return 0.0, 0.0
