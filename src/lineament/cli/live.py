@@ -12,6 +12,7 @@ import click
 
 from .mapping import UNITS
 from .options import (
+    LASER_POSE,
     LIMITS,
     METHOD,
     NOISE,
@@ -59,7 +60,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     metavar="off|scans|poses|TOPIC",
     help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
 )
-@click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
+@LASER_POSE
 @click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")

@@ -14,7 +14,7 @@ from typing import Any
 from ..errors import LineamentError
 from ..limits import LIMITS, Limits
 from ..scan import Pose
-from ..scan.fields import STAMPS
+from ..scan.fields import STAMPS, checked_mounting
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
@@ -189,6 +189,7 @@ class LiveConfig:
                 for value in values
             ):
                 raise ValueError(f"{name} is {values}, expected {many} finite numbers")
+        checked_mounting(self.laser_pose)
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
         if self.log is None and self.deskew == "poses":

@@ -13,8 +13,9 @@ from typing import Any, ClassVar, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
-from ..scan import LaserScan
-from ..scan.fields import STAMPS, check_scale
+from ..scan import LaserScan, Pose
+from ..scan.fields import STAMPS, check_scale, checked_mounting
+from ..scan.poses import carried, compose
 from ..scan.units import why_invalid
 
 T = TypeVar("T")
@@ -37,6 +38,7 @@ class ReadOptions:
     limits: Limits = LIMITS
     stamp: str = "first"
     scale: float = 1.0
+    laser_pose: Pose | None = None
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
@@ -46,6 +48,8 @@ class ReadOptions:
         if self.stamp not in STAMPS:
             raise ValueError(f"stamp is {self.stamp!r}, expected {' or '.join(STAMPS)}")
         check_scale(self.scale)
+        if self.laser_pose is not None:
+            object.__setattr__(self, "laser_pose", checked_mounting(self.laser_pose))
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -185,6 +189,11 @@ class Log(Pictured, ABC):
         options = self.options
         if options.stamp != "first":
             scan = scan.stamped(options.stamp)
+        if options.laser_pose is not None and scan.pose is not None:
+            pose, covariance = compose(scan.pose, options.laser_pose), scan.pose_covariance
+            if covariance is not None:
+                covariance = carried(covariance, scan.pose, pose)
+            scan = scan.with_pose(pose, covariance)
         return scan if options.scale == 1 else scan.scaled(options.scale)
 
     def measured(self) -> Iterator[tuple[str, LaserScan]]:

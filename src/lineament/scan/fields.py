@@ -130,7 +130,8 @@ def irregular_bearings(angles: Array) -> tuple[float, float]:
     if len(bad):
         i = int(bad[0]) + 1
         raise ValueError(
-            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that all increase, or all decrease"
+            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase, "
+            "or that all decrease"
         )
     if len(angles) == 0:
         return 0.0, 0.0
@@ -246,6 +247,17 @@ def checked_pose(pose: Any) -> Pose:
     except ValueError:
         raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
     return x, y, theta
+
+
+def checked_mounting(laser_pose: Any) -> Pose:
+    """Pose of the scanner on what poses are of: three finite numbers, the last an angle."""
+    try:
+        pose = checked_pose(laser_pose)
+    except ValueError as error:
+        raise ValueError(f"laser_{error}") from None
+    if abs(pose[2]) > 2 * math.pi:
+        raise ValueError(f"laser_pose has theta = {pose[2]:g} rad, more than a turn{_DEGREES}")
+    return pose
 
 
 def covariance_of_pose(covariance: ArrayLike) -> Array:
