@@ -5,13 +5,17 @@ import warnings
 
 import numpy as np
 import pytest
+import ros_bags
 
 import lineament as ln
 from lineament import Extractor, LaserScan, LineamentWarning, LogError, RangeNoise
+from lineament.cli import run
 from lineament.errors import heard
 from lineament.logs import open_log, save_npz, summarize
 from lineament.scan.units import doubt
+from lineament.tasks.bulk import Manifest, extract_logs
 from lineament.tasks.extract import extract_log
+from lineament.view import Session
 
 BEARINGS = {"angle_min": -1.0, "angle_increment": 0.01}
 WALL = 2.5 / np.cos(np.linspace(-1.0, 1.0, 201))
@@ -136,6 +140,52 @@ def test_what_is_heard_is_not_shown():
         for _ in range(3):
             ln.extract(MILLIMETRES, **BEARINGS)
     assert len(found) == 1
+
+
+def test_commands_warn_in_one_line_once(tmp_path, capfd):
+    far = log_of(tmp_path / "far.npz", [MILLIMETRES] * 4)
+    output = str(tmp_path / "out.parquet")
+    assert run(["extract", str(far), "-o", output, "-q"]) == 0
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("lineament: half of the ranges are beyond 200 m, where no 2-D scanner")
+    assert run(["extract", str(far), "-o", output, "-q", "--scale", "0.001"]) == 0
+    assert capfd.readouterr().err == ""
+    none = log_of(tmp_path / "none.npz", [np.full(201, 2500.0)] * 4, range_max=30.0)
+    for command in (["extract", str(none), "-o", output], ["info", str(none)]):
+        assert run([*command, "-q"]) == 1
+        (line,) = capfd.readouterr().err.splitlines()
+        assert line.startswith(f"lineament: {none}: has no valid range in 4 scans: they are 2500")
+    for option, problem in (
+        (["--scale", "0"], "scale is 0.0, expected > 0"),
+        (["--noise", "10"], "noise has sigma = 10"),
+        (["--laser-pose", "0", "0", "90"], "theta = 90 rad, more than a turn"),
+    ):
+        assert run(["extract", str(far), "-o", output, *option]) == 2
+        assert problem in capfd.readouterr().err
+
+
+def test_logs_in_bulk_warn_each_for_itself(tmp_path):
+    for name, ranges in (("a", MILLIMETRES), ("b", WALL), ("c", MILLIMETRES)):
+        log_of(tmp_path / f"{name}.npz", [ranges] * 3)
+    bulk = extract_logs(tmp_path, tmp_path / "out", Extractor())
+    assert bulk.failed == 0
+    begun = [text.partition(": half of the ranges are")[0] for text in bulk.warnings]
+    assert begun == [str(tmp_path / "a.npz"), str(tmp_path / "c.npz")]
+    rows = Manifest(tmp_path / "out").rows
+    assert [len(rows[str(tmp_path / f"{name}.npz")].warnings) for name in "abc"] == [1, 0, 1]
+
+
+def test_a_view_of_two_scanners_says_so(tmp_path):
+    messages = ros_bags.Messages(2)
+    items = [(f"/{at}", k, messages.scan(k, [1.0, 2.0])) for k, at in enumerate(("front", "rear"))]
+    path = ros_bags.write(tmp_path, "mcap", items)
+    with (
+        pytest.warns(LineamentWarning, match=r"shows scans of /front, /rear in turns \(--topic"),
+        Session(path, {}) as session,
+    ):
+        session.wait()
+    with Session(path, {}, topic="/rear") as session:
+        session.wait()
 
 
 # Bearings and noise

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 #: Beams that a stamp may be the time of, in the order in which they are taken.
 STAMPS = ("first", "middle", "last")
 _FLOAT64 = np.dtype(np.float64)
-_OF_MESSAGE = ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
+_OF_MESSAGE: tuple[str, ...] = ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
 _OF_MESSAGE += ("scan_time", "time_increment")
 #: x, y [m], and heading [rad].
 Pose = tuple[float, float, float]

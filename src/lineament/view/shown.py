@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LineamentError
+from ..errors import LineamentError, warn
 from ..extractor import Extractor
 from ..kernels import FARTHEST
 from ..logs import open_log, save_npz
@@ -39,6 +39,8 @@ class ShownLog:
     ) -> None:
         log = open_log(path, **reading)
         log.scan(0)
+        if log.topic is None and len(log.topics) > 1:
+            warn(f"{log.name}: shows scans of {', '.join(log.topics)} in turns (--topic for one)")
         self._about: dict[str, Any] = {"format": log.format, "total": None}
         self._faults = {"error": "", "skipped": 0, "faults": log.faults}
         # Another log, as each iteration counts its faults anew.
