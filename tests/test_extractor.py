@@ -86,13 +86,13 @@ def test_order_of_scans_and_reuse_do_not_matter():
     ("changes", "message"),
     [
         ({"ranges": [1.0, 2.0]}, r"ranges has shape \(2,\), expected \(m, n\)"),
-        ({"ranges": [["a"]]}, "ranges are no matrix"),
+        ({"ranges": [["a"]]}, r"ranges is \[\['a'\]\], expected numbers"),
         ({"workers": 0}, "workers is 0"),
         ({"workers": 1.5}, r"workers is 1\.5"),
         ({"workers": True}, "workers is True"),
         ({"stamps": [1.0]}, r"stamps has shape \(1,\), expected \(2,\)"),
         ({"angle_min": None}, "angle_min and angle_increment, or angles"),
-        ({"angle_increment": -1.0}, r"angle_increment is -1\.0"),
+        ({"angle_increment": 0.0}, "angle_increment is 0"),
         ({"range_max": 0.0}, r"range_max is 0\.0"),
         ({"angles": [0.0]}, "angles are given together"),
     ],
@@ -115,7 +115,7 @@ def test_features_carry_stamp_frame_and_noise():
 # Invariances
 
 
-@pytest.mark.parametrize("turn", [0.5, -2.0, 3.0, 100.0])
+@pytest.mark.parametrize("turn", [0.5, -2.0, 3.0, 9.0])
 @pytest.mark.parametrize("seed", range(4))
 def test_turned_bearings_turn_the_features(turn, seed):
     scan = random_scan(seed)

@@ -184,7 +184,7 @@ def test_a_ring_of_one_piece_has_each_beam_once(name, n):
     scan = LaserScan(
         2 + 0.01 * np.random.default_rng(0).normal(size=n), *full_circle(n)[[0]], 2 * math.pi / n
     )
-    found = assert_sound(Extractor(name, noise=50.0), scan)
+    found = assert_sound(Extractor(name, noise=0.99), scan)
     assert (found.segments["n_points"] <= n).all()
 
 

@@ -144,7 +144,10 @@ def test_unknown_names_are_refused_with_the_choices(name):
 
 @pytest.mark.parametrize("name", ["liu", "liu:paper"])
 def test_unknown_parameters_are_refused_with_the_choices(name):
-    with pytest.raises(ValueError, match=r"'liu' has no parameter 'radius', .*: sigma_d, .*corner"):
+    with pytest.raises(
+        ValueError,
+        match=r"'liu' has no parameter 'radius': is it support_radius\? .*: sigma_d, .*corner",
+    ):
         get_method(name, radius=3)
     with pytest.raises(ValueError, match="no parameter 'presets'"):
         Extractor(name, presets=("x",))

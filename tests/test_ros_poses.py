@@ -7,8 +7,9 @@ import pytest
 import ros_bags
 from text_logs import check_refused
 
-from lineament import LogError
-from lineament.logs import open_log, ros_poses
+from lineament import LaserScan, LineamentWarning, LogError
+from lineament.logs import open_log, ros_poses, save_npz
+from lineament.scan.poses import carried
 
 SECOND = 1_000_000_000
 both = pytest.mark.parametrize("kind", ["rosbag1", "mcap"])
@@ -21,8 +22,13 @@ def write(path, kind, make):
     return ros_bags.write(path, kind, items)
 
 
-def poses(path, pose_topic):
-    return [scan.pose for scan in open_log(path, pose_topic=pose_topic)]
+#: The scanner is where the poses are of.
+AT_BODY = (0.0, 0.0, 0.0)
+
+
+def poses(path, pose_topic, laser_pose=AT_BODY):
+    log = open_log(path, pose_topic=pose_topic, laser_pose=laser_pose)
+    return [scan.pose for scan in log]
 
 
 def scans(messages, *stamps, time=None):
@@ -50,7 +56,8 @@ def test_between_two_poses(tmp_path, kind, maker):
     assert between == pytest.approx((2.0, 1.5, 3.0 + 0.25 * (2 * math.pi - 6.0)))
     assert after == pytest.approx((5.0, 0.0, -3.0))
     assert [scan.pose for scan in open_log(path)] == [None] * 4
-    assert [scan.stamp for scan in open_log(path, pose_topic="/pose")] == [1.5, 2.0, 2.25, 3.5]
+    log = open_log(path, pose_topic="/pose", laser_pose=AT_BODY)
+    assert [scan.stamp for scan in log] == [1.5, 2.0, 2.25, 3.5]
 
 
 @both
@@ -82,6 +89,58 @@ def test_a_chain_of_transforms(tmp_path, kind):
     between, _ = poses(path, "/tf:map -> /odom -> base_link -> laser")
     assert between == pytest.approx((0.0, 12.5, -math.pi / 2))
     assert poses(path, "/tf:map->laser") == [None, None]
+
+
+@both
+def test_the_mounting_is_found_in_static_transforms(tmp_path, kind):
+    """The scanner is turned by a quarter on a mast 0.5 m ahead; the robot looks along y."""
+
+    def make(messages):
+        at = messages.transform
+        yield from scans(messages, 1.0)  # It waits for the mounting, as for its pose.
+        yield "/odom", 1.0, messages.odometry(1.0, 1.0, 2.0, math.pi / 2)
+        mast, laser = at(0, "base_link", "mast", 0.5, 0, 0), at(0, "mast", "laser", 0, 0.1, 1.0)
+        yield "/tf_static", 1.5, messages.transforms(laser, mast)
+        yield from scans(messages, 2.0)
+
+    path = write(tmp_path, kind, make)
+    expected = pytest.approx((0.9, 2.5, math.pi / 2 + 1.0))
+    assert poses(path, "/odom", None) == [expected] * 2
+    assert poses(path, "/odom") == [pytest.approx((1.0, 2.0, math.pi / 2))] * 2
+    assert poses(path, "/odom", (0.5, 0.1, 1.0)) == [expected] * 2
+
+
+@pytest.mark.parametrize("links", [[], [("base_link", "camera")], [("laser", "laser")]])
+@pytest.mark.parametrize("maker", ["odometry", "pose_stamped"])
+def test_a_mounting_that_is_not_known_is_warned_of(tmp_path, links, maker):
+    def make(messages):
+        made = [messages.transform(0.0, *link, 1.0, 1.0, 1.0) for link in links]
+        yield "/tf_static", 0.0, messages.transforms(*made)
+        yield "/odom", 1.0, getattr(messages, maker)(1.0, 1.0, 2.0, 3.0)
+        yield from scans(messages, 1.0, 1.5, 2.0)
+
+    path = write(tmp_path, "mcap", make)
+    of = "are those of 'base_link'" if maker == "odometry" else "do not say what they are of"
+    problem = f"poses of /odom {of}, and where 'laser' is on it is not known: .*laser_pose"
+    with pytest.warns(LineamentWarning, match=problem) as caught:
+        assert poses(path, "/odom", None) == [pytest.approx((1.0, 2.0, 3.0))] * 3
+    assert len(caught) == 1
+
+
+def test_a_mounting_that_is_given_carries_poses_and_their_covariance(tmp_path):
+    """Seen from the robot, the scanner is 2 m to the left: as it turns, it goes along x."""
+    npz = tmp_path / "log.npz"
+    save_npz(npz, [LaserScan([1.0], 0.0, 0.1, pose=(1.0, 1.0, 0.0))])
+    assert open_log(npz, laser_pose=(0.0, 2.0, 0.5))[0].pose == (1.0, 3.0, 0.5)
+    covariance = carried(np.diag([0.0, 0.0, 0.01]), (1.0, 1.0, 0.0), (1.0, 3.0, 0.5))
+    expected = [[0.04, 0.0, -0.02], [0.0, 0.0, 0.0], [-0.02, 0.0, 0.01]]
+    np.testing.assert_allclose(covariance, expected, atol=1e-15)
+    for given, problem in (
+        ((0.0, 0.0, 90.0), r"laser_pose has theta = 90 rad, .*degrees"),
+        ((0.0, 0.0), r"laser_pose is \(0.0, 0.0\), expected three finite numbers"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            open_log(npz, laser_pose=given)
 
 
 def test_a_static_link_holds_at_all_times(tmp_path):
@@ -129,7 +188,10 @@ def test_a_scanner_that_hangs_upside_down(tmp_path):
     assert scan.intensities.tolist() == [8.0, 7.0]
     # The first beam is still that of the stamp.
     assert (scan.stamp_beam, scan.time_increment) == (1, -0.25)
-    assert open_log(path, pose_topic="/tf:map->base").scan(0).intensities.tolist() == [7.0, 8.0]
+    # A chain that ends before is continued by the mounting.
+    assert open_log(path, pose_topic="/tf:map->base").scan(0).pose == pytest.approx(scan.pose)
+    found = open_log(path, pose_topic="/tf:map->base", laser_pose=AT_BODY).scan(0)
+    assert found.intensities.tolist() == [7.0, 8.0]
 
 
 def test_a_scan_with_the_stamp_of_a_pose_does_not_wait(tmp_path, monkeypatch):
@@ -186,7 +248,7 @@ def test_a_pose_without_measure_is_reported(tmp_path, x):
     path = write(tmp_path, "mcap", make)
     with pytest.raises(LogError, match=r"/odom message 0: pose is \(.*, 0.0, 0.0\), expected"):
         poses(path, "/odom")
-    log = open_log(path, pose_topic="/odom", keep_going=True)
+    log = open_log(path, pose_topic="/odom", keep_going=True, laser_pose=AT_BODY)
     assert [scan.pose for scan in log] == [None]
     assert log.skipped == 1
 
@@ -200,8 +262,9 @@ def test_scans_that_wait_where_a_bag_breaks_are_returned(tmp_path):
     data = path.read_bytes()
     path.write_bytes(data[: data.rindex(b"laser") + 20])
     found = []
+    log = open_log(path, pose_topic="/odom", laser_pose=AT_BODY)
     with pytest.raises(LogError, match="is cut off"):
-        found.extend(scan.pose for scan in open_log(path, pose_topic="/odom"))
+        found.extend(scan.pose for scan in log)
     assert found == [(7.0, 0.0, 0.0)] * 2
 
 
@@ -227,7 +290,9 @@ def test_topics_that_have_no_poses(tmp_path, pose_topic, problem):
 def test_poses_of_motion_capture(data_dir):
     """The truth of this run was refined from them: they agree to centimetres."""
     topic = "/vrpn_client_node/jackal/pose"
-    found = list(open_log(data_dir / "rosbag1" / "jackal_mocap.bag", pose_topic=topic))
+    path = data_dir / "rosbag1" / "jackal_mocap.bag"
+    with pytest.warns(LineamentWarning, match="do not say what they are of, and where 'velodyne'"):
+        found = list(open_log(path, pose_topic=topic))
     with np.load(data_dir / "truth" / "jackal_mocap_02171554.npz") as truth:
         stamps, expected = truth["stamps"], truth["poses"]
     nearest = np.abs(stamps[:, None] - [scan.stamp for scan in found]).argmin(axis=1)

@@ -181,7 +181,7 @@ def scan_bytes(ranges=(1.0, 2.0), **fields):
     ("fields", "problem"),
     [
         ({"ranges": []}, "ranges is empty, expected at least one beam"),
-        ({"angle_increment": 0.0}, "angle_increment is 0.0, expected > 0"),
+        ({"angle_increment": 0.0}, "angle_increment is 0, expected a step"),
         ({"intensities": [1.0]}, "intensities has 1 values, expected 2"),
     ],
 )

@@ -26,7 +26,7 @@ from lineament.motion import Tracker
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment
 from lineament.rosmsg.scans import laser_scan
-from lineament.scan.laser_scan import STAMPS
+from lineament.scan.fields import STAMPS
 from lineament.scan.poses import compose, poses_along, relative
 from lineament.simulation import World, cast_rays
 from lineament.simulation.placing import clearance

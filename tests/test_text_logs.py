@@ -152,7 +152,7 @@ def faulty(good, *cases):
         (",0.1,1,1,2", "angle_min and angle_increment, or angles, must be given"),
         ("0,0.1,1,1,two", "range 2 of 2 is 'two'"),
         ("0,0.1,1,1,1_0", "range 2 of 2 is '1_0'"),
-        ("0,-0.1,1,1,2", "angle_increment is -0.1"),
+        ("0,0,1,1,2", "angle_increment is 0"),
     )
     + faulty(tinyslam_line(1, [1000] * 682), ("1 2 3", "has 3 columns, expected 707")),
 )

@@ -18,7 +18,7 @@ from ._version import __version__
 
 if TYPE_CHECKING:
     from . import bounds, logs, methods, simulation
-    from .errors import LineamentError, LogError
+    from .errors import LineamentError, LineamentWarning, LogError
     from .extractor import Extractor, extract, trace
     from .features import FeatureBatch, Features
     from .logs import open_log
@@ -35,6 +35,7 @@ _HOME = {
     "Features": "features",
     "LaserScan": "scan",
     "LineamentError": "errors",
+    "LineamentWarning": "errors",
     "LogError": "errors",
     "RangeNoise": "scan",
     "Trace": "methods.trace",

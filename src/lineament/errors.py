@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 
 #: The packages that only some commands need, each with the smallest extra that installs it.
 EXTRAS = {
@@ -37,6 +40,38 @@ class LineamentError(Exception):
 
 class NothingFoundError(LineamentError):
     """What was asked for was done, and nothing was found; the command line ends with 3, not 1."""
+
+
+class LineamentWarning(UserWarning):
+    """What was given can hardly be meant, such as ranges in millimetres; it is taken as it is."""
+
+
+#: Where warnings are collected in place of being shown, by thread.
+_heard: ContextVar[list[str] | None] = ContextVar("heard", default=None)
+
+
+def warn(message: str) -> None:
+    """Warn whoever called the package, by a text that is the same for each scan of a log."""
+    heard = _heard.get()
+    if heard is not None:
+        if message not in heard:
+            heard.append(message)
+        return
+    level, frame = 2, sys._getframe(1).f_back
+    while frame is not None and frame.f_globals.get("__name__", "").startswith("lineament."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, LineamentWarning, stacklevel=level + 1)
+
+
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """Collect what is warned of within, in this thread; Python's own filters are not by thread."""
+    found: list[str] = []
+    token = _heard.set(found)
+    try:
+        yield found
+    finally:
+        _heard.reset(token)
 
 
 class LogError(LineamentError):

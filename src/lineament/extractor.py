@@ -17,10 +17,14 @@ from .methods.trace import Trace
 from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
+from .scan.fields import numbers
+from .scan.units import FAR, warn_of_units
 
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
 
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
+#: Fields of a scan that are not those of every scan.
+_FIELDS = ("stamp", "scan_time", "time_increment", "frame_id", "intensities", "pose")
 #: What kernels are loaded with, so that the first scan need not wait for them.
 WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
 
@@ -90,7 +94,10 @@ class Extractor:
         return f"Extractor({self.method!r}, noise={self.noise!r})"
 
     def __call__(self, scan: LaserScan) -> Features:
-        """Extract the features of one scan; a TypeError if it is something else."""
+        """Extract the features of one scan; a TypeError if it is something else.
+
+        Ranges that can hardly be metres are a `LineamentWarning`.
+        """
         if not isinstance(scan, LaserScan):
             raise _no_scan(scan)
         block = self._blocks.take(scan) or self._new_block(scan, 1)
@@ -110,6 +117,9 @@ class Extractor:
             scan=scan,
         )
         self._blocks.append(block)
+        is_empty = not (len(segments) or len(breakpoints))
+        if is_empty or scan.range_max > FAR:
+            warn_of_units(scan.ranges, scan.range_min, scan.range_max, is_empty)
         return features
 
     def batch(
@@ -123,15 +133,18 @@ class Extractor:
         range_max: float = math.inf,
         stamps: ArrayLike | None = None,
         frame_id: str = "",
+        scale: float = 1.0,
         workers: int = 1,
     ) -> FeatureBatch:
         """Extract the features of many scans with the same bearings.
+
+        As in `LaserScan`, beams that are given clockwise are reversed.
 
         Parameters
         ----------
         ranges : array_like, shape (m, n)
             One scan a row [m].
-        angle_min, angle_increment, angles, range_min, range_max, frame_id
+        angle_min, angle_increment, angles, range_min, range_max, frame_id, scale
             As in `LaserScan`, for all rows.
         stamps : array_like, shape (m,), optional
             Stamp of each row [s]; 0 if not given.
@@ -152,7 +165,7 @@ class Extractor:
         m, n = rows.shape
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
             raise ValueError(f"workers is {workers!r}, expected a whole number ≥ 1")
-        times = np.zeros(m) if stamps is None else np.array(stamps, dtype=np.float64)
+        times = np.zeros(m) if stamps is None else np.array(numbers("stamps", stamps))
         if times.shape != (m,):
             raise ValueError(f"stamps has shape {times.shape}, expected ({m},), one for each row")
         frame = LaserScan(
@@ -163,6 +176,7 @@ class Extractor:
             range_min=range_min,
             range_max=range_max,
             frame_id=frame_id,
+            scale=scale,
         )
         capacity = block_capacity(n)
         # New memory costs more to touch than to fill, above all from several threads at once.
@@ -170,11 +184,19 @@ class Extractor:
             self._workers.take(frame) or self._new_block(frame, capacity)
             for _ in range(max(1, min(workers, m)))
         ]
+        if frame.stamp_beam:  # It was taken first, as the last: they are given clockwise.
+            rows = rows[:, ::-1]
+        if scale != 1:
+            rows = scale * rows
         found = run_batch(rows, blocks, self._run or self._first_run)
         self._workers.extend(blocks)
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
+        is_empty = found.counts.sum(axis=1) == 0
+        limits = frame.range_min, frame.range_max
+        doubtful = range(m) if frame.range_max > FAR else np.flatnonzero(is_empty)
+        any(warn_of_units(rows[i], *limits, is_empty[i]) for i in doubtful)
         return FeatureBatch(
             **found.records,
             clusters=found.clusters,
@@ -212,6 +234,7 @@ def extract(
     angles: ArrayLike | None = None,
     range_min: float = 0.0,
     range_max: float = math.inf,
+    scale: float = 1.0,
     **parameters: Any,
 ) -> Features:
     """Extract the features of one scan; for many, keep an `Extractor`.
@@ -222,8 +245,9 @@ def extract(
         The scan, or its ranges [m].
     method, noise, **parameters
         As in `Extractor`.
-    angle_min, angle_increment, angles, range_min, range_max
-        As in `LaserScan`; for ranges, not for a scan, which has them.
+    angle_min, angle_increment, angles, range_min, range_max, scale
+        As in `LaserScan`; for ranges, not for a scan, which has them. So are its other fields,
+        ``stamp`` or ``frame_id``.
 
     Raises
     ------
@@ -232,13 +256,20 @@ def extract(
     ValueError
         If a field of the scan, the method or a parameter makes no sense.
 
+    Warns
+    -----
+    LineamentWarning
+        If the ranges can hardly be metres.
+
     Examples
     --------
     >>> extract([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01, method="liu", min_points=4)
     Features(0 segments, 0 corners, 0 edges, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
-    made = _scan_of(scan, (angle_min, angle_increment, angles), (range_min, range_max))
-    return Extractor(method, noise=noise, **parameters)(made)
+    bearings, limits = (angle_min, angle_increment, angles), (range_min, range_max, scale)
+    fields = {name: parameters.pop(name) for name in _FIELDS if name in parameters}
+    extractor = Extractor(method, noise=noise, **parameters)
+    return extractor(_scan_of(scan, bearings, limits, fields))
 
 
 def trace(
@@ -251,6 +282,7 @@ def trace(
     angles: ArrayLike | None = None,
     range_min: float = 0.0,
     range_max: float = math.inf,
+    scale: float = 1.0,
     **parameters: Any,
 ) -> Trace:
     """Extract the features of one scan and keep every intermediate.
@@ -262,21 +294,26 @@ def trace(
     >>> trace([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01).spacing.round(2).tolist()
     [nan, 0.02, 0.02]
     """
-    made = _scan_of(scan, (angle_min, angle_increment, angles), (range_min, range_max))
-    return Extractor(method, noise=noise, **parameters).trace(made)
+    bearings, limits = (angle_min, angle_increment, angles), (range_min, range_max, scale)
+    fields = {name: parameters.pop(name) for name in _FIELDS if name in parameters}
+    extractor = Extractor(method, noise=noise, **parameters)
+    return extractor.trace(_scan_of(scan, bearings, limits, fields))
 
 
-def _scan_of(given: Any, bearings: tuple[Any, Any, Any], limits: tuple[float, float]) -> LaserScan:
-    """Make a scan of ranges and their bearings; a scan stays as it is."""
-    bare = all(bearing is None for bearing in bearings)
+def _scan_of(
+    given: Any, bearings: tuple[Any, ...], limits: tuple[float, ...], fields: dict[str, Any]
+) -> LaserScan:
+    """Make a scan of ranges and its other fields; a scan stays as it is."""
+    is_bare = all(bearing is None for bearing in bearings)
     if isinstance(given, LaserScan):
-        if not bare or limits != (0.0, math.inf):
-            raise TypeError("a LaserScan has its own bearings and limits: pass it alone")
+        if fields or not is_bare or limits != (0.0, math.inf, 1.0):
+            raise TypeError("a LaserScan has its own bearings, limits and times: pass it alone")
         return given
-    if bare or isinstance(given, str | Path):
+    if is_bare or isinstance(given, str | Path):
         raise _no_scan(given)
-    first, step, angles = bearings
-    return LaserScan(given, first, step, angles=angles, range_min=limits[0], range_max=limits[1])
+    (first, step, angles), (low, high, scale) = bearings, limits
+    fields |= {"angles": angles, "range_min": low, "range_max": high, "scale": scale}
+    return LaserScan(given, first, step, **fields)
 
 
 def _no_scan(given: Any) -> TypeError:
@@ -312,10 +349,7 @@ def _matrix(ranges: ArrayLike) -> NDArray[np.float64]:
             "batch takes no LaserScan, expected a matrix of ranges, one scan a row, with "
             "angle_min=... and angle_increment=...; an extractor itself takes a scan"
         )
-    try:
-        rows = np.asarray(ranges, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("ranges are no matrix of numbers, expected shape (m, n)") from None
+    rows = numbers("ranges", ranges)
     if rows.ndim != 2:
         raise ValueError(f"ranges has shape {rows.shape}, expected (m, n): one scan a row")
     return rows

@@ -3,10 +3,12 @@
 import errno
 import os
 import sys
+import warnings
+from typing import Any
 
 import click
 
-from ..errors import LineamentError, NothingFoundError
+from ..errors import LineamentError, LineamentWarning, NothingFoundError
 from ..progress import compiling_shown
 from .commands import COMMANDS
 from .options import complain
@@ -46,7 +48,8 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     output = sys.stdout
     try:
-        with compiling_shown(show_compiling):
+        with compiling_shown(show_compiling), warnings.catch_warnings():
+            _show_warnings()
             return _run(arguments)
     except (click.Abort, KeyboardInterrupt):
         return _complain("lineament: stopped", 130)
@@ -77,6 +80,20 @@ def _run(arguments: list[str] | None) -> int:
     except LineamentError as error:
         return _complain(f"lineament: {error}", 3 if isinstance(error, NothingFoundError) else 1)
     return 0
+
+
+def _show_warnings() -> None:
+    """Show a warning of ours as one line, once; others as before."""
+    others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if issubclass(category, LineamentWarning):
+            complain(f"lineament: {message}")
+        else:
+            others(message, category, *where)
+
+    warnings.simplefilter("once", LineamentWarning)
+    warnings.showwarning = show
 
 
 def _unwritten(name: str | None, reason: str | None) -> int:

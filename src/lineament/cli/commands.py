@@ -38,7 +38,11 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 
     opened = open_log(log, **reading)
     items = tracker(quiet)(opened.items(), Path(opened.name).name, len(opened))
-    click.echo(str(summarize(opened, items)))
+    summary = summarize(opened, items)
+    click.echo(str(summary))
+    if not any(topic.ranges for topic in summary.topics):
+        for _ in opened.measured():  # Raises the error that says why.
+            pass
 
 
 @click.command()

@@ -12,6 +12,7 @@ from .options import (
     LOG_PATH,
     PATH,
     QUIET,
+    SCALE,
     SCAN,
     TOPIC,
     Place,
@@ -46,6 +47,7 @@ def demo(log: Path | str | None, limits: dict[str, int] | None, output: Path, qu
 @click.option("-m", "--method", "methods", multiple=True, help="Repeatable.  [default: all]")
 @click.option("-o", "--output", required=True, type=PATH, help="A picture (.png …) or .html.")
 @TOPIC
+@SCALE
 @KEEP_GOING
 @LIMITS
 @QUIET

@@ -18,6 +18,7 @@ from .options import (
     SET,
     TEXT_PATH,
     check_ending,
+    complain,
     make_extractor,
     reading,
 )
@@ -141,6 +142,8 @@ def _extract_into_folder(
         )
     if not quiet:
         click.echo(str(bulk))
+    for warning in bulk.warnings:
+        complain(f"lineament: {warning}")
     if bulk.failed:
         raise LineamentError(f"{bulk.failed} of {bulk.logs} logs failed, see {bulk.manifest}")
     if not bulk.whole:  # Else what was found in those is not counted again.

@@ -12,11 +12,13 @@ import click
 
 from .mapping import UNITS
 from .options import (
+    LASER_POSE,
     LIMITS,
     METHOD,
     NOISE,
     PATH,
     QUIET,
+    SCALE_HELP,
     SET,
     TEXT_PATH,
     complain,
@@ -42,6 +44,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
 @click.option("--echo", type=_ECHOES, help="Which echo.  [default: first]")
 @click.option("--stamp", type=_STAMPS, help="Beam of the header's time.  [default: first]")
+@click.option("--scale", type=float, help=SCALE_HELP + "  [default: 1]")
 @click.option("--ros", type=click.IntRange(0, 2), help="Version of ROS; 0: none.  [default: 2]")
 @click.option("--domain", type=click.IntRange(0, 232), help="DDS domain.  [default: ROS_DOMAIN_ID]")
 @click.option("--localhost", **_FLAG, help="Stay on this machine.")
@@ -57,7 +60,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     metavar="off|scans|poses|TOPIC",
     help="Undo the motion of the sensor, known from its scans, a log's poses, or odometry.",
 )
-@click.option("--laser-pose", type=float, nargs=3, help="x y theta of the laser on the robot.")
+@LASER_POSE
 @click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")

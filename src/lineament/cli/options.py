@@ -52,6 +52,15 @@ _ECHO = click.option(
     help="Which return of a beam that has several.",
 )
 _RING = click.option("--ring", type=click.IntRange(min=0), help="Ring of a point cloud to read.")
+SCALE_HELP = "Factor on ranges and their limits: 0.001 where they are in millimetres."
+SCALE = click.option("--scale", type=float, default=1.0, show_default=True, help=SCALE_HELP)
+LASER_POSE = click.option(
+    "--laser-pose",
+    type=float,
+    nargs=3,
+    metavar="X Y THETA",
+    help="Pose of the laser on the robot, that poses are of [m, m, rad].",
+)
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
@@ -103,16 +112,24 @@ QUIET = click.option("-q", "--quiet", **_QUIET)
 HUSH = click.option("-q", "--quiet", expose_value=False, **_QUIET)
 
 
+_READING = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale", "laser_pose")
+
+
 def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     def adding(command: Callable[..., None]) -> Callable[..., None]:
         """Add the options of a log; the command gets them as ``open_log(log, **reading)``."""
 
         @wraps(command)
         def collecting(**given: Any) -> None:
-            names = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits")
-            command(reading={name: given.pop(name) for name in names}, **given)
+            from ..scan.fields import check_scale, checked_mounting
 
-        for option in (LIMITS, KEEP_GOING, poses, _RING, _ECHO, TOPIC):
+            with wrong_usage():
+                check_scale(given["scale"])
+                if given["laser_pose"] is not None:
+                    checked_mounting(given["laser_pose"])
+            command(reading={name: given.pop(name) for name in _READING}, **given)
+
+        for option in (LIMITS, KEEP_GOING, SCALE, LASER_POSE, poses, _RING, _ECHO, TOPIC):
             collecting = option(collecting)
         return collecting
 

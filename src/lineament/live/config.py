@@ -14,7 +14,7 @@ from typing import Any
 from ..errors import LineamentError
 from ..limits import LIMITS, Limits
 from ..scan import Pose
-from ..scan.laser_scan import STAMPS
+from ..scan.fields import STAMPS, checked_mounting
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
@@ -28,6 +28,7 @@ _BOUNDS: dict[str, tuple[float, float]] = {
     "depth": (1, 1000),
     "rate": (0, 1e6),
     "noise": (0, 1000),
+    "scale": (1e-9, 1e9),
     "domain": (0, 232),
     "foxglove": (0, 65535),
     "dock_track": (0, 2**31 - 1),
@@ -67,6 +68,8 @@ class LiveConfig:
         Which echo of the latter: ``first``, ``last`` or ``strongest``.
     stamp : str
         Which beam of a scan is taken at the time of its header: ``first``, ``middle`` or ``last``.
+    scale : float
+        What ranges and their limits are multiplied by to be in metres: 0.001 for millimetres.
     ros : int
         2, or 1 for ROS 1 (rospy); 0 for none, where a log is played for Foxglove alone.
     domain : int, optional
@@ -142,6 +145,7 @@ class LiveConfig:
     type: str = "LaserScan"
     echo: str = "first"
     stamp: str = "first"
+    scale: float = 1.0
     ros: int = 2
     domain: int | None = None
     localhost: bool = False
@@ -185,6 +189,7 @@ class LiveConfig:
                 for value in values
             ):
                 raise ValueError(f"{name} is {values}, expected {many} finite numbers")
+        checked_mounting(self.laser_pose)
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
         if self.log is None and self.deskew == "poses":

@@ -115,6 +115,8 @@ class Pipeline(InTurn):
         kept = self._publisher(publisher)
         if self._config.stamp != "first":
             scan = scan.stamped(self._config.stamp)
+        if self._config.scale != 1:
+            scan = scan.scaled(self._config.scale)
         twist, kept.last = self._twist(kept, scan), scan
         self._note(scan, twist)
         straight = deskew(scan, twist)

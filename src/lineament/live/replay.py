@@ -71,7 +71,7 @@ class ReplaySource:
     ) -> None:
         self._log = open_log(path, **reading)
         self._rate, self._loop, self._clock = rate, loop, clock
-        self._items = iter(self._log.items())
+        self._items = iter(self._log.measured())
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
         # The first scan is due when it is first asked for.
         self._has_begun, self._due, self._stamp = False, 0.0, math.nan
@@ -127,6 +127,6 @@ class ReplaySource:
     def _following(self) -> tuple[str, LaserScan] | None:
         following = next(self._items, None)
         if following is None and self._loop:
-            self._items = iter(self._log.items())
+            self._items = iter(self._log.measured())
             following = next(self._items, None)
         return following

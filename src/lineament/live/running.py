@@ -98,6 +98,7 @@ def _ends(
             ring=config.ring,
             keep_going=config.keep_going,
             limits=config.limits,
+            laser_pose=config.laser_pose if any(config.laser_pose) else None,
         )
         stack.enter_context(closing(source))
     if config.ros == 1:

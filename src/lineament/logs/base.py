@@ -14,8 +14,10 @@ from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
-from ..scan import LaserScan
-from ..scan.laser_scan import STAMPS
+from ..scan import LaserScan, Pose
+from ..scan.fields import STAMPS, check_scale, checked_mounting
+from ..scan.poses import carried, compose
+from ..scan.units import why_invalid
 
 T = TypeVar("T")
 
@@ -36,6 +38,8 @@ class ReadOptions:
     pose_topic: str | None = None
     limits: Limits = LIMITS
     stamp: str = "first"
+    scale: float = 1.0
+    laser_pose: Pose | None = None
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
@@ -44,6 +48,9 @@ class ReadOptions:
             raise ValueError(f"ring is {self.ring!r}, expected a whole number ≥ 0")
         if self.stamp not in STAMPS:
             raise ValueError(f"stamp is {self.stamp!r}, expected {' or '.join(STAMPS)}")
+        check_scale(self.scale)
+        if self.laser_pose is not None:
+            object.__setattr__(self, "laser_pose", checked_mounting(self.laser_pose))
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -186,11 +193,11 @@ class Log(Pictured, ABC):
         this._skipped = self._skipped = Skipped()
         this._check_size()
         self._size = this._size
-        scans, beams, stamp = self.limits.scans, self.limits.beams, self.options.stamp
+        scans, beams = self.limits.scans, self.limits.beams
         for count, (topic, scan) in enumerate(this._items(), 1):
             n = len(scan.ranges)
             if n <= beams and count <= scans:
-                yield topic, scan if stamp == "first" else scan.stamped(stamp)
+                yield topic, self._meant(scan)
                 continue
             try:
                 self.limits.check("scans", count)
@@ -199,6 +206,31 @@ class Log(Pictured, ABC):
                 this._fault(LogError(self.name, f"scan {count - 1}: {error}"))
             if count > scans:
                 return
+
+    def _meant(self, scan: LaserScan) -> LaserScan:
+        """Return a scan as the options say what is in the log."""
+        options = self.options
+        if options.stamp != "first":
+            scan = scan.stamped(options.stamp)
+        if options.laser_pose is not None and scan.pose is not None:
+            pose, covariance = compose(scan.pose, options.laser_pose), scan.pose_covariance
+            if covariance is not None:
+                covariance = carried(covariance, scan.pose, pose)
+            scan = scan.with_pose(pose, covariance)
+        return scan if options.scale == 1 else scan.scaled(options.scale)
+
+    def measured(self) -> Iterator[tuple[str, LaserScan]]:
+        """Yield what `items` does; a LogError at the end if no beam of all scans is valid."""
+        scans, is_measured, why = 0, False, ""
+        for topic, scan in self.items():
+            scans += 1
+            is_measured = is_measured or bool(scan.valid.any())
+            if not is_measured and not why:
+                why = why_invalid(scan.ranges, scan.range_min, scan.range_max)
+            yield topic, scan
+        if scans and not is_measured:
+            why = why or "no beam returned anything"
+            raise LogError(self.name, f"has no valid range in {scans} scans: {why}")
 
     def _check_size(self) -> None:
         """Report that the file has become shorter than it was when the log was last read."""

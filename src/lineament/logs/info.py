@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import one_line
 from ..scan import LaserScan, Pose
+from ..scan.units import FAR
 from .base import Log, Topic
 
 #: How many frames, topics and kinds of messages are listed.
@@ -61,6 +62,7 @@ class TopicInfo:
         if self.ranges is not None:
             low_range, median, high_range = self.ranges
             ranges = f"{low_range:.2f} to {high_range:.2f} m, median {median:.2f} m, {ranges}"
+            ranges += ": in millimetres? (scale=0.001)" * (median > FAR)
         way = f", {self.travelled:.1f} m travelled" if self.scans > 1 else ""
         several = ": more than one scanner on this topic?" if len(self.frame_ids) > 1 else ""
         return [

@@ -86,7 +86,10 @@ class NpzLog(Log):
         if "poses" in arrays and np.isfinite(arrays["poses"][i]).all():
             fields["pose"] = tuple(arrays["poses"][i].tolist())
         scan = LaserScan(arrays["ranges"][i], **fields)
-        beam = float(_at(arrays["stamp_beam"], i)) if "stamp_beam" in arrays else 0.0
+        beam = scan.stamp_beam
+        if "stamp_beam" in arrays:  # Of beams as they are stored, which may be clockwise.
+            stored = float(_at(arrays["stamp_beam"], i))
+            beam = beam - stored if beam else stored
         ns = int(arrays["stamps_ns"][i]) if "stamps_ns" in arrays else None
         return scan.stamped(beam, ns) if beam or ns is not None else scan
 

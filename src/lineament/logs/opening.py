@@ -58,6 +58,8 @@ def open_log(
     pose_topic: str | None = None,
     limits: Mapping[str, int] | None = None,
     stamp: str = "first",
+    scale: float = 1.0,
+    laser_pose: tuple[float, float, float] | None = None,
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -84,6 +86,13 @@ def open_log(
         Limits of :class:`~lineament.limits.Limits` that are to be others, by name.
     stamp : str
         Which beam is taken at the stamp: ``first``, ``middle`` or ``last``, in time.
+    scale : float
+        What ranges and their limits are multiplied by to be in metres: 0.001 where the log has
+        millimetres. Poses are not.
+    laser_pose : (x, y, theta), optional
+        Pose of the scanner on what the poses of the log are of [m, m, rad]. By default, poses of a
+        ROS log are moved by ``/tf_static``, with a `LineamentWarning` where it does not say where
+        the scanner is; poses of other logs are those of the scanner.
 
     Returns
     -------
@@ -93,7 +102,8 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring`, `pose_topic`, `stamp` or a limit is not a value that it can have.
+        If `echo`, `ring`, `pose_topic`, `stamp`, `scale`, `laser_pose` or a limit is not a
+        value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, has no such topic,
         or is beyond a limit. While the log is iterated: if a scan in it is faulty, unless
@@ -108,7 +118,8 @@ def open_log(
     >>> log.format, len(log), [scan.stamp for scan in log]
     ('carmen', 1, [7.5])
     """
-    options = ReadOptions(echo, ring, pose_topic, Limits.of(limits), stamp)
+    most = Limits.of(limits)
+    options = ReadOptions(echo, ring, pose_topic, most, stamp, scale, laser_pose)
     source = _located(path, options.limits)
     head = sources.read_head(source)
     reader = _recognised(head)

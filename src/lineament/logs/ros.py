@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
+from ..rosmsg.poses import TRANSFORMS
 from ..rosmsg.scans import CLOUD, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
@@ -91,7 +92,7 @@ class RosLog(Log):
     ) -> Sequence[tuple[str, LaserScan]]:
         """Read one message: the scans that are ready after it, by topic."""
         topic, kind = connection.topic, connection.type
-        if finder and topic in finder.topics and kind in finder.types:
+        if finder and finder.takes(topic, kind):
             return finder.learn(connection, data)
         if topic not in self._wanted or kind not in self._decoders:
             return ()
@@ -102,7 +103,9 @@ class RosLog(Log):
         if self.options.pose_topic is None:
             return None
         try:
-            finder = PoseFinder(self.options.pose_topic, self.limits)
+            is_given = self.options.laser_pose is not None
+            mountings = () if is_given else self._topics_of(TRANSFORMS)
+            finder = PoseFinder(self.options.pose_topic, self.limits, mountings, is_given=is_given)
         except ValueError as error:
             raise LogError(self.name, str(error)) from None
         if finder.topic not in self._topics_of(finder.types):

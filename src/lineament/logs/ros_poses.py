@@ -3,15 +3,17 @@
 import math
 from bisect import bisect_right
 from collections import deque
+from collections.abc import Collection, Iterable
 from itertools import pairwise
 
 import numpy as np
 
+from ..errors import warn
 from ..limits import LIMITS, Limits
-from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, stamped_poses
+from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.wire import Buffer
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import compose
+from ..scan.poses import carried, compose
 from .ros_bag import Connection
 
 #: Poses that are held of each track, and scans that wait for a pose after theirs.
@@ -34,27 +36,55 @@ class PoseFinder:
     stamp of the scan. Links that are on the topic with ``_static`` at its end hold at all times.
     The scans of a frame that is upside down are turned over: their pose is that of a frame with the
     same x axis, whose z axis points up.
+
+    Where the frame of the scans is in that of the poses is looked up among `mountings`, the topics
+    of transforms of the log; where it is not known, that is warned of, and the poses are taken for
+    those of the scanner. With `is_given`, whoever asks knows it.
     """
 
-    def __init__(self, wanted: str, limits: Limits = LIMITS) -> None:
-        self._limits = limits
+    def __init__(
+        self,
+        wanted: str,
+        limits: Limits = LIMITS,
+        mountings: Collection[str] = (),
+        *,
+        is_given: bool = True,
+    ) -> None:
+        self._limits, self._is_given = limits, is_given
         self.topic, _, chain = wanted.partition(":")
         frames = [_frame(name) for name in chain.split("->")] if chain else []
         if chain and (len(frames) < 2 or not all(frames)):
             raise ValueError(
                 f"pose topic is {wanted!r}, expected frames as in {self.topic}:odom->base_link"
             )
-        self.topics = (self.topic, f"{self.topic}_static") if chain else (self.topic,)
+        static = f"{self.topic}_static" if chain else "/tf_static"
+        #: Whether links that hold at all times may still come.
+        self._is_static_ahead = static in mountings
+        self.topics = (self.topic, static) if chain or static in mountings else (self.topic,)
+        self._is_chain = bool(chain)
+        #: What poses are of, "" if that is not known; and links that hold at all times, by child.
+        self._body = frames[-1] if chain else ""
+        self._links: dict[str, StampedPose] = {}
+        self._is_warned = False
         #: Types of messages that the topic may have.
         self.types = TRANSFORMS if chain else tuple(POSE_TYPES)
         self._tracks = {edge: _Track() for edge in pairwise(frames)} or {("", ""): _Track()}
         self._waiting: deque[tuple[str, LaserScan]] = deque()
 
+    def takes(self, topic: str, kind: str) -> bool:
+        """Whether messages of a type on a topic are for `learn`."""
+        return topic in self.topics and kind in (self.types if topic == self.topic else TRANSFORMS)
+
     def learn(self, connection: Connection, data: Buffer) -> list[tuple[str, LaserScan]]:
         """Take a message with poses, and return the scans, by topic, that waited for it."""
-        is_chain, is_static = len(self.topics) > 1, connection.topic != self.topic
+        is_static = connection.topic != self.topic
         for found in stamped_poses(data, connection.encoding, connection.type, self._limits):
-            edge = (_frame(found.frame), _frame(found.child_frame)) if is_chain else ("", "")
+            frame, child = _frame(found.frame), _frame(found.child_frame)
+            if is_static and len(self._links) < MAX_POSES:
+                self._links[child] = found._replace(frame=frame)
+            elif not self._is_chain:
+                self._body = child
+            edge = (frame, child) if self._is_chain or is_static else ("", "")
             if edge in self._tracks:
                 stamp = -math.inf if is_static else found.stamp
                 self._tracks[edge].add(stamp, found.pose, found.covariance)
@@ -75,15 +105,44 @@ class PoseFinder:
         while self._waiting:
             topic, scan = self._waiting[0]
             is_covered = all(track.covers(scan.stamp) for track in self._tracks.values())
+            mounting = self._mounting(_frame(scan.frame_id))
+            if mounting is None and self._is_static_ahead and not self._links:
+                is_covered = False
             if len(self._waiting) <= most and not is_covered:
                 break
             self._waiting.popleft()
-            if sum(track.is_upside_down for track in self._tracks.values()) % 2:
+            pose, covariance = self._pose(scan.stamp, mounting or ())
+            if mounting is None and pose is not None:
+                self._warn(scan.frame_id)
+            links = (*self._tracks.values(), *(mounting or ()))
+            if sum(link.is_upside_down for link in links) % 2:
                 scan = scan.turned_over()
-            ready.append((topic, scan.with_pose(*self._pose(scan.stamp))))
+            ready.append((topic, scan.with_pose(pose, covariance)))
         return ready
 
-    def _pose(self, stamp: float) -> tuple[Pose | None, Array | None]:
+    def _mounting(self, laser: str) -> list[StampedPose] | None:
+        """Links from what poses are of to the frame of a scan; None if they are not known."""
+        links: list[StampedPose] = []
+        while not self._is_given and (not self._body or laser != self._body):
+            link = self._links.get(laser)
+            if link is None or len(links) > len(self._links):
+                return None
+            links.insert(0, link)
+            laser = link.frame
+        return links
+
+    def _warn(self, laser: str) -> None:
+        if not self._is_warned:
+            self._is_warned = True
+            of = f"are those of {self._body!r}" if self._body else "do not say what they are of"
+            warn(
+                f"poses of {self.topic} {of}, and where {laser!r} is on it is not known: they are "
+                "taken for those of the scanner (laser_pose=...)"
+            )
+
+    def _pose(
+        self, stamp: float, mounting: Iterable[StampedPose]
+    ) -> tuple[Pose | None, Array | None]:
         pose, covariance, side = (0.0, 0.0, 0.0), None, 1
         for track in self._tracks.values():
             link = track.at(stamp)
@@ -93,6 +152,13 @@ class PoseFinder:
             (x, y, theta), covariance = link
             pose = compose(pose, (x, side * y, side * theta))
             side = -side if track.is_upside_down else side
+        body = pose
+        for fixed in mounting:
+            x, y, theta = fixed.pose
+            pose = compose(pose, (x, side * y, side * theta))
+            side = -side if fixed.is_upside_down else side
+        if covariance is not None and pose != body:
+            covariance = carried(covariance, body, pose)
         return pose, covariance
 
 

@@ -100,13 +100,12 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     if cls is None or (preset and preset not in cls.presets):
         known_methods = ", ".join(method_names())
         raise ValueError(f"method {name!r} is unknown, expected one of: {known_methods}")
+    from .parameters import unknown
+
     known = [field.name for field in fields(cls)]
     for parameter in parameters:
         if parameter not in known:
-            raise ValueError(
-                f"method {base!r} has no parameter {parameter!r}, expected one of: "
-                f"{', '.join(known)}"
-            )
+            raise ValueError(unknown(f"method {base!r}", parameter, known))
     return cast(Method, (getattr(cls, preset) if preset else cls)(**parameters))
 
 

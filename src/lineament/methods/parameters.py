@@ -1,12 +1,16 @@
 """Parameters of methods, each declared once: its default, bounds, unit and meaning."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, fields
-from inspect import cleandoc
+from difflib import get_close_matches
+from functools import wraps
+from inspect import cleandoc, signature
 from numbers import Integral, Real
 from textwrap import wrap
 from typing import Any, TypeVar, dataclass_transform
+
+from ..scan import LaserScan
 
 T = TypeVar("T")
 
@@ -57,6 +61,26 @@ class Bounds:
             raise ValueError(f"{name} is {value!r}, expected {self}{less}")
 
 
+#: Fields of a scan, which a parameter that is not known may be meant as.
+_FIELDS = [name for name in signature(LaserScan).parameters if name != "ranges"]
+
+
+def unknown(owner: str, name: str, known: Iterable[str]) -> str:
+    """Return what to write in place of a parameter that a method does not have."""
+    known = list(known)
+    if name == "angle_max":
+        return (
+            "angle_max is no field of a scan, expected angle_increment, "
+            "(angle_max - angle_min)/(n - 1) for n beams"
+        )
+    names = [*known, *_FIELDS]
+    near = [one for one in names if one.startswith(name)] or get_close_matches(name, names, n=1)
+    hint = ""
+    if near:
+        hint = f"is it {near[0]}{'' if near[0] in known else ', a field of the scan'}? "
+    return f"{owner} has no parameter {name!r}: {hint}expected one of: {', '.join(known)}"
+
+
 def parameter(
     default: bool | int | float | str, meaning: str, *, unit: str = "", **bounds: Any
 ) -> Any:
@@ -102,6 +126,7 @@ def method(cls: type[T]) -> type[T]:
     One with a name, and without an example, gets the example that finds the corners of a room.
     """
     cls = dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    _check_names(cls)
     lines = ["Parameters", "----------"]
     for one in fields(cls):  # type: ignore[arg-type]
         bounds = one.metadata["bounds"]
@@ -117,3 +142,17 @@ def method(cls: type[T]) -> type[T]:
     end = min((at for at in ends if at >= 0), default=len(text))
     cls.__doc__ = "\n".join([text[:end].rstrip(), "", *lines, "", text[end:]])
     return cls
+
+
+def _check_names(cls: Any) -> None:
+    """Let a class name what it was given that is no parameter, and what may be meant."""
+    made, known = cls.__init__, [one.name for one in fields(cls)]
+
+    @wraps(made)
+    def checked(self: Any, **given: Any) -> None:
+        for name in given:
+            if name not in known:
+                raise TypeError(unknown(cls.__name__, name, known))
+        made(self, **given)
+
+    cls.__init__ = checked

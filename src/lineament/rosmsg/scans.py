@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..limits import LIMITS, Limits
 from ..scan import LaserScan
-from ..scan.fields import counter_clockwise
 from .wire import Buffer, WireReader
 
 CLOUD = "sensor_msgs/PointCloud2"
@@ -136,10 +135,18 @@ def _scan(
     angle_min, _, increment, time_increment, scan_time, range_min, range_max = geometry
     if len(ranges) == 0:
         raise ValueError("ranges is empty, expected at least one beam")
-    times = {"scan_time": scan_time, "time_increment": time_increment}
-    fields, first = counter_clockwise(ranges, intensities, angle_min, increment, **times)
-    scan = LaserScan(**fields, range_min=range_min, range_max=range_max, frame_id=frame_id)
-    return scan.stamped(first, stamp)
+    scan = LaserScan(
+        ranges,
+        angle_min,
+        increment,
+        range_min=range_min,
+        range_max=range_max,
+        scan_time=scan_time,
+        time_increment=time_increment,
+        frame_id=frame_id,
+        intensities=intensities,
+    )
+    return scan.stamped(scan.stamp_beam, stamp)
 
 
 def _echoes(reader: WireReader, n: int, limits: Limits) -> tuple[Array, Array, Array]:

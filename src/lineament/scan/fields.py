@@ -8,11 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+#: Beams that a stamp may be the time of, in the order in which they are taken.
+STAMPS = ("first", "middle", "last")
 _FLOAT64 = np.dtype(np.float64)
+_OF_MESSAGE: tuple[str, ...] = ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
+_OF_MESSAGE += ("scan_time", "time_increment")
 #: x, y [m], and heading [rad].
 Pose = tuple[float, float, float]
 #: Beams to points: a gap of more steps is where the scan begins, and a turn has so many at most.
 _WIDE, _MOST_BEAMS = 10.0, 20_000
+#: A scan that goes around from behind has bearings up to three half turns; none has so many [rad].
+_FARTHEST = 4 * math.pi
+_DEGREES = ": are they in degrees? (numpy.radians)"
+#: No limit of a scanner is farther [m].
+_LONGEST = 1000.0
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
 
@@ -35,15 +44,11 @@ def finite(name: str, value: object) -> float:
 
 
 def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
-    """Copy `values` into a read-only float64 vector."""
-    try:
-        given = np.asarray(values)
-        if given.dtype.kind == "c":
-            raise TypeError
-        # To set what happens at a signalling NaN costs a microsecond.
-        copy = given.copy() if given.dtype is _FLOAT64 else _as_float64(given)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} is {values!r:.60}, expected a vector of numbers") from None
+    """Copy `values` into a read-only float64 vector; what is masked or null is NaN."""
+    if type(values) is np.ndarray and values.dtype is _FLOAT64:
+        copy = values.copy()
+    else:
+        copy = np.array(numbers(name, values))
     if copy.ndim != 1:
         raise ValueError(f"{name} has shape {copy.shape}, expected one dimension")
     if length is not None and len(copy) != length:
@@ -54,23 +59,64 @@ def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
 
 # A damaged file may hold a signalling NaN: it becomes a NaN like any other, without a warning.
 @np.errstate(invalid="ignore")
-def _as_float64(values: NDArray[Any]) -> Array:
-    return values.astype(np.float64)
+def numbers(name: str, values: ArrayLike) -> Array:
+    """Make a float64 array of numbers, of any shape; what is masked or null is NaN.
+
+    ValueError for truth values, dates, texts and complex numbers, which NumPy would convert.
+    """
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind == "O":
+            given = np.array([*map(_number_or_nan, given.flat)]).reshape(given.shape)
+        if given.dtype.kind not in "fiu" and given.size:
+            raise TypeError
+        made = given.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        shown = " ".join(f"{values!r:.60}".split())
+        raise ValueError(f"{name} is {shown}, expected numbers in an array") from None
+    mask = np.ma.getmask(values)
+    return made if mask is np.ma.nomask else np.where(mask, np.nan, made)
 
 
-def regular_bearings(first: object, step: object, n: int) -> tuple[float, float]:
-    """First bearing and step of `n` beams [rad], which must go round once at most."""
+def _number_or_nan(value: Any) -> float:
+    # Tables have None or their own null (pandas.NA) where there is no number.
+    if value is None or type(value).__name__ == "NAType":
+        return math.nan
+    if isinstance(value, bool | np.bool_ | str | bytes):
+        raise TypeError
+    return float(value)
+
+
+def regular_bearings(first: object, step: object, n: int) -> tuple[float, float, bool]:
+    """First bearing and step of `n` beams [rad], which must go round once at most.
+
+    And whether they are those of the beams in reverse, since these run clockwise.
+    """
     if first is None or step is None:
         raise ValueError("angle_min and angle_increment, or angles, must be given")
     first, step = finite("angle_min", first), finite("angle_increment", step)
+    is_clockwise = step < 0 and n > 1
+    if is_clockwise:
+        first, step = first + (n - 1) * step, -step
     if n > 1 and not first + 0.5 * step > first:
-        if step > 0:
-            raise ValueError(f"angle_increment is {step}, too small for bearings from {first}")
-        raise ValueError(f"angle_increment is {step}, expected > 0: beams run counter-clockwise")
+        if step == 0:
+            raise ValueError("angle_increment is 0, expected a step from beam to beam")
+        raise ValueError(f"angle_increment is {step}, too small for bearings from {first}")
     last = first + (n - 1) * step
     if last - first > 2 * math.pi:  # Rare, and the check proper takes longer.
         _check_turn("angle_increment", first, last, step)
-    return first, step
+    if not -_FARTHEST <= first <= _FARTHEST:
+        raise ValueError(_no_bearing("angle_min", first))
+    return first, step, is_clockwise
+
+
+def bearings(angles: ArrayLike, n: int) -> tuple[Array, bool]:
+    """Copy `n` bearings; if they decrease, in reverse. And whether they do."""
+    copy = vector("angles", angles, n)
+    if np.ma.getmask(angles).any():
+        raise ValueError("angles are masked, expected a bearing of each beam")
+    is_clockwise = n > 1 and copy[0] > copy[-1] and bool((np.diff(copy) < 0).all())
+    return (copy[::-1], True) if is_clockwise else (copy, False)
 
 
 @np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
@@ -84,12 +130,15 @@ def irregular_bearings(angles: Array) -> tuple[float, float]:
     if len(bad):
         i = int(bad[0]) + 1
         raise ValueError(
-            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase"
+            f"angles[{i}] is {angles[i]} after {angles[i - 1]}, expected bearings that increase, "
+            "or that all decrease"
         )
     if len(angles) == 0:
         return 0.0, 0.0
     step = float(np.median(steps)) if len(steps) else 0.0
     _check_turn("angles", angles[0], angles[-1], step)
+    if not -_FARTHEST <= angles[0] <= _FARTHEST:
+        raise ValueError(_no_bearing("angles[0]", angles[0]))
     return float(angles[0]), step
 
 
@@ -98,15 +147,17 @@ def _check_turn(name: str, first: float, last: float, step: float) -> None:
     if last - first > 2 * math.pi + min(1.5 * step, 0.1):
         raise ValueError(
             f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
+            f"{_DEGREES if last - first > 4 * math.pi else ''}"
         )
+
+
+def _no_bearing(name: str, value: float) -> str:
+    return f"{name} is {value:.6g} rad, more than two turns from the x axis{_DEGREES}"
 
 
 def beams_to(points: ArrayLike) -> tuple[Array, Array]:
     """Ranges and increasing bearings of beams to points (n, 2), and of beams to nothing between."""
-    try:
-        xy = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"points is {points!r:.60}, expected numbers of shape (n, 2)") from None
+    xy = numbers("points", points)
     xy = xy.reshape(-1, 2) if xy.size == 0 else xy
     if xy.ndim != 2 or xy.shape[1] != 2:
         raise ValueError(f"points has shape {xy.shape}, expected (n, 2): x and y of each")
@@ -145,6 +196,48 @@ def range_limits(low: object, high: object) -> tuple[float, float]:
     return range_min, range_max
 
 
+def beam_at_stamp(beam: str | float, n: int, is_clockwise: bool) -> float:
+    """Index of the beam that a stamp is the time of; it may be given as one of `STAMPS`."""
+    if isinstance(beam, str):
+        if beam not in STAMPS:
+            raise ValueError(f"stamp is {beam!r}, expected {', '.join(STAMPS)}")
+        share = STAMPS.index(beam) / 2
+        return (1 - share if is_clockwise else share) * (n - 1)
+    return finite("stamp_beam", beam)
+
+
+def check_scale(scale: object) -> float:
+    """Check what ranges are to be multiplied by."""
+    factor = finite("scale", scale)
+    if factor <= 0:
+        raise ValueError(f"scale is {scale}, expected > 0: 0.001 for ranges in millimetres")
+    return factor
+
+
+def in_metres(ranges: Array, scale: object, range_max: float = 0.0) -> Array:
+    """Ranges times a scale; `range_max` is in metres already."""
+    factor = check_scale(scale)
+    if _LONGEST < range_max < math.inf:
+        raise ValueError(
+            f"range_max is {range_max:g} m: scale is for the ranges alone, limits are in metres"
+        )
+    made = factor * ranges
+    made.setflags(write=False)
+    return made
+
+
+def in_reverse(own: dict[str, Any]) -> dict[str, Any]:
+    """Fields of a scan whose beams run the other way round, but for its bearings."""
+    n, intensities = len(own["ranges"]), own["intensities"]
+    return {
+        "ranges": own["ranges"][::-1],
+        "intensities": None if intensities is None else intensities[::-1],
+        "stamp_beam": n - 1 - own["stamp_beam"],
+        "scan_time": -own["scan_time"],
+        "time_increment": -own["time_increment"],
+    }
+
+
 def checked_pose(pose: Any) -> Pose:
     """Three finite numbers."""
     try:
@@ -154,6 +247,17 @@ def checked_pose(pose: Any) -> Pose:
     except ValueError:
         raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
     return x, y, theta
+
+
+def checked_mounting(laser_pose: Any) -> Pose:
+    """Pose of the scanner on what poses are of: three finite numbers, the last an angle."""
+    try:
+        pose = checked_pose(laser_pose)
+    except ValueError as error:
+        raise ValueError(f"laser_{error}") from None
+    if abs(pose[2]) > 2 * math.pi:
+        raise ValueError(f"laser_pose has theta = {pose[2]:g} rad, more than a turn{_DEGREES}")
+    return pose
 
 
 def covariance_of_pose(covariance: ArrayLike) -> Array:
@@ -179,38 +283,14 @@ def nanoseconds(stamp: float) -> int:
     return seconds * NANO + round((stamp - seconds) * NANO)
 
 
-def counter_clockwise(
-    ranges: Any, intensities: Any, angle_min: float, increment: float, **times: float
-) -> tuple[dict[str, Any], int]:
-    """Fields of a scan whose beams may run clockwise, and the index of its first beam in time.
-
-    `times` are `time_increment` and `scan_time`.
-    """
-    n, first = len(ranges), 0
-    if increment < 0 and n > 1:
-        ranges, first = ranges[::-1], n - 1
-        intensities = None if intensities is None else intensities[::-1]
-        angle_min, increment = angle_min + first * increment, -increment
-        times = {name: -time for name, time in times.items()}
-    angles = {"angle_min": angle_min, "angle_increment": increment}
-    return {"ranges": ranges, "intensities": intensities, **angles, **times}, first
-
-
-def message_fields(message: Any) -> tuple[dict[str, Any], int, int | None]:
-    """Fields of a scan for a ``sensor_msgs/LaserScan``, its first beam, and its stamp [ns].
+def message_fields(message: Any) -> tuple[dict[str, Any], int | None]:
+    """Fields of a scan for a ``sensor_msgs/LaserScan``, and its stamp [ns].
 
     AttributeError if the message is something else.
     """
     intensities = getattr(message, "intensities", None)
-    fields, first = counter_clockwise(
-        message.ranges,
-        None if intensities is None or not len(intensities) else intensities,
-        message.angle_min,
-        number("angle_increment", message.angle_increment),
-        scan_time=number("scan_time", message.scan_time),
-        time_increment=number("time_increment", message.time_increment),
-    )
-    fields |= {"range_min": message.range_min, "range_max": message.range_max}
+    fields = {name: getattr(message, name) for name in _OF_MESSAGE}
+    fields["intensities"] = intensities if intensities is not None and len(intensities) else None
     header, ns = getattr(message, "header", None), None
     if header is not None:
         fields["frame_id"], stamp = header.frame_id, header.stamp
@@ -220,4 +300,4 @@ def message_fields(message: Any) -> tuple[dict[str, Any], int, int | None]:
             ns = int(stamp.secs) * NANO + int(stamp.nsecs)
         else:
             fields["stamp"] = float(stamp)
-    return fields, first, ns
+    return fields, ns

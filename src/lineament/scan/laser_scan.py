@@ -16,10 +16,14 @@ from .fields import (
     NANO,
     Array,
     Pose,
+    beam_at_stamp,
     beams_to,
+    bearings,
     checked_pose,
     covariance_of_pose,
     finite,
+    in_metres,
+    in_reverse,
     irregular_bearings,
     message_fields,
     nanoseconds,
@@ -28,27 +32,29 @@ from .fields import (
     vector,
 )
 
-#: Beams that a stamp may be the time of, in the order in which they are taken.
-STAMPS = ("first", "middle", "last")
-
 
 class LaserScan(ReadOnly, Pictured):
     """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
     `range_max`. Invalid beams (NaN, ±inf, 0, too near, no return) stay where they are and are
-    never filled. Arrays are float64 copies and read-only, and so is the scan.
+    never filled. Arrays are float64 copies and read-only, and so is the scan. What is masked in a
+    masked array, or null in a column of a table, is NaN.
+
+    Beams that are given clockwise (a negative `angle_increment`, or `angles` that decrease) are
+    reversed: beams of the scan, and of all features, count from the last that was given.
+    `stamp_beam`, and times of the other sign, say when they were taken.
 
     Parameters
     ----------
     ranges : array_like, shape (n,)
-        Measured distances [m], in order of increasing bearing.
+        Measured distances [m].
     angle_min, angle_increment : float
         Bearing of the first beam and step between beams [rad], counter-clockwise from the
         x axis of the sensor (equation 1).
     angles : array_like, shape (n,), optional
-        Bearings [rad] of irregular beams, strictly increasing, instead of `angle_min` and
-        `angle_increment` (which are then the first bearing and the median step).
+        Bearings [rad] of irregular beams, strictly increasing or decreasing, instead of `angle_min`
+        and `angle_increment` (which are then the first bearing and the median step).
     range_min, range_max : float
         Limits of valid ranges [m]: ``range_min <= r < range_max``.
     stamp : float
@@ -62,11 +68,15 @@ class LaserScan(ReadOnly, Pictured):
         Strength of each return, in the sensor's unit.
     pose : (x, y, theta), optional
         Pose of the sensor in the world frame of its log [m, m, rad].
+    scale : float
+        What `ranges` are multiplied by to be in metres: 0.001 if they are in millimetres. It is not
+        for `range_min` and `range_max`, which are in metres; see `scaled`.
 
     Raises
     ------
     ValueError
-        If the fields make no sense together. The message names the field and its value.
+        If the fields make no sense together, or are no numbers. The message names the field and its
+        value.
 
     Examples
     --------
@@ -110,15 +120,16 @@ class LaserScan(ReadOnly, Pictured):
         frame_id: str = "",
         intensities: ArrayLike | None = None,
         pose: Pose | None = None,
+        scale: float = 1.0,
     ) -> None:
         own = self.__dict__
         own["ranges"] = vector("ranges", ranges)
         n = len(own["ranges"])
         own["is_regular"] = angles is None
         if angles is None:
-            first, step = regular_bearings(angle_min, angle_increment, n)
+            first, step, is_clockwise = regular_bearings(angle_min, angle_increment, n)
         elif angle_min is None and angle_increment is None:
-            own["angles"] = vector("angles", angles, n)
+            own["angles"], is_clockwise = bearings(angles, n)
             first, step = irregular_bearings(own["angles"])
         else:
             raise ValueError("angles are given together with angle_min or angle_increment")
@@ -132,6 +143,10 @@ class LaserScan(ReadOnly, Pictured):
         own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
         own["pose"] = None if pose is None else checked_pose(pose)
         own["pose_covariance"] = None
+        if is_clockwise:
+            own.update(in_reverse(own))
+        if scale != 1:
+            own["ranges"] = in_metres(own["ranges"], scale, own["range_max"])
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
@@ -236,15 +251,25 @@ class LaserScan(ReadOnly, Pictured):
 
         Bearings change their sign: what hangs upside down is then in a frame with z upwards.
         """
-        own: dict[str, Any] = {"ranges": self.ranges[::-1]}
-        own["stamp_beam"] = len(self) - 1 - self.stamp_beam
-        if self.intensities is not None:
-            own["intensities"] = self.intensities[::-1]
+        own = in_reverse(vars(self))
         own["angle_min"] = -float(self.angles[-1]) if len(self) else 0.0
         if not self.is_regular:
             own["angles"] = vector("angles", -self.angles[::-1])
-        times = {name: -getattr(self, name) for name in ("scan_time", "time_increment")}
-        return self._changed(**own, **times)
+        return self._changed(**own)
+
+    def scaled(self, scale: float) -> Self:
+        """Return the same scan with ranges and their limits times a number.
+
+        Of a log or message in millimetres, 0.001 makes a scan in metres. The pose stays.
+
+        Examples
+        --------
+        >>> LaserScan([1500.0], 0.0, 0.1, range_max=5600.0).scaled(0.001).range_max
+        5.6
+        """
+        low, high = range_limits(self.range_min * scale, self.range_max * scale)
+        ranges = in_metres(self.ranges, scale)
+        return self._changed(ranges=ranges, range_min=low, range_max=high)
 
     def stamped(self, beam: str | float, ns: int | None = None) -> Self:
         """Return the same scan with a stamp that is the time of another beam.
@@ -262,13 +287,8 @@ class LaserScan(ReadOnly, Pictured):
         >>> LaserScan([1.0, 1.0, 1.0], 0.0, 0.1, time_increment=0.01).stamped("last").stamp_beam
         2.0
         """
-        if isinstance(beam, str):
-            if beam not in STAMPS:
-                raise ValueError(f"stamp is {beam!r}, expected {', '.join(STAMPS)}")
-            share = STAMPS.index(beam) / 2
-            is_clockwise = (self.time_increment or self.scan_time) < 0
-            beam = (1 - share if is_clockwise else share) * (len(self) - 1)
-        fields: dict[str, Any] = {"stamp_beam": finite("stamp_beam", beam)}
+        is_clockwise = (self.time_increment or self.scan_time) < 0
+        fields: dict[str, Any] = {"stamp_beam": beam_at_stamp(beam, len(self), is_clockwise)}
         if ns is not None and ns != self.stamp_ns:
             fields |= {"stamp_ns": index(ns), "stamp": ns / NANO}
         return self._changed(**fields)
@@ -305,8 +325,7 @@ class LaserScan(ReadOnly, Pictured):
     def from_message(cls, message: Any, *, pose: Pose | None = None, stamp: str = "first") -> Self:
         """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
 
-        The beams of a scanner that turns clockwise (a negative increment) are put in the order of
-        increasing bearings; `stamp_beam` and the signs of the times say when they were taken.
+        Of one in millimetres, ``from_message(message).scaled(0.001)`` is in metres.
 
         Parameters
         ----------
@@ -332,8 +351,9 @@ class LaserScan(ReadOnly, Pictured):
         7.5
         """
         try:
-            fields, first, ns = message_fields(message)
-            scan = cls(**fields, pose=pose).stamped(first, ns)
+            fields, ns = message_fields(message)
         except AttributeError as error:
             raise ValueError(f"message is no sensor_msgs/LaserScan: {error}") from None
+        scan = cls(**fields, pose=pose)
+        scan = scan.stamped(scan.stamp_beam, ns)
         return scan.stamped(stamp) if stamp != "first" else scan

@@ -11,6 +11,15 @@ from .fields import Array, number
 
 Distance = TypeVar("Distance", float, Array)
 
+#: What no scanner reaches, and the unit that a larger number is likely in. The worst ranges are off
+#: by centimetres or a few percent, and a beam is that wide.
+_BEYOND = {
+    "sigma": (1.0, "in metres: is it in millimetres? (0.001 of it)"),
+    "proportional": (1.0, "metres a metre: is it in percent? (0.01 of it)"),
+    "bearing": (0.1, "in radians: is it in degrees? (math.radians)"),
+    "quantum": (1.0, "in metres: is it in millimetres? (0.001 of it)"),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class RangeNoise:
@@ -51,20 +60,34 @@ class RangeNoise:
 
     @classmethod
     def of(cls, noise: NoiseLike) -> RangeNoise:
-        """Return a noise as it is; a number is its sigma [m].
+        """Return the noise of a scanner as it is; a number is its sigma [m].
+
+        Raises
+        ------
+        TypeError
+            If it is neither.
+        ValueError
+            If no scanner is so bad: `sigma` or `quantum` of 1 m and more, `proportional` of 1,
+            `bearing` of 0.1 rad.
 
         Examples
         --------
         >>> RangeNoise.of(0.01) == RangeNoise(sigma=0.01)
         True
         """
-        if isinstance(noise, RangeNoise):
-            return noise
-        if not isinstance(noise, Real) or isinstance(noise, bool):
-            raise TypeError(
-                f"noise is {noise!r:.60}, expected a RangeNoise, or its sigma in metres"
-            )
-        return cls(sigma=float(noise))
+        if not isinstance(noise, RangeNoise):
+            if not isinstance(noise, Real) or isinstance(noise, bool):
+                raise TypeError(
+                    f"noise is {noise!r:.60}, expected a RangeNoise, or its sigma in metres"
+                )
+            noise = cls(sigma=float(noise))
+        for name, (least, unit) in _BEYOND.items():
+            value = getattr(noise, name)
+            if value >= least:
+                raise ValueError(
+                    f"noise has {name} = {value:g}, expected less than {least:g} {unit}"
+                )
+        return noise
 
     def range_variance(self, distance: Distance) -> Distance:
         """Variance [m²] of a range of `distance` [m], or of each of an array of them."""

@@ -28,6 +28,13 @@ def compose(pose: Pose, motion: Pose) -> Pose:
     return x + c * dx - s * dy, y + s * dx + c * dy, math.remainder(theta + turn, 2 * math.pi)
 
 
+def carried(covariance: Array, pose: Pose, other: Pose) -> Array:
+    """Covariance (3, 3) of the other pose, which moves with a pose of that covariance."""
+    lever = np.eye(3)
+    lever[:2, 2] = pose[1] - other[1], other[0] - pose[0]
+    return np.asarray(lever @ covariance @ lever.T)
+
+
 def inverse(pose: Pose) -> Pose:
     """Pose of the origin, seen from a pose.
 

@@ -88,7 +88,7 @@ def extract_log(
         ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
-        ``limits``.
+        ``limits``, ``scale``.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def extract_log(
     if world and writer.needs_scan:
         raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
     with writer:
-        for topic, scan in track(log.items(), Path(log.name).name, len(log)):
+        for topic, scan in track(log.measured(), Path(log.name).name, len(log)):
             features = extractor(scan)
             if world:
                 unplaced += scan.pose is None

@@ -137,7 +137,8 @@ def locate_log(
     started += time.perf_counter() - opened
 
     def followed(on: LineMap, most: int | None = None) -> Iterator[tuple[LaserScan, Whereabouts]]:
-        scans = (scan for _, scan in islice(log.items(), most))
+        items = islice(log.items(), most) if most else log.measured()
+        scans = (scan for _, scan in items)
         shown = scans if most else track(scans, Path(log.name).name, len(log))
         return follow(shown, on, extractor, odometry=odometry, deskewed=deskewed)
 

@@ -114,7 +114,7 @@ def map_log(
     started += time.perf_counter() - opened
     drive, stamps = Drive(), []
     # In the order of time, which is not that of every log: scans are all held in memory for that.
-    scans = sorted(log, key=lambda scan: scan.stamp)
+    scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
     for scan in track(scans, Path(log.name).name, len(scans)):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
         stamps.append(scan.stamp)

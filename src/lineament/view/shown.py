@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LineamentError
+from ..errors import LineamentError, warn
 from ..extractor import Extractor
 from ..kernels import FARTHEST
 from ..logs import open_log, save_npz
@@ -39,6 +39,8 @@ class ShownLog:
     ) -> None:
         log = open_log(path, **reading)
         log.scan(0)
+        if log.topic is None and len(log.topics) > 1:
+            warn(f"{log.name}: shows scans of {', '.join(log.topics)} in turns (--topic for one)")
         self._about: dict[str, Any] = {"format": log.format, "total": None}
         self._faults = {"error": "", "skipped": 0, "faults": log.faults}
         # Another log, as each iteration counts its faults anew.
@@ -111,7 +113,8 @@ class ShownLog:
     def _fill(self, log: Any) -> None:
         try:
             self._about["total"] = len(log)
-            self.store.fill(log.items() if self._plan is None else self._located(log.items()))
+            items = log.measured()
+            self.store.fill(items if self._plan is None else self._located(items))
         except LineamentError as error:
             self._faults["error"] = str(error)
         except Exception as error:  # Nobody else could report it: the page does.

@@ -25,14 +25,15 @@ class Row(Extraction):
     """What became of one log, and what was extracted from it.
 
     The log is a full path or an address; the name, that in the column ``log``. The outcome is
-    ``pending`` (not reached, or interrupted), ``done`` or ``failed``, with the error. The output is
-    relative to the data set, of size `bytes`. `log_bytes` is None if unknown, `log_state` the time
-    of the last change, or what the store reports.
+    ``pending`` (not reached, or interrupted), ``done`` or ``failed``, with the error; what was
+    warned of is in `warnings`. The output is relative to the data set, of size `bytes`. `log_bytes`
+    is None if unknown, `log_state` the time of the last change, or what the store reports.
     """
 
     name: str
     outcome: str = "pending"
     error: str = ""
+    warnings: list[str] = field(default_factory=list)
     bytes: int = 0
     log_bytes: int | None = None
     log_state: str = ""

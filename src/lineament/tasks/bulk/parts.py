@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...errors import LineamentError
+from ...errors import LineamentError, heard
 from ...extractor import Extractor
 from ...files import made_folder
 from ...logs.sources import is_address
@@ -54,15 +54,17 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
         for left in made_folder(part.parent).glob(".part-0.*.part"):  # by a killed worker
             with suppress(OSError):
                 left.unlink()
-        found = extract_log(
-            row.log,
-            part,
-            Extractor(task.method, noise=task.noise),
-            topic_column=True,
-            world=task.world,
-            track=_reporting(report),
-            **task.reading,
-        )
+        with heard() as warnings:
+            found = extract_log(
+                row.log,
+                part,
+                Extractor(task.method, noise=task.noise),
+                topic_column=True,
+                world=task.world,
+                track=_reporting(report),
+                **task.reading,
+            )
+        row = replace(row, warnings=warnings)
         written = part.stat().st_size
     except LineamentError as error:
         row = failed(row, str(error))

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -35,7 +35,8 @@ class Bulk:
     """Result of a run over many logs.
 
     The data set and its manifest; logs asked for, those that were complete before and skipped,
-    those that failed; and as in `Extraction`, over the logs of this run.
+    those that failed; and as in `Extraction`, over the logs of this run. What was warned of, behind
+    the name of its log.
     """
 
     folder: str
@@ -46,6 +47,7 @@ class Bulk:
     scans: int
     features: dict[str, int]
     seconds: float
+    warnings: list[str]
 
     def __str__(self) -> str:
         found = ", ".join(f"{count} {name}" for name, count in self.features.items())
@@ -165,6 +167,7 @@ def extract_logs(
         scans=sum(row.scans for row in done),
         features={name: sum(row.features.get(name, 0) for row in done) for name in TABLES},
         seconds=time.perf_counter() - started,
+        warnings=[f"{row.log}: {text}" for row in done for text in row.warnings],
     )
 
 
@@ -262,8 +265,8 @@ def _settings(reading: dict[str, Any]) -> dict[str, Any]:
         if name not in defaults:
             raise ValueError(f"{name!r} is unknown, expected one of: {', '.join(defaults)}")
     settings = defaults | reading
-    limits = Limits.of(settings["limits"])
-    ReadOptions(settings["echo"], settings["ring"], settings["pose_topic"], limits)  # checks them
+    options = {one.name: settings[one.name] for one in fields(ReadOptions)}
+    ReadOptions(**options | {"limits": Limits.of(options["limits"])})  # checks them
     return settings
 
 
