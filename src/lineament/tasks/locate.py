@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import LogError
+from ..errors import LogError, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import ending_of, naming_errors, written_beside
 from ..logs import open_log
@@ -114,7 +114,7 @@ def locate_log(
     """
     ending = ending_of(output, ENDINGS)
     extractor = Extractor() if extractor is None else extractor
-    drawn = LineMap.read(plan, layers, units=units)
+    drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
     load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
@@ -146,11 +146,13 @@ def locate_log(
 
 
 def plan_warning(plan: LineMap, name: object) -> str:
-    """Return a line about a plan of a size that no building has, or ""."""
-    wide, deep = plan.size
-    if _SMALL <= max(wide, deep) <= _LARGE:
-        return ""
-    return f"{name}: is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)"
+    """Return a line about a plan of a size that no building has, or of which parts are left out."""
+    (wide, deep), said = plan.size, []
+    if plan.left_out:
+        said.append(f"{plan.left_out} walls or columns have impossible numbers, left out")
+    if not _SMALL <= max(wide, deep) <= _LARGE:
+        said.append(f"is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)")
+    return one_line(f"{name}: {'; '.join(said)}") if said else ""
 
 
 def _write_table(

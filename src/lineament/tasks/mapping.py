@@ -98,7 +98,7 @@ def map_log(
     (60, True)
     """
     extractor = Extractor() if extractor is None else extractor
-    plan = None if onto is None else LineMap.read(onto)
+    plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     load_kernels([extractor])
     started = time.perf_counter()
     log = open_log(path, **reading)
