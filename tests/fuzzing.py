@@ -1,9 +1,10 @@
 """A million inputs of every kind, on both cores: python tests/fuzzing.py --inputs 1000000.
 
 Damaged logs, scans for all methods with any parameters, all writers, requests to the viewer,
-messages to the node. The state is in a folder: a run that was interrupted goes on. An input that
-raises, hangs, crashes, or takes too long is kept there, with what was raised, and the run goes on;
-the table at the end counts them. Recordings in the folder LINEAMENT_DATA lend their beginnings.
+messages to the node, plans and places on them. The state is in a folder: a run that was interrupted
+goes on. An input that raises, hangs, crashes, or takes too long is kept there, with what was
+raised, and the run goes on; the table at the end counts them. Recordings in the folder
+LINEAMENT_DATA lend their beginnings.
 
 An input is a function of the seed, its number, and, for logs, of the corpus: inputs that ran lines
 of the readers which none had run before.
@@ -37,7 +38,8 @@ from lineament.methods import method_names
 #: Bounds for each input: processor time [s], wall clock [s], address space [bytes].
 SECONDS, PATIENCE, MEMORY = 5.0, 90, 6 << 30
 #: What is fuzzed, and in how many of a hundred inputs.
-SHARES = {"methods": 57, "readers": 25, "messages": 10, "viewer": 5, "writers": 3}
+SHARES = {"methods": 50, "readers": 25, "messages": 10, "viewer": 5, "writers": 3}
+SHARES |= {"plans": 4, "locate": 3}
 #: Inputs after which the state is saved.
 SAVED = 200
 
@@ -78,6 +80,7 @@ class Lines:
 
 def targets_in(scratch: Path) -> dict[str, Any]:
     """Return what is fuzzed, by the names of `SHARES`."""
+    from fuzz_plans import Locating, Plans
     from fuzz_readers import Readers
     from fuzz_targets import Messages, Methods, Viewer, Writers
 
@@ -87,6 +90,8 @@ def targets_in(scratch: Path) -> dict[str, Any]:
         "messages": Messages(scratch),
         "viewer": Viewer(scratch),
         "writers": Writers(scratch),
+        "plans": Plans(scratch),
+        "locate": Locating(scratch),
         "readers": Readers(scratch, Path(recordings) if recordings else None),
     }
 

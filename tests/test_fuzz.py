@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from fuzz_plans import Locating, Plans
 from fuzz_readers import OPTIONS, check, chosen, scratch
 from fuzz_targets import Messages, Methods, Viewer, Writers
 from hypothesis import HealthCheck, given, settings
@@ -86,7 +87,7 @@ def test_where_lengths_and_offsets_stand(samples):
 
 @pytest.mark.parametrize(
     ("target", "inputs"),
-    [(Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60)],
+    [(Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60), (Plans, 100), (Locating, 6)],
     ids=lambda value: getattr(value, "__name__", value),
 )
 def test_inputs_of_each_kind(target, inputs, tmp_path):

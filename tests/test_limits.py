@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from crafted import CRAFTED
+from crafted_plans import PLANS
 from mutations import own_samples
 
 from lineament import LogError
@@ -42,7 +43,9 @@ print(json.dumps([memory / 1000, *ends]))
 
 
 def test_every_limit_has_a_crafted_file():
-    assert {limit for limit, _, _ in CRAFTED.values()} - {""} == set(NAMES)
+    logs, plans = ({limit for limit, *_ in crafted.values()} for crafted in (CRAFTED, PLANS))
+    # The time that a server takes is tested with its like, in test_sources.py.
+    assert logs | plans - {""} == {*NAMES, ""} - {"fetch"}
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no figure of memory here")

@@ -1,6 +1,7 @@
 """The loop of a node over messages in memory, its pipeline, and its counters."""
 
 import math
+import struct
 import time
 from collections.abc import Callable
 from functools import partial
@@ -28,7 +29,7 @@ from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
 from lineament.scan.poses import compose, poses_along, twist_between
-from lineament.simulation import SENSORS, drive, room
+from lineament.simulation import SENSORS, cast_rays, drive, room
 
 BEARINGS = np.linspace(-0.5, 0.5, 101)
 WALL = 2.0 / np.cos(BEARINGS)
@@ -467,6 +468,41 @@ def test_moving_scans_are_deskewed(deskew, most):
     expected = ln.deskew(scan, (1.0, 0.0, 0.0))
     np.testing.assert_allclose(frame.straight.ranges, expected.ranges, atol=most)
     assert np.nanmax(np.abs(frame.straight.ranges - scan.ranges)) > 0.005
+
+
+def turning_scan(way, pose, twist, still=False):
+    """Return a message of a sweep of 270° in 75 ms in a room; `way` is 1 or -1, its mirror's."""
+    n, step = 541, math.radians(0.5)
+    bearings, each = way * (np.arange(n) * step - math.radians(135)), 0.075 / 540
+    times = np.zeros(n) if still else each * np.arange(n)
+    at = np.array([compose(pose, tuple(by)) for by in poses_along(twist, times)])
+    ranges, _ = cast_rays(room(), at, bearings)
+    ends = bearings[0], bearings[-1], way * step, each, 0.1, 0.1, 30.0
+    header = b"\0\1\0\0" + struct.pack("<iII", 7, 0, 6) + b"laser\0\0\0"
+    data = header + struct.pack("<7fI", *ends, n) + ranges.astype("<f4").tobytes() + bytes(4)
+    return received_scan("one", data, "cdr", "sensor_msgs/LaserScan").read()
+
+
+@pytest.mark.parametrize("way", [1, -1], ids=["counter-clockwise", "clockwise"])
+def test_deskewed_features_are_those_of_a_scanner_at_rest_whichever_way_it_turns(way):
+    pose, twist = (-1.0, 0.3, 0.4), (0.6, 0.2, 1.5)
+    pipeline = Pipeline(LiveConfig(deskew="/odom", noise=0.001))
+    pipeline.hear(moving(*twist, stamp=7.0))
+    found = pipeline("one", turning_scan(way, pose, twist)).features
+    rest = ln.extract(turning_scan(1, pose, twist, still=True), noise=0.001)
+    skewed = ln.extract(turning_scan(way, pose, twist), noise=0.001)
+
+    def off(features):
+        """How far the ends of segments longer than half a metre are from the lines at rest [m]."""
+        long = [table[table["length"] > 0.5] for table in (features.segments, rest.segments)]
+        assert len(long[0]) >= 4
+        u = np.stack((np.cos(long[1]["angle"]), np.sin(long[1]["angle"])), axis=1)
+        ends = np.stack((long[0]["start"], long[0]["end"]), axis=1)
+        arm = ends[:, :, None] - long[1]["centroid"]
+        return np.abs(arm[..., 1] * u[:, 0] - arm[..., 0] * u[:, 1]).max(axis=1).min(axis=1).max()
+
+    assert off(found) < 0.002
+    assert off(skewed) > 0.02
 
 
 # Counters.

@@ -401,6 +401,13 @@ def test_scan_and_log_in_a_notebook(scan, log):
     assert f"{counts['segments']} segments" in html
 
 
+def test_control_characters_of_names_do_not_reach_a_page():
+    hostile = ln.LaserScan([1.0] * 9, -0.5, 0.1, frame_id="a\x1b]0;b\x07\u202e<b>")
+    html = hostile._repr_html_()
+    assert "a\\x1b]0;b\\x07\\u202e&lt;b&gt;" in html
+    assert not any(letter in html for letter in "\x1b\x07\u202e")
+
+
 def test_a_log_that_cannot_be_read_shows_why(tmp_path):
     path = tmp_path / "a&b.log"
     path.write_text("FLASER 2 1.0 1.0 0 0 0 0 0 0 1.0 h 1.0\nFLASER 3 1.0\n")

@@ -6,6 +6,7 @@ import os
 import struct
 import subprocess
 import sys
+import threading
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -132,6 +133,37 @@ def test_what_cannot_be_fetched(memory):
     assert len(open_log("memory://a.log", limits={"copy": len(FLASER)})) == 1
     limits = {"copy": len(FLASER) - 1}
     check_refused("to be copied, more than the limit", "memory://a.log", limits=limits)
+
+
+@pytest.mark.parametrize("hanging", ["listing", "opening", "reading"])
+def test_a_server_that_trickles_is_given_up(hanging):
+    """What it sends in a second is less than a megabyte; it would go on for ever."""
+    fsspec = pytest.importorskip("fsspec")
+    answer = threading.Event()
+
+    class File(io.BytesIO):
+        def read(self, _=-1):
+            return self.getvalue()[:1] if hanging == "reading" and answer.wait() else b""
+
+    class Trickle(fsspec.AbstractFileSystem):
+        protocol, cachable = "trickle", False
+
+        def isdir(self, _):
+            return hanging == "listing" and answer.wait()
+
+        def _open(self, *_, **__):
+            if hanging == "opening":
+                answer.wait()
+            return File(FLASER)
+
+    fsspec.register_implementation("trickle", Trickle, clobber=True)
+    call = find_logs if hanging == "listing" else open_log
+    line = (
+        r"^trickle://a\.log: takes 2 s to answer, or to send a megabyte, more than the limit of 1"
+    )
+    with pytest.raises(LogError, match=line):
+        call("trickle://a.log", limits={"fetch": 1})
+    answer.set()
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,11 @@ EXTRAS = {
 _MOST = 1000
 
 
+def shortened(problem: str) -> str:
+    """Cut what is wrong with a file to a length that a person reads."""
+    return problem if len(problem) <= _MOST else f"{problem[: _MOST - 2]} …"
+
+
 def one_line(text: str) -> str:
     """Write what would break a line or steer a terminal as an escape, whatever a file holds."""
     if text.isprintable():
@@ -85,9 +90,7 @@ class LogError(LineamentError):
 
     def __init__(self, path: object, problem: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line is not None else f"{path}"
-        if len(problem) > _MOST:
-            problem = f"{problem[: _MOST - 2]} …"
-        super().__init__(one_line(f"{where}: {problem}"))
+        super().__init__(one_line(f"{where}: {shortened(problem)}"))
         self.path, self.problem, self.line = str(path), problem, line
 
     def fresh(self) -> LogError:

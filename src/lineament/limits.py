@@ -1,4 +1,4 @@
-"""What a log may be at most: one set of limits for every reader and for the live node."""
+"""What a log or a plan may be at most: limits of every reader and of the live node."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -10,7 +10,7 @@ SPARE = 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The limits of logs, each above what recorders write, and below what hurts.
+    """The limits of logs and plans, each above what programs write, and below what hurts.
 
     What is beyond one of them is a fault of one line, before memory or time is spent on it.
 
@@ -37,9 +37,19 @@ class Limits:
     line : int
         Bytes of a line of text, of a JSON object, or of the metadata of a bag.
     depth : int
-        Depth of JSON.
+        Depth of JSON, and of blocks in blocks.
     name : int
         Bytes of a name: of a topic, a type, a frame.
+    drawing : int
+        Bytes of the file of a plan.
+    entities : int
+        Entities of a drawing with its blocks expanded, or rows of a table that is a plan.
+    chords : int
+        Chords that a curve of a drawing becomes, each off it by at most 1 cm.
+    walls : int
+        Lines of a drawing, those of curves included.
+    fetch : int
+        Seconds that a log at an address may take to answer, and each megabyte of it to arrive.
 
     Examples
     --------
@@ -60,6 +70,11 @@ in Python limits={'beams': N})
     line: int = 1 << 22
     depth: int = 32
     name: int = 4096
+    drawing: int = 1 << 26
+    entities: int = 250_000
+    chords: int = 10_000
+    walls: int = 100_000
+    fetch: int = 60
 
     def __post_init__(self) -> None:
         for limit in fields(self):
@@ -103,8 +118,13 @@ _ABOUT = {
     "members": "has {} files",
     "rows": "has {} rows",
     "line": "has {} bytes in a line or JSON object",
-    "depth": "has {} levels of JSON",
+    "depth": "has {} levels of JSON, or of blocks",
     "name": "has {} bytes in a name",
+    "drawing": "has {} bytes in a plan",
+    "entities": "has {} entities or rows, blocks expanded",
+    "chords": "has {} chords in a curve",
+    "walls": "has {} lines",
+    "fetch": "takes {} s to answer, or to send a megabyte",
 }
 #: What holds unless something else is asked for.
 LIMITS = Limits()

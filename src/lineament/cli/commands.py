@@ -20,6 +20,7 @@ from .options import (
     SCAN,
     SET,
     check_ending,
+    complain,
     make_extractor,
     methods_option,
     reading,
@@ -132,8 +133,11 @@ def view(
     drawn = None
     if plan is not None:
         from ..mapping import LineMap
+        from ..tasks.locate import plan_warning
 
-        drawn = LineMap.read(plan, **drawing)
+        drawn = LineMap.read(plan, **drawing, limits=reading["limits"])
+        if warning := plan_warning(drawn, plan):
+            complain(f"lineament: {warning}")
     session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 

@@ -221,7 +221,7 @@ def plan_of(config: LiveConfig) -> LineMap | None:
     from ..mapping import LineMap
 
     layers = config.layers.split(",") if config.layers else None
-    return LineMap.read(config.map, layers, units=config.units)
+    return LineMap.read(config.map, layers, units=config.units, limits=config.limits)
 
 
 def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:

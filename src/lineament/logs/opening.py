@@ -208,7 +208,7 @@ def find_logs(
 
 def _expanded(path: str | os.PathLike[str], limits: Limits) -> list[str]:
     if sources.is_address(path):
-        names = sources.listed(str(path))
+        names = sources.listed(str(path), limits)
         logs = names if names == [path] else [name for name in names if _has_ending(name)]
     elif Path(path).is_dir():
         logs = list(_logs_in_folder(Path(path), limits))

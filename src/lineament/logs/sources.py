@@ -7,14 +7,16 @@ import os
 import shutil
 import stat
 import tempfile
+import threading
 import weakref
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from queue import Empty, Queue
 from types import ModuleType
-from typing import NoReturn, Self
+from typing import NoReturn, Self, TypeVar, cast
 
 from ..errors import LogError, needs
 from ..limits import LIMITS, Limits
@@ -27,6 +29,7 @@ ZIP = b"PK\x03\x04"
 HEAD_SIZE = 1 << 16
 
 _PIECE = 1 << 20
+_T = TypeVar("_T")
 
 
 def read_head(path: str | os.PathLike[str]) -> Head:
@@ -190,21 +193,52 @@ def is_address(path: str | os.PathLike[str]) -> bool:
 
 def fetched(address: str, limits: Limits) -> LocalCopy:
     """Copy what is at an address; LogError if it, fsspec or a driver of fsspec is missing."""
-    with _fsspec(address) as fsspec, fsspec.open(address, "rb") as file:
-        return LocalCopy(address, iter(partial(file.read, _PIECE), b""), limits)
+    with _fsspec(address) as fsspec:
+        in_time = partial(_in_time, address, limits)
+        with in_time(fsspec.open(address, "rb").open) as file:
+            pieces = iter(partial(in_time, partial(file.read, _PIECE)), b"")
+            return LocalCopy(address, pieces, limits)
 
 
-def listed(address: str) -> list[str]:
+def listed(address: str, limits: Limits = LIMITS) -> list[str]:
     """Return the files in the folder at an address or of its pattern, else the address alone."""
     with _fsspec(address) as fsspec:
-        system, root = fsspec.core.url_to_fs(address)
-        if any(sign in root for sign in "*?["):
-            names = system.glob(root)
-        elif system.isdir(root):
-            names = system.find(root)
-        else:
-            return [address]
-        return sorted(system.unstrip_protocol(name) for name in names)
+        return _in_time(address, limits, partial(_listed, fsspec, address))
+
+
+def _listed(fsspec: ModuleType, address: str) -> list[str]:
+    system, root = fsspec.core.url_to_fs(address)
+    if any(sign in root for sign in "*?["):
+        names = system.glob(root)
+    elif system.isdir(root):
+        names = system.find(root)
+    else:
+        return [address]
+    return sorted(system.unstrip_protocol(name) for name in names)
+
+
+def _in_time(address: str, limits: Limits, call: Callable[[], _T]) -> _T:
+    """Call in a thread that is given up, with a LogError, if it takes longer than the limit.
+
+    Servers that send a byte now and then would keep a reader for days.
+    """
+    ends: Queue[tuple[_T | None, BaseException | None]] = Queue()
+
+    def run() -> None:
+        try:
+            ends.put((call(), None))
+        except BaseException as error:
+            ends.put((None, error))
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        result, error = ends.get(timeout=limits.fetch)
+    except Empty:
+        limits.check("fetch", limits.fetch + 1, partial(LogError, address))
+        raise
+    if error is not None:
+        raise error
+    return cast("_T", result)
 
 
 @contextmanager

@@ -5,9 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import LineamentError
 from ..kernels.mapping.votes import vote
 from ..scan import Array
-from .walls import lengths_of, unit
+from .walls import Numbers, lengths_of, unit
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
 #: there, below π; `solid` is 1 where that is inside a wall, 0 where it is free, -1 if not known.
@@ -27,6 +28,8 @@ MEETING = np.dtype(
 REACH, LEAST_SINE = 0.35, 0.35
 #: An arm of a corner is at least so long [m].
 ARM = 0.08
+#: Points along walls by which they are found, and pairs of walls that are looked at, at most.
+_MOST_POINTS, _MOST_PAIRS = 4_000_000, 5_000_000
 #: Corners whose openings differ by more are not the same [rad].
 ALIKE = math.radians(12)
 #: Ends of walls vote if the wall is so long [m], by this weight; turns count from this vote on.
@@ -37,11 +40,7 @@ BOX, TURN = 0.6, math.radians(12)
 
 def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
     """Return where two walls end together, or one ends on the other: records of `MEETING`."""
-    ends = np.stack((walls["start"], walls["end"]), axis=1)
-    low, high = ends.min(axis=1) - REACH, ends.max(axis=1) + REACH
-    # Only walls whose boxes overlap can meet.
-    beside = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
-    pairs = np.column_stack(np.nonzero(np.triu(beside, 1)))
+    pairs = beside(walls)
     u = unit(walls["angle"])
     sine = _cross(u[pairs[:, 0]], u[pairs[:, 1]])
     crossing = np.abs(sine) > LEAST_SINE
@@ -72,6 +71,44 @@ def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
         corners["walls"], corners["solid"] = of, np.where(one_sided, leads[:, 0] < 0, -1)
         found.append(corners[~one_sided | (leads[:, 0] != leads[:, 1])])
     return np.concatenate(found)
+
+
+def beside(walls: NDArray[np.void]) -> Numbers:
+    """Return pairs of walls of which one, a little longer, may pass by an end of the other.
+
+    Rows are sorted, with the lower number first. Points along the walls are listed by cells, and
+    each end looks into the nine cells around it: the cost is that of the pairs.
+    """
+    u, lengths, n = unit(walls["angle"]), lengths_of(walls), len(walls)
+    total = float(lengths.sum()) + 2 * REACH * n
+    step = max(2 * REACH, total / _MOST_POINTS)
+    counts = np.ceil((lengths + 2 * REACH) / step).astype(np.int64)
+    wall, first = np.repeat(np.arange(n), counts), np.cumsum(counts) - counts
+    along = step * (np.arange(len(wall)) - first[wall] + 0.5) - REACH
+    points = walls["start"][wall] + along[:, None] * u[wall]
+    ends, of = np.concatenate((walls["start"], walls["end"])), np.tile(np.arange(n), 2)
+    low = np.minimum(points.min(axis=0, initial=np.inf), ends.min(axis=0, initial=np.inf))
+    size = 1.01 * (REACH + step / 2)
+    cells, at = (np.floor((places - low) / size).astype(np.int64) + 1 for places in (points, ends))
+    rows = int(max(cells[:, 1].max(initial=0), at[:, 1].max(initial=0))) + 2
+    keys = cells @ (rows, 1)
+    order = np.argsort(keys, kind="stable")
+    keys, wall = keys[order], wall[order]
+    # The three cells of a column are one after the other.
+    around = (at @ (rows, 1))[:, None] + np.array((-rows, 0, rows))
+    begins = np.searchsorted(keys, around.ravel() - 1)
+    counts = np.searchsorted(keys, around.ravel() + 1, side="right") - begins
+    if (many := int(counts.sum())) > _MOST_PAIRS:
+        raise LineamentError(
+            f"{many} pairs of {n} walls lie beside each other, expected at most {_MOST_PAIRS}: "
+            "are all lines of the plan walls?"
+        )
+    one = np.repeat(np.repeat(of, 3), counts)
+    offsets = np.arange(many) - np.repeat(np.cumsum(counts) - counts, counts)
+    other = wall[np.repeat(begins, counts) + offsets]
+    found = np.unique(np.minimum(one, other) * n + np.maximum(one, other))
+    pairs = np.column_stack((found // max(n, 1), found % max(n, 1)))
+    return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
 
 
 def _spread(walls: NDArray[np.void], at: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import repeat
 from pathlib import Path
@@ -15,17 +15,22 @@ from .._copies import ReadOnly, locked
 from ..errors import LineamentError
 from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
+from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
+from .drawings import read_drawing
 from .hypotheses import anchors, meetings
-from .plans import read_drawing, read_table
+from .plans import plan_error, read_table
 from .sights import columns_shown, walls_shown
 from .walls import COLUMN, lengths_of, segments_of, shared, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
-#: Size of the cells by which walls are found [m], how far around a wall they reach, most cells.
-_CELL, _AROUND, _MOST_CELLS = 0.75, 0.3, 4_000_000
+#: Farther from the origin, coordinates are too coarse to be believed [m].
+FARTHEST = 1e8
+#: Size of the cells by which walls are found [m], how far around a wall they reach; most cells, and
+#: most in the boxes around all walls.
+_CELL, _AROUND, _MOST_CELLS, _MOST_LISTED = 0.75, 0.3, 4_000_000, 20_000_000
 #: Walls of which a round column is made to meet beams.
 _SIDES = 12
 
@@ -47,8 +52,14 @@ class LineMap(ReadOnly):
     walls : structured array of `WALL`
         Walls without length or with numbers that are not finite are left out.
     columns : structured array of `COLUMN`, optional
+        Those with numbers that are not finite are left out.
     sigma : float
         How far the drawn walls are from where they stand [m], beside their covariances.
+
+    Attributes
+    ----------
+    left_out : int
+        Walls and columns of the file, or given, whose numbers are not finite.
 
     Raises
     ------
@@ -69,19 +80,31 @@ class LineMap(ReadOnly):
         *,
         sigma: float = 0.0,
     ) -> None:
+        columns = np.zeros(0, COLUMN) if columns is None else columns
         ends = np.concatenate((walls["start"], walls["end"]), axis=1)
-        good = np.isfinite(ends).all(axis=1) & (lengths_of(walls) > 1e-6)
-        good &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
-        if not good.any():
+        finite = np.isfinite(ends).all(axis=1)
+        finite &= np.isfinite(walls["covariance"]).all(axis=(1, 2))
+        whole = np.isfinite(columns["center"]).all(axis=1) & np.isfinite(columns["radius"])
+        whole &= np.isfinite(columns["covariance"]).all(axis=(1, 2)) & (columns["radius"] > 0)
+        self.left_out = int((~finite).sum() + (~whole).sum())
+        self.columns, rest = columns[whole], walls[finite]
+        places = np.concatenate((ends[finite].ravel(), self.columns["center"].ravel()))
+        farthest = abs(places).max(initial=0.0)
+        if farthest > FARTHEST:
+            raise LineamentError(
+                f"the plan is {farthest:.4g} m from its origin, expected a building: "
+                "is it drawn in metres?"
+            )
+        self.walls = rest[lengths_of(rest) > 1e-6]
+        if not len(self.walls):
             raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")
-        self.walls = locked(walls[good])
+        self.walls, self.columns = locked(self.walls), locked(self.columns)
         extent = max(self.size)
         if extent > LONGEST:
             raise LineamentError(
-                f"the plan is {extent:.0f} m wide, expected a building: "
+                f"the plan is {extent:.5g} m wide, expected a building: "
                 "is it drawn in other units? (units=, --units)"
             )
-        self.columns = locked(np.zeros(0, COLUMN) if columns is None else columns.copy())
         self.sigma = sigma
 
     def __repr__(self) -> str:
@@ -101,8 +124,10 @@ class LineMap(ReadOnly):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and depth of the rectangle around all walls [m]."""
-        width, depth = np.ptp(self.ends.reshape(-1, 2), axis=0).tolist()
+        """Width and depth of the rectangle around all walls and columns [m]."""
+        center, radius = self.columns["center"], self.columns["radius"][:, None]
+        places = self.ends.reshape(-1, 2), center - radius, center + radius
+        width, depth = np.ptp(np.concatenate(places), axis=0).tolist()
         return width, depth
 
     @property
@@ -137,7 +162,9 @@ class LineMap(ReadOnly):
         found = np.zeros(len(circles), COLUMN)
         found["center"], found["radius"], found["views"] = circles[:, :2], circles[:, 2], 1
         lines = np.array(ends, np.float64).reshape(-1, 2, 2)
-        return cls(walls_of(lines, side=side), found, sigma=sigma)
+        with np.errstate(over="ignore", invalid="ignore"):  # refused, or left out
+            walls = walls_of(lines, side=side)
+        return cls(walls, found, sigma=sigma)
 
     @classmethod
     def from_features(
@@ -183,6 +210,7 @@ class LineMap(ReadOnly):
         *,
         units: str | None = None,
         sigma: float = 0.0,
+        limits: Mapping[str, int] | None = None,
     ) -> Self:
         """Read a plan: DXF, or a table of features in the frame of the world (Parquet).
 
@@ -198,20 +226,34 @@ class LineMap(ReadOnly):
         sigma : float
             How far the drawn walls are from where they stand [m].
 
+        limits : mapping, optional
+            Limits that differ from those of ``lineament.limits.Limits``: of the plan's bytes
+            (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``.
+
         Raises
         ------
         LineamentError
-            If the file cannot be read or has no walls.
+            If the file cannot be read, is beyond a limit, or has no walls.
         """
-        ending = Path(path).suffix.lower()
-        if ending == ".dxf":
-            return cls.from_lines(*read_drawing(path, layers, units), sigma=sigma)
-        if ending == ".parquet":
-            return cls.from_features([read_table(path)], sigma=sigma)
-        raise LineamentError(
-            f"{path}: a plan is a .dxf or a .parquet, not {ending or 'this'}: "
-            "`lineament map LOG -o plan.dxf` makes one of a drive"
-        )
+        ending, most = Path(path).suffix.lower(), Limits.of(limits)
+        try:
+            if ending == ".dxf":
+                lines, circles, left_out = read_drawing(path, layers, units, most)
+                plan = cls.from_lines(lines, circles, sigma=sigma)
+            elif ending == ".parquet":
+                features, left_out = read_table(path, most)
+                plan = cls.from_features([features], sigma=sigma)
+            else:
+                raise LineamentError(
+                    f"a plan is a .dxf or a .parquet, not {ending or 'this'}: "
+                    "`lineament map LOG -o plan.dxf` makes one of a drive"
+                )
+            plan.left_out += left_out
+            len(plan.corners)  # refuses more walls beside each other than a building has
+        except LineamentError as error:
+            problem = str(error).removeprefix(f"{path}: ")
+            raise plan_error(path)(problem) from None
+        return plan
 
     def to_features(self) -> Features:
         """Return walls, corners and columns as the features of one scan in the map's frame."""
@@ -254,7 +296,9 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     table[:n, 7], table[:n, 8] = v01 + lever * v11, v11
     table[:, 6] += sigma**2
     low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0
-    cell = max(_CELL, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
+    boxes = float(np.prod(abs(along) + 2 * (_AROUND + _CELL), axis=1).sum())
+    area = float(np.prod(high - low))
+    cell = max(_CELL, math.sqrt(area / _MOST_CELLS), math.sqrt(boxes / _MOST_LISTED))
     counts = np.ceil((high - low) / cell)
     grid, begins = np.array([*low, cell, *counts]), np.zeros(int(np.prod(counts)) + 1, np.int64)
     list_walls(table, grid, _AROUND, begins[:-1], np.empty(0, np.int64))

@@ -1,122 +1,154 @@
-"""Plans from files: DXF of any program, and tables of features in the frame of the world."""
+"""Plans from files: what all have in common, and tables of features in the frame of the world."""
 
 import os
-from collections.abc import Iterator, Sequence
-from fnmatch import fnmatch
-from typing import Any
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LineamentError, needed_by
-from ..features import ARC, SEGMENT, Features, make_records
+from ..errors import LineamentError, one_line, shortened
+from ..features import ARC, SEGMENT, TABLES, Features, make_records
+from ..limits import Limits
 from ..scan import Array
 
-#: Metres of the units that $INSUNITS of a DXF names.
-UNITS = {
-    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 0.001, 5: 0.01, 6: 1.0, 7: 1000.0, 8: 2.54e-8,
-    9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0,
-}  # fmt: skip
-#: Numbers of the units that a person names.
-NAMES = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "dm": 14}
-#: A bend becomes chords that are off it by no more [m].
-SAG = 0.01
-#: What walls are drawn with, and what is taken apart into that.
-_DRAWN = ("LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE")
-_WHOLE = ("INSERT", "LWPOLYLINE", "POLYLINE", "MLINE")
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 #: Fields of segments and arcs, and their columns in a table.
 _FIELDS = {
     "start": ("start_x", "start_y"), "end": ("end_x", "end_y"), "centroid": ("x", "y"),
     "center": ("x", "y"), "angle": ("angle",), "length": ("length",), "misfit": ("misfit",),
     "radius": ("radius",),
 }  # fmt: skip
+_ENTRIES = ("00", "01", "11", "02", "12", "22")
+#: No deviation of a wall is larger [m]; a covariance that is singular is widened by this share.
+_VAGUE, _RIDGE = 1e3, 1e-9
 
 
-def read_drawing(
-    path: str | os.PathLike[str], layers: Sequence[str] | None, units: str | None
-) -> tuple[Array, Array]:
-    """Return lines (n, 2, 2) and circles ``x y r`` (m, 3) of a DXF; see `LineMap.read`."""
-    with needed_by(f"{path}:"):
-        import ezdxf
+def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
+    """Return what makes an error of one line of what is wrong with a plan."""
+
+    def make(problem: str) -> LineamentError:
+        return LineamentError(one_line(f"{path}: {shortened(problem)}"))
+
+    return make
+
+
+def check_file(path: str | os.PathLike[str], limits: Limits) -> None:
+    """Raise a LineamentError unless a plan is a regular file within the limit."""
+    error = plan_error(path)
     try:
-        drawing = ezdxf.readfile(path)  # type: ignore[attr-defined]
-    except OSError as error:
-        raise LineamentError(f"{path}: {error.strerror or 'is no DXF'}") from None
-    except ezdxf.DXFError as error:  # type: ignore[attr-defined]
-        raise LineamentError(f"{path}: is no DXF: {error}") from None
-    drawn = drawing.header.get("$INSUNITS", 0) if units is None else NAMES[units]
-    unit = UNITS.get(drawn, 1.0)
-    entities = list(_exploded(drawing.modelspace()))
-    names = dict.fromkeys(layer for layer, _ in entities)
-    if layers is None:
-        chosen = {name for name in names if "wall" in name.lower()} or set(names)
-    else:
-        chosen = {n for n in names for p in layers if fnmatch(n.lower(), p.lower())}
-        if not chosen:
-            there = ", ".join(names) or "none"
-            raise LineamentError(f"{path}: no layer is {' or '.join(layers)}; there are: {there}")
-    lines, rings = [np.zeros((0, 2, 2))], []
-    for entity in (entity for layer, entity in entities if layer in chosen):
-        dxf = entity.dxf
-        if entity.dxftype() == "CIRCLE":
-            rings.append((*entity.ocs().to_wcs(dxf.center).vec2, dxf.radius))
-        else:
-            is_line = entity.dxftype() == "LINE"
-            along = (dxf.start, dxf.end) if is_line else entity.flattening(SAG / unit)
-            vertices = unit * np.array([(vertex.x, vertex.y) for vertex in along])
-            lines.append(np.stack((vertices[:-1], vertices[1:]), axis=1))
-    ends = np.concatenate(lines)
-    ends = ends[np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 1e-6]
-    if not len(ends):
-        raise LineamentError(
-            f"{path}: has no walls: {len(entities)} entities on {len(names)} layers, no line"
-        )
-    return ends, unit * np.array(rings).reshape(-1, 3)
+        status = Path(path).stat()
+    except OSError as problem:
+        raise error(problem.strerror or "cannot be read") from None
+    # Pipes and devices may never end.
+    if not stat.S_ISREG(status.st_mode):
+        raise error("is no regular file, expected a plan")
+    limits.check("drawing", status.st_size, error)
 
 
-def _exploded(entities: Any, block: str = "0") -> Iterator[tuple[str, Any]]:
-    """Yield what is drawn and its layer; in a block, layer 0 is the layer of the block."""
-    for entity in entities:
-        layer = block if entity.dxf.layer == "0" else entity.dxf.layer
-        if entity.dxftype() in _WHOLE:
-            yield from _exploded(entity.virtual_entities(), layer)
-        elif entity.dxftype() in _DRAWN:
-            yield layer, entity
+def read_table(path: str | os.PathLike[str], limits: Limits) -> tuple[Features, int]:
+    """Return the segments and arcs of all scans of a table, and how many rows have no numbers.
 
-
-def read_table(path: str | os.PathLike[str]) -> Features:
-    """Return the segments and arcs of all scans of a table."""
+    Rows with empty or impossible numbers are left out.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    names = {name: None for columns in _FIELDS.values() for name in columns}
-    columns = [*names, *(f"cov_{entry}" for entry in ("00", "01", "11", "02", "12", "22"))]
+    check_file(path, limits)
+    error = plan_error(path)
     try:
-        table = pq.read_table(path, columns=["kind", *columns])
-    except OSError as error:
-        raise LineamentError(f"{path}: {error.strerror or 'is no Parquet'}") from None
-    except (pa.ArrowInvalid, KeyError) as error:
-        raise LineamentError(f"{path}: is no table of features: {error}") from None
-    values = {name: table[name].to_numpy() for name in columns}
-    kinds = np.asarray(table["kind"].to_pylist())
-    return Features(
-        segments=_records(SEGMENT, values, kinds == "segment"),
-        corners=make_records("corners", []),
-        edges=make_records("edges", []),
-        arcs=_records(ARC, values, kinds == "arc"),
-        breakpoints=make_records("breakpoints", []),
-        clusters=np.empty(0, np.int32),
-    )
+        # Texts stay numbers of a dictionary: one of a megabyte may be in each row.
+        with pq.ParquetFile(path, read_dictionary=["kind"]) as file:
+            _check_columns(file.schema_arrow, error)
+            about = file.metadata
+            limits.check("entities", about.num_rows, error)
+            groups = [about.row_group(k) for k in range(about.num_row_groups)]
+            size = sum(group.total_byte_size for group in groups)
+            limits.check_growth(size, Path(path).stat().st_size, error)
+            table = file.read(columns=["kind", *_columns()])
+    except OSError as problem:
+        raise error(problem.strerror or "is no Parquet") from None
+    except (pa.ArrowException, ValueError, UnicodeDecodeError) as problem:
+        raise error(f"is no table of features: {problem}") from None
+    values = {name: _numbers(table[name]) for name in _columns()}
+    found, left_out = {}, 0
+    for dtype, kind in ((SEGMENT, "segment"), (ARC, "arc")):
+        rows = _equal(table["kind"], kind)
+        records = _records(dtype, values, rows)
+        good = _are_possible(records)
+        found[kind], left_out = records[good], left_out + int((~good).sum())
+    if left_out and not len(found["segment"]):
+        raise error(f"has no walls: {left_out} rows have empty or impossible numbers")
+    tables = {name: make_records(name, []) for name in TABLES}
+    tables |= {"segments": found["segment"], "arcs": found["arc"]}
+    return Features(**tables, clusters=np.empty(0, np.int32)), left_out
+
+
+def _columns() -> list[str]:
+    names = dict.fromkeys(name for columns in _FIELDS.values() for name in columns)
+    return [*names, *(f"cov_{entry}" for entry in _ENTRIES)]
+
+
+def _check_columns(schema: "pa.Schema", error: Callable[[str], LineamentError]) -> None:
+    import pyarrow as pa
+
+    missing = [name for name in ("kind", *_columns()) if name not in schema.names]
+    if missing:
+        raise error(f"is no table of features: it has no column {', '.join(missing)}")
+    for name in _columns():
+        form = schema.field(name).type
+        if not (pa.types.is_floating(form) or pa.types.is_integer(form)):
+            raise error(f"is no table of features: column {name} holds {form}, expected numbers")
+    form = schema.field("kind").type
+    of = form.value_type if pa.types.is_dictionary(form) else form
+    if not (pa.types.is_string(of) or pa.types.is_large_string(of)):
+        raise error(f"is no table of features: column kind holds {form}, expected text")
+
+
+def _numbers(column: "pa.ChunkedArray") -> Array:
+    """Values of a column, NaN where it is empty."""
+    import pyarrow as pa
+
+    chunks = [chunk.cast(pa.float64()).to_numpy(zero_copy_only=False) for chunk in column.chunks]
+    return np.concatenate([np.empty(0), *chunks])
+
+
+def _equal(column: "pa.ChunkedArray", text: str) -> NDArray[np.bool_]:
+    import pyarrow.compute as pc
+
+    return np.asarray(pc.fill_null(pc.equal(column, text), False).to_numpy(), bool)
 
 
 def _records(
-    dtype: np.dtype[np.void], values: dict[str, NDArray[Any]], rows: NDArray[np.bool_]
+    dtype: np.dtype[np.void], values: dict[str, Array], rows: NDArray[np.bool_]
 ) -> NDArray[np.void]:
     """Make records of rows of a table."""
     records = np.zeros(int(rows.sum()), dtype)
     for name in _FIELDS.keys() & set(dtype.names or ()):
         columns = np.stack([values[column][rows] for column in _FIELDS[name]], axis=-1)
-        records[name] = np.nan_to_num(columns).reshape(records[name].shape)
+        records[name] = columns.reshape(records[name].shape)
     for i, j in np.ndindex(records["covariance"].shape[1:]):
         records["covariance"][:, i, j] = values[f"cov_{min(i, j)}{max(i, j)}"][rows]
     return records
+
+
+def _are_possible(records: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Which records have numbers, and covariances that are some; these get an inverse."""
+    names, covariance = set(records.dtype.names or ()), records["covariance"]
+    good: NDArray[np.bool_] = np.asarray((abs(covariance) <= _VAGUE**2).all(axis=(1, 2)))
+    for name in _FIELDS.keys() & names:
+        finite = np.isfinite(records[name])
+        good &= finite.all(axis=1) if finite.ndim > 1 else finite
+    if "radius" in names:
+        good &= records["radius"] > 0
+    diagonal = np.einsum("nii->ni", covariance)
+    diagonal[good] *= 1 + _RIDGE
+    # Correlations between -1 and 1, in all directions.
+    sigma = np.sqrt(np.maximum(diagonal[good], 1e-300))
+    correlation = covariance[good] / (sigma[:, :, None] * sigma[:, None])
+    good[good] = np.linalg.eigvalsh(correlation).min(axis=1, initial=1.0) > -_RIDGE
+    return good

@@ -174,8 +174,14 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
     order, labels, u = np.lexsort((first - last, -views)), np.arange(count), unit(lines["angle"])
     ends = points[:, None] + np.stack((first, last), axis=1)[:, :, None] * u[:, None]
     kept = np.zeros(count, dtype=bool)
+    # Twice around, so that those of nearly the same angle follow each other.
+    ranked = np.tile(np.argsort(lines["angle"]), 2)
+    turned = lines["angle"][ranked] + np.repeat((0.0, 2 * math.pi), count)
+    least = np.where(lines["angle"] - _TURN < -math.pi, 2 * math.pi, 0.0) + lines["angle"]
+    begins, ends_at = (np.searchsorted(turned, least + turn) for turn in (-_TURN, _TURN))
     for k in order[views[order] > 0].tolist():
-        near = np.flatnonzero(kept & (abs(wrapped(lines["angle"] - lines["angle"][k])) < _TURN))
+        near = np.sort(ranked[begins[k] : ends_at[k]])
+        near = near[kept[near]]
         along = ((ends[k] - points[near, None]) * u[near, None]).sum(axis=2)
         begin, end = along.min(axis=1), along.max(axis=1)
         beside = (begin < last[near] + GAP) & (end > first[near] - GAP)
@@ -230,12 +236,18 @@ def walls_shown(tables: Sequence[Records]) -> Records:
 
 def columns_shown(tables: Iterable[Records]) -> Records:
     """Return the columns that arcs in the frame of the map show, by Kalman's update."""
+    arcs = list(chain.from_iterable(tables))
     columns: list[Records] = []
-    for arc in chain.from_iterable(tables):
-        for column in columns:
-            e = np.append(arc["center"] - column["center"], arc["radius"] - column["radius"])
+    places, spreads, gate = np.empty((len(arcs), 3)), np.empty(len(arcs)), chi_square(_GATE, 3)
+    for arc in arcs:
+        place, n = np.append(arc["center"], arc["radius"]), len(columns)
+        # The χ² is at least the squared distance over the trace of the covariance.
+        squares = np.square(places[:n] - place).sum(axis=1)
+        spread = np.trace(arc["covariance"])
+        for k in np.flatnonzero(squares < gate * (spreads[:n] + spread)).tolist():
+            column, e = columns[k], place - places[k]
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
-            if e @ inverse @ e < chi_square(_GATE, 3):
+            if e @ inverse @ e < gate:
                 gain = column["covariance"] @ inverse
                 column["center"] += (gain @ e)[:2]
                 column["radius"] += (gain @ e)[2]
@@ -243,5 +255,8 @@ def columns_shown(tables: Iterable[Records]) -> Records:
                 column["views"] += 1
                 break
         else:
+            k = n
             columns.append(np.array((arc["center"], arc["radius"], arc["covariance"], 1), COLUMN))
+        places[k] = *columns[k]["center"], columns[k]["radius"]
+        spreads[k] = np.trace(columns[k]["covariance"])
     return np.array(columns, COLUMN)

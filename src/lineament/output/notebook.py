@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from ..scan import Array, LaserScan, NoiseLike
 from . import canvas, drawing
 from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
 from .markers import Markers, markers_of
+from .markup import escape
 from .svg import ROUND
 
 if TYPE_CHECKING:

@@ -4,10 +4,10 @@ import base64
 import os
 import struct
 from collections.abc import Iterable
-from html import escape
 from typing import NamedTuple
 
 from ..files import write_text
+from .markup import escape
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de; --page: #fff;

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from html import escape
 from pathlib import Path
 
 import numpy as np
 
 from ..scan import Array
 from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
+from .markup import escape
 from .plans import Plan, PlanWriter
 
 #: The plan and the room below it for scale and caption, and the margin, of a sheet of A3 [mm].

@@ -6,19 +6,20 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import LineamentError, LogError, NothingFoundError
+from ..errors import LineamentError, LogError, NothingFoundError, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
+from ..mapping.drawings import NAMES as UNITS
 from ..mapping.following import Whereabouts, follow
-from ..mapping.plans import NAMES as UNITS
 from ..progress import Track, untracked
 from ..scan import LaserScan
 from .mapping import tum_written
@@ -127,7 +128,7 @@ def locate_log(
     ending = ending_of(output, ENDINGS)
     check_outputs([output], [path, plan])
     extractor = Extractor() if extractor is None else extractor
-    drawn = LineMap.read(plan, layers, units=units)
+    drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
     if log.topic is None and len(log.topics) > 1:
@@ -142,6 +143,10 @@ def locate_log(
         shown = scans if most else track(scans, Path(log.name).name, len(log))
         return follow(shown, on, extractor, odometry=odometry, deskewed=deskewed)
 
+    def located(on: LineMap) -> float:
+        tried = [bool(where) for _, where in followed(on, _TRIED)]
+        return sum(tried) / len(tried)
+
     found = [(scan.stamp, where) for scan, where in followed(drawn)]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
@@ -153,13 +158,15 @@ def locate_log(
         _write_table(output, found, is_csv=ending == ".csv")
     stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
     seconds, warning = time.perf_counter() - started, plan_warning(drawn, plan)
-    if sum(known) < _HARDLY * len(known):
-
-        def located(on: LineMap) -> float:
-            tried = [bool(where) for _, where in followed(on, _TRIED)]
-            return sum(tried) / len(tried)
-
-        warning = _units_warning(plan, layers, drawn, located) or warning
+    if sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf":
+        others = {
+            name: partial(LineMap.read, plan, layers, units=name, limits=reading.get("limits"))
+            for name in UNITS
+        }
+        best = _units_that_fit(others, drawn, located)
+        if best:
+            hint = f"shows where the scans were if it is drawn in {best}: --units {best}"
+            warning = one_line(f"{plan}: {hint}")
     return Located(
         log=str(path),
         plan=str(plan),
@@ -174,31 +181,36 @@ def locate_log(
 
 
 def plan_warning(plan: LineMap, name: object) -> str:
-    """Return a line about a plan of a size that no building has, or ""."""
-    wide, deep = plan.size
-    if _SMALL <= max(wide, deep) <= _LARGE:
-        return ""
-    return f"{name}: is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)"
+    """Return a line about a plan of a size that no building has, or of which parts are left out."""
+    (wide, deep), said = plan.size, []
+    if plan.left_out:
+        said.append(f"{plan.left_out} walls or columns have impossible numbers, left out")
+    if not _is_a_building(plan):
+        said.append(f"is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)")
+    return one_line(f"{name}: {'; '.join(said)}") if said else ""
 
 
-def _units_warning(
-    plan: str | os.PathLike[str],
-    layers: Sequence[str] | None,
+def _is_a_building(plan: LineMap) -> bool:
+    return _SMALL <= max(plan.size) <= _LARGE
+
+
+def _units_that_fit(
+    plans: dict[str, Callable[[], LineMap]],
     drawn: LineMap,
     located: Callable[[LineMap], float],
 ) -> str:
-    """Return that a DXF is drawn in other units if these show where the scans were, or "".
+    """Return the units in which the most of the first scans are located on a plan, or "".
 
-    `located` returns the share of scans that are located on a plan.
+    `plans` read it in each unit; `located` returns the share of scans that are located on one.
     """
     best, most = "", _HARDLY
-    for name in UNITS if Path(plan).suffix.lower() == ".dxf" else ():
+    for name, read in plans.items():
         with suppress(LineamentError):  # Larger than any building, say.
-            other = LineMap.read(plan, layers, units=name)
+            other = read()
             is_same = math.isclose(max(other.size), max(drawn.size))
-            if not is_same and not plan_warning(other, plan) and (share := located(other)) > most:
+            if not is_same and _is_a_building(other) and (share := located(other)) > most:
                 best, most = name, share
-    return best and f"{plan}: shows where the scans were if it is drawn in {best}: --units {best}"
+    return best
 
 
 def _write_table(

@@ -106,7 +106,7 @@ def map_log(
     with needed_by("map"):  # now, not when the drive is followed
         import_module("scipy")
     check_outputs(filter(None, (output, poses)), filter(None, (path, onto)))
-    plan = None if onto is None else LineMap.read(onto)
+    plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
     opened = time.perf_counter()

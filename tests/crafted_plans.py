@@ -1,0 +1,164 @@
+"""Plans that are small on disk and huge, endless, deep or no numbers to whoever believes them."""
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from lineament.mapping import LineMap
+
+ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
+NAN, INF = math.nan, math.inf
+
+
+def drawn(path: Path, draw: Callable[[Any, Any], Any], room: bool = True) -> None:
+    """Write a DXF: a room, perhaps, and what is drawn in its model space beside its blocks."""
+    drawing = ezdxf.new("R2010", units=6)
+    space = drawing.modelspace()
+    for x, y, to_x, to_y in ROOM.tolist() if room else ():
+        space.add_line((x, y), (to_x, to_y))
+    draw(space, drawing.blocks)
+    drawing.saveas(path)
+
+
+def _laughs(space: Any, blocks: Any) -> None:
+    blocks.new("0").add_line((0, 0), (4, 0))
+    for level in range(1, 12):
+        block = blocks.new(f"{level}")
+        for i in range(10):
+            block.add_blockref(f"{level - 1}", (i, 0))
+    space.add_blockref("11", (0, 0))
+
+
+def _deep(space: Any, blocks: Any) -> None:
+    for level in range(60):
+        blocks.new(f"{level}").add_blockref(f"{level + 1}", (1, 0))
+    blocks.new("60").add_line((0, 0), (1, 0))
+    space.add_blockref("0", (0, 0))
+
+
+def _holds_itself(space: Any, blocks: Any) -> None:
+    blocks.new("a").add_blockref("b", (1, 1))
+    blocks.new("b").add_blockref("A", (1, 1))
+    space.add_blockref("a", (0, 0))
+
+
+def _columns_of_arcs(space: Any, blocks: Any) -> None:
+    blocks.new("a").add_arc((0, 0), 500.0, 0, 359)
+    grid = {"row_count": 30, "column_count": 30, "row_spacing": 1, "column_spacing": 1}
+    space.add_blockref("a", (0, 0), dxfattribs=grid)
+
+
+def _grid(space: Any, blocks: Any) -> None:
+    blocks.new("a").add_line((0, 0), (1, 0))
+    grid = {"row_count": 30000, "column_count": 30000, "row_spacing": 1, "column_spacing": 1}
+    space.add_blockref("a", (0, 0), dxfattribs=grid)
+
+
+def _hatch(space: Any, blocks: Any) -> None:
+    blocks.new("a").add_line((0, 0), (5, 0))
+    blocks["a"].add_line((0, 0), (0, 5))
+    grid = {"row_count": 200, "column_count": 200, "row_spacing": 0.02, "column_spacing": 0.02}
+    space.add_blockref("a", (0, 0), dxfattribs=grid)
+
+
+def sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(1 << 27)
+
+
+def table(path: Path, rows: int = 0, change: Any = None, **options: Any) -> None:
+    """Write a table of a room, so many times or changed."""
+    LineMap.from_lines(ROOM).write(path)
+    written = pq.read_table(path)
+    if rows:
+        written = written.filter(pa.compute.equal(written["kind"], "segment"))
+        written = written.take(np.zeros(rows, np.int64))
+    pq.write_table(change(written) if change else written, path, **options)
+
+
+def put(name: str, values: Any) -> Callable[[pa.Table], pa.Table]:
+    """Return what puts values into the first rows of a column."""
+
+    def change(of: pa.Table) -> pa.Table:
+        rest = of[name].to_pylist()[len(values) :]
+        form = of.schema.field(name).type
+        column = pa.array([*values, *rest], None if isinstance(values[0], str) else form)
+        return of.set_column(of.schema.get_field_index(name), name, column)
+
+    return change
+
+
+def _each(*entities: Callable[[Any], Any]) -> Callable[[Path], None]:
+    return lambda path: drawn(path, lambda space, _: [add(space) for add in entities])
+
+
+#: What each is beyond (or ""), how it is written, limits, and what is said of it or of the plan.
+PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
+    "laughs.dxf": ("entities", lambda path: drawn(path, _laughs), {}, ""),
+    "grid.dxf": ("entities", lambda path: drawn(path, _grid), {}, ""),
+    "rows.parquet": ("entities", lambda path: table(path, 300_000), {}, ""),
+    "deep.dxf": ("depth", lambda path: drawn(path, _deep), {}, ""),
+    "bigarc.dxf": ("chords", _each(lambda to: to.add_arc((0, 0), 1e12, 0, 180)), {}, ""),
+    "bigring.dxf": ("chords", _each(lambda to: to.add_circle((0, 0), 1e9)), {}, ""),
+    "bulge.dxf": (
+        "chords", _each(lambda to: to.add_lwpolyline([(0, 0, 1), (1e9, 0, 0)], "xyb")), {}, "",
+    ),
+    "spline.dxf": (
+        "chords", _each(lambda to: to.add_spline([(0, 0), (1e9, 1e9), (2e9, -1e9), (9, 0)])), {},
+        "",
+    ),
+    "ellipse.dxf": ("chords", _each(lambda to: to.add_ellipse((0, 0), (1e9, 0), 0.5)), {}, ""),
+    "arcs.dxf": ("walls", lambda path: drawn(path, _columns_of_arcs), {}, ""),
+    "sparse.dxf": ("drawing", sparse, {}, ""),
+    "sparse.parquet": ("drawing", sparse, {}, ""),
+    "packed.parquet": (
+        "ratio",
+        lambda path: table(path, 249_000, use_dictionary=False, compression="zstd"),
+        {},
+        "",
+    ),
+    "hatch.dxf": ("", lambda path: drawn(path, _hatch), {}, "pairs of .* walls lie beside each"),
+    "holds.dxf": ("", lambda path: drawn(path, _holds_itself), {}, "block 'a' holds itself"),
+    "fifo.dxf": ("", os.mkfifo, {}, "is no regular file, expected a plan"),
+    "fifo.parquet": ("", os.mkfifo, {}, "is no regular file, expected a plan"),
+    "zero.dxf": ("", lambda path: path.symlink_to("/dev/zero"), {}, "is no regular file"),
+    "bulgenan.dxf": ("", _each(lambda to: to.add_lwpolyline([(0, 0, NAN), (1, 0)], "xyb")), {},
+                     "read, 4 walls, 1 left out"),
+    "circlenan.dxf": ("", _each(lambda to: to.add_circle((NAN, 0), 1)), {},
+                      "read, 4 walls, 1 left out"),
+    "radius.dxf": ("", _each(lambda to: to.add_circle((1, 0), 0), lambda to: to.add_arc(
+        (0, 0), 0, 0, 90), lambda to: to.add_circle((0, 0), INF)), {}, "read, 4 walls, 3 left out"),
+    "circlefar.dxf": ("", _each(lambda to: to.add_circle((1e300, 0), 1)), {},
+                      r"plan is 1e\+300 m from its origin"),
+    "circleaway.dxf": ("", _each(lambda to: to.add_circle((1e7, 0), 1)), {},
+                       r"is 1e\+07 m wide"),
+    "line.dxf": ("", _each(lambda to: to.add_line((0, NAN), (1, 1)), lambda to: to.add_line(
+        (0, 0), (INF, 1))), {}, "read, 4 walls, 2 left out"),
+    "far.dxf": ("", _each(lambda to: to.add_line((-1e308, 0), (1e308, 1))), {},
+                r"plan is 1e\+308 m from"),
+    "scale.dxf": ("", lambda path: drawn(path, lambda space, blocks: (
+        blocks.new("a").add_line((0, 0), (1, 1)),
+        space.add_blockref("a", (0, 0), dxfattribs={"xscale": INF, "yscale": 1e308}))), {},
+        "read, 4 walls, 1 left out"),
+    "splinenan.dxf": ("", _each(lambda to: to.add_open_spline([(0, 0), (NAN, 1), (2, 0), (3, 1)])),
+                      {}, "read, 4 walls, 1 left out"),
+    "text.parquet": ("", lambda path: table(path, change=put("x", ["a"] * 8)), {},
+                     "column x holds string, expected numbers"),
+    "column.parquet": ("", lambda path: table(path, change=lambda of: of.drop_columns(["x"])), {},
+                       "has no column x$"),
+    "null.parquet": ("", lambda path: table(path, change=put("start_x", [None, NAN])), {},
+                     "read, 2 walls, 2 left out"),
+    "inf.parquet": ("", lambda path: table(path, change=put("cov_00", [INF, -1.0, 1e300])), {},
+                    "read, 1 walls, 3 left out"),
+    "singular.parquet": ("", lambda path: table(path, change=lambda of: put("cov_00", [1.0])(
+        put("cov_01", [0.1])(put("cov_11", [0.01])(of)))), {}, "read, 4 walls, 0 left out"),
+    "all.parquet": ("", lambda path: table(path, change=put("end_y", [NAN] * 4)), {},
+                    "has no walls: 4 rows have empty or impossible numbers"),
+}  # fmt: skip
