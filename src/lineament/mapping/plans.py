@@ -83,9 +83,16 @@ def read_table(path: str | os.PathLike[str], limits: Limits) -> tuple[Features, 
         found[kind], left_out = records[good], left_out + int((~good).sum())
     if left_out and not len(found["segment"]):
         raise error(f"has no walls: {left_out} rows have empty or impossible numbers")
-    tables = {name: make_records(name, []) for name in TABLES}
-    tables |= {"segments": found["segment"], "arcs": found["arc"]}
-    return Features(**tables, clusters=np.empty(0, np.int32)), left_out
+    nothing = {name: make_records(name, []) for name in TABLES}
+    features = Features(
+        segments=found["segment"],
+        corners=nothing["corners"],
+        edges=nothing["edges"],
+        arcs=found["arc"],
+        breakpoints=nothing["breakpoints"],
+        clusters=np.empty(0, np.int32),
+    )
+    return features, left_out
 
 
 def _columns() -> list[str]:

@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -195,7 +195,7 @@ def _is_a_building(plan: LineMap) -> bool:
 
 
 def _units_that_fit(
-    plans: dict[str, Callable[[], LineMap]],
+    plans: Mapping[str, Callable[[], LineMap]],
     drawn: LineMap,
     located: Callable[[LineMap], float],
 ) -> str:
