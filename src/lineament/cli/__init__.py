@@ -90,7 +90,7 @@ def _show_warnings() -> None:
             others(message, category, *where)
 
     warnings.simplefilter("once", LineamentWarning)
-    warnings.showwarning = show
+    warnings.showwarning = show  # type: ignore[assignment]
 
 
 def _unwritten(name: str | None, reason: str | None) -> int:

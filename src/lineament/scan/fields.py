@@ -110,13 +110,20 @@ def regular_bearings(first: object, step: object, n: int) -> tuple[float, float,
     return first, step, is_clockwise
 
 
-def bearings(angles: ArrayLike, n: int) -> tuple[Array, bool]:
-    """Copy `n` bearings; if they decrease, in reverse. And whether they do."""
+def bearings(
+    first: object, step: object, angles: ArrayLike | None, n: int
+) -> tuple[Array | None, float, float, bool]:
+    """Bearings of irregular beams, the first and the (median) step; whether they are reversed."""
+    if angles is None:
+        return None, *regular_bearings(first, step, n)
+    if first is not None or step is not None:
+        raise ValueError("angles are given together with angle_min or angle_increment")
     copy = vector("angles", angles, n)
     if np.ma.getmask(angles).any():
         raise ValueError("angles are masked, expected a bearing of each beam")
     is_clockwise = n > 1 and copy[0] > copy[-1] and bool((np.diff(copy) < 0).all())
-    return (copy[::-1], True) if is_clockwise else (copy, False)
+    copy = copy[::-1] if is_clockwise else copy
+    return copy, *irregular_bearings(copy), is_clockwise
 
 
 @np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
@@ -224,6 +231,23 @@ def in_metres(ranges: Array, scale: object, range_max: float = 0.0) -> Array:
     made = factor * ranges
     made.setflags(write=False)
     return made
+
+
+def part_of(scan: Any, kept: range) -> dict[str, Any]:
+    """Fields of the scan of some beams."""
+    beams = slice(kept.start, kept.stop, kept.step)
+    own: dict[str, Any] = {"ranges": scan.ranges[beams]}
+    if scan.intensities is not None:
+        own["intensities"] = scan.intensities[beams]
+    if scan.is_regular:
+        own["angle_min"] = scan.angle_min + kept.start * scan.angle_increment
+        own["angle_increment"] = scan.angle_increment * kept.step
+    else:
+        own["angles"] = scan.angles[beams]
+        own["angle_min"], own["angle_increment"] = irregular_bearings(own["angles"])
+    own["stamp_beam"] = (scan.stamp_beam - kept.start) / kept.step
+    own["time_increment"] = scan.time_increment * kept.step
+    return own
 
 
 def in_reverse(own: dict[str, Any]) -> dict[str, Any]:
