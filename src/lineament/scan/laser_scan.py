@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._lazy import Pictured
+from .changes import in_metres, in_reverse, part_of
 from .fields import (
     NANO,
     Array,
@@ -21,11 +22,8 @@ from .fields import (
     checked_pose,
     covariance_of_pose,
     finite,
-    in_metres,
-    in_reverse,
     message_fields,
     nanoseconds,
-    part_of,
     range_limits,
     vector,
 )
