@@ -106,8 +106,8 @@ def test_empty_batch(shape):
 
 
 def test_noise_rows():
-    noise = ln.RangeNoise(0.1, 0.2, 0.3, 0.4)
-    assert noise_row(noise).tolist() == [0.1, 0.2, 0.3, 0.4]
+    noise = ln.RangeNoise(0.1, 0.2, 0.03, 0.4)
+    assert noise_row(noise).tolist() == [0.1, 0.2, 0.03, 0.4]
     assert noise_of(noise_row(noise)) == noise
     assert np.isnan(noise_row(None)).all()
     assert noise_of(noise_row(None)) is None

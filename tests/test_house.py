@@ -33,7 +33,7 @@ def test_files_and_signatures_are_of_a_size_to_read(path):
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
             count = len(node.args.posonlyargs) + len(node.args.args) + len(node.args.kwonlyargs)
-            assert count <= 13, f"{node.name}: {count}"  # `self` included
+            assert count <= 14, f"{node.name}: {count}"  # `self` included
         if isinstance(node, ast.ImportFrom):
             assert node.end_lineno - node.lineno <= 15, f"line {node.lineno}"
 

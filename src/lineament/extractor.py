@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, ExitStack
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -18,13 +17,12 @@ from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 from .scan.fields import numbers
+from .scan.given import FIELDS, no_scan, scan_of
 from .scan.units import FAR, warn_of_units
 
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
 
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
-#: Fields of a scan that are not those of every scan.
-_FIELDS = ("stamp", "scan_time", "time_increment", "frame_id", "intensities", "pose")
 #: What kernels are loaded with, so that the first scan need not wait for them.
 WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
 
@@ -99,7 +97,7 @@ class Extractor:
         Ranges that can hardly be metres are a `LineamentWarning`.
         """
         if not isinstance(scan, LaserScan):
-            raise _no_scan(scan)
+            raise no_scan(scan)
         block = self._blocks.take(scan) or self._new_block(scan, 1)
         block.load(scan.ranges)
         (self._run or self._first_run)(block)
@@ -267,9 +265,9 @@ def extract(
     Features(0 segments, 0 corners, 0 edges, 0 arcs, 0 breakpoints, 0 clusters, stamp=0.000)
     """
     bearings, limits = (angle_min, angle_increment, angles), (range_min, range_max, scale)
-    fields = {name: parameters.pop(name) for name in _FIELDS if name in parameters}
+    fields = {name: parameters.pop(name) for name in FIELDS if name in parameters}
     extractor = Extractor(method, noise=noise, **parameters)
-    return extractor(_scan_of(scan, bearings, limits, fields))
+    return extractor(scan_of(scan, bearings, limits, fields))
 
 
 def trace(
@@ -295,42 +293,9 @@ def trace(
     [nan, 0.02, 0.02]
     """
     bearings, limits = (angle_min, angle_increment, angles), (range_min, range_max, scale)
-    fields = {name: parameters.pop(name) for name in _FIELDS if name in parameters}
+    fields = {name: parameters.pop(name) for name in FIELDS if name in parameters}
     extractor = Extractor(method, noise=noise, **parameters)
-    return extractor.trace(_scan_of(scan, bearings, limits, fields))
-
-
-def _scan_of(
-    given: Any, bearings: tuple[Any, ...], limits: tuple[float, ...], fields: dict[str, Any]
-) -> LaserScan:
-    """Make a scan of ranges and its other fields; a scan stays as it is."""
-    is_bare = all(bearing is None for bearing in bearings)
-    if isinstance(given, LaserScan):
-        if fields or not is_bare or limits != (0.0, math.inf, 1.0):
-            raise TypeError("a LaserScan has its own bearings, limits and times: pass it alone")
-        return given
-    if is_bare or isinstance(given, str | Path):
-        raise _no_scan(given)
-    (first, step, angles), (low, high, scale) = bearings, limits
-    fields |= {"angles": angles, "range_min": low, "range_max": high, "scale": scale}
-    return LaserScan(given, first, step, **fields)
-
-
-def _no_scan(given: Any) -> TypeError:
-    """Return the error that says what to pass in place of something that is no scan."""
-    kind = type(given).__name__
-    if isinstance(given, str | Path):
-        hint = "open_log(path).scan(0) reads one from a log"
-    elif callable(getattr(given, "scan", None)):
-        hint = "log[i] is one of a log"
-    elif hasattr(given, "ranges"):
-        hint = "LaserScan.from_message(message) makes one of a message"
-    else:
-        hint = (
-            "extract(ranges, angle_min=..., angle_increment=...) takes ranges, "
-            "LaserScan.from_points(xy) takes points"
-        )
-    return TypeError(f"scan is of type {kind}, expected a LaserScan: {hint}")
+    return extractor.trace(scan_of(scan, bearings, limits, fields))
 
 
 def load_kernels(extractors: Iterable[Extractor]) -> None:

@@ -121,7 +121,8 @@ def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Cal
 
         @wraps(command)
         def collecting(**given: Any) -> None:
-            from ..scan.fields import check_scale, checked_mounting
+            from ..scan.changes import check_scale
+            from ..scan.fields import checked_mounting
 
             with wrong_usage():
                 check_scale(given["scale"])

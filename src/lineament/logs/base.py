@@ -15,7 +15,8 @@ from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
 from ..scan import LaserScan, Pose
-from ..scan.fields import STAMPS, check_scale, checked_mounting
+from ..scan.changes import check_scale
+from ..scan.fields import STAMPS, checked_mounting
 from ..scan.poses import carried, compose
 from ..scan.units import why_invalid
 

@@ -20,8 +20,6 @@ _WIDE, _MOST_BEAMS = 10.0, 20_000
 #: A scan that goes around from behind has bearings up to three half turns; none has so many [rad].
 _FARTHEST = 4 * math.pi
 _DEGREES = ": are they in degrees? (numpy.radians)"
-#: No limit of a scanner is farther [m].
-_LONGEST = 1000.0
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
 
@@ -110,13 +108,20 @@ def regular_bearings(first: object, step: object, n: int) -> tuple[float, float,
     return first, step, is_clockwise
 
 
-def bearings(angles: ArrayLike, n: int) -> tuple[Array, bool]:
-    """Copy `n` bearings; if they decrease, in reverse. And whether they do."""
+def bearings(
+    first: object, step: object, angles: ArrayLike | None, n: int
+) -> tuple[Array | None, float, float, bool]:
+    """Bearings of irregular beams, the first and the (median) step; whether they are reversed."""
+    if angles is None:
+        return None, *regular_bearings(first, step, n)
+    if first is not None or step is not None:
+        raise ValueError("angles are given together with angle_min or angle_increment")
     copy = vector("angles", angles, n)
     if np.ma.getmask(angles).any():
         raise ValueError("angles are masked, expected a bearing of each beam")
     is_clockwise = n > 1 and copy[0] > copy[-1] and bool((np.diff(copy) < 0).all())
-    return (copy[::-1], True) if is_clockwise else (copy, False)
+    copy = copy[::-1] if is_clockwise else copy
+    return copy, *irregular_bearings(copy), is_clockwise
 
 
 @np.errstate(over="ignore")  # Steps between absurd bearings, which go more than once around.
@@ -204,38 +209,6 @@ def beam_at_stamp(beam: str | float, n: int, is_clockwise: bool) -> float:
         share = STAMPS.index(beam) / 2
         return (1 - share if is_clockwise else share) * (n - 1)
     return finite("stamp_beam", beam)
-
-
-def check_scale(scale: object) -> float:
-    """Check what ranges are to be multiplied by."""
-    factor = finite("scale", scale)
-    if factor <= 0:
-        raise ValueError(f"scale is {scale}, expected > 0: 0.001 for ranges in millimetres")
-    return factor
-
-
-def in_metres(ranges: Array, scale: object, range_max: float = 0.0) -> Array:
-    """Ranges times a scale; `range_max` is in metres already."""
-    factor = check_scale(scale)
-    if _LONGEST < range_max < math.inf:
-        raise ValueError(
-            f"range_max is {range_max:g} m: scale is for the ranges alone, limits are in metres"
-        )
-    made = factor * ranges
-    made.setflags(write=False)
-    return made
-
-
-def in_reverse(own: dict[str, Any]) -> dict[str, Any]:
-    """Fields of a scan whose beams run the other way round, but for its bearings."""
-    n, intensities = len(own["ranges"]), own["intensities"]
-    return {
-        "ranges": own["ranges"][::-1],
-        "intensities": None if intensities is None else intensities[::-1],
-        "stamp_beam": n - 1 - own["stamp_beam"],
-        "scan_time": -own["scan_time"],
-        "time_increment": -own["time_increment"],
-    }
 
 
 def checked_pose(pose: Any) -> Pose:

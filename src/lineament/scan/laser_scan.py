@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._copies import ReadOnly, locked
 from .._lazy import Pictured
+from .changes import in_metres, in_reverse, part_of
 from .fields import (
     NANO,
     Array,
@@ -22,13 +23,9 @@ from .fields import (
     checked_pose,
     covariance_of_pose,
     finite,
-    in_metres,
-    in_reverse,
-    irregular_bearings,
     message_fields,
     nanoseconds,
     range_limits,
-    regular_bearings,
     vector,
 )
 
@@ -38,8 +35,8 @@ class LaserScan(ReadOnly, Pictured):
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
     `range_max`. Invalid beams (NaN, ±inf, 0, too near, no return) stay where they are and are
-    never filled. Arrays are float64 copies and read-only, and so is the scan. What is masked in a
-    masked array, or null in a column of a table, is NaN.
+    never filled. Arrays are float64 copies and read-only, and so is the scan. What is masked or
+    null is NaN.
 
     Beams that are given clockwise (a negative `angle_increment`, or `angles` that decrease) are
     reversed: beams of the scan, and of all features, count from the last that was given.
@@ -69,14 +66,13 @@ class LaserScan(ReadOnly, Pictured):
     pose : (x, y, theta), optional
         Pose of the sensor in the world frame of its log [m, m, rad].
     scale : float
-        What `ranges` are multiplied by to be in metres: 0.001 if they are in millimetres. It is not
-        for `range_min` and `range_max`, which are in metres; see `scaled`.
+        What `ranges` are multiplied by to be in metres: 0.001 if they are in millimetres. Limits
+        are in metres; of a message that has all in millimetres, see `scaled`.
 
     Raises
     ------
     ValueError
-        If the fields make no sense together, or are no numbers. The message names the field and its
-        value.
+        If the fields make no sense together. The message names the field and its value.
 
     Examples
     --------
@@ -126,13 +122,9 @@ class LaserScan(ReadOnly, Pictured):
         own["ranges"] = vector("ranges", ranges)
         n = len(own["ranges"])
         own["is_regular"] = angles is None
-        if angles is None:
-            first, step, is_clockwise = regular_bearings(angle_min, angle_increment, n)
-        elif angle_min is None and angle_increment is None:
-            own["angles"], is_clockwise = bearings(angles, n)
-            first, step = irregular_bearings(own["angles"])
-        else:
-            raise ValueError("angles are given together with angle_min or angle_increment")
+        irregular, first, step, is_clockwise = bearings(angle_min, angle_increment, angles, n)
+        if irregular is not None:
+            own["angles"] = irregular
         own["angle_min"], own["angle_increment"] = first, step
         own["range_min"], own["range_max"] = range_limits(range_min, range_max)
         own["stamp"] = finite("stamp", stamp)
@@ -168,18 +160,7 @@ class LaserScan(ReadOnly, Pictured):
         kept = range(len(self))[index]
         if kept.step < 0:
             raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
-        own: dict[str, Any] = {"ranges": self.ranges[index]}
-        if self.intensities is not None:
-            own["intensities"] = self.intensities[index]
-        if self.is_regular:
-            own["angle_min"] = self.angle_min + kept.start * self.angle_increment
-            own["angle_increment"] = self.angle_increment * kept.step
-        else:
-            own["angles"] = self.angles[index]
-            own["angle_min"], own["angle_increment"] = irregular_bearings(own["angles"])
-        own["stamp_beam"] = (self.stamp_beam - kept.start) / kept.step
-        own["time_increment"] = self.time_increment * kept.step
-        return self._changed(**own)
+        return self._changed(**part_of(self, kept))
 
     def _changed(self, **fields: Any) -> Self:
         """Return a copy with other fields, which are checked already."""
@@ -260,7 +241,7 @@ class LaserScan(ReadOnly, Pictured):
     def scaled(self, scale: float) -> Self:
         """Return the same scan with ranges and their limits times a number.
 
-        Of a log or message in millimetres, 0.001 makes a scan in metres. The pose stays.
+        Of a message in millimetres, ``from_message(message).scaled(0.001)``. The pose stays.
 
         Examples
         --------
@@ -268,8 +249,7 @@ class LaserScan(ReadOnly, Pictured):
         5.6
         """
         low, high = range_limits(self.range_min * scale, self.range_max * scale)
-        ranges = in_metres(self.ranges, scale)
-        return self._changed(ranges=ranges, range_min=low, range_max=high)
+        return self._changed(ranges=in_metres(self.ranges, scale), range_min=low, range_max=high)
 
     def stamped(self, beam: str | float, ns: int | None = None) -> Self:
         """Return the same scan with a stamp that is the time of another beam.
@@ -324,8 +304,6 @@ class LaserScan(ReadOnly, Pictured):
     @classmethod
     def from_message(cls, message: Any, *, pose: Pose | None = None, stamp: str = "first") -> Self:
         """Convert any ``sensor_msgs/LaserScan`` (rospy, rclpy, rosbags, DDS), by its fields.
-
-        Of one in millimetres, ``from_message(message).scaled(0.001)`` is in metres.
 
         Parameters
         ----------
