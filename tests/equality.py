@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import astuple
 
 import naive
 import numpy as np
@@ -23,7 +24,7 @@ def assert_same_run(scan, extractor: Extractor) -> dict:
     noise = extractor.noise
     given = None
     if noise is not None:
-        given = (noise.sigma, noise.proportional, noise.bearing, noise.quantum)
+        given = astuple(noise)
     twin = naive.liu(scan, method, trace.filtered, given)
     assert_same_trace(trace, twin)
     assert_same_features(trace.features, twin)

@@ -31,17 +31,17 @@ def valid(scan) -> list[bool]:
     return [one(r) for r in scan.ranges.tolist()]
 
 
-def noise_of(scan) -> tuple[float, float, float, float]:
-    """Noise of the rivals: that of `optimal`, but of few measurements too, and of a lattice."""
+def noise_of(scan) -> tuple[float, ...]:
+    """Noise of the rivals: that of `optimal`, but of a lattice too."""
+    constant, growth, uncertainty, pooled = estimated_noise(scan)
     if not any(valid(scan)):
-        return (math.nan, 0.0, 0.0, 0.0)
-    constant, growth = estimated_noise(scan, fewest=1)
-    if constant + growth <= 1.0001 * LEAST_SIGMA**2:
+        return (math.nan, 0.0, 0.0, 0.0, uncertainty)
+    if pooled <= LEAST_SIGMA**2:
         steps = second_differences(scan)
         lattice = [step for step in steps if LEAST_SIGMA < step < 0.15]
         if len(lattice) > len(steps) / 8:
             constant = max(constant, min(lattice) ** 2 / 12)
-    return (math.sqrt(constant), math.sqrt(growth), 0.0, 0.0)
+    return (math.sqrt(constant), math.sqrt(growth), 0.0, 0.0, uncertainty)
 
 
 def second_differences(scan) -> list[float]:

@@ -7,7 +7,7 @@ from liu_2023 import Paper, line_of
 
 
 def range_variance(rho, noise):
-    s, proportional, _, quantum = noise
+    s, proportional, _, quantum, *_ = noise
     return np.maximum(s**2 + (proportional * rho) ** 2 + quantum**2 / 12, 1e-8)
 
 

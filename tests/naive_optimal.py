@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import wrightomega
 
 from lineament import LaserScan
 
@@ -36,13 +37,33 @@ def third_of(errors, squares):
     return 1.03 * errors[kept].mean(), squares[kept].mean(), int(kept.sum())
 
 
-def estimated_noise(scan: LaserScan, fewest: int = 24) -> tuple[float, float]:
-    """Constant and growth, of measurements off the line through their neighbours."""
+def expected_variance(square, degrees, prior=0.012**2, spread=4.5):
+    """Mean of a variance with this mean square, and the deviation of half its logarithm.
+
+    The peak of -(λ - c)²/2s - (k/2)(λ + u exp(-λ)) solves λ = c - w + w u exp(-λ), w = s k/2.
+    """
+    ratio, weight, peaks = max(square / prior, 1e-30), spread * degrees / 2, []
+    for centre in (-spread / 2, spread / 2):
+        level = centre
+        if weight:
+            level -= weight
+            level += wrightomega(math.log(weight * ratio) - level)
+        pull = degrees / 2 * ratio * math.exp(-level)
+        height = -((level - centre) ** 2) / (2 * spread) - degrees / 2 * level - pull
+        peaks.append((height, pull + 1 / spread))
+    (height, curvature), (raised, other) = peaks
+    mean = prior * math.sqrt(curvature / other) * math.exp(raised - height)
+    return mean, 0.5 / math.sqrt(curvature)
+
+
+def estimated_noise(scan: LaserScan) -> tuple[float, float, float, float]:
+    """Constant, growth, uncertainty, and mean square, of what is off the line of neighbours."""
     usable = np.flatnonzero(scan.valid & (scan.ranges >= 1e-6) & (scan.ranges < 1e3))
     rho, bearing = scan.ranges, scan.angles
     middle = [b for a, b, c in zip(usable, usable[1:], usable[2:], strict=False) if c - a == 2]
-    if len(middle) < fewest:
-        return 1e-8, 0.0
+    if not middle:
+        constant, uncertainty = expected_variance(0.0, 0.0)
+        return constant, 0.0, uncertainty, 0.0
     i = np.array(middle)
     whole = np.sin(bearing[i + 1] - bearing[i - 1])
     through = np.sin(bearing[i + 1] - bearing[i]) / rho[i - 1]
@@ -50,14 +71,18 @@ def estimated_noise(scan: LaserScan, fewest: int = 24) -> tuple[float, float]:
     errors, squares = (rho[i] ** 2 * (through - 1 / rho[i])) ** 2 / 1.5, rho[i] ** 2
     far = squares >= squares.mean()
     v, square, count = np.transpose([third_of(errors[h], squares[h]) for h in (~far, far)])
-    constant, growth = (v @ count) / count.sum(), 0.0
-    if count.all() and v[1] > v[0] * (1 + 3 * math.sqrt(2 * 1.94 * (1 / count[0] + 1 / count[1]))):
+    pooled, growth = (v @ count) / count.sum(), 0.0
+    constant, uncertainty = expected_variance(pooled, count.sum() / 1.94)
+    chance = 3 * math.sqrt(2 * 1.94 * (1 / np.maximum(count, 1)).sum())
+    if v[1] - v[0] > chance * pooled:
+        v *= constant / pooled
         growth = (v[1] - v[0]) / (square[1] - square[0])
         constant = v[0] - growth * square[0]
         if constant < 1e-8:
             growth = 0.5 * (v[0] / square[0] + v[1] / square[1])
     constant = min(max(constant, 1e-8), 0.01)
-    return constant, max(0.0, min(growth, (0.01 - constant) / rho[usable].max() ** 2))
+    growth = max(0.0, min(growth, (0.01 - constant) / rho[usable].max() ** 2))
+    return constant, growth, uncertainty, pooled
 
 
 # Clustering

@@ -1,6 +1,7 @@
 """Slow twins of how scans are parted, split and tracked: lists, recursion, a fit at every step."""
 
 import math
+from dataclasses import astuple
 from itertools import pairwise
 
 import numpy as np
@@ -29,7 +30,7 @@ def untied(scan: LaserScan) -> LaserScan:
 def noise_of(scan, extractor) -> tuple[float, ...]:
     noise = extractor.noise
     if noise is not None:
-        return (noise.sigma, noise.proportional, noise.bearing, noise.quantum)
+        return astuple(noise)
     return estimated(scan)
 
 

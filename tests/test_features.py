@@ -51,7 +51,7 @@ def test_dict_is_json():
         for record, row in zip(getattr(features, name), again[name], strict=True):
             assert {field: record[field].tolist() for field in dtype.names} == row
     assert again["clusters"] == features.clusters.tolist()
-    assert again["noise"] == {"sigma": 0.01, "proportional": 0, "bearing": 0, "quantum": 0}
+    assert again["noise"] == {"sigma": 0.01, "proportional": 0, "bearing": 0, "quantum": 0, "uncertainty": 0}
     assert (again["stamp"], again["frame_id"]) == (2.5, "laser")
     empty = ln.extract(ln.LaserScan([np.nan] * 3, 0.0, 0.1)).to_dict()
     assert (empty["noise"], empty["clusters"]) == (None, [-1, -1, -1])
@@ -106,8 +106,8 @@ def test_empty_batch(shape):
 
 
 def test_noise_rows():
-    noise = ln.RangeNoise(0.1, 0.2, 0.03, 0.4)
-    assert noise_row(noise).tolist() == [0.1, 0.2, 0.03, 0.4]
+    noise = ln.RangeNoise(0.1, 0.2, 0.03, 0.4, 0.5)
+    assert noise_row(noise).tolist() == [0.1, 0.2, 0.03, 0.4, 0.5]
     assert noise_of(noise_row(noise)) == noise
     assert np.isnan(noise_row(None)).all()
     assert noise_of(noise_row(None)) is None

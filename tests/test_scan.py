@@ -224,7 +224,7 @@ def test_noise_adds_up():
         noise.sigma = 1.0
 
 
-@pytest.mark.parametrize("name", ["sigma", "proportional", "bearing", "quantum"])
+@pytest.mark.parametrize("name", ["sigma", "proportional", "bearing", "quantum", "uncertainty"])
 @pytest.mark.parametrize("value", [-1e-9, NAN, INF, "0.1", None, True, 1j])
 def test_noise_refuses(name, value):
     with pytest.raises(ValueError, match=rf"RangeNoise\.{name} is {value!r:.4}"):

@@ -120,7 +120,7 @@ def test_batch_gives_the_same_table_as_its_scans():
         clusters=np.stack([f.clusters for f in scans]),
         offsets=offsets,
         stamps=np.array([f.stamp for f in scans]),
-        noises=np.zeros((5, 4)),
+        noises=np.zeros((5, 5)),
         frame_id="laser",
     )
     assert batch_table(batch, 7).equals(features_table(scans, 7))

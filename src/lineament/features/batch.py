@@ -35,8 +35,9 @@ class FeatureBatch(Tabled, ReadOnly):
         the other tables.
     stamps : float64 array, shape (m,)
         Stamp of each scan [s].
-    noises : float64 array, shape (m, 4)
-        (sigma, proportional, bearing, quantum) used for each scan; NaN where no beam is valid.
+    noises : float64 array, shape (m, 5)
+        (sigma, proportional, bearing, quantum, uncertainty) of each scan, as in `RangeNoise`; NaN
+        where no beam is valid.
     frame_id : str
         Frame of all scans.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,7 +76,8 @@ class Features(Tabled, ReadOnly, Pictured):
     frame_id : str
         The scan's own frame.
     noise : RangeNoise or None
-        The range noise that was used, given or estimated; None where the scan has no valid beam.
+        The range noise that was used, given or estimated; its `uncertainty` says how well it is
+        known. None where the scan has no valid beam.
     scan : LaserScan or None
         The scan itself, for pictures; None in a batch, in another frame, and from a file.
 
@@ -226,15 +227,14 @@ class Features(Tabled, ReadOnly, Pictured):
 
 
 def noise_row(noise: NoiseLike | None) -> NDArray[np.float64]:
-    """(sigma, proportional, bearing, quantum) as the kernels take them, NaN where not given."""
+    """Write the parts of a noise as the kernels take them, NaN where it is not given."""
     if noise is None:
-        return np.full(4, np.nan)
-    noise = RangeNoise.of(noise)
-    return np.array([noise.sigma, noise.proportional, noise.bearing, noise.quantum])
+        return np.full(5, np.nan)
+    return np.array(astuple(RangeNoise.of(noise)))
 
 
 def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
-    """Name the four parts of a noise; None if they are NaN (no valid beam to estimate from)."""
+    """Name the parts of a noise; None if they are NaN (no valid beam to estimate from)."""
     parts = row.tolist()
     return None if math.isnan(parts[0]) else RangeNoise(*parts)
 

@@ -32,13 +32,13 @@ def extract_rows(
     ----------
     sensor : tuple
         (range_min, range_max, step, circular).
-    given_noise : float64 array, shape (4,)
+    given_noise : float64 array, shape (5,)
         See `noise.estimate_noise`.
     parameters : tuple
         See `Parameters`.
     scratch : tuple
         That of `bilateral.filter_ranges`, and the two arrays of `budget.limit_pieces`.
-    noises : float64 array, shape (m, 4)
+    noises : float64 array, shape (m, 5)
         Result: the noise of each scan.
     tables : tuple
         See `measuring.measure`.

@@ -90,7 +90,7 @@ class Optimal(MethodBase):
             np.zeros((at.SPANS, n), np.int64),
             np.zeros((n, at.PIECES)),
             np.zeros((n, at.SUMS)),
-            np.zeros(3),
+            np.zeros(4),
         )
         return arrays, np.empty((PLANES, n, vertices)), np.empty((n, vertices), np.int64)
 

@@ -40,7 +40,7 @@ class Block:
     ----------
     frame : LaserScan
         Any scan with the bearings and range limits of those to come.
-    noise : float64 array, shape (4,)
+    noise : float64 array, shape (5,)
         Noise of the sensor as a row, NaN where it is to be estimated.
     capacity : int
         Scans that have room.
@@ -57,7 +57,7 @@ class Block:
         self.range_min, self.range_max = frame.range_min, frame.range_max
         self.sensor = self.range_min, self.range_max, self.step, self.circular
         self.noise, self.own = noise, own
-        self.noises = np.empty((capacity, 4))
+        self.noises = np.empty((capacity, 5))
         self.ranges = np.empty((capacity, n))
         self.floats, self.ints = at.workspace(n)
         self.work = at.named(self.floats, self.ints)
@@ -189,7 +189,7 @@ def run_batch(rows: Array, blocks: Sequence[Block], run: Callable[[Block], None]
     """Run a method over rows of ranges, shape (m, n), with a thread for each block."""
     m, n = rows.shape
     counts, clusters = np.empty((m, len(TABLES)), np.int64), np.empty((m, n), np.int32)
-    batch = Batch(counts, clusters, np.empty((m, 4)), {})
+    batch = Batch(counts, clusters, np.empty((m, 5)), {})
 
     def run_share(k: int) -> list[list[bytes]]:
         """Run over some of the rows; arrays go to the batch at once, records are returned."""

@@ -36,6 +36,10 @@ class RangeNoise:
         Noise of the bearing [rad].
     quantum : float
         Step of the lattice on which ranges are reported [m].
+    uncertainty : float
+        Standard deviation of sigma, over sigma, where it was estimated: 0.03 for a scan of 1,081
+        beams, 0.05 for one of 361, 1 where nothing is known. The variance is a mean over what it
+        may be, so that covariances include this; nothing else depends on it.
 
     Examples
     --------
@@ -47,9 +51,10 @@ class RangeNoise:
     proportional: float = 0.0
     bearing: float = 0.0
     quantum: float = 0.0
+    uncertainty: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("sigma", "proportional", "bearing", "quantum"):
+        for name in ("sigma", "proportional", "bearing", "quantum", "uncertainty"):
             value = getattr(self, name)
             if type(value) is float and 0 <= value < math.inf:
                 continue

@@ -99,7 +99,7 @@ def sensor_like(name: str, *, sigma: float | None = None, **changes: float | Non
     Examples
     --------
     >>> sensor_like("lms181", sigma=0.03, dropout=None).noise
-    RangeNoise(sigma=0.03, proportional=0.0, bearing=0.0, quantum=0.01)
+    RangeNoise(sigma=0.03, proportional=0.0, bearing=0.0, quantum=0.01, uncertainty=0.0)
     """
     if name not in SENSORS:
         raise ValueError(f"sensor is {name!r}, expected one of {', '.join(SENSORS)}")

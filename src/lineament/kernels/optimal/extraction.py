@@ -15,9 +15,6 @@ from .fits import measure
 from .joining import join_all
 from .partition import clearest_border, fill_sums, merge_lines, partition
 
-#: Fewer triples say little of the noise.
-_FEWEST = np.int64(24)
-
 
 @kernel
 def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noises, counts):
@@ -31,14 +28,14 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
         How many of them are scans.
     bearings : float64 array, shape (2, n)
         Cosines and sines of the bearings.
-    given : float64 array, shape (4,)
-        (sigma, proportional, bearing, quantum), NaN where they are to be estimated.
+    given : float64 array, shape (5,)
+        (sigma, proportional, bearing, quantum, uncertainty), NaN where they are to be estimated.
     settings : (range_min, range_max, circular, evidence, missing)
         Limits of the ranges [m]; whether the beams go around; price of a line; missing beams over
         which a surface goes on.
     arrays, results : tuples of arrays
         As in `layout.Work` and `layout.Tables`.
-    noises : float64 array, shape (m, 4)
+    noises : float64 array, shape (m, 5)
         Written: the noise of each scan.
     counts : int64 array, shape (3 or more,)
         Written: measurements, lines and surfaces of the last scan.
@@ -71,21 +68,21 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
         _write_surfaces(work, tables, scan, surfaces)
         join_all(work, tables, scan, surfaces, closed)
         _write_clusters(work, tables, scan, surfaces, closed)
-        for part in range(4):
+        for part in range(5):
             noises[row, part] = 0.0 if estimated else given[part]
         if estimated:
             noises[row, 0] = math.sqrt(work.noise[0]) if count > 0 else math.nan
-            noises[row, 1] = math.sqrt(work.noise[1])
+            noises[row, 1], noises[row, 4] = math.sqrt(work.noise[1]), work.noise[3]
         counts[0], counts[1], counts[2] = count, lines, surfaces
 
 
 @inlined
 def _estimate_noise(work, count, given):
-    """Step 1: write the noise as (constant, growth, variance of a bearing)."""
+    """Step 1: write the noise as (constant, growth, variance of a bearing, uncertainty)."""
     noise = work.noise
     if math.isnan(given[0]):
-        noise[0], noise[1] = fit_noise(
-            work.points, work.beams[at.BEAM], count, at.KEY, at.SCRATCH, _FEWEST
+        noise[0], noise[1], noise[3], _ = fit_noise(
+            work.points, work.beams[at.BEAM], count, at.KEY, at.SCRATCH
         )
         noise[2] = 0.0
         return

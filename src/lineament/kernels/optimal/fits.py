@@ -4,13 +4,15 @@ import math
 
 from .. import helper, inlined, sums
 from ..line_fit import TOTAL, direction
-from ..noise import LEAST_SIGMA
+from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
 from .constants import LEAST, SIGMAS, TAU
 from .partition import solve, surface_variance
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
 _TOGETHER = 4
+#: Of overlapping second differences of their means, so many count as one.
+_OVERLAP = 3.4
 #: Deviation of what lies anywhere between two measurements, in their spacing.
 _WITHIN = 0.5 / math.sqrt(12.0)
 
@@ -121,17 +123,26 @@ def _scatter_of_means(work, surfaces):
     """Variance of the mean of neighbouring measurements, over that of as many independent ones.
 
     Scanners smooth their ranges, so that neighbours are off alike. It is 1 for white noise, and
-    taken from second differences of means of four, which a wall that bows does not change.
+    taken from second differences of means of four, which a wall that bows does not change. Where
+    most lines are too short for these, the others may be corners that pass for lines.
     """
     points, pieces, squares, used = work.points, work.pieces, work.points[at.KEY], 0
+    long, short = 0, 0
     for k in range(surfaces):
         first, end = work.spans[at.FIRST, k], work.spans[at.LAST, k] + 1
-        if work.spans[at.KIND, k] == at.LINE and end - first >= 3 * _TOGETHER:
+        if work.spans[at.KIND, k] != at.LINE:
+            continue
+        if end - first < 3 * _TOGETHER:
+            short += end - first
+        else:
+            long += end - first
             a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.SCRATCH]
             _second_differences(points[:, first:end], a, b, work.noise, error, squares[used:])
             used += end - first + 1 - 3 * _TOGETHER
+    if long <= short:
+        return 1.0
     mean, limit = 1.0, math.inf
-    for _ in range(2 if used >= 3 * _TOGETHER else 0):
+    for _ in range(2):
         total, kept = 0.0, 0
         for i in range(used):
             if squares[i] <= limit:
@@ -139,6 +150,7 @@ def _scatter_of_means(work, surfaces):
                 kept += 1
         mean = total / kept
         limit = SIGMAS * SIGMAS * mean
+    mean, _ = expected_variance(mean, used / _OVERLAP, 1.0)
     # Nothing is known better than the best scanner measures it.
     return max(mean, LEAST_SIGMA * LEAST_SIGMA / work.noise[0])
 

@@ -1,0 +1,91 @@
+"""Noise of few measurements: weighed against what scanners have, and covariances that hold."""
+
+import math
+
+import numpy as np
+import pytest
+from worlds import fan, scan_of, wall
+
+import lineament as ln
+from lineament import Extractor, LaserScan, RangeNoise
+from lineament.evaluation import NormalisedErrors
+from lineament.methods.stages import estimate_noise
+
+#: Root of the mean variance of scanners [m], and variance of its logarithm.
+TYPICAL, SPREAD = 0.012, 4.5
+
+
+def test_noise_that_nothing_is_known_of_is_that_of_scanners():
+    """Every second beam has no range."""
+    ranges = np.full(7, math.nan)
+    ranges[::2] = 2.0
+    for method in ("optimal", "liu", "iepf"):
+        noise = ln.extract(ranges, angle_min=0.0, angle_increment=0.1, method=method).noise
+        assert noise.sigma == pytest.approx(TYPICAL)
+        assert noise.uncertainty == pytest.approx(math.sqrt(SPREAD) / 2)
+
+
+@pytest.mark.parametrize("off", [1e-4, 0.003, 0.01, 0.03, 0.1])
+def test_noise_of_one_triple_is_the_mean_of_its_posterior(off):
+    """By the integral over the variance: prior, times χ² of 1/1.94 degrees of freedom."""
+    scan = LaserScan(2.0 / np.cos([-0.01, 0.0, 0.01]) + [0.0, off, 0.0], -0.01, 0.01)
+    square, degrees = 1.03 * off**2 / 1.5, 1 / 1.94
+    log = np.linspace(-60.0, 20.0, 100_001)
+    centre = math.log(TYPICAL**2) - SPREAD / 2
+    density = -((log - centre) ** 2) / (2 * SPREAD) - degrees / 2 * (log + square * np.exp(-log))
+    density = np.exp(density - density.max())
+    mean = (density * np.exp(log)).sum() / density.sum()
+    assert estimate_noise(scan).sigma == pytest.approx(math.sqrt(mean), rel=0.03)
+
+
+@pytest.mark.parametrize("sigma", [0.001, 0.003, 0.01, 0.03])
+def test_noise_of_many_is_what_they_say(sigma):
+    """Off by less than half of the estimate's standard error, which it reports."""
+    ranges = np.random.default_rng(3).normal(wall(fan(40), 2.0, 0.0), sigma)
+    scan = scan_of(ranges, fan(40))
+    noise = estimate_noise(scan)
+    error = np.diff(ranges - wall(fan(40), 2.0, 0.0), 2)
+    root = math.sqrt((error**2).mean() / 6)
+    assert noise.sigma == pytest.approx(root, rel=0.5 * noise.uncertainty)
+    assert noise.uncertainty == pytest.approx(math.sqrt(1.94 / 2 / len(error)), rel=0.1)
+
+
+def test_noise_of_sixty_trunks_is_not_that_of_the_best_scanner():
+    """Of 15 cm, in 181 beams: it was 0.1 mm, as there are fewer than 24 threes."""
+    rng = np.random.default_rng(8)
+    angles, found = np.linspace(-math.pi / 2, math.pi / 2, 181), []
+    for _ in range(20):
+        ranges = np.full(181, math.inf)
+        for bearing, far in zip(rng.uniform(-1.5, 1.5, 60), rng.uniform(2, 20, 60), strict=True):
+            half = 0.15**2 - (far * np.sin(angles - bearing)) ** 2
+            hit = (half > 0) & (abs(angles - bearing) < 1)
+            near = far * np.cos(angles - bearing) - np.sqrt(np.where(hit, half, 0.0))
+            ranges = np.where(hit, np.minimum(ranges, near), ranges)
+        found.append(ln.extract(scan_of(ranges + rng.normal(0, 0.01, 181), angles)).noise.sigma)
+    assert 0.005 < np.median(found) < 0.03
+    assert min(found) > 0.002
+
+
+@pytest.mark.parametrize("name", ["optimal", "iepf", "liu:scale_free"])
+@pytest.mark.parametrize("n", [4, 6, 8, 12, 16, 23, 24, 40, 80, 200])
+def test_covariance_of_a_lone_wall_is_that_of_its_errors(name, n):
+    """Of any number of measurements: up to 22 it was ten thousand times too small."""
+    rng, angles = np.random.default_rng((4, n)), (np.arange(n) - (n - 1) / 2) * 0.006
+    far = 5.0 / np.cos(angles)
+    batch = Extractor(name).batch(rng.normal(far, 0.01, (400, n)), angles=angles)
+    lines = np.concatenate([f.segments for f in batch if len(f.segments) == 1])
+    assert len(lines) > 350
+    turn = np.angle(np.exp(1j * (lines["angle"] - math.pi / 2)))
+    errors = np.column_stack((5.0 - lines["centroid"][:, 0], turn))
+    assert 0.7 < NormalisedErrors.of(errors, lines["covariance"]).mean_ratio < 1.4
+
+
+def test_noise_that_is_given_is_used_as_it_is():
+    """With the uncertainty that it has, which changes nothing."""
+    scan = scan_of(np.random.default_rng(1).normal(wall(fan(3), 2.0, 0.0), 0.01), fan(3))
+    known, vague = (Extractor(noise=RangeNoise(0.01, uncertainty=u))(scan) for u in (0.0, 0.5))
+    assert known.noise.uncertainty == 0.0
+    assert vague.noise.uncertainty == 0.5
+    np.testing.assert_array_equal(known.segments, vague.segments)
+    batch = Extractor(noise=vague.noise).batch(scan.ranges[None], angles=scan.angles)
+    assert batch[0].noise == vague.noise
