@@ -1,10 +1,10 @@
 """Covariances of features where few measurements tell how large the noise is, as Markdown tables.
 
 Run: python benchmarks/few.py [--sigma 0.01] [--given] [--method NAME]... One object in view, or
-thirty small ones around, of n measurements each (corners: n a wall), with white noise. Cells are the
-NEES over its degrees of freedom: mean (median over that of chi-square) of the features found; 1 if
-covariances are those of the errors; – where fewer than 50 were found. `--given` tells each method
-the noise: what differs from 1 then is the method's own.
+thirty small ones around, of n measurements each (corners: n a wall), with white noise. Cells are
+the NEES over its degrees of freedom: mean (median over that of chi-square) of the features found; 1
+if covariances are those of the errors; – where fewer than 50 were found. `--given` gives each
+method the noise: what differs from 1 then is the method's own.
 """
 
 import argparse
@@ -111,7 +111,7 @@ def errors_of(batch: FeatureBatch, table: str, owner: Array, turns: Array, truth
 def measure(extractor: Extractor, name: str, n: int, sigma: float, seed: int) -> NormalisedErrors:
     """Normalised errors of the features of some random scans of a scene."""
     shape, table, objects, step = SCENES[name]
-    rng, runs = np.random.default_rng((seed, n)), 1500 if objects == 1 else 50
+    rng, runs = np.random.default_rng((seed, n)), 500 if objects == 1 else 16
     beams = (2 if table == "corners" else 1) * n
     step = step if objects == 1 else 2 * math.pi / (objects * (beams + FREE))
     width = beams + FREE

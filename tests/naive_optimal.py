@@ -33,7 +33,8 @@ def third_of(errors, squares):
     """Variance of normal errors by the third that is least; mean square of range, and number."""
     if len(errors) == 0:
         return 0.0, 0.0, 0
-    kept = errors <= 9 * np.sort(errors)[len(errors) // 3] / 0.4307**2
+    third = min(math.ceil(len(errors) / 3), len(errors) - 1)
+    kept = errors <= 9 * np.sort(errors)[third] / 0.4307**2
     return 1.03 * errors[kept].mean(), squares[kept].mean(), int(kept.sum())
 
 

@@ -221,5 +221,6 @@ def test_huge_ranges_do_not_drown_their_neighbours():
 
 def test_a_jump_without_noise_is_no_lattice():
     scan = LaserScan([2.0] * 20 + [4.0] * 20, 0.0, 0.01)
-    assert estimate_noise(scan).sigma == pytest.approx(1e-4)
+    # Seen from the centre, arcs are off the lines of neighbours by 0.1 and 0.2 mm.
+    assert estimate_noise(scan).sigma < 0.0002
     assert len(set(ln.extract(scan).clusters)) == 2

@@ -51,7 +51,8 @@ def test_dict_is_json():
         for record, row in zip(getattr(features, name), again[name], strict=True):
             assert {field: record[field].tolist() for field in dtype.names} == row
     assert again["clusters"] == features.clusters.tolist()
-    assert again["noise"] == {"sigma": 0.01, "proportional": 0, "bearing": 0, "quantum": 0, "uncertainty": 0}
+    others = dict.fromkeys(("proportional", "bearing", "quantum", "uncertainty"), 0)
+    assert again["noise"] == {"sigma": 0.01} | others
     assert (again["stamp"], again["frame_id"]) == (2.5, "laser")
     empty = ln.extract(ln.LaserScan([np.nan] * 3, 0.0, 0.1)).to_dict()
     assert (empty["noise"], empty["clusters"]) == (None, [-1, -1, -1])

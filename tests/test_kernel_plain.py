@@ -35,8 +35,8 @@ def made(name):
 
 #: Lengths of the world, by the modules that have them [m]; squares of lengths.
 LENGTHS = (
-    "TAU", "REACH", "MOST_DEVIATION", "ARC_RADIUS", "LEAST_SIGMA", "MOST_SIGMA", "NEAREST",
-    "FARTHEST", "_COARSEST_QUANTUM", "LINK", "WORST", "_LINK", "_WORST",
+    "TAU", "REACH", "MOST_DEVIATION", "ARC_RADIUS", "LEAST_SIGMA", "MOST_SIGMA", "TYPICAL_SIGMA",
+    "NEAREST", "FARTHEST", "_COARSEST_QUANTUM", "LINK", "WORST", "_LINK", "_WORST",
 )  # fmt: skip
 SQUARES = {"_ROUNDING": 4.0}
 #: How what a table has grows with lengths; what is not here does not.

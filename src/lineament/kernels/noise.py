@@ -181,7 +181,9 @@ def _least_third(points, count, row, spare, low, high):
         n += 1.0 if kept[i] < math.inf else 0.0
     if n == 0.0:
         return 0.0, 0.0, 0.0
-    limit = _SIGMAS * _SIGMAS * _THIRD * ranked(kept, count, int(n) // 3)
+    # The last of the third: of few, one less would take too much for clutter.
+    third = min((int(n) + 2) // 3, int(n) - 1)
+    limit = _SIGMAS * _SIGMAS * _THIRD * ranked(kept, count, third)
     total, squares, used = 0.0, 0.0, 0.0
     for i in range(count):
         within = kept[i] <= limit

@@ -36,7 +36,7 @@ SUMS = 6
 
 
 class Work(NamedTuple):
-    """The arrays of one scan: its noise is (constant, growth, variance of a bearing, uncertainty)."""
+    """The arrays of one scan: noise is (constant, growth, variance of a bearing, uncertainty)."""
 
     points: NDArray[np.float64]
     beams: NDArray[np.int64]
