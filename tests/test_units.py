@@ -145,9 +145,10 @@ def test_what_is_heard_is_not_shown():
 def test_commands_warn_in_one_line_once(tmp_path, capfd):
     far = log_of(tmp_path / "far.npz", [MILLIMETRES] * 4)
     output = str(tmp_path / "out.parquet")
-    assert run(["extract", str(far), "-o", output, "-q"]) == 0
-    (line,) = capfd.readouterr().err.splitlines()
+    assert run(["extract", str(far), "-o", output, "-q"]) == 3
+    line, nothing = capfd.readouterr().err.splitlines()
     assert line.startswith("lineament: half of the ranges are beyond 200 m, where no 2-D scanner")
+    assert nothing == f"lineament: {far}: no feature in 4 scans, expected some"
     assert run(["extract", str(far), "-o", output, "-q", "--scale", "0.001"]) == 0
     assert capfd.readouterr().err == ""
     none = log_of(tmp_path / "none.npz", [np.full(201, 2500.0)] * 4, range_max=30.0)
