@@ -237,12 +237,20 @@ def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
     assert page.index("<figure") < page.index("<dl>")
     assert str(folder / "index.html") in capsys.readouterr().out
     # Without poses there is no map, but scans; that of another log is removed.
-    (tmp_path / "demo").mkdir()
-    (tmp_path / "demo" / "map.png").touch()
+    assert (folder / "map.png").exists()
     log = corner_log(tmp_path / "still.npz", 2)
-    assert run(["demo", str(log), "-q", "-o", str(tmp_path / "demo")]) == 0
-    pictures = {path.stem for path in (tmp_path / "demo").glob("*.png")}
+    assert run(["demo", str(log), "-q", "-o", str(folder)]) == 0
+    pictures = {path.stem for path in folder.glob("*.png")}
     assert pictures == {"scan", "corner", "trace", "methods", "scans"}
+
+
+@pytest.mark.parametrize("name", ["scan.png", "map.png", "drive.npz", "index.html"])
+def test_demo_spares_files_that_it_did_not_make(name, tmp_path, capsys):
+    own = tmp_path / name
+    own.write_text("mine")
+    assert run(["demo", "-q", "-o", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.startswith(f"lineament: {own}: is of no demo and would be")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from .._copies import ReadOnly
 from .._lazy import Pictured
 from ..errors import needed_by
 from ..scan import LaserScan, NoiseLike, RangeNoise
-from ..scan.fields import covariance_of_pose, nanoseconds
+from ..scan.fields import checked_pose, covariance_of_pose, nanoseconds
 from .records import TABLES
 
 if TYPE_CHECKING:
@@ -158,6 +158,11 @@ class Features(Tabled, ReadOnly, Pictured):
         frame_id : str, optional
             Name of the new frame; by default the old one stays.
 
+        Raises
+        ------
+        ValueError
+            If the pose is not three finite numbers, or the covariance is none.
+
         Examples
         --------
         >>> import lineament as ln
@@ -166,6 +171,7 @@ class Features(Tabled, ReadOnly, Pictured):
         >>> moved.segments["centroid"].round(2).tolist()
         [[1.0, 2.0]]
         """
+        x, y, theta = checked_pose((x, y, theta))
         c, s = math.cos(theta), math.sin(theta)
         rotation = np.array([[c, -s], [s, c]])
         shift = np.array([x, y])

@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from itertools import repeat
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -156,12 +155,13 @@ class LineMap(ReadOnly):
     ) -> Self:
         """Make a plan of lines ``x1 y1 x2 y2`` (n, 4) and columns ``x y r`` (m, 3), known exactly.
 
-        `side` is 1 for lines that are seen from their left alone.
+        Lines may also be pairs of ends (n, 2, 2). `side` is 1 for lines that are seen from their
+        left alone. Raises ValueError for other shapes.
         """
-        circles = np.array(columns, np.float64).reshape(-1, 3)
+        circles, lines = _rows("columns", columns, (3,)), _rows("lines", ends, (4,), (2, 2))
         found = np.zeros(len(circles), COLUMN)
         found["center"], found["radius"], found["views"] = circles[:, :2], circles[:, 2], 1
-        lines = np.array(ends, np.float64).reshape(-1, 2, 2)
+        lines = lines.reshape(-1, 2, 2)
         with np.errstate(over="ignore", invalid="ignore"):  # refused, or left out
             walls = walls_of(lines, side=side)
         return cls(walls, found, sigma=sigma)
@@ -193,11 +193,22 @@ class LineMap(ReadOnly):
             Walls and columns that were seen less often are left out.
         sigma : float
             As for the map.
+
+        Raises
+        ------
+        ValueError
+            If there are not as many poses, or covariances, as scans.
+        LineamentError
+            As for the map.
         """
-        at = (repeat(None) if of is None else of for of in (poses, pose_covariances))
+        scans, given = list(features), {"poses": poses, "pose_covariances": pose_covariances}
+        at = [[None] * len(scans) if of is None else list(of) for of in given.values()]
+        for name, of in zip(given, at, strict=True):
+            if len(of) != len(scans):
+                raise ValueError(f"{name} are {len(of)}, expected {len(scans)}, one for each scan")
         placed = [
             seen if pose is None else seen.transform(*pose, spread)
-            for seen, pose, spread in zip(features, *at, strict=False)
+            for seen, pose, spread in zip(scans, *at, strict=True)
         ]
         shown = walls_shown([of.segments for of in placed]), columns_shown(of.arcs for of in placed)
         return cls(*(records[records["views"] >= min_views] for records in shown), sigma=sigma)
@@ -306,3 +317,12 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     members = np.empty(begins[-1], np.int64)
     list_walls(table, grid, _AROUND, begins[:-1].copy(), members)
     return Index(table, grid, begins, members)
+
+
+def _rows(name: str, given: ArrayLike, *shapes: tuple[int, ...]) -> Array:
+    """Numbers of one of some shapes in each row; none is a row of nothing."""
+    rows = np.array(given, np.float64)
+    if rows.size and rows.shape[1:] not in shapes:
+        wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
+        raise ValueError(f"{name} have shape {rows.shape}, expected {wanted}")
+    return rows.reshape(-1, *shapes[0])

@@ -116,6 +116,11 @@ def locate(
     -------
     Location
 
+    Raises
+    ------
+    ValueError
+        If a covariance is given without a guess.
+
     Examples
     --------
     >>> import lineament as ln
@@ -126,6 +131,8 @@ def locate(
     >>> where.verdict, [round(value, 2) for value in where.pose]
     ('located', [-1.0, 0.5, 0.7])
     """
+    if guess is None and covariance is not None:
+        raise ValueError("a covariance is given without a guess, which it would be that of")
     if isinstance(query, LocalMap):
         query = query.query()
     elif isinstance(query, Features):

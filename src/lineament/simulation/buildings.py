@@ -39,6 +39,8 @@ from .worlds import World, closed, rectangle
 
 #: Half the width of the lane behind a door that stays clear of furniture [m].
 _LANE = 0.6
+#: Width and depth of a storey, at most [m]: rooms and rays grow with its area.
+_WIDEST = 300.0
 #: A sensor is put no nearer to a surface than this [m].
 _CLEAR = 0.3
 #: Speed of people [m/s], the radius of a leg, and how far a leg is from the middle [m].
@@ -211,7 +213,7 @@ def office(
     seed : int
         Of everything that is drawn.
     size : (width, depth)
-        Outer size [m], at least 20 m x 16 m.
+        Outer size [m], 20 m x 16 m to 300 m x 300 m.
     identical : float
         Share of rows of identical rooms.
     furniture : float
@@ -222,7 +224,7 @@ def office(
     Raises
     ------
     ValueError
-        If the storey is too small.
+        If the storey is too small or too large.
 
     Examples
     --------
@@ -232,8 +234,9 @@ def office(
     >>> storey.plan.n_surfaces < storey.world.n_surfaces
     True
     """
-    if size[0] < 20 or size[1] < 16:
-        raise ValueError(f"size is {size}, expected at least 20 m x 16 m")
+    if not (20 <= size[0] <= _WIDEST and 16 <= size[1] <= _WIDEST):
+        most = f"{_WIDEST:g} m x {_WIDEST:g} m"
+        raise ValueError(f"size is {size}, expected 20 m x 16 m to {most}")
     rng = np.random.default_rng([seed, 6])
     level, upright = corridors_of(size, rng)
     rooms: list[Room] = []

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 DEMO_METHODS = ("optimal", "liu:scale_free", "liu:paper")
 #: Names of the pictures; of the last two a log has one.
 _PICTURES = ("scan", "corner", "trace", "methods", "map", "scans")
+#: The simulated log; and how the title of a page begins.
+_DRIVE, _TITLE = "drive.npz", "lineament: lines and corners of "
 #: How many scans one picture shows.
 _MOMENTS = 6
 
@@ -46,19 +48,22 @@ def run_demo(
     Raises
     ------
     LineamentError
-        If the log cannot be read or the folder cannot be written.
+        If the log cannot be read, or the folder cannot be written, or has files of such names that
+        no demo made.
     """
     if log is not None:
         open_log(log, limits=limits)  # before a folder is made for it
     target = made_folder(folder)
     page, table = target / "index.html", target / "features.parquet"
     drawn = [target / f"{name}.png" for name in _PICTURES]
-    check_outputs([page, table, *drawn], () if log is None else (log,))
+    written = [page, table, *drawn, *([target / _DRIVE] if log is None else [])]
+    check_outputs(written, () if log is None else (log,))
+    _spare_others(page, written)
     load_kernels(map(Extractor, DEMO_METHODS))
     if log is None:
         from ..simulation import SENSORS, simulate_log
 
-        log = target / "drive.npz"
+        log = target / _DRIVE
         simulate_log(log, "building", SENSORS["utm30lx"], rate=4.0, seed=1, track=track)
     extractor = Extractor(DEMO_METHODS[0])
     summary = extract_log(log, table, extractor, track=track, limits=limits)
@@ -80,9 +85,17 @@ def run_demo(
     from ..output.page import image_part, list_part, write_parts
 
     images = [image_part(caption, path.read_bytes(), dark=dark) for caption, path, dark in pictures]
-    title = f"lineament: lines and corners of {Path(log).name}"
-    write_parts(page, title, [*images[:1], list_part(facts), *images[1:]])
+    write_parts(page, f"{_TITLE}{Path(log).name}", [*images[:1], list_part(facts), *images[1:]])
     return [*facts, ("page", str(page))]
+
+
+def _spare_others(page: Path, written: list[Path]) -> None:
+    """Raise a LineamentError where files that no demo made would be replaced."""
+    there = [path for path in written if path.exists()]
+    if there and not (page.exists() and _TITLE in page.read_text("utf-8", "replace")):
+        raise LineamentError(
+            f"{there[0]}: is of no demo and would be replaced: name another folder"
+        )
 
 
 def _draw(
