@@ -8,11 +8,11 @@ from small_room import RING, plan_of, query_at, scans_on
 
 from lineament import Extractor, Tracker
 from lineament.mapping import LineMap, LocalMap, Query, locate
-from lineament.mapping.evidence import evidence_of
+from lineament.mapping.evidence import Evidence, evidence_of
 from lineament.mapping.following import Follower
 from lineament.mapping.hypotheses import anchors, directions, hypotheses
 from lineament.mapping.local_map import moved_beams, thinned
-from lineament.mapping.locate import _searched
+from lineament.mapping.locate import Location, _searched
 from lineament.mapping.refine import adjusted
 from lineament.mapping.walls import walls_of
 
@@ -239,3 +239,59 @@ def test_scans_far_apart_are_not_of_one_drive(stamp, odometry, torn):
     found = follower(np.eye(3))
     found._stamp, found._odometry = 1.0, (3.0, 4.0, 0.0)
     assert found._is_torn(stamp, odometry) == torn
+
+
+def location(verdict="located", odds=50.0, contradicted=0.0):
+    evidence = Evidence(odds, 0.9, 0.1 - contradicted, contradicted, 100)
+    return Location(verdict, (0.0, 0.0, 0.0), np.diag((0.01, 0.01, 0.002)) ** 2, evidence)
+
+
+LOST, SURELY = "not on this map", math.log(1000)
+
+
+@pytest.mark.parametrize(
+    ("looks", "known"),
+    [
+        # Two looks that contradict are not too many; after a third the plan is looked at anew.
+        ([location(LOST, -5.0)] * 2 + [location()], [True] * 4),
+        ([location(LOST, -5.0)] * 3 + [location(LOST)], [True] * 4 + [False]),
+        ([location(LOST, SURELY - 0.1)] * 3 + [location(LOST)], [True] * 4 + [False]),
+        ([location(LOST, SURELY + 0.1)] * 4, [True] * 5),
+        ([location(LOST, 50.0, 0.13)] * 3 + [location(LOST)], [True] * 4 + [False]),
+        ([location(LOST, 50.0, 0.11)] * 4, [True] * 5),
+        # Four looks that agree take back one that does not, three do not.
+        ([location(LOST, -5.0)] * 2 + [location()] * 4 + [location(LOST, -5.0)] * 2, [True] * 9),
+        (
+            [location(LOST, -5.0)] * 2 + [location()] * 3 + [location(LOST, -5.0), location(LOST)],
+            [True] * 7 + [False],
+        ),
+    ],
+)
+def test_looks_that_contradict_the_plan(monkeypatch, looks, known):
+    """A sensor that stands, and looks at the plan with each scan, once a second."""
+    answers = iter([location(), *looks])
+    monkeypatch.setattr("lineament.mapping.following.locate", lambda *_: next(answers))
+    found, extract = Follower(plan_of(RING)), Extractor()
+    scan = next(scans_on([0.0]))
+    wheres = [found(extract(scan.stamped("first", int(1.1e9 * k)))) for k in range(len(known))]
+    assert [bool(where) for where in wheres] == known
+
+
+@pytest.mark.parametrize(
+    ("step", "turn", "pace", "every"),
+    [(0.11, 0.0, 0.01, 5), (0.0, 0.055, 0.01, 5), (0.0, 0.0, 0.3, 4), (0.0, 0.0, 0.1, 11)],
+)
+def test_the_plan_is_looked_at_each_half_metre_15_degrees_or_second(
+    monkeypatch, step, turn, pace, every
+):
+    found, extract = Follower(plan_of(RING)), Extractor()
+    wheres = []
+    for k, scan in enumerate(scans_on(step * np.arange(12), turn=turn)):
+        of_scan = location()
+        answer = Location("located", scan.pose, of_scan.covariance, of_scan.evidence)
+        monkeypatch.setattr("lineament.mapping.following.locate", lambda *_, got=answer: got)
+        scan = scan.stamped("first", int(1e9 * pace * k))
+        wheres.append(found(extract(scan), scan.pose))
+    looked = [k for k, where in enumerate(wheres) if where.location is not None]
+    assert looked == [*range(0, 12, every)]
+    assert all(wheres)
