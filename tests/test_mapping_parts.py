@@ -7,13 +7,16 @@ import pytest
 from handmade import features, segment
 from small_room import scans_on
 
-from lineament import Extractor
+from lineament import Extractor, Tracker
 from lineament.features import SEGMENT
+from lineament.mapping import LocalMap
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import single
 from lineament.mapping.sights import SIGHT, lines_of, merged, sights_of, walls_along
 from lineament.mapping.walls import walls_of
+from lineament.scan.poses import compose
+from lineament.simulation import World
 
 
 def test_a_wall_is_hidden_by_how_far_it_is_in_the_middle_of_what_they_share():
@@ -175,3 +178,48 @@ def test_where_a_way_was_passed_before():
     frames = [Frame(k == 10) for k in range(20)]
     survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)
     np.testing.assert_allclose(np.diff(survey.way), [*[0.5] * 9, 12, *[0.5] * 9])
+
+
+@pytest.mark.parametrize(("step", "turn"), [(0.11, 0.0), (0.0, 0.1)])
+def test_a_key_frame_is_taken_for_each_0_3_m_or_15_degrees(step, turn):
+    placed, extract = Drive(), Extractor()
+    poses = []
+    for scan in scans_on(step * np.arange(10), turn=turn):
+        placed.add(scan, extract(scan), scan.pose)
+        poses.append(scan.pose)
+    assert [frame.index for frame in placed.frames] == [0, 3, 6, 9]
+    assert [k for k, _ in placed.scans] == [0, 0, 0, 1, 1, 1, 2, 2, 2, 3]
+    found = [compose(placed.frames[k].pose, pose) for k, pose in placed.scans]
+    off = np.subtract(found, poses)
+    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+    assert np.abs(off).max() < 0.02
+    # Walls keep their numbers while they are seen.
+    first, last = placed.frames[0].walls, placed.frames[-1].walls
+    assert len({*first} & {*last}) >= 5
+    assert len({*first}) == len(first)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_how_well_a_local_map_knows_its_motions(given):
+    """By odometry 5 mm, 5 mrad and a tenth; else 5 cm and all of the way, 20 mrad and a fifth."""
+    tracker, local, extract = Tracker(), LocalMap(), Extractor()
+    for scan in scans_on([-0.2, 0.2], turn=0.2):
+        found, at = extract(scan), scan.pose if given else None
+        local.add(found, tracker(found, scan.pose), at)
+    (_, last) = local._sights
+    sigma = (0.005 + 0.04, 0.005 + 0.04, 0.005 + 0.02) if given else (0.45, 0.45, 0.02 + 0.04)
+    np.testing.assert_allclose(np.sqrt(np.diag(last.covariance)), sigma, rtol=0.02)
+    np.testing.assert_allclose(last.motion, (0.4, 0.0, 0.2), atol=0.02)
+
+
+def test_in_a_corridor_a_motion_along_it_is_not_known():
+    """To half a metre more, where no odometry shows it."""
+    corridor = World([[-90, -1, 90, -1], [90, 1, -90, 1]], [])
+    tracker, local, extract = Tracker(), LocalMap(), Extractor()
+    for scan in scans_on([0.0, 0.4], corridor):
+        found = extract(scan)
+        local.add(found, tracker(found))
+    along, across, _ = np.sqrt(np.diag(local._sights[-1].covariance))
+    assert 0.5 < along < 1.1
+    assert across < 0.6 < 0.5 + along
+    assert along**2 - across**2 == pytest.approx(0.25, rel=0.05)
