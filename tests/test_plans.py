@@ -18,7 +18,6 @@ from lineament.output.canvas import CORNER_COLOR, EDGE_COLOR
 from lineament.output.floor_plan import Averages, FloorPlan
 from lineament.output.markers import arc_span, ellipses_of, markers_of
 from lineament.output.scene import Layer, layers_of
-from lineament.output.walls import offsets_between
 
 SVG = "{http://www.w3.org/2000/svg}"
 WALL = (0, 0), (4, 0)
@@ -437,34 +436,3 @@ def test_pieces_of_strips_are_the_same_in_one_array():
     ):
         found = Layer("a", (0, 0, 0, 1), 0.1, given_strips).pairs
         np.testing.assert_array_equal(found, np.reshape(pairs, (-1, 2)))
-
-
-def beside(a, b, angle):
-    """How far a line lies beside a wall, by definition, one number at a time."""
-    (ax, ay), (bx, by) = a[1] - a[0], b[1] - b[0]
-    if abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) >= angle:
-        return math.inf
-    short, long = (a, b) if math.dist(*a) <= math.dist(*b) else (b, a)
-    u = (long[1] - long[0]) / math.dist(*long)
-    along = (a - b[0]) @ (b[1] - b[0]) / math.dist(*b)
-    if max(min(along) - math.dist(*b), -max(along)) >= 0.2:
-        return math.inf
-    return max(abs(u[0] * (p - long[0])[1] - u[1] * (p - long[0])[0]) for p in short)
-
-
-@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
-def test_offsets_between_lines_and_walls_are_those_of_their_definition(quarters):
-    """Also where all lines are few, along one axis, and the walls begin beside their ends."""
-    rng = np.random.default_rng(quarters)
-    start, turn = rng.uniform(-2, 2, (40, 2)), rng.choice((0, 0.05, 0.2, math.pi), 40)
-    length = rng.uniform(0.3, 6, (40, 1))
-    lines = np.stack((start, start + length * np.column_stack((np.cos(turn), np.sin(turn)))), 1)
-    lines = np.append(lines, [[(0, 0), (10, 0)], [(8, 0), (12, 0)], [(10.1, 0), (14, 0)]], axis=0)
-    lines = lines @ turned(quarters * math.pi / 2)
-    for count in (1, 2, 43):
-        few, angles = lines[-count:], np.linspace(0.1, 0.3, count)
-        expected = [
-            [beside(a, b, angle) for b in lines] for a, angle in zip(few, angles, strict=True)
-        ]
-        np.testing.assert_allclose(offsets_between(few, lines, angles), expected, atol=1e-9)
-        assert np.isfinite(expected).sum() > 2
