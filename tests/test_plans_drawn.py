@@ -40,7 +40,9 @@ def test_arcs_of_one_thing_are_within_10_cm(other, is_one):
     plan = FloorPlan()
     for x, y, radius in ((0, 0, 0.5), other):
         plan.add(features(arcs=[arc(x, y, radius, 0, 9)]))
-    assert len(plan.markers(1)[0].arcs) == 2 - is_one
+    arcs = plan.markers(1)[0].arcs
+    assert len(arcs) == 2 - is_one
+    np.testing.assert_array_equal(arcs[:, 3:], [(0.0, 2 * math.pi)] * len(arcs))  # whole circles
 
 
 @pytest.mark.parametrize(
