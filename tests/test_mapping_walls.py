@@ -10,7 +10,7 @@ from lineament.errors import LineamentError
 from lineament.mapping import LineMap
 from lineament.mapping.drive_map import _passed
 from lineament.mapping.hypotheses import anchors, meetings
-from lineament.mapping.sights import SIGHT, errors, extents, lines_of, move
+from lineament.mapping.sights import SIGHT, errors, extents, lines_of, move, walls_along
 from lineament.mapping.walls import COLUMN, as_walls, cut, moved, segments_of, walls_of, wrapped
 from lineament.scan.poses import compose, inverse
 
@@ -244,3 +244,13 @@ def test_a_wall_that_three_beams_pass_is_gone(ys, ranges, gone):
     assert _passed(wall, beams).tolist() == [gone]
     other_side = segments_of(walls_of(np.array([[(2.0, 1.0), (2.0, -1.0)]])))
     assert not _passed(other_side, beams).any()
+
+
+@pytest.mark.parametrize(("across", "parts"), [(4, 2), (6, 1)])
+def test_a_wall_goes_on_where_more_than_a_fifth_of_its_sights_do(across, parts):
+    """Twenty sights to either side of a doorway, and some along all of it."""
+    sights = np.zeros(40 + across, SIGHT)
+    sights["covariance"] = 1e-6 * np.eye(2)
+    sights["ends"][:20], sights["ends"][20:40], sights["ends"][40:] = (0, 2), (3, 5), (0, 5)
+    lines = lines_of(sights, np.zeros((1, 3)), 1)
+    assert len(walls_along(sights, np.zeros((1, 3)), lines, views=2)) == parts
