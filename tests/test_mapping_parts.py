@@ -223,3 +223,14 @@ def test_in_a_corridor_a_motion_along_it_is_not_known():
     assert 0.5 < along < 1.1
     assert across < 0.6 < 0.5 + along
     assert along**2 - across**2 == pytest.approx(0.25, rel=0.05)
+
+
+def test_each_stretch_of_the_way_that_passed_near_is_looked_at():
+    """One that passes 1.5 m away at key frame 8, and one that begins 0.5 m away at key frame 40."""
+    first = np.column_stack((0.5 * np.arange(-8, 8), np.full(16, 1.5)))
+    away = np.column_stack((np.full(24, 50.0), np.arange(24)))
+    second = np.column_stack((np.zeros(10), 0.5 + 0.3 * np.arange(10)))
+    places = np.concatenate((first, away, second, away, [(0.0, 0.0)]))
+    poses = np.column_stack((places, np.zeros(len(places))))
+    survey = Survey([Frame() for _ in poses], poses, None, None)
+    assert survey._passed(len(poses) - 1, 2.0) == [40, 8]
