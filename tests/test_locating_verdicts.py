@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from small_room import RING, plan_of, query_at
 
+from lineament import LaserScan
 from lineament.mapping import LineMap, Query, locate
+from lineament.mapping.following import follow
 from lineament.mapping.hypotheses import BOX, TURN
 from lineament.mapping.locate import VERDICTS, _judged, _near, distinct, squares_off
 from lineament.mapping.refine import adjusted
@@ -134,3 +136,26 @@ def test_a_turn_is_found_at_once_by_the_angles(flipped):
         start = np.add(POSE, (0.0, 0.0, turn))
         pose, _ = adjusted(start, np.arange(n), Query(walls, known, query.beams), PLAN.index)
         assert pose[2] == pytest.approx(POSE[2], abs=1e-4)
+
+
+def test_how_far_a_sweep_may_be_off_as_a_whole(monkeypatch):
+    """By the change of the velocity and a tenth of it, over half the sweep of 0.1 s; 1 at first."""
+    twists, skews = iter([None, None, (2.0, 0.0, 0.5), (2.0, 0.0, 0.5)]), []
+
+    class Stub:
+        def __init__(self, plan):
+            assert plan is PLAN
+
+        @property
+        def twist(self):
+            return next(twists)
+
+        def __call__(self, features, pose, skew):
+            assert pose is None
+            skews.append(skew)
+
+    monkeypatch.setattr("lineament.mapping.following.Follower", Stub)
+    scan = LaserScan([2.0] * 11, 0.0, 0.1, time_increment=0.01)
+    list(follow([scan] * 4, PLAN, lambda straight: straight, odometry=False))
+    expected = [(0.05, 0, 0.05), (0, 0, 0), (0.11, 0, 0.0275), (0.01, 0, 0.0025)]
+    np.testing.assert_allclose(skews, expected, atol=1e-12)
