@@ -150,7 +150,7 @@ def test_how_far_a_sweep_may_be_off_as_a_whole(monkeypatch):
         def twist(self):
             return next(twists)
 
-        def __call__(self, features, pose, skew):
+        def __call__(self, _, pose, skew):
             assert pose is None
             skews.append(skew)
 

@@ -7,10 +7,19 @@ import pytest
 from small_room import RING, plan_of, query_at
 
 from lineament.errors import LineamentError
+from lineament.features import ARC
 from lineament.mapping import LineMap
 from lineament.mapping.drive_map import _passed
 from lineament.mapping.hypotheses import anchors, meetings
-from lineament.mapping.sights import SIGHT, errors, extents, lines_of, move, walls_along
+from lineament.mapping.sights import (
+    SIGHT,
+    columns_shown,
+    errors,
+    extents,
+    lines_of,
+    move,
+    walls_along,
+)
 from lineament.mapping.walls import COLUMN, as_walls, cut, moved, segments_of, walls_of, wrapped
 from lineament.scan.poses import compose, inverse
 
@@ -254,3 +263,12 @@ def test_a_wall_goes_on_where_more_than_a_fifth_of_its_sights_do(across, parts):
     sights["ends"][:20], sights["ends"][20:40], sights["ends"][40:] = (0, 2), (3, 5), (0, 5)
     lines = lines_of(sights, np.zeros((1, 3)), 1)
     assert len(walls_along(sights, np.zeros((1, 3)), lines, views=2)) == parts
+
+
+@pytest.mark.parametrize(("square", "columns"), [(10.5, 1), (12.3, 2)])
+def test_columns_are_one_within_the_99_percent_of_three_degrees(square, columns):
+    """Centre and radius of both are known to 10 mm; the quantile is 11.34."""
+    first, other = np.zeros((2, 1), ARC)
+    first["covariance"] = other["covariance"] = np.eye(3) * 1e-4
+    other["radius"] = math.sqrt(2e-4 * square)
+    assert len(columns_shown([first, other])) == columns
