@@ -19,11 +19,13 @@ from lineament.scan.poses import compose
 from lineament.simulation import World
 
 
-def test_a_wall_is_hidden_by_how_far_it_is_in_the_middle_of_what_they_share():
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
+def test_a_wall_is_hidden_by_how_far_it_is_in_the_middle_of_what_they_share(turn):
     """A wall of 10 m, and others askew from x = 2 to 8: 12 and 20 cm off at x = 5."""
+    c, s = math.cos(turn), math.sin(turn)
     for middle, hidden in ((0.12, True), (0.20, False)):
         ends = [(0, 0, 10, 0), (2, middle - 0.1, 8, middle + 0.1)]
-        walls = walls_of(np.array(ends).reshape(-1, 2, 2))
+        walls = walls_of(np.array(ends).reshape(-1, 2, 2) @ np.array([[c, s], [-s, c]]))
         walls["views"] = 9, 3
         assert len(single(walls)) == (1 if hidden else 2)
 
