@@ -200,9 +200,12 @@ def tests_of(area: str) -> list[Path]:
 
 
 def order_of(mutant: Mutant, reached: Reached) -> list[str]:
-    """Return the tests that reach the line of a mutant, and then those that reach its file."""
+    """Return the tests that reach the line of a mutant, and then those that reach its file.
+
+    And those that reach nothing: they look at constants.
+    """
     path = str(mutant.file.relative_to(SOURCE))
-    near = {test: of[path] for test, (_, of) in reached.items() if path in of}
+    near = {test: of.get(path, []) for test, (_, of) in reached.items() if path in of or not of}
     by_seconds = sorted(near, key=lambda test: (mutant.line not in near[test], reached[test][0]))
     tests, seconds = [], 0.0
     for test in by_seconds:
