@@ -88,9 +88,9 @@ new-user: .venv/ready
 	$(BIN)/python -m build --no-isolation --quiet
 	$(BIN)/python benchmarks/new_user.py dist/lineament-*-py3-none-any.whl
 
-# Do the tests fail when the code is wrong? Half an hour for each hundred on two cores.
+# Do the tests fail when the code is wrong? A quarter of an hour for each area on two cores.
 mutants: .venv/ready
-	$(BIN)/python benchmarks/mutants.py --count 300 --seed 1
+	$(BIN)/python benchmarks/mutants.py $(AREA:%=--area %) --seed 1
 
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py

@@ -1,269 +1,281 @@
 """Mutants: does a test fail when the code is wrong?
 
-    python benchmarks/mutants.py --count 300 --seed 1 [--area output] [--jobs 2]
+    python benchmarks/mutants.py --area mapping [--area output ...] --count 40 --seed 1
 
-The suite runs once under coverage, uncompiled, to know which tests reach which line. Then one
-place at a time is changed (a comparison, an operator, a constant, a min for a max, a statement
-left out), and the tests that reach it run, the quickest first, until one fails. Mutants are drawn
-at random, the same ones for a seed, spread evenly over the areas. Survivors are listed with their
-lines: each is either equivalent, or a test that is missing.
+The tests of an area run once under coverage, to know which of them reach which line. Then one
+place at a time is changed (a comparison, an operator, a constant, a min for a max, a statement left
+out), and the tests that reach the line run, the quickest first, then others that reach its file,
+until one fails. Mutants are drawn at random, the same ones for a seed. Survivors are listed with
+their lines: each is either equivalent, or a test that is missing.
+
+Sources are copied to ``build/mutants``, where each job changes its own copy. What a file of tests
+reaches is kept there, too, until it or any source changes.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
+import hashlib
+import importlib
+import json
+import multiprocessing
 import os
 import random
+import resource
 import shutil
-import sqlite3
-import subprocess
+import signal
 import sys
-import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
 
-from coverage.numbits import numbits_to_nums
+import coverage
+import numba
+import pytest
+from mutating import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
-SOURCE = ROOT / "src" / "lineament"
-AREAS = {
-    "kernels": ("kernels",),
-    "methods": ("methods", "extractor.py", "scan", "features", "explain", "bounds.py"),
-    "logs": ("logs", "rosmsg"),
-    "output": ("output",),
-    "motion": ("motion",),
-    "evaluation": ("evaluation", "simulation", "reproduce"),
-    "commands": ("tasks", "cli", "view", "live", "files.py", "errors.py"),
+SOURCE = ROOT / "src"
+WORK = ROOT / "build" / "mutants"
+#: The parts of each area, and the tests that belong to it: ``tests/test_NAME.py``.
+AREAS: dict[str, tuple[str, str]] = {
+    "kernels": ("kernels", "*"),
+    "methods": ("methods extractor.py scan features explain bounds.py", "*"),
+    "logs": ("logs rosmsg", "*log* ros* source* info saving limits bulk* pdbs"),
+    "output": (
+        "output",
+        "output plans* figures notebook writers_mcap ros_messages feature_points world tables",
+    ),
+    "mapping": ("mapping", "mapping* locating* relocation"),
+    "motion": (
+        "motion",
+        "motion tracking* docking odometry deskewing relocation evaluation_tracking",
+    ),
+    "live": ("live", "live* relocation ros_messages"),
+    "evaluation": ("evaluation", "evaluation* ple partition* consistency liu* compare"),
+    "simulation": ("simulation", "simulation scenes truth buildings world scanners"),
+    "reproduce": ("reproduce", "experiment* reproduce compare"),
+    "commands": (
+        "tasks cli view files.py errors.py",
+        "cli ends view* bulk* progress locating* mapping* extractor explaining dependencies limits",
+    ),
 }
-#: Seconds that the tests of one mutant may take: a mutant that loops is killed by the clock.
-PATIENCE = 120.0
-#: The most tests that run for one mutant, the quickest of those that reach it.
-MOST_TESTS = 60
+#: Kernels are compiled unless they change: numba does not see that what they call did.
+UNCOMPILED = ("kernels", "methods")
+#: Tests run for one mutant until they would take so long; a mutant that loops is killed by its
+#: processor time, one that hangs by the clock [s].
+ENOUGH, MOST, PATIENCE = 30.0, 100, 400.0
+#: Imported before the tests are started, each time as a fork of this process.
+LIBRARIES = "hypothesis numpy.testing pyarrow.parquet matplotlib.pyplot scipy.sparse.linalg"
 
-COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
-    ast.In: ast.NotIn, ast.NotIn: ast.In,
-}  # fmt: skip
-OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.FloorDiv: ast.Mult, ast.Mod: ast.Mult, ast.Pow: ast.Mult,
-}  # fmt: skip
-SWAPS = {"min": "max", "max": "min", "any": "all", "all": "any", "sin": "cos", "cos": "sin"}
+#: Of each test its seconds, and the lines that it reaches in each file.
+Reached = dict[str, tuple[float, dict[str, list[int]]]]
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """One change of one file."""
+class Contexts:
+    """A plugin of pytest that records what each test reaches, its seconds, and if it passes."""
 
-    area: str
-    file: Path
-    line: int
-    what: str
-    text: str
+    def __init__(self) -> None:
+        self.coverage = coverage.Coverage(
+            data_file=None, source=[str(WORK / "0")], config_file=False
+        )
+        self.seconds: dict[str, float] = {}
+        self.failed: set[str] = set()
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        self.coverage.switch_context(nodeid)
+        self.seconds[nodeid] = -sum(os.times()[:4])
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        self.seconds[nodeid] += sum(os.times()[:4])
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.outcome != "passed":
+            self.failed.add(report.nodeid)
+
+    def reached(self) -> Reached:
+        data = self.coverage.get_data()
+        lines: dict[str, dict[str, list[int]]] = defaultdict(dict)
+        for path in data.measured_files():
+            short = str(Path(path).relative_to(WORK / "0"))
+            for line, tests in data.contexts_by_lineno(path).items():
+                for test in tests:
+                    lines[test].setdefault(short, []).append(line)
+        good = self.seconds.keys() - self.failed
+        return {test: (self.seconds[test], lines[test]) for test in sorted(good)}
+
+
+def prepare(job: str, compiled: bool) -> None:
+    """Turn this process, a fork, to the sources of a job."""
+    os.setsid()
+    copy = str(WORK / job)
+    os.environ |= {"PYTHONPATH": copy, "NUMBA_DISABLE_JIT": str(int(not compiled))}
+    sys.path.insert(0, copy)
+    numba.config.DISABLE_JIT = int(not compiled)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    log = os.open(WORK / f"{job}.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(log, 1)
+    os.dup2(log, 2)
+
+
+def arguments(compiled: bool) -> list[str]:
+    """Return those of pytest; uncompiled, what is slow is left out."""
+    what = ["-q", "-p", "no:cacheprovider", f"--rootdir={ROOT}"]
+    what += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    return what if compiled else [*what, "-m", "not slow"]
+
+
+def cover(file: str, kept: Path, compiled: bool) -> None:
+    """Run a file of tests, and keep what its tests reach."""
+    prepare("0", compiled)
+    contexts = Contexts()
+    contexts.coverage.start()
+    pytest.main([*arguments(compiled), file], plugins=[contexts])
+    contexts.coverage.stop()
+    kept.write_text(json.dumps(contexts.reached()))
+
+
+def run(tests: list[str], job: str, compiled: bool) -> None:
+    """Run tests; the exit status is that of pytest."""
+    prepare(job, compiled)
+    # The files of the mutant before may have the same size and second.
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    sys.dont_write_bytecode = True
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST, MOST))
+    os._exit(int(pytest.main([*arguments(compiled), "-x", *tests])))
+
+
+def forked(target: Callable[..., None], *arguments: Any) -> int | None:
+    """Return the exit status of a function that runs in a fork, or None if it takes too long."""
+    patience = PATIENCE if target is run else None
+    process = multiprocessing.get_context("fork").Process(target=target, args=arguments)
+    process.start()
+    process.join(patience)
+    if process.exitcode is None:
+        os.killpg(process.pid or 0, signal.SIGKILL)
+        process.join()
+        return None
+    return process.exitcode
+
+
+def copied(job: str) -> str:
+    """Copy the sources, with their times, for numba to know them by."""
+    shutil.copytree(
+        SOURCE, WORK / job, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    return job
+
+
+def covering(files: list[Path], compiled: bool) -> Reached:
+    """Return what the tests of some files reach."""
+    common = b"".join(file.read_bytes() for file in sorted(SOURCE.rglob("*.py")))
+    reached: Reached = {}
+    for file in files:
+        state = hashlib.sha256(common + file.read_bytes() + bytes([compiled])).hexdigest()[:16]
+        kept = WORK / f"{file.stem}-{state}.json"
+        if not kept.exists():
+            started = time.monotonic()
+            print(f"{file.name}: ", end="", file=sys.stderr, flush=True)
+            forked(cover, str(file), kept, compiled)
+            print(f"{time.monotonic() - started:.0f} s", file=sys.stderr, flush=True)
+        reached |= json.loads(kept.read_text())
+    return reached
 
 
 def files_of(area: str) -> Iterator[Path]:
     """Yield the source files of an area."""
-    for part in AREAS[area]:
-        place = SOURCE / part
+    for part in AREAS[area][0].split():
+        place = SOURCE / "lineament" / part
         yield from sorted(place.rglob("*.py")) if place.is_dir() else [place]
 
 
-def mutants_of(area: str, file: Path) -> Iterator[Mutant]:
-    """Yield every mutant of a file."""
-    source = file.read_text(encoding="utf-8")
-    lines = source.splitlines(keepends=True)
-    starts = [0]
-    for line in lines:
-        starts.append(starts[-1] + len(line.encode()))
-    data = source.encode()
-
-    def changed(node: ast.expr | ast.stmt, new: str) -> Mutant:
-        first = starts[node.lineno - 1] + node.col_offset
-        last = starts[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0)
-        old = data[first:last].decode()
-        text = (data[:first] + new.encode() + data[last:]).decode()
-        return Mutant(area, file, node.lineno, f"{old!r} -> {new!r}"[:150], text)
-
-    tree = ast.parse(source)
-    skipped = {
-        id(child)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.AnnAssign | ast.arg | ast.JoinedStr | ast.Raise | ast.Import)
-        or (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
-        for child in ast.walk(getattr(node, "annotation", None) or node)
-        if not (isinstance(node, ast.AnnAssign) and child is node)
-    }
-    for node in ast.walk(tree):
-        if id(node) in skipped or getattr(node, "col_offset", None) is None:
-            continue
-        yield from (changed(place, new) for place, new in _changes(node))
+def tests_of(area: str) -> list[Path]:
+    """Return the files of tests of an area."""
+    names = AREAS[area][1].split()
+    return sorted({file for name in names for file in (ROOT / "tests").glob(f"test_{name}.py")})
 
 
-def _changes(node: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
-    """Yield the places of a node that change, and what they become."""
-    if isinstance(node, ast.expr):
-        yield from ((node, f"({ast.unparse(new)})") for new in (*_operations(node), *_values(node)))
-    elif isinstance(node, ast.AugAssign) or (
-        isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
-    ):
-        yield node, "pass"
+def order_of(mutant: Mutant, reached: Reached) -> list[str]:
+    """Return the tests that reach the line of a mutant, and then those that reach its file.
+
+    And those that reach nothing: they look at constants.
+    """
+    path = str(mutant.file.relative_to(SOURCE))
+    near = {test: of.get(path, []) for test, (_, of) in reached.items() if path in of or not of}
+    by_seconds = sorted(near, key=lambda test: (mutant.line not in near[test], reached[test][0]))
+    tests, seconds = [], 0.0
+    for test in by_seconds:
+        seconds += reached[test][0]
+        if tests and seconds > ENOUGH:
+            break
+        tests.append(test)
+    return tests
 
 
-def _operations(node: ast.expr) -> Iterator[ast.expr]:
-    if isinstance(node, ast.Compare) and len(node.ops) == 1:
-        yield ast.Compare(node.left, [COMPARISONS[type(node.ops[0])]()], node.comparators)
-    elif isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        if not isinstance(node.left, ast.Constant) or not isinstance(node.left.value, str):
-            yield ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right)
-    elif isinstance(node, ast.BoolOp):
-        yield ast.BoolOp(ast.Or() if isinstance(node.op, ast.And) else ast.And(), node.values)
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub):
-        yield node.operand
-
-
-def _values(node: ast.expr) -> Iterator[ast.expr]:
-    if isinstance(node, ast.Constant) and type(node.value) is int:
-        yield ast.Constant(node.value + 1)
-    elif isinstance(node, ast.Constant) and type(node.value) is float:
-        yield ast.Constant(node.value * 1.5 if node.value else 1.0)
-    elif isinstance(node, ast.Name) and node.id in SWAPS and isinstance(node.ctx, ast.Load):
-        yield ast.Name(SWAPS[node.id])
-    elif isinstance(node, ast.Attribute) and node.attr in SWAPS:
-        yield ast.Attribute(node.value, SWAPS[node.attr])
-
-
-def covering(folder: Path) -> tuple[dict[tuple[str, int], list[str]], dict[str, float]]:
-    """Run the suite once; return the tests that reach each line, and the seconds of each test."""
-    data, report = folder / "coverage", folder / "durations"
-    config = folder / "coveragerc"
-    config.write_text(
-        f"[run]\nsource = {SOURCE}\ndata_file = {data}\ndynamic_context = test_function\n"
-    )
-    run = [sys.executable, "-m", "coverage", "run", f"--rcfile={config}", "-m", "pytest"]
-    run += ["-q", "-p", "no:cacheprovider", "--durations=0", "--durations-min=0", "-m", "not slow"]
-    done = subprocess.run(
-        [*run, "tests"], cwd=ROOT, env=environment(SOURCE.parent), capture_output=True, text=True
-    )
-    report.write_text(done.stdout)
-    seconds: dict[str, float] = defaultdict(float)
-    for line in done.stdout.splitlines():
-        parts = line.split()
-        if len(parts) == 3 and parts[1] in ("call", "setup", "teardown") and "::" in parts[2]:
-            seconds[plain_id(parts[2])] += float(parts[0].rstrip("s"))
-    tests: dict[tuple[str, int], list[str]] = defaultdict(list)
-    with sqlite3.connect(data) as base:
-        query = (
-            "select path, context, numbits from line_bits join file on file.id = file_id "
-            "join context on context.id = context_id where context != ''"
-        )
-        for path, context, bits in base.execute(query):
-            for line_number in numbits_to_nums(bits):
-                tests[path, line_number].append(context)
-    return tests, seconds
-
-
-def plain_id(test: str) -> str:
-    """Return the name of a test function as coverage has it: ``test_x.test_name``."""
-    file, _, name = test.partition("::")
-    return f"{Path(file).stem}.{name.split('[')[0].replace('::', '.')}"
-
-
-def environment(source: Path) -> dict[str, str]:
-    """Return the environment of a run without compilation on some sources."""
-    return {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(source)}
-
-
-def survives(mutant: Mutant, tests: list[str], work: Path) -> bool:
+def survives(mutant: Mutant, tests: list[str], job: str, compiled: bool) -> bool:
     """Run the tests on the mutant; whether all pass."""
-    copy = work / f"{os.getpid()}-{id(mutant)}"
-    shutil.copytree(SOURCE.parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    (copy / mutant.file.relative_to(SOURCE.parent)).write_text(mutant.text, encoding="utf-8")
-    by_file = defaultdict(list)
-    for test in tests:
-        name = test.split(".")
-        by_file[name[0]].append(name[-1])
-    chosen = [f"tests/{file}.py" for file in by_file]
-    # The names select; a name that another file has too runs there as well.
-    names = " or ".join(sorted({name for found in by_file.values() for name in found}))
-    run = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow"]
+    file = WORK / job / mutant.file.relative_to(SOURCE)
+    file.write_text(mutant.text, encoding="utf-8")
     try:
-        done = subprocess.run(
-            [*run, "-k", names, *chosen],
-            cwd=ROOT,
-            env=environment(copy),
-            capture_output=True,
-            timeout=PATIENCE,
-        )
-    except subprocess.TimeoutExpired:
-        return False
+        return forked(run, tests, job, compiled) in (0, 5)
     finally:
-        shutil.rmtree(copy, ignore_errors=True)
-    return done.returncode in (0, 5)
+        shutil.copy2(mutant.file, file)
+
+
+def run_area(area: str, drawn: list[Mutant], jobs: SimpleQueue[str], threads: int) -> None:
+    """Print what becomes of the mutants of an area."""
+    started, compiled = time.monotonic(), area not in UNCOMPILED
+    reached = covering(tests_of(area), compiled)
+
+    def lives(mutant: Mutant) -> bool:
+        tests, job = order_of(mutant, reached), jobs.get()
+        try:
+            return not tests or survives(mutant, tests, job, compiled)
+        finally:
+            jobs.put(job)
+
+    killed = 0
+    with ThreadPoolExecutor(threads) as pool:
+        for done, (mutant, left) in enumerate(zip(drawn, pool.map(lives, drawn), strict=True), 1):
+            print(f"\r{done} of {len(drawn)}", end="", file=sys.stderr, flush=True)
+            killed += not left
+            if left:
+                place = str(mutant.file.relative_to(SOURCE))
+                seen = any(mutant.line in of.get(place, ()) for _, of in reached.values())
+                note = "" if seen else "  (no test reaches the line)"
+                print(f"  {place}:{mutant.line}: {mutant.what}{note}", flush=True)
+    share, seconds = 100 * killed / max(len(drawn), 1), time.monotonic() - started
+    print(f"{area}: {killed} of {len(drawn)} killed, {share:.0f} %, {seconds:.0f} s", flush=True)
 
 
 def main() -> None:
     """Run the mutants of each area; print the shares that were killed, and the survivors."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=300, help="mutants in all")
+    parser.add_argument("--count", type=int, default=40, help="mutants of each area")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--area", action="append", choices=AREAS, help="these areas alone")
+    parser.add_argument("--skip", action="append", default=[], help="leave out such paths")
+    parser.add_argument("--at", help="all mutants of this FILE:LINE instead, of one area")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     given = parser.parse_args()
-    areas = given.area or list(AREAS)
-    work = Path(tempfile.mkdtemp())
-    try:
-        print("which tests reach which line", file=sys.stderr, flush=True)
-        tests, seconds = covering(work)
-        with ThreadPoolExecutor(given.jobs) as pool:
-            for area in areas:
-                run_area(area, given.count // len(areas), given.seed, tests, seconds, work, pool)
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
-
-
-def run_area(
-    area: str,
-    count: int,
-    seed: int,
-    tests: dict[tuple[str, int], list[str]],
-    seconds: dict[str, float],
-    work: Path,
-    pool: ThreadPoolExecutor,
-) -> None:
-    """Draw the mutants of an area among the lines that run, and print what became of them."""
-    started = time.monotonic()
-    every = [mutant for file in files_of(area) for mutant in mutants_of(area, file)]
-    drawn = random.Random(f"{seed} {area}").sample(every, min(count, len(every)))
-
-    by_file: dict[str, list[str]] = defaultdict(list)
-    for (path, _), names in tests.items():
-        by_file[path] += names
-
-    def fate(mutant: Mutant) -> bool:
-        # A line that runs at import alone: whatever reaches its file.
-        reached = tests.get((str(mutant.file), mutant.line)) or by_file[str(mutant.file)]
-        order = sorted(set(reached), key=lambda test: seconds.get(test, 0.0))[:MOST_TESTS]
-        return not order or survives(mutant, order, work)
-
-    alive = [m for m, lives in zip(drawn, pool.map(fate, drawn), strict=True) if lives]
-    killed = len(drawn) - len(alive)
-    share = 100 * killed / max(len(drawn), 1)
-    print(
-        f"{area}: {killed} of {len(drawn)} killed, {share:.0f} %, "
-        f"{time.monotonic() - started:.0f} s",
-        flush=True,
-    )
-    for mutant in alive:
-        note = "" if (str(mutant.file), mutant.line) in tests else "  (no test reaches the line)"
-        place = mutant.file.relative_to(SOURCE)
-        print(f"  {place}:{mutant.line}: {mutant.what}{note}", flush=True)
+    for name in LIBRARIES.split():
+        importlib.import_module(name)
+    WORK.mkdir(parents=True, exist_ok=True)
+    jobs: SimpleQueue[str] = SimpleQueue()
+    for job in range(given.jobs):
+        jobs.put(copied(str(job)))
+    os.chdir(ROOT)
+    for area in given.area or AREAS:
+        files = [f for f in files_of(area) if not any(part in str(f) for part in given.skip)]
+        every = [mutant for file in files for mutant in mutants_of(file)]
+        drawn = random.Random(f"{given.seed} {area}").sample(every, min(given.count, len(every)))
+        if given.at:
+            drawn = [m for m in every if f"{m.file}:{m.line}".endswith(given.at)]
+        run_area(area, drawn, jobs, given.jobs)
 
 
 if __name__ == "__main__":

@@ -179,3 +179,60 @@ def test_a_room_that_is_the_same_from_both_ends():
 )  # fmt: skip
 def test_walls_contradict_a_motion(motion, n, is_so):
     assert is_contradicted(motion, WALLS[:n], WALLS) == is_so
+
+
+def wall(middle, length, turn=0.0):
+    c, s = 0.5 * length * math.cos(turn), 0.5 * length * math.sin(turn)
+    x, y = middle
+    return segment((x - c, y - s), (x + c, y + s), 0, 9)
+
+
+@pytest.mark.parametrize(
+    ("later", "is_found"),
+    [
+        (wall((0.0, 0.09), 4.0), True),
+        (wall((0.0, -0.11), 4.0), False),
+        (wall((0.0, 0.0), 1.0, 0.05), True),
+        (wall((0.0, 0.0), 1.0, -0.07), False),
+        # Two metres are shared with a wall of 4 m, half of the shorter.
+        (wall((1.9, 0.0), 4.0), True),
+        (wall((-2.1, 0.0), 4.0), False),
+        (wall((1.9, 0.0), 1.0), True),
+        (wall((2.1, 0.0), 1.0), False),
+        (wall((3.0, 0.0), 8.0), True),
+        (wall((4.5, 0.0), 8.0), False),
+    ],
+)
+def test_a_wall_is_found_again_near_its_line_beside_half_of_it(later, is_found):
+    """One of 4 m; of 10 cm off it, 60 mrad, and half of the shorter beside each other."""
+    before = features(segments=[wall((0.0, 0.0), 4.0), wall((0, 50), 9.0), wall((0, 60), 9.0)])
+    # Of three walls a share of less than 0.3 contradicts: this one alone is nearly all of them.
+    now = features(segments=[later, wall((0, 90), 0.1), wall((0, 91), 0.1)])
+    assert is_contradicted((0.0, 0.0, 0.0), before.segments, now.segments) != is_found
+    place, turn = np.array((1.0, -2.0)), 1.1
+    moved = now.transform(*inverse((*place, turn)))
+    assert is_contradicted((*place, turn), before.segments, moved.segments) != is_found
+
+
+def test_the_ten_longest_walls_decide():
+    """Ten walls of 4 m that are found again, and of 1 m any number that are not; or ten of 5."""
+    same = [wall((0.0, 2.0 * k), 4.0) for k in range(10)]
+    for length, is_so in ((1.0, False), (5.0, True)):
+        others = [wall((50.0, 2.0 * k), length) for k in range(10)]
+        later = [wall((90.0, 2.0 * k), length) for k in range(10)]
+        before, now = (features(segments=same + rest).segments for rest in (others, later))
+        assert is_contradicted((0.0, 0.0, 0.0), before, now) == is_so
+
+
+@pytest.mark.parametrize(("missing", "is_known"), [(0, True), (1, True), (4, False)])
+def test_half_of_the_walls_must_be_found_again(missing, is_known):
+    """Of six walls some stand elsewhere, where no motion explains them."""
+    motion = (0.3, 0.2, 0.1)
+    others = [wall((40.0 + 7 * k, 9.0 * k * k), 4.5, 0.4 + 1.1 * k) for k in range(missing)]
+    later = [*WALLS[: 6 - missing], *features(segments=others).segments]
+    now = features(segments=later).transform(*inverse(motion)).segments
+    narrow = ((0.2, 0.2, 0.1), np.full(3, 0.2))
+    found = relocated(WALLS, now, [WIDE, narrow])
+    assert (found is not None) == is_known
+    if is_known:
+        np.testing.assert_allclose(found, motion, atol=0.02)

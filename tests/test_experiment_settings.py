@@ -1,0 +1,71 @@
+"""The settings of the experiments are those of docs/results.md; columns have the unit they name."""
+
+import importlib
+import math
+import re
+
+import pytest
+
+SETTINGS = {
+    "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
+              "FACE_FROM": 0.1, "FACE_TO": 0.6},
+    "compare": {"_TIMED": 50},
+    "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISE": (263, 3.7),
+                    "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75))},
+    "grid": {"HALF_WIDTHS": (2, 8), "RADIUS": 6, "THRESHOLD": 0.66, "GATE": 0.1,
+             "RADII": (3, 4, 5, 6, 7, 8, 10, 12, 16), "SCENES_A_FRAME": 2,
+             "THRESHOLDS": (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.66, 0.8, 1.0, 1.5),
+             "TURNS": (0.25, 0.5, 0.75)},
+    "layers": {"PAPER": {"liu": 95.11, "liu:paper": 95.11, "pdbs, fixed": 83.55},
+               "PAPER_COUNTS": (11, 5), "SOUGHT": 400},
+    "museum": {"SCANS_A_FRAME": 40, "APART": 0.1, "FAR": (1.0, 5.0), "PLACES": 5},
+    "noise": {"OFF": 0.1, "SIZES": [(0.1, 0.3), (0.3, 0.6), (0.6, 1.2), (1.2, math.inf)]},
+    "real": {"SCANS_A_FRAME": 3, "STILL_A_FRAME": 10, "PAIRS_A_FRAME": 12, "ARENA_A_FRAME": 10,
+             "FIRST": 9, "RATE": 0.8, "QUALITIES": (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)},
+    "repetition": {"_SEEDS": range(5), "_FLAT": 0.03},
+    "scans": {"MOVED": 0.3, "TURNED": math.radians(15), "_SEARCHED": 200, "_STILL": (0.001, 0.001),
+              "_SCENES": 20000, "_COPIES": 8, "_BATCHES": 5},
+    "scenes": {"CHOICE": 5, "NEAR": 0.98},
+    "sensitivity": {"DISTANCES": (0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2), "SCANS_A_FRAME": 6,
+                    "TOLERANCES": (0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3), "VIEWS_A_FRAME": 4},
+    "similarity": {"SMALL": 0.01},
+    "success": {"PAPER_PARTITION": {"liu": (0.9511, (9.6, 25.3)), "pdbs": (0.8355, (15.8, 36.3))},
+                "PAPER_CORNERS": {"liu": (0.9262, (21.6, 38.2)), "iepf": (0.7251, (29.9, 53.4))},
+                "MORE": 10},
+    "tracking": {"SCANS_A_FRAME": 300, "_WAY": (0.02, 0.1), "_TURN": (0.01, 0.1)},
+    "two_corners": {"DISTANCE": 2.302, "GATE": 0.25, "SCANS_A_FRAME": 20,
+                    "_PLACES": ((0.7, 0.9, 0.5), (2.0, 0.6, -0.4), (2.9, 1.3, 0.2),
+                                (1.4, 2.3, -0.6), (2.6, 2.4, 0.1))},
+}  # fmt: skip
+UNITS = {"mm": 1e3, "mm²": 1e6, "%": 100, "µs": 1e6, "ms": 1e3, "mrad": 1e3,
+         "°": math.degrees(1)}  # fmt: skip
+
+
+def module(name):
+    return importlib.import_module(f"lineament.reproduce.{name}")
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_are_those_of_the_results(name):
+    assert {key: getattr(module(name), key) for key in SETTINGS[name]} == SETTINGS[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "table"),
+    [("all_methods", "_COLUMNS"), ("all_methods", "_PANELS"), ("compare", "SIMILARITY"),
+     ("layers", "_COLUMNS"), ("museum", "_COLUMNS"), ("noise", "_RANGES"), ("noise", "_FEATURES"),
+     ("real", "FREE_SPACE"), ("real", "STANDING_STILL"), ("real", "REPEATS"), ("real", "ARENA"),
+     ("scenes", "_COLUMNS"), ("tracking", "_RELATIONS"), ("tracking", "_MOTION"),
+     ("tracking", "_TRACKS"), ("tracking", "_PANELS")],
+)  # fmt: skip
+def test_columns_are_in_the_unit_that_they_name(name, table):
+    """One without a unit is a number, or has that of the column before it."""
+    before = 1.0
+    for label, (key, factor) in getattr(module(name), table).items():
+        unit = re.search(r"\[(.+?)\]", label)
+        if unit is not None:
+            before = UNITS.get(unit[1], 1)
+            # The paper's successes are in percent already.
+            assert factor == pytest.approx(1 if key == "paper" else before), label
+        else:
+            assert factor in (1, before), label

@@ -1,0 +1,161 @@
+"""Verdicts of `locate` by the odds of the best pose over chance, others and the mirror image."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+from small_room import RING, plan_of, query_at
+
+from lineament import LaserScan
+from lineament.mapping import LineMap, Query, locate
+from lineament.mapping.following import follow
+from lineament.mapping.hypotheses import BOX, TURN
+from lineament.mapping.locate import VERDICTS, _judged, _near, distinct, squares_off
+from lineament.mapping.refine import adjusted
+
+POSE, PLAN = (0.3, -0.2, 0.7), plan_of(RING)
+SURE, ROOM = math.log(1000), 500.0
+LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS
+#: The package has the function under this name.
+MODULE = sys.modules["lineament.mapping.locate"]
+
+
+@pytest.mark.parametrize(
+    ("odds", "other", "contradicted", "verdict"),
+    [
+        (SURE + 0.1, -9.0, 0.0, LOCATED),
+        (SURE - 0.1, -9.0, 0.0, LOST),
+        (SURE + 50, -9.0, 0.049, LOCATED),
+        (SURE + 50, -9.0, 0.051, LOST),
+        (SURE + 50, 50 - 0.1, 0.0, LOCATED),
+        (SURE + 50, 50 + 0.1, 0.0, AMBIGUOUS),
+    ],
+)
+def test_the_best_pose_is_a_thousand_times_likelier_than_chance_and_others(
+    odds, other, contradicted, verdict
+):
+    chance, poses = math.log(ROOM), np.array([POSE, (1.0, 1.0, 1.0)])
+    found = np.array([(odds + chance, 0.8, 0.2, contradicted), (other + chance, 0.5, 0.5, 0.0)])
+    where = _judged(poses, found, query_at(POSE, PLAN), PLAN, ROOM)
+    assert where.verdict == verdict
+    assert where.evidence.log_odds == pytest.approx(odds)
+    assert (where.evidence.explained, where.evidence.contradicted) == (0.8, contradicted)
+    np.testing.assert_allclose(where.pose, POSE, atol=1e-6)
+    if verdict == AMBIGUOUS:
+        ((pose, evidence),) = where.alternatives
+        assert pose == pytest.approx((1.0, 1.0, 1.0))
+        assert evidence.log_odds == pytest.approx(other)
+    else:
+        assert where.alternatives == []
+
+
+@pytest.mark.parametrize(("sigma", "verdict"), [(0.13, LOCATED), (0.17, UNOBSERVED)])
+def test_a_direction_is_unobserved_that_is_known_worse_than_15_cm(sigma, verdict):
+    """One wall of the plan says where the pose is along a corridor, and it is known so well."""
+    c, s = math.cos(0.4), math.sin(0.4)
+    ends = np.array([(-9, -1, 9, -1), (9, -1, 9, 1), (9, 1, -9, 1)]).reshape(-1, 2)
+    walls = LineMap.from_lines((ends @ [[c, s], [-s, c]]).reshape(-1, 4), side=1).walls.copy()
+    walls["covariance"] = np.diag((1e-3, 1e-3)) ** 2
+    walls["covariance"][1, 0, 0] = sigma**2
+    plan = LineMap(walls)
+    pose = (0.5, 0.1, 0.2)
+    where = _judged(np.array([pose]), np.array([(99, 1, 0, 0)]), query_at(pose, plan), plan, ROOM)
+    assert where.verdict == verdict
+    values = np.linalg.eigvalsh(where.covariance[:2, :2])
+    assert math.sqrt(values[1]) == pytest.approx(sigma, rel=0.03)
+    if verdict == UNOBSERVED:
+        assert abs(np.dot(where.unobserved, (c, s))) > 0.999
+
+
+@pytest.mark.parametrize(
+    ("control", "contradicted", "verdict"),
+    [
+        (-3.1, 0.0, LOCATED),
+        (-2.9, 0.0, AMBIGUOUS),
+        (SURE - 0.1, 0.0, AMBIGUOUS),
+        (SURE + 0.1, 0.0, LOST),
+        (-9.0, 0.029, LOCATED),
+        (-9.0, 0.031, LOST),
+    ],
+)
+def test_the_mirror_image_does_worse(monkeypatch, control, contradicted, verdict):
+    """By e³; where it does a thousand times better, this is another place."""
+    query, answers = query_at(POSE, PLAN), []
+    answers.append((np.array([POSE]), np.array([(60.0, 0.9, 0.1, contradicted)])))
+    answers.append((np.array([POSE]), np.array([(60.0 + control, 0.9, 0.1, 0.0)])))
+    given = iter(answers)
+    monkeypatch.setattr(MODULE, "_searched", lambda *_: next(given))
+    assert locate(query, PLAN).verdict == verdict
+    # With a guess it is not asked.
+    given = iter(answers)
+    assert locate(query, PLAN, POSE).verdict == LOCATED
+
+
+def test_chance_is_one_in_the_poses_that_a_plan_has_room_for(monkeypatch):
+    found = np.array([POSE]), np.array([(60.0, 0.9, 0.1, 0.0)])
+    monkeypatch.setattr(MODULE, "_searched", lambda *_: found)
+    where = locate(query_at(POSE, PLAN), PLAN)
+    room = 7.0 * 5.0 / BOX**2 * 2 * math.pi / TURN
+    assert where.evidence.log_odds == pytest.approx(60 - math.log(room))
+
+
+def test_poses_around_a_guess():
+    """Within 2 σ by half a box; where there are more than 800, those within 4 σ that have votes."""
+    query = query_at(POSE, PLAN)
+    near = _near(POSE, None, query, PLAN)
+    off = near - POSE
+    assert len(near) == 9 * 9 * 9
+    np.testing.assert_allclose(np.abs(off).max(axis=0), (1.0, 1.0, 2 * math.radians(10)))
+    for axis, most in enumerate((BOX / 2, BOX / 2, TURN / 2)):
+        assert 0 < np.diff(np.unique(np.round(off[:, axis], 9))).max() <= most + 1e-9
+    spread = np.diag((2.0, 2.0, 1.0)) ** 2
+    far = _near(POSE, spread, query, PLAN)
+    np.testing.assert_allclose(far[0], POSE)
+    squares = squares_off(far, POSE, spread)
+    assert 1 < squares.max() < 16
+    turned = np.array([(0.3, -0.2, 0.7 + 2 * math.pi - 0.1)])
+    assert squares_off(turned, POSE, spread)[0] == pytest.approx(0.01)
+
+
+def test_poses_that_are_chosen_are_apart():
+    poses = np.array([(0, 0, 0), (0.14, 0, 0), (0, 0, 0.05), (0.16, 0, 0), (0, 0, 0.07), (9, 0, 0)])
+    scores = np.array([6.0, 5, 4, 3, 2, 7])
+    assert distinct(poses, scores, (0.15, 0.06), 9).tolist() == [5, 0, 3, 4]
+    assert distinct(poses, scores, (0.15, 0.06), 2).tolist() == [5, 0]
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_turn_is_found_at_once_by_the_angles(flipped):
+    query, n = query_at(POSE, PLAN), len(RING)
+    walls = query.walls.copy()
+    if flipped:
+        walls["angle"] += math.pi
+    known = np.kron(np.eye(n), np.diag((0.5, 1e-5)) ** 2)
+    for turn in (0.3, -0.2):
+        start = np.add(POSE, (0.0, 0.0, turn))
+        pose, _ = adjusted(start, np.arange(n), Query(walls, known, query.beams), PLAN.index)
+        assert pose[2] == pytest.approx(POSE[2], abs=1e-4)
+
+
+def test_how_far_a_sweep_may_be_off_as_a_whole(monkeypatch):
+    """By the change of the velocity and a tenth of it, over half the sweep of 0.1 s; 1 at first."""
+    twists, skews = iter([None, None, (2.0, 0.0, 0.5), (2.0, 0.0, 0.5)]), []
+
+    class Stub:
+        def __init__(self, plan):
+            assert plan is PLAN
+
+        @property
+        def twist(self):
+            return next(twists)
+
+        def __call__(self, _, pose, skew):
+            assert pose is None
+            skews.append(skew)
+
+    monkeypatch.setattr("lineament.mapping.following.Follower", Stub)
+    scan = LaserScan([2.0] * 11, 0.0, 0.1, time_increment=0.01)
+    list(follow([scan] * 4, PLAN, lambda straight: straight, odometry=False))
+    expected = [(0.05, 0, 0.05), (0, 0, 0), (0.11, 0, 0.0275), (0.01, 0, 0.0025)]
+    np.testing.assert_allclose(skews, expected, atol=1e-12)

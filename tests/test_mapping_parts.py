@@ -1,0 +1,238 @@
+"""Parts of maps of drives by hand-worked cases: walls and lines, what is expected, loops."""
+
+import math
+
+import numpy as np
+import pytest
+from handmade import features, segment
+from small_room import scans_on
+
+from lineament import Extractor, Tracker
+from lineament.features import SEGMENT
+from lineament.mapping import LocalMap
+from lineament.mapping.drive_map import Drive, _likely_turns
+from lineament.mapping.loops import Survey
+from lineament.mapping.making import single
+from lineament.mapping.sights import SIGHT, lines_of, merged, sights_of, walls_along
+from lineament.mapping.walls import walls_of
+from lineament.scan.poses import compose
+from lineament.simulation import World
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
+def test_a_wall_is_hidden_by_how_far_it_is_in_the_middle_of_what_they_share(turn):
+    """A wall of 10 m, and others askew from x = 2 to 8: 12 and 20 cm off at x = 5."""
+    c, s = math.cos(turn), math.sin(turn)
+    for middle, hidden in ((0.12, True), (0.20, False)):
+        ends = [(0, 0, 10, 0), (2, middle - 0.1, 8, middle + 0.1)]
+        walls = walls_of(np.array(ends).reshape(-1, 2, 2) @ np.array([[c, s], [-s, c]]))
+        walls["views"] = 9, 3
+        assert len(single(walls)) == (1 if hidden else 2)
+
+
+def test_a_short_part_of_a_bowed_wall_may_be_askew():
+    """Half a metre, off by 10 mm: its direction is known to 2 · 10 mm / 0.5 m = 40 mrad."""
+    for turn, parts in ((0.1, 1), (0.14, 2)):
+        segments = np.zeros(2, SEGMENT)
+        for k, (x, half, angle) in enumerate([(0.0, 5.0, 0.0), (0.0, 0.25, turn)]):
+            u = np.array((math.cos(angle), math.sin(angle)))
+            segments["start"][k], segments["end"][k] = (x, 0) - half * u, (x, 0) + half * u
+            segments["centroid"][k], segments["angle"][k] = (x, 0), angle
+        segments["length"], segments["rms"] = (10, 0.5), (0, 0.01)
+        segments["misfit"], segments["n_points"] = (0, 0.01), 1000
+        segments["covariance"] = np.eye(2) * 1e-8
+        sights = sights_of([(segments, np.arange(2))])
+        lines = lines_of(sights, np.zeros((1, 3)), 2)
+        walls = merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"]
+        assert len({*walls.tolist()}) == parts
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.4, -0.9])
+def test_the_likeliest_turns_are_those_near_the_expected_one(turned):
+    """In a square room four turns are as good; of two on either side, none is preferred."""
+    corners = np.array([(-2, -2), (2, -2), (2, 2), (-2, 2)], float)
+    ends = np.stack((corners, np.roll(corners, -1, axis=0)), axis=1)
+    around = features(segments=[segment(a, b, 0, 9) for a, b in ends.tolist()])
+    seen = around.transform(0.0, 0.0, -turned)
+    turns = _likely_turns(around, seen, turned, 0.1)
+    off = np.abs(np.remainder(turns - turned + math.pi, 2 * math.pi) - math.pi)
+    assert off[0] < math.radians(3)
+    assert np.round(off[:4] / (math.pi / 2)).tolist() == [0, 1, 1, 2]
+    wide = _likely_turns(around, seen, turned + math.pi / 4, 9.0)
+    off = np.remainder(wide - turned - math.pi / 4 + math.pi, 2 * math.pi) - math.pi
+    assert sorted(np.round(off[:2] / (math.pi / 4)).tolist()) == [-1, 1]
+
+
+def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
+    """A wall of 4 m between two of 1 m, which do not touch each other."""
+    ends = np.array([(-3.1, 0, -2.1, 0), (-2, 0, 2, 0), (2.1, 0, 3.1, 0)]).reshape(-1, 2, 2)
+    for order in ([0, 1, 2], [1, 0, 2], [2, 0, 1]):
+        segments = np.zeros(3, SEGMENT)
+        segments["start"], segments["end"] = ends[order, 0], ends[order, 1]
+        segments["centroid"] = ends[order].mean(axis=1)
+        segments["length"] = np.linalg.norm(segments["end"] - segments["start"], axis=1)
+        segments["covariance"] = np.eye(2) * 1e-6
+        sights = sights_of([(segments, np.arange(3))])
+        lines = lines_of(sights, np.zeros((1, 3)), 3)
+        found = merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"]
+        assert found.tolist() == [0, 0, 0]
+
+
+def test_poses_near_the_expected_one_are_tried():
+    """Wherever within two deviations the pose is, one is tried within reach of refinement."""
+    placed, extract = Drive(), Extractor()
+    for scan in scans_on([0.0]):
+        placed.add(scan, found := extract(scan))
+    rng, prior = np.random.default_rng(0), (0.2, -0.1, 0.3)
+    for way, turn in ((0.02, 0.02), (0.1, 0.1), (0.3, 0.2)):
+        tried = placed._tried(found, prior, way, turn)
+        for off in rng.uniform(-1, 1, (50, 3)) * (2 * way, 2 * way, min(2 * turn, 0.3)):
+            away = np.abs(tried - np.add(prior, off)) / (0.16, 0.16, 0.06)
+            assert away.max(axis=1).min() < 1
+
+
+def going(steps, pace, count=60):
+    """A drive whose scans come at a pace, which went on by the same step from each to the next."""
+    placed = Drive()
+    for scan in scans_on([0.0]):
+        placed.add(scan, Extractor()(scan))
+    for k in range(1, count + 1):
+        x, y, theta = np.multiply(steps, k)
+        placed._go_on(pace * k, (x, y, theta))
+        placed._last = pace * k, None, (x, y, theta)
+    return placed
+
+
+def test_without_odometry_a_drive_goes_on_as_it_did():
+    """By the last step, and by 30 % of it beside what it may do in 0.1 s at 0.4 m/s, 0.8 rad/s."""
+    placed = going((0.05, 0.01, 0.0), 0.1)
+    pose, spread = placed._expected(6.1, None)
+    np.testing.assert_allclose(pose, (61 * 0.05, 61 * 0.01, 0.0))
+    way, turn = 0.02 + 0.4 * 0.1 + 0.3 * math.hypot(0.05, 0.01), 0.02 + 0.8 * 0.1
+    np.testing.assert_allclose(np.sqrt(np.diag(spread)), (way, way, turn), rtol=0.02)
+    # After a second it may be anywhere near; the same stamp again is one step.
+    wide = np.sqrt(np.diag(placed._expected(7.0, None)[1]))
+    np.testing.assert_allclose(wide, (0.3 + 0.0153, 0.3 + 0.0153, 0.7), rtol=0.02)
+    np.testing.assert_allclose(placed._expected(6.0, None)[1], spread, rtol=0.05)
+
+
+def test_a_robot_is_not_thought_to_go_on_faster_than_1_2_metres_a_second():
+    for speed, thought in (((1.0, -1.1), (0.1, -0.11)), ((3.0, -4.0), (0.12, -0.12))):
+        last = np.multiply(speed, 6.0)
+        pose, _ = going((*np.multiply(speed, 0.1), 0.0), 0.1)._expected(6.1, None)
+        np.testing.assert_allclose(pose[:2] - last, thought, rtol=0.03)
+    pose, _ = going((0.0, 0.0, 0.3), 0.1)._expected(6.1, None)
+    assert math.remainder(pose[2] - 60 * 0.3, 2 * math.pi) == pytest.approx(0.12, rel=0.03)
+
+
+def test_odometry_says_how_a_drive_goes_on():
+    """30 mm and 20 mrad, and a tenth of the motion, beside it."""
+    placed = going((0.0, 0.0, 0.0), 0.1, 1)
+    placed._last = 0.1, (5.0, 1.0, math.pi / 2), (0.2, 0.1, 0.0)
+    pose, spread = placed._expected(0.2, (5.0, 1.3, math.pi / 2 - 0.2))
+    np.testing.assert_allclose(pose, (0.5, 0.1, -0.2))
+    np.testing.assert_allclose(spread, np.diag((0.06, 0.06, 0.04)) ** 2)
+
+
+def test_parts_of_a_wall_are_known_where_they_are():
+    """A line known to 1 mm and 1 mrad at its middle, which one of its three parts has."""
+    sights = np.zeros(3, SIGHT)
+    sights["covariance"] = np.eye(2) * 1e-6
+    sights["ends"] = (-3.0, -0.5), (0.5, 3.5), (-0.1, 0.2)
+    lines = walls_of(np.array([[(0.0, 0.0), (1.0, 0.0)]]))
+    lines["centroid"], lines["covariance"] = 0.0, np.eye(2) * 1e-6
+    walls = walls_along(sights, np.zeros((1, 3)), lines, gap=0.25)
+    np.testing.assert_allclose(walls["start"][:, 0], (-3.0, -0.1, 0.5))
+    np.testing.assert_allclose(walls["end"][:, 0], (-0.5, 0.2, 3.5))
+    np.testing.assert_allclose(walls["centroid"][:, 0], (-1.75, 0.0, 2.0))
+    variance = 1e-6 * (1 + np.square((1.75, 0, 2)))
+    np.testing.assert_allclose(walls["covariance"][:, 0, 0], variance)
+    assert walls["views"].tolist() == [1, 1, 1]
+
+
+class Frame:
+    """As much of a key frame as its place needs."""
+
+    def __init__(self, is_lost=False):
+        self.is_lost = is_lost
+
+
+def test_where_a_way_was_passed_before():
+    """Around a square of 10 m, twice, by 0.5 m: 80 key frames a round, 40 m of way."""
+    leg = np.linspace(0, 10, 20, endpoint=False)
+    x = np.concatenate((leg, 0 * leg + 10, 10 - leg, 0 * leg))
+    ring = np.column_stack((x, np.roll(x, 20)))
+    poses = np.column_stack((np.tile(ring, (2, 1)), np.zeros(160)))
+    survey = Survey([Frame() for _ in poses], poses, None, None)
+    np.testing.assert_allclose(survey.way, 0.5 * np.arange(160))
+    # In the middle of the second round's first leg: there in the first round, by fours; within
+    # 2 m of way no other stretch is near. Nothing of the first 12 m was seen before.
+    assert survey._passed(90, 2.0) == [8]
+    assert survey._passed(93, 2.0) == [12]
+    assert survey._passed(24, 100.0) == []
+    assert survey._passed(25, 100.0) == [0]
+    # Within 11 m are stretches on either side; the two nearest of them.
+    across = np.column_stack((np.arange(-10, 10, 0.5), np.full(40, 5.0), np.zeros(40)))
+    poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
+    survey = Survey([Frame() for _ in poses], poses, None, None)
+    assert survey._passed(160, 3.5) == [60, 100]
+    # Where it was lost, what was seen before is far.
+    frames = [Frame(k == 10) for k in range(20)]
+    survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)
+    np.testing.assert_allclose(np.diff(survey.way), [*[0.5] * 9, 12, *[0.5] * 9])
+
+
+@pytest.mark.parametrize(("step", "turn"), [(0.11, 0.0), (0.0, 0.1)])
+def test_a_key_frame_is_taken_for_each_0_3_m_or_15_degrees(step, turn):
+    placed, extract = Drive(), Extractor()
+    poses = []
+    for scan in scans_on(step * np.arange(10), turn=turn):
+        placed.add(scan, extract(scan), scan.pose)
+        poses.append(scan.pose)
+    assert [frame.index for frame in placed.frames] == [0, 3, 6, 9]
+    assert [k for k, _ in placed.scans] == [0, 0, 0, 1, 1, 1, 2, 2, 2, 3]
+    found = [compose(placed.frames[k].pose, pose) for k, pose in placed.scans]
+    off = np.subtract(found, poses)
+    off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+    assert np.abs(off).max() < 0.02
+    # Walls keep their numbers while they are seen.
+    first, last = placed.frames[0].walls, placed.frames[-1].walls
+    assert len({*first} & {*last}) >= 5
+    assert len({*first}) == len(first)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_how_well_a_local_map_knows_its_motions(given):
+    """By odometry 5 mm, 5 mrad and a tenth; else 5 cm and all of the way, 20 mrad and a fifth."""
+    tracker, local, extract = Tracker(), LocalMap(), Extractor()
+    for scan in scans_on([-0.2, 0.2], turn=0.2):
+        found, at = extract(scan), scan.pose if given else None
+        local.add(found, tracker(found, scan.pose), at)
+    (_, last) = local._sights
+    sigma = (0.005 + 0.04, 0.005 + 0.04, 0.005 + 0.02) if given else (0.45, 0.45, 0.02 + 0.04)
+    np.testing.assert_allclose(np.sqrt(np.diag(last.covariance)), sigma, rtol=0.02)
+    np.testing.assert_allclose(last.motion, (0.4, 0.0, 0.2), atol=0.02)
+
+
+def test_in_a_corridor_a_motion_along_it_is_not_known():
+    """To half a metre more, where no odometry shows it."""
+    corridor = World([[-90, -1, 90, -1], [90, 1, -90, 1]], [])
+    tracker, local, extract = Tracker(), LocalMap(), Extractor()
+    for scan in scans_on([0.0, 0.4], corridor):
+        found = extract(scan)
+        local.add(found, tracker(found))
+    along, across, _ = np.sqrt(np.diag(local._sights[-1].covariance))
+    assert 0.5 < along < 1.1
+    assert across < 0.6 < 0.5 + along
+    assert along**2 - across**2 == pytest.approx(0.25, rel=0.05)
+
+
+def test_each_stretch_of_the_way_that_passed_near_is_looked_at():
+    """One that passes 1.5 m away at key frame 8, and one that begins 0.5 m away at key frame 40."""
+    first = np.column_stack((0.5 * np.arange(-8, 8), np.full(16, 1.5)))
+    away = np.column_stack((np.full(24, 50.0), np.arange(24)))
+    second = np.column_stack((np.zeros(10), 0.5 + 0.3 * np.arange(10)))
+    places = np.concatenate((first, away, second, away, [(0.0, 0.0)]))
+    poses = np.column_stack((places, np.zeros(len(places))))
+    survey = Survey([Frame() for _ in poses], poses, None, None)
+    assert survey._passed(len(poses) - 1, 2.0) == [40, 8]

@@ -1,0 +1,40 @@
+"""Settings of maps and places that were tuned on recordings, and that no single case shows.
+
+The figures of docs/results.md and docs/notebook.md are theirs: `benchmarks/mapping.py` and
+`benchmarks/locating.py` measure them again.
+"""
+
+import importlib
+
+import numpy as np
+import pytest
+
+SETTINGS = {
+    "adjust": {"_KERNEL": 3.0, "_WIDE": 256.0, "_WIDER": 4, "_ROUNDS": 4, "_SMALL": 1e-4,
+               "_HELD": 1e11, "_BATCH": 200, "_DENSE": 6000},
+    "drive_map": {"_ROUGHNESS": 0.01, "_BINS": 120, "_MILD": -0.8, "_PASSED": 0.5,
+                  "REMEMBERED": 30, "_SLOWEST": 3.0, "_ROUNDS": 4, "_SURE": 0.75, "_SURER": 0.97,
+                  "_NARROW": 0.1, "_BEAMS": 120, "_SIFTED": ((12, 100), (40, 32)), "_WIDE": 0.12,
+                  "_TIGHT": 0.04, "_APART": (0.15, 0.06), "_LOST": 0.38,
+                  "_NEAR": np.diag((0.05, 0.05, 0.02)) ** 2},
+    "following": {"SEEN": 1.0, "_TIGHT": 0.03},
+    "hypotheses": {"ALIKE": np.radians(12), "OF_ENDS": 0.5, "LEAST_TURN": 0.3, "BOX": 0.6,
+                   "TURN": np.radians(12)},
+    "line_map": {"_CELL": 0.75, "_MOST_CELLS": 4_000_000},
+    "locate": {"TRIED": 800, "SIFTED": 60, "REFINED": 24, "JUDGED": 12, "_FEWEST_BEAMS": 12,
+               "_FEW_BEAMS": 40, "_NEAR": (0.15, 0.06), "_SAME": (0.06, 0.02), "_WIDE": 0.12,
+               "_TIGHT": 0.02},
+    "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "_TWICE": 25.0,
+               "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_SPREADS": ((0.8, 0.12), (0.3, 0.06)),
+               "_UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_APART": 0.015, "_PLACES": 3.0,
+               "_AGREE": (0.5, 0.05), "_VIEWS": 3},
+    "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
+    "sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_are_those_that_the_results_were_measured_with(name):
+    module = importlib.import_module(f"lineament.mapping.{name}")
+    for key, value in SETTINGS[name].items():
+        np.testing.assert_allclose(getattr(module, key), value, rtol=1e-12, err_msg=key)

@@ -1,0 +1,129 @@
+"""What plans are drawn of: segments that are sure, corners and arcs that are one, strips, views."""
+
+import math
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from handmade import arc, corner, features, segment
+
+from lineament import LaserScan
+from lineament.output import open_writer
+from lineament.output.floor_plan import FloorPlan
+from lineament.output.markers import Markers
+from lineament.output.walls import offsets_between
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def line(start, end, sigma=(0.002, 0.002)):
+    return segment(start, end, 0, 9, sigma=sigma)
+
+
+def turned(angle):
+    return np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+
+
+@pytest.mark.parametrize(("off", "is_one"), [(0.14, True), (0.16, False)])
+def test_corners_of_one_thing_are_within_15_cm(off, is_one):
+    plan = FloorPlan()
+    for y in (0.0, off):
+        plan.add(features(corners=[corner(1, y)]))
+    assert len(plan.markers(1)[0].corners) == 2 - is_one
+
+
+@pytest.mark.parametrize(
+    ("other", "is_one"),
+    [((0, 0, 0.59), True), ((0, 0, 0.61), False), ((0.09, 0, 0.5), True), ((0, 0.11, 0.5), False)],
+)
+def test_arcs_of_one_thing_are_within_10_cm(other, is_one):
+    plan = FloorPlan()
+    for x, y, radius in ((0, 0, 0.5), other):
+        plan.add(features(arcs=[arc(x, y, radius, 0, 9)]))
+    arcs = plan.markers(1)[0].arcs
+    assert len(arcs) == 2 - is_one
+    np.testing.assert_array_equal(arcs[:, 3:], [(0.0, 2 * math.pi)] * len(arcs))  # whole circles
+
+
+@pytest.mark.parametrize(
+    ("segment", "is_kept"),
+    [
+        (line((0, 0), (0.21, 0)), True),
+        (line((0, 0), (0.19, 0)), False),
+        (line((0, 0), (999, 0), sigma=(0.002, 1e-5)), True),
+        (line((0, 0), (1001, 0), sigma=(0.002, 1e-5)), False),
+        # At its ends a wall is known to 5 cm: its offset, and half of its length by its angle.
+        (line((0, 0), (4, 0), sigma=(0.03, 0.0195)), True),
+        (line((0, 0), (4, 0), sigma=(0.03, 0.0205)), False),
+        (line((0, 0), (4, 0), sigma=(0.04, 0.0145)), True),
+        (line((0, 0), (4, 0), sigma=(0.04, 0.0155)), False),
+    ],
+)
+def test_segments_that_a_plan_takes(segment, is_kept):
+    plan = FloorPlan()
+    plan.add(features(segments=[segment]))
+    assert len(plan.walls()) == is_kept
+
+
+def beside(a, b, angle):
+    """How far a line lies beside a wall, by definition, one number at a time."""
+    (ax, ay), (bx, by) = a[1] - a[0], b[1] - b[0]
+    if abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) >= angle:
+        return math.inf
+    short, long = (a, b) if math.dist(*a) <= math.dist(*b) else (b, a)
+    u = (long[1] - long[0]) / math.dist(*long)
+    along = (a - b[0]) @ (b[1] - b[0]) / math.dist(*b)
+    if max(min(along) - math.dist(*b), -max(along)) >= 0.2:
+        return math.inf
+    return max(abs(u[0] * (p - long[0])[1] - u[1] * (p - long[0])[0]) for p in short)
+
+
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_offsets_between_lines_and_walls_are_those_of_their_definition(quarters):
+    """Also where all lines are few, along one axis, and the walls begin beside their ends."""
+    rng = np.random.default_rng(quarters)
+    start, turn = rng.uniform(-2, 2, (40, 2)), rng.choice((0, 0.05, 0.2, math.pi), 40)
+    length = rng.uniform(0.3, 6, (40, 1))
+    lines = np.stack((start, start + length * np.column_stack((np.cos(turn), np.sin(turn)))), 1)
+    lines = np.append(lines, [[(0, 0), (10, 0)], [(8, 0), (12, 0)], [(10.1, 0), (14, 0)]], axis=0)
+    lines = lines @ turned(quarters * math.pi / 2)
+    for count in (1, 2, 43):
+        few, angles = lines[-count:], np.linspace(0.1, 0.3, count)
+        expected = [
+            [beside(a, b, angle) for b in lines] for a, angle in zip(few, angles, strict=True)
+        ]
+        np.testing.assert_allclose(offsets_between(few, lines, angles), expected, atol=1e-9)
+        assert np.isfinite(expected).sum() > 2
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_each_scan_is_drawn_once(tmp_path, count):
+    """A wall that all scans show, one that the first shows, one that the last shows."""
+    shared, first, last = line((0, 0), (4, 0)), line((0, 2), (4, 2)), line((0, 4), (4, 4))
+    scan = LaserScan([1.0] * 100, 0.0, 0.01, pose=(1.0, 0.0, 0.0))
+    with open_writer(tmp_path / "a.svg") as writer:
+        for k in range(count):
+            own = [first] * (k == 0) + [last] * (k == count - 1)
+            writer.write(features(segments=[shared, *own]), scan)
+    lines = [of.attrib for of in ET.parse(tmp_path / "a.svg").iter(f"{SVG}line")]
+    views = {float(of["y1"]): int(of["data-views"]) for of in lines}
+    assert views == {0.0: count, 2.0: 1, 4.0: 1}
+    assert {float(of["x1"]) for of in lines} == {1.0}
+
+
+def test_arcs_and_ellipses_become_strips():
+    """A quarter of a circle of 2 m, from below to the right, and an ellipse that is turned."""
+    nothing = np.zeros((0, 2))
+    arcs = np.array([(1, 2, 2.0, -math.pi / 2, 0.0)])
+    ellipses = np.array([(1, 2, 0.4, 0.1, math.pi / 6)])
+    markers = Markers(np.zeros((0, 2, 2)), nothing, nothing, arcs, ellipses)
+    (strip,) = markers.arc_strips()
+    angles = np.linspace(-math.pi / 2, 0, 13)  # 48 to a turn
+    np.testing.assert_allclose(strip, (1, 2) + 2 * np.stack((np.cos(angles), np.sin(angles)), 1))
+    (strip,) = markers.ellipse_strips()
+    along, across = ((strip - (1, 2)) @ turned(math.pi / 6).T).T
+    np.testing.assert_allclose((along / 0.4) ** 2 + (across / 0.1) ** 2, 1)
+    np.testing.assert_allclose(strip[0], strip[-1])
+    assert len(strip) == 49
+    assert np.ptp(along) == pytest.approx(0.8)
+    np.testing.assert_allclose(markers.points, [(3, 2), (-1, 2), (1, 4), (1, 0)])
