@@ -249,7 +249,7 @@ def test_demo_spares_files_that_it_did_not_make(name, tmp_path, capsys):
     own = tmp_path / name
     own.write_text("mine")
     assert run(["demo", "-q", "-o", str(tmp_path)]) == 1
-    assert capsys.readouterr().err.startswith(f"lineament: {own}: is of no demo and would be")
+    assert capsys.readouterr().err.startswith(f"lineament: {own}: is of no demo: name a folder")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 

@@ -10,8 +10,8 @@ import lineament as ln
 from lineament.cli import run
 from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
-from lineament.mapping import LineMap
-from lineament.simulation import SENSORS, drive, room
+from lineament.mapping import LineMap, locate
+from lineament.simulation import SENSORS, drive, office, room
 
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 
@@ -223,3 +223,42 @@ def test_table_of_extract_in_the_world_is_a_plan(tmp_path):
     off = [cross(along, end[:, None] - lines[:, 0]) for end in ends] / np.linalg.norm(along, axis=1)
     assert np.abs(off).max(axis=1).min(axis=1).max() < 0.02
     assert 4 <= len(often) <= 12
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        (
+            lambda: LineMap.from_lines([[0, 0], [1, 1]]),
+            r"lines have shape \(2, 2\), expected \(n, 4\)",
+        ),
+        (lambda: LineMap.from_lines([0, 0, 1, 1]), r"lines have shape \(4,\)"),
+        (
+            lambda: LineMap.from_lines(ROOM, [[1, 1]]),
+            r"columns have shape \(1, 2\), expected \(n, 3\)",
+        ),
+        (
+            lambda: LineMap.from_features([features()] * 2, [(0, 0, 0)]),
+            "poses are 1, expected 2, one for each scan",
+        ),
+        (
+            lambda: LineMap.from_features([features()], [(0, 0, 0)], [np.eye(3)] * 2),
+            "pose_covariances are 2, expected 1",
+        ),
+        (lambda: features().transform(0, math.nan, 0), "pose is .* expected three finite numbers"),
+        (lambda: features().transform("0", 0, 0), "pose is .* expected three finite numbers"),
+        (
+            lambda: locate(features(), LineMap.from_lines(ROOM), covariance=np.eye(3)),
+            "a covariance is given without a guess",
+        ),
+        (lambda: office(1, (30_000, 20_000)), "expected 20 m x 16 m to 300 m x 300 m"),
+    ],
+)
+def test_what_would_be_half_taken_is_refused(given, problem):
+    with pytest.raises(ValueError, match=problem):
+        given()
+
+
+def test_pairs_of_ends_are_lines():
+    pairs, rows = LineMap.from_lines(ROOM.reshape(-1, 2, 2)), LineMap.from_lines(ROOM)
+    assert pairs.walls.tobytes() == rows.walls.tobytes()
