@@ -1,13 +1,15 @@
-"""One scan given in many ways, which must all have the same features.
+"""One scan given in many ways, which must all have the same features; results read again.
 
-Other types, masks, units, directions of the beams, and copies or threads of one extractor: nothing
-raises where these go wrong, so that only the features of the plain scan can tell.
+Other types, masks, units, directions of the beams, mountings, and copies or threads of one
+extractor: nothing raises where these go wrong, so that only the features of the plain scan can
+tell. The files of `map` and `locate` must hold what was found.
 """
 
 import copy
 import math
 import pickle
 import sys
+import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -16,10 +18,19 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
+import pyarrow.csv
+import pyarrow.parquet
 from fuzz_targets import NOISES, Target, any_method, any_scan
 
-from lineament import Extractor, Features, LaserScan
+from lineament import Extractor, Features, LaserScan, open_log
 from lineament.features import TABLES
+from lineament.logs import save_npz
+from lineament.mapping import VERDICTS, LineMap
+from lineament.mapping.evidence import Evidence
+from lineament.mapping.following import Whereabouts
+from lineament.scan.poses import compose
+from lineament.tasks.locate import _write_table
+from lineament.tasks.mapping import tum_written
 
 THREADS = 4
 
@@ -58,8 +69,10 @@ class Forms(Target):
 
     #: What the plain scan is before it is compared, where that is another.
     AS: ClassVar[dict[str, Callable[[LaserScan], LaserScan]]] = {
-        "millimetres": lambda scan: fields_of(scan, 1e-3 * (1e3 * scan.ranges), 1e-3 * 1e3),
+        "millimetres": lambda scan: fields_of(scan, 1e-3 * milli(scan)),
+        "scaled": lambda scan: there_and_back(scan),
         "single precision": lambda scan: fields_of(scan, narrow(scan.ranges)),
+        "log": lambda scan: there_and_back(scan),
         "message": lambda scan: fields_of(scan, narrow(scan.ranges)),
     }
     FORMS: ClassVar[dict[str, Callable[[Extractor, list[LaserScan]], Any]]] = {}
@@ -76,21 +89,32 @@ def narrow(ranges: Any) -> Any:
         return ranges.astype(np.float32)
 
 
-def fields_of(scan: LaserScan, ranges: Any, factor: float = 1.0) -> LaserScan:
+def fields_of(scan: LaserScan, ranges: Any, factor: float = 1.0, **given: Any) -> LaserScan:
     """Return the same scan with other ranges, and limits that are rounded by a factor."""
     bearings: dict[str, Any] = {"angles": scan.angles}
     if scan.is_regular:
         bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
     limits = {"range_min": factor * scan.range_min, "range_max": factor * scan.range_max}
-    return LaserScan(ranges, **bearings, **limits)
+    return LaserScan(ranges, **bearings, **limits, **given)
 
 
-def batch_of(extractor: Extractor, rows: Any, scan: LaserScan, workers: int = 1) -> Any:
+def milli(scan: LaserScan) -> Any:
+    with np.errstate(over="ignore"):
+        return 1e3 * scan.ranges
+
+
+def there_and_back(scan: LaserScan) -> LaserScan:
+    """Return a scan that was in millimetres: ranges and limits are rounded twice."""
+    far = fields_of(scan, milli(scan), 1e3)
+    return fields_of(far, 1e-3 * far.ranges, 1e-3)
+
+
+def batch_of(extractor: Extractor, rows: Any, scan: LaserScan, **given: Any) -> Any:
     bearings: dict[str, Any] = {"angles": scan.angles}
     if scan.is_regular:
         bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
     limits = {"range_min": scan.range_min, "range_max": scan.range_max}
-    return extractor.batch(rows, **bearings, **limits, workers=workers)
+    return extractor.batch(rows, **bearings, **limits, **given)
 
 
 @form
@@ -170,17 +194,15 @@ def single_precision(used: Extractor, scans: list[LaserScan]) -> Any:
 
 @form
 def millimetres(used: Extractor, scans: list[LaserScan]) -> Any:
-    scan = scans[0]
-    plain = fields_of(scan, 1e3 * scan.ranges, 1e3)
-    ends = {"range_min": plain.range_min, "range_max": plain.range_max}
-    bearings: dict[str, Any] = {"angles": scan.angles}
-    if scan.is_regular:
-        bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-    return [
-        used(LaserScan(plain.ranges, **bearings, **ends, scale=1e-3)),
-        used(plain.scaled(1e-3)),
-        used.batch(plain.ranges[None], **bearings, **ends, scale=1e-3)[0],
-    ]
+    """Ranges alone are in millimetres; limits stay in metres."""
+    scan, given = scans[0], {"scale": 1e-3}
+    plain = milli(scan)
+    return [used(fields_of(scan, plain, **given)), batch_of(used, plain[None], scan, **given)[0]]
+
+
+@form
+def scaled(used: Extractor, scans: list[LaserScan]) -> Any:
+    return used(fields_of(scans[0], milli(scans[0]), 1e3).scaled(1e-3))
 
 
 @form
@@ -204,3 +226,82 @@ def message(used: Extractor, scans: list[LaserScan]) -> Any:
     names = "angle_min angle_increment range_min range_max scan_time time_increment"
     fields = {name: getattr(scan, name) for name in names.split()}
     return used(LaserScan.from_message(SimpleNamespace(ranges=narrow(scan.ranges), **fields)))
+
+
+@form
+def log(used: Extractor, scans: list[LaserScan]) -> Any:
+    """A log in millimetres with poses of a robot, read in metres with those of its scanner."""
+    scan, robot, laser = scans[0], (1.0, -2.0, 0.7), (0.2, 0.1, -1.3)
+    if not len(scan):
+        return used(fields_of(scan, scan.ranges))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.npz"
+        save_npz(path, [fields_of(scan, milli(scan), 1e3).with_pose(robot)])
+        (read,) = open_log(path, scale=1e-3, laser_pose=laser)
+    np.testing.assert_allclose(read.pose, compose(robot, laser), rtol=1e-12)
+    return used(read)
+
+
+class Results(Target):
+    """What `map` and `locate` write is what they found."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def make(self, chance: Random) -> tuple[str, int]:
+        return chance.choice((".parquet", ".csv", ".tum", "map.parquet", "map.dxf")), (
+            chance.getrandbits(32)
+        )
+
+    def check(self, made: tuple[str, int]) -> str:
+        ending, seed = made
+        rng, path = np.random.default_rng(seed), self._folder / f"results{ending}"
+        if ending.startswith("map"):
+            return self._plan(rng, path)
+        n = int(rng.integers(0, 9))
+        stamps = (rng.uniform(0, 2e9) + np.cumsum(rng.exponential(0.1, n))).tolist()
+        poses = [tuple(pose) for pose in rng.normal(size=(n, 3), scale=(50, 50, 4)).tolist()]
+        if ending == ".tum":
+            with tum_written(path, stamps, poses):
+                pass
+            rows = np.array([line.split() for line in path.read_text().splitlines()], float)
+            rows = rows.reshape(n, 8)
+            np.testing.assert_allclose(rows[:, 0], stamps, atol=1e-6)
+            np.testing.assert_allclose(rows[:, 1:3], np.reshape(poses, (n, 3))[:, :2], atol=1e-6)
+            turn = 2 * np.arctan2(rows[:, 6], rows[:, 7]) - np.reshape(poses, (n, 3))[:, 2]
+            np.testing.assert_allclose(np.cos(turn), 1, atol=1e-12)
+            return ".tum: the same"
+        spread = [np.diag(rng.exponential(10.0 ** rng.integers(-6, 2), 3)) for _ in poses]
+        evidence = [Evidence(rng.normal(), *rng.random(3), 9) for _ in poses]
+        places = [
+            Whereabouts(str(rng.choice(VERDICTS)), *given)
+            for given in zip(poses, spread, evidence, strict=True)
+        ]
+        found = list(zip(stamps, places, strict=True))
+        if not found:  # which is an error before
+            return f"{ending}: nothing"
+        _write_table(path, found, is_csv=ending == ".csv")
+        reading = pyarrow.csv.read_csv if ending == ".csv" else pyarrow.parquet.read_table
+        rows = reading(path).to_pylist()
+        for row, stamp, place in zip(rows, stamps, places, strict=True):
+            assert (row["stamp"], row["verdict"]) == (stamp, place.verdict)
+            pose = (row["x"], row["y"], row["theta"])
+            assert pose == (place.pose if place.is_known else (None,) * 3)
+            assert row["cov_yy"] == (place.covariance[1, 1] if place.is_known else None)
+            assert row["explained"] == place.evidence.explained
+        return f"{ending}: the same"
+
+    def _plan(self, rng: np.random.Generator, path: Path) -> str:
+        """Walls a metre apart, none of which is one with another."""
+        n = int(rng.integers(1, 12))
+        y, start, length = np.arange(n), rng.uniform(-20, 20, n), rng.uniform(0.5, 30, n)
+        turn, (dx, dy) = rng.uniform(-3, 3), rng.uniform(-500, 500, 2)
+        ends = np.stack((np.c_[start, y], np.c_[start + length, y]), axis=1)
+        turned = ends @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        plan = LineMap.from_lines(turned + np.array((dx, dy)))
+        plan.write(path)
+        read = LineMap.read(path)
+        assert read.left_out == 0
+        own, again = (np.sort(one.ends.reshape(-1, 2), axis=0) for one in (plan, read))
+        np.testing.assert_allclose(again, own, atol=1e-5)
+        return f"{path.name[7:]}: the same"

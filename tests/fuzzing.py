@@ -33,13 +33,14 @@ from random import Random
 from types import CodeType, FrameType
 from typing import Any
 
+from lineament import LineamentWarning
 from lineament.methods import method_names
 
 #: Bounds for each input: processor time [s], wall clock [s], address space [bytes].
 SECONDS, PATIENCE, MEMORY = 5.0, 90, 6 << 30
 #: What is fuzzed, and in how many of a hundred inputs.
-SHARES = {"methods": 50, "readers": 25, "messages": 10, "viewer": 5, "writers": 3}
-SHARES |= {"plans": 4, "locate": 3}
+SHARES = {"methods": 34, "forms": 25, "readers": 20, "messages": 9, "viewer": 4, "writers": 3}
+SHARES |= {"plans": 3, "results": 1, "locate": 1}
 #: Inputs after which the state is saved.
 SAVED = 200
 
@@ -80,6 +81,7 @@ class Lines:
 
 def targets_in(scratch: Path) -> dict[str, Any]:
     """Return what is fuzzed, by the names of `SHARES`."""
+    from fuzz_forms import Forms, Results
     from fuzz_plans import Locating, Plans
     from fuzz_readers import Readers
     from fuzz_targets import Messages, Methods, Viewer, Writers
@@ -90,6 +92,8 @@ def targets_in(scratch: Path) -> dict[str, Any]:
         "messages": Messages(scratch),
         "viewer": Viewer(scratch),
         "writers": Writers(scratch),
+        "forms": Forms(scratch),
+        "results": Results(scratch),
         "plans": Plans(scratch),
         "locate": Locating(scratch),
         "readers": Readers(scratch, Path(recordings) if recordings else None),
@@ -99,6 +103,7 @@ def targets_in(scratch: Path) -> dict[str, Any]:
 def check_again(kept: Path) -> str:
     """Check an input that was kept: what came of it, or what it raises."""
     warnings.simplefilter("error")
+    warnings.simplefilter("ignore", LineamentWarning)  # of what is made by chance
     with tempfile.TemporaryDirectory(prefix="fuzzing-") as scratch:
         target = targets_in(Path(scratch))[kept.stem.partition("-")[2]]
         try:
@@ -125,6 +130,7 @@ def work(state: Path, seed: int, worker: int, workers: int, inputs: int) -> None
     begin = json.loads(saved.read_text())["next"] if saved.exists() else worker
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     warnings.simplefilter("error")
+    warnings.simplefilter("ignore", LineamentWarning)  # of what is made by chance
     unraisable: list[Any] = []
     sys.unraisablehook = unraisable.append
     gc.disable()  # What only the collector would remove shows, as it comes only now and then.

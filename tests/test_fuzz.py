@@ -11,12 +11,15 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from fuzz_forms import Forms, Results
 from fuzz_plans import Locating, Plans
 from fuzz_readers import OPTIONS, check, chosen, scratch
 from fuzz_targets import Messages, Methods, Viewer, Writers
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutations import Sample, mutated, own_samples, recorded_samples, sizes
+
+pytestmark = pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
 
 settings_of_all = settings(
     max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -87,7 +90,10 @@ def test_where_lengths_and_offsets_stand(samples):
 
 @pytest.mark.parametrize(
     ("target", "inputs"),
-    [(Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60), (Plans, 100), (Locating, 6)],
+    [
+        *((Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60)),
+        *((Forms, 300), (Results, 60), (Plans, 100), (Locating, 6)),
+    ],
     ids=lambda value: getattr(value, "__name__", value),
 )
 def test_inputs_of_each_kind(target, inputs, tmp_path):

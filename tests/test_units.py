@@ -341,3 +341,14 @@ def test_warnings_are_shown_by_place():
         for k in range(3):
             ln.extract(MILLIMETRES + k, **BEARINGS)
     assert len(caught) == 1
+
+
+def test_scaled_scans_keep_irregular_bearings():
+    """Bearings that were given are those of the scan, not multiples of their median step."""
+    angles = np.array([0.0, 0.1, 0.35, 0.4])
+    scan = ln.LaserScan([1000.0, 2000.0, 3000.0, np.nan], angles=angles, range_max=9000.0)
+    assert scan.points.shape == (4, 2)
+    scaled = scan.scaled(0.001)
+    assert scaled.angles.tolist() == angles.tolist()
+    np.testing.assert_allclose(scaled.points, scan.points / 1000, rtol=1e-12)
+    assert scaled.valid.tolist() == [True, True, True, False]

@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from .fields import Array, finite, irregular_bearings
 
 #: No limit of a scanner is farther [m].
@@ -24,7 +26,8 @@ def in_metres(ranges: Array, scale: object, range_max: float = 0.0) -> Array:
         raise ValueError(
             f"range_max is {range_max:g} m: scale is for the ranges alone, limits are in metres"
         )
-    made = factor * ranges
+    with np.errstate(over="ignore"):  # Infinitely far is no range.
+        made = factor * ranges
     made.setflags(write=False)
     return made
 

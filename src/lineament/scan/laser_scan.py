@@ -164,8 +164,11 @@ class LaserScan(ReadOnly, Pictured):
 
     def _changed(self, **fields: Any) -> Self:
         """Return a copy with other fields, which are checked already."""
-        # What is made when it is first asked for is of the old fields.
-        made = ("angles", "valid", "points") if "ranges" in fields else ()
+        # What is made when it is first asked for is of the old fields; bearings that are irregular
+        # were given.
+        made = ("valid", "points") if "ranges" in fields else ()
+        if made and self.is_regular:
+            made = (*made, "angles")
         other = self.__class__.__new__(self.__class__)
         other.__dict__.update({k: v for k, v in vars(self).items() if k not in made}, **fields)
         return other
@@ -248,8 +251,9 @@ class LaserScan(ReadOnly, Pictured):
         >>> LaserScan([1500.0], 0.0, 0.1, range_max=5600.0).scaled(0.001).range_max
         5.6
         """
+        ranges = in_metres(self.ranges, scale)
         low, high = range_limits(self.range_min * scale, self.range_max * scale)
-        return self._changed(ranges=in_metres(self.ranges, scale), range_min=low, range_max=high)
+        return self._changed(ranges=ranges, range_min=low, range_max=high)
 
     def stamped(self, beam: str | float, ns: int | None = None) -> Self:
         """Return the same scan with a stamp that is the time of another beam.
