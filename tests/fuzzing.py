@@ -39,8 +39,15 @@ from lineament.methods import method_names
 #: Bounds for each input: processor time [s], wall clock [s], address space [bytes].
 SECONDS, PATIENCE, MEMORY = 5.0, 90, 6 << 30
 #: What is fuzzed, and in how many of a hundred inputs.
-SHARES = {"methods": 34, "forms": 25, "readers": 20, "messages": 9, "viewer": 4, "writers": 3}
-SHARES |= {"plans": 3, "results": 1, "locate": 1}
+SHARES: dict[str, float] = {
+    "methods": 34,
+    "forms": 25,
+    "readers": 20,
+    "messages": 9,
+    "viewer": 4,
+    "writers": 3,
+}
+SHARES |= {"plans": 3.0, "results": 1.5, "locate": 0.5}
 #: Inputs after which the state is saved.
 SAVED = 200
 
