@@ -256,7 +256,7 @@ def fit_line(points: ArrayLike, *, noise: NoiseLike | None = None, fit: str = "t
         raise ValueError(f"points has {len(xy)} points, expected at least 2")
     if not xy.any(axis=1).all():
         raise ValueError("points has a point at the origin, expected points that a beam can meet")
-    block = _one_cluster(xy, noise_row(1.0 if noise is None else noise))
+    block = _one_cluster(xy, np.eye(5)[0] if noise is None else noise_row(noise))
     block.work.pieces[[at.FIRST, at.LAST, at.BEFORE], 0] = 0, len(xy) - 1, -1
     block.counts[at.PIECES] = 1
     block.measure(fit=FITS[fit], sharp=False)

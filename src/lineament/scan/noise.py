@@ -16,7 +16,7 @@ Distance = TypeVar("Distance", float, Array)
 _BEYOND = {
     "sigma": (1.0, "in metres: is it in millimetres? (0.001 of it)"),
     "proportional": (1.0, "metres a metre: is it in percent? (0.01 of it)"),
-    "bearing": (0.1, "in radians: is it in degrees? (math.radians)"),
+    "bearing": (0.2, "in radians: is it in degrees? (math.radians)"),
     "quantum": (1.0, "in metres: is it in millimetres? (0.001 of it)"),
 }
 
@@ -73,7 +73,7 @@ class RangeNoise:
             If it is neither.
         ValueError
             If no scanner is so bad: `sigma` or `quantum` of 1 m and more, `proportional` of 1,
-            `bearing` of 0.1 rad.
+            `bearing` of 0.2 rad.
 
         Examples
         --------
