@@ -242,7 +242,7 @@ def test_a_full_disk_is_reported_and_leaves_no_half_file(logs, tmp_path):
 @pytest.mark.parametrize(("seconds", "rate"), [(0.0, 0), (0.5, 20)])
 def test_rates_of_a_run(seconds, rate):
     extraction = Extraction(log="a", scans=10, seconds=seconds)
-    for found in (extraction, Bulk("out", "rows", 1, 0, 0, 10, {}, seconds)):
+    for found in (extraction, Bulk("out", "rows", 1, 0, 0, 10, {}, seconds, [])):
         assert str(found).endswith(f"  {seconds:.2f} s, {rate} scans/s")
 
 

@@ -249,7 +249,7 @@ def test_demo_spares_files_that_it_did_not_make(name, tmp_path, capsys):
     own = tmp_path / name
     own.write_text("mine")
     assert run(["demo", "-q", "-o", str(tmp_path)]) == 1
-    assert capsys.readouterr().err.startswith(f"lineament: {own}: is of no demo: name a folder")
+    assert f"{own}: is of no demo and would be replaced" in capsys.readouterr().err
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
@@ -381,6 +381,7 @@ def show(reading):
 def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
     given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
+    given += ["--scale", "0.001", "--laser-pose", "1", "2", "3"]
     limits = ["--limit", "beams=3", "--limit", "ratio=1_000"]
     show.main([*given, "--keep-going", *limits], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
@@ -388,7 +389,16 @@ def test_options_become_what_open_log_takes(capsys):
     # Nothing is deskewed by a command that reads a log so.
     assert {**plain, "stamp": "first"} == options
     limited = {"beams": 3, "ratio": 1000}
-    assert list(all_given.values()) == ["/scan", True, "last", 0, "/odom", limited]
+    assert all_given == {
+        "topic": "/scan",
+        "keep_going": True,
+        "echo": "last",
+        "ring": 0,
+        "pose_topic": "/odom",
+        "limits": limited,
+        "scale": 0.001,
+        "laser_pose": (1.0, 2.0, 3.0),
+    }
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES

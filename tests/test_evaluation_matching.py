@@ -64,18 +64,18 @@ def test_match_refuses():
 
 
 @pytest.mark.parametrize(
-    ("package", "compute"),
+    ("package", "extra", "compute"),
     [
-        ("scipy", lambda: evaluate(WALL, WALL)),
-        ("scipy", lambda: evaluate(features(), features()).summary()),
-        ("scipy", lambda: icp(SCAN, SCAN)),
-        ("shapely", lambda: score_map([], SCAN, np.ones((3, 2)))),
+        ("scipy", "mapping", lambda: evaluate(WALL, WALL)),
+        ("scipy", "mapping", lambda: evaluate(features(), features()).summary()),
+        ("scipy", "mapping", lambda: icp(SCAN, SCAN)),
+        ("shapely", "evaluation", lambda: score_map([], SCAN, np.ones((3, 2)))),
     ],
 )
-def test_without_an_optional_package_one_line_names_the_extra(package, compute, monkeypatch):
+def test_without_a_package_one_line_names_the_smallest_extra(package, extra, compute, monkeypatch):
     for module in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[evaluation\]'$"):
+    with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[{extra}\]'$"):
         compute()
 
 

@@ -43,6 +43,7 @@ SQUARES = {"_ROUNDING": 4.0}
 POWERS = {
     "segments": {"start": 1, "end": 1, "centroid": 1, "length": 1, "rms": 1, "misfit": 1},
     "corners": {"position": 1, "covariance": 2},
+    "edges": {"position": 1, "covariance": 2},
     "arcs": {"center": 1, "radius": 1, "rms": 1, "covariance": 2},
     "breakpoints": {"position": 1},
 }

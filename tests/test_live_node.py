@@ -291,6 +291,7 @@ def spoilt(chance: Random) -> Received:
     ],
     ids=["optimal", "scans", "odom", "liu"],
 )
+@pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
 def test_no_message_ends_a_node(options):
     chance, n = Random(3), 800
 

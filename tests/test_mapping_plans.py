@@ -182,7 +182,7 @@ def test_layer_that_is_not_there_names_those_that_are(tmp_path):
         ([], "no walls: 0 lines"),
         ([[1, 1, 1, 1]], "no walls: 1 lines, none has a length"),
         ([[0, 0, np.nan, 1]], "no walls"),
-        (1000 * ROOM, "is 4000 m wide, .* is it drawn in metres"),
+        (1000 * ROOM, "is 4000 m wide, .* is it drawn in other units"),
     ],
 )
 def test_walls_without_length_and_plans_without_walls(lines, line):

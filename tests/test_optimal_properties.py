@@ -208,6 +208,7 @@ def test_features_of_thousands_of_scans_are_sound(extractor):
     st.sampled_from([1e-6, 0.001, 0.01, 0.0775, 2 * math.pi / 40]),
 )
 @settings(max_examples=500)
+@pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
 def test_features_of_any_floats_are_sound(ranges, step):
     step = min(step, 2 * math.pi / max(len(ranges), 1))
     scan = LaserScan(ranges, -1.0, step)

@@ -147,8 +147,9 @@ def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys):
     assert plan_warning(plan, "a") == "a: 1 walls or columns have impossible numbers, left out"
     run(["locate", log, "--map", path, "-o", poses, "-q"])
     assert "1 walls or columns have impossible numbers" in capsys.readouterr().err
+    found = str(tmp_path / "found.parquet")
     for command in (["locate", log, "--map", path], ["map", log, "--onto", path]):
-        assert run([*command, "-o", poses.replace("tum", "parquet"), "--limit", "entities=2"]) == 1
+        assert run([*command, "-o", found, "--limit", "entities=2"]) == 1
         assert "a.parquet: has 8 entities or rows" in capsys.readouterr().err
 
 

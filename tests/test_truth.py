@@ -215,7 +215,7 @@ def test_by_hand(name):
 
 def test_beams_through_the_vertices_of_a_room():
     features = truth(lines(box(-2, -2, 2, 2)), ORIGIN, ring(16))  # at -180°, -157.5°, -135°
-    assert counts(features) == (4, 4, 0, 0)
+    assert counts(features) == (4, 4, 0, 0, 0)
     assert features.segments["n_points"].sum() == 16
     np.testing.assert_allclose(features.corners["opening"], RIGHT)
 
@@ -254,7 +254,7 @@ def test_a_column_in_front_of_a_wall():
 )
 def test_a_column_of_two_beams_has_no_bound_and_no_cluster(circle, sensor, n_points, in_cluster):
     features = truth(World([], [circle]), ORIGIN, sensor)
-    assert counts(features)[:3] == (0, 0, 1)
+    assert counts(features)[:4] == (0, 0, 0, 1)
     assert features.arcs["n_points"].tolist() == [n_points]
     assert np.isfinite(features.arcs["covariance"]).all() == (n_points > 2)
     assert (features.clusters == 0).sum() == in_cluster

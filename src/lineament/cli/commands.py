@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ..errors import warn
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
@@ -20,7 +21,6 @@ from .options import (
     SCAN,
     SET,
     check_ending,
-    complain,
     make_extractor,
     methods_option,
     reading,
@@ -137,7 +137,7 @@ def view(
 
         drawn = LineMap.read(plan, **drawing, limits=reading["limits"])
         if warning := plan_warning(drawn, plan):
-            complain(f"lineament: {warning}")
+            warn(warning)
     session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 

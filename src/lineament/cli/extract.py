@@ -111,7 +111,7 @@ def extract(
     extraction = extract_log(found[0], output, extractor, track=tracker(quiet), **reading)
     if not quiet:
         click.echo(str(extraction))
-    check_found(extraction.log, extraction.scans, extraction.features)
+    check_found(extraction.log, extraction.scans, extraction.features, extractor.method)
 
 
 def _extract_into_folder(
@@ -147,7 +147,7 @@ def _extract_into_folder(
     if bulk.failed:
         raise LineamentError(f"{bulk.failed} of {bulk.logs} logs failed, see {bulk.manifest}")
     if not bulk.whole:  # Else what was found in those is not counted again.
-        check_found(output, bulk.scans, bulk.features)
+        check_found(output, bulk.scans, bulk.features, extractor.method)
 
 
 def _executor(

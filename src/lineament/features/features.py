@@ -161,7 +161,7 @@ class Features(Tabled, ReadOnly, Pictured):
         Raises
         ------
         ValueError
-            If the pose is not three finite numbers, or the covariance is none.
+            If the pose is not three finite numbers, or the covariance not one of such.
 
         Examples
         --------

@@ -164,11 +164,8 @@ class LaserScan(ReadOnly, Pictured):
 
     def _changed(self, **fields: Any) -> Self:
         """Return a copy with other fields, which are checked already."""
-        # What is made when it is first asked for is of the old fields; bearings that are irregular
-        # were given.
-        made = ("valid", "points") if "ranges" in fields else ()
-        if made and self.is_regular:
-            made = (*made, "angles")
+        # What is made when first asked for is of the old fields; irregular bearings were given.
+        made = ("valid", "points", "angles")[: 2 + self.is_regular] if "ranges" in fields else ()
         other = self.__class__.__new__(self.__class__)
         other.__dict__.update({k: v for k, v in vars(self).items() if k not in made}, **fields)
         return other
@@ -248,8 +245,8 @@ class LaserScan(ReadOnly, Pictured):
 
         Examples
         --------
-        >>> LaserScan([1500.0], 0.0, 0.1, range_max=5600.0).scaled(0.001).range_max
-        5.6
+        >>> LaserScan([1500.0], 0.0, 0.1, range_max=5600.0).scaled(0.001).ranges.tolist()
+        [1.5]
         """
         ranges = in_metres(self.ranges, scale)
         low, high = range_limits(self.range_min * scale, self.range_max * scale)

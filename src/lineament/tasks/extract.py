@@ -14,6 +14,7 @@ from ..extractor import Extractor, load_kernels
 from ..features import TABLES, Features, make_records
 from ..files import check_outputs
 from ..logs import open_log
+from ..methods import Method
 from ..output import open_writer
 from ..output.scene import WORLD_FRAME
 from ..progress import Track, untracked
@@ -152,9 +153,10 @@ def extract_log(
     )
 
 
-def check_found(name: str, scans: int, features: Mapping[str, int]) -> None:
-    """Raise a NothingFoundError if no scan has a feature, of which breakpoints are none."""
-    if not any(count for kind, count in features.items() if kind != "breakpoints"):
+def check_found(name: str, scans: int, features: Mapping[str, int], method: Method) -> None:
+    """Raise a NothingFoundError if no scan has a feature; breakpoints count for `pdbs` alone."""
+    found = {kind for kind, count in features.items() if count}
+    if not found - ({"breakpoints"} if method.name != "pdbs" else set()):
         raise NothingFoundError(f"{name}: no feature in {scans} scans, expected some")
 
 
