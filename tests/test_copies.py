@@ -54,6 +54,7 @@ def values(of):
     return of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", method_names())
 def test_a_copy_of_a_used_extractor_is_fresh(name):
     for given in (name, get_method(name)):
@@ -83,6 +84,7 @@ def test_a_copy_traces_and_takes_batches():
 
 
 # Threads of other tests may be about: the pool uses none of their locks.
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 @pytest.mark.parametrize("start", ["fork", "spawn"])
 def test_a_used_extractor_in_other_processes(start):
@@ -189,6 +191,7 @@ def step_of(kind):
     return made, lambda of, k: values(step(of, *seen[k]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["tracker", "odometer", "dock", "local map", "follower", "drive", "pipeline"]
 )

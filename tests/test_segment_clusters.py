@@ -11,6 +11,8 @@ from worlds import degenerate_scans, fan, random_scan, scan_of, wall
 from lineament import Extractor, open_log
 from lineament.methods import get_method, method_names
 
+pytestmark = pytest.mark.slow
+
 #: Methods and presets, with any number of vertices and with few of them; some know no vertices.
 SETTINGS = [
     (name, vertices)

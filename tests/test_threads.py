@@ -19,6 +19,8 @@ from lineament.methods import get_method
 from lineament.motion import Odometer
 from lineament.output import open_writer
 
+pytestmark = pytest.mark.slow
+
 OTHERS = [LaserScan(x / np.cos(BEARINGS[:61]), angles=BEARINGS[:61]) for x in (2.0, 3.5)]
 
 
