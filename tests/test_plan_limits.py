@@ -194,6 +194,7 @@ def test_pairs_grow_with_walls_and_not_with_their_square():
     assert pairs(8000) < 5 * pairs(2000)
 
 
+@pytest.mark.slow
 def test_long_walls_are_listed_in_bounds():
     rng = np.random.default_rng(0)
     start = rng.uniform(0, 100, (3000, 2))
