@@ -32,8 +32,9 @@ _THIRD = 1.0 / 0.4307**2
 _WHOLE = 1.03
 #: Of overlapping triples, so many count as one.
 _OVERLAP = 1.94
-#: Steps of Newton's method, and the least that a mean square is of what is expected.
-_NEWTON_STEPS, _SMALLEST_RATIO = 8, 1e-30
+#: Steps of Newton's method; the least and the most that a mean square is of what is expected: what
+#: is a metre off is clutter.
+_NEWTON_STEPS, _LEAST_RATIO, _MOST_RATIO = 8, 1e-30, 1e4
 #: No scanner reports its ranges in coarser steps [m].
 _COARSEST_QUANTUM = 0.15
 #: Of ranges on a lattice, at least so large a share differs from the neighbours'.
@@ -112,7 +113,7 @@ def expected_variance(square, degrees, prior):
     normal with the variance `SPREAD`, and the mean of the variance is `prior`. By Laplace's method
     for the posterior and for the variance times it (Tierney and Kadane 1986), 6 % off at most.
     """
-    ratio = max(square / prior, _SMALLEST_RATIO)
+    ratio = min(max(square / prior, _LEAST_RATIO), _MOST_RATIO)
     height, curvature = _peak(ratio, 0.5 * degrees, -0.5 * SPREAD)
     raised, raised_curvature = _peak(ratio, 0.5 * degrees, 0.5 * SPREAD)
     mean = math.sqrt(curvature / raised_curvature) * math.exp(raised - height)

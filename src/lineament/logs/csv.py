@@ -4,6 +4,7 @@ import re
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import islice
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from .bearings import bearing_fields, by_bearing
 from .linelog import LineLog, Parser, number_parser, numbers, scalar
 from .lines import numbered_lines
 
+# Neither a comment nor blank.
+_ROW = re.compile(rb"\s*[^#\s]").match
 # A row a scan.
 _BEARINGS = ("angle_min", "angle_increment")
 _SCALARS = (*_BEARINGS, "stamp", "range_min", "range_max", "scan_time", "time_increment")
@@ -48,7 +51,7 @@ class _Csv(Log):
         return cls._fits(*_columns(head.data.split(b"\n"))[1:])
 
     def _open(self) -> None:
-        rows = (line for _, line in numbered_lines(self.source, self.limits))
+        rows = map(itemgetter(1), numbered_lines(self.source, self.limits))
         self._delimiter, self._names, width = _columns(rows)
         if not self._fits(self._names, width):
             raise LogError(
@@ -61,13 +64,13 @@ class _Csv(Log):
     def _lines(self) -> Iterator[tuple[int, bytes]]:
         """Yield each row below the header with the number of its line."""
         lines = numbered_lines(self.source, self.limits)
-        rows = ((number, line) for number, line in lines if _is_row(line))
+        rows = ((number, line) for number, line in lines if _ROW(line))
         return islice(rows, 1 if self._names else 0, None)
 
 
 def _columns(lines: Iterable[bytes]) -> tuple[bytes, list[str], int]:
     """Return what the first row shows: the delimiter, names unless it is numbers, the width."""
-    row = next(filter(_is_row, lines), b"")
+    row = next(filter(_ROW, lines), b"")
     delimiter = next((sign for sign in (b",", b";", b"\t") if sign in row), b",")
     cells = _cells(row, delimiter)
     try:
@@ -79,10 +82,6 @@ def _columns(lines: Iterable[bytes]) -> tuple[bytes, list[str], int]:
 
 def _cells(row: bytes, delimiter: bytes) -> list[bytes]:
     return [cell.strip(b' \t\r"') for cell in row.split(delimiter)]
-
-
-def _is_row(line: bytes) -> bool:
-    return not (line.isspace() or not line or line.lstrip().startswith(b"#"))
 
 
 class CsvLog(_Csv, LineLog):

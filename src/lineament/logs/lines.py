@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 
 from ..errors import LogError
@@ -140,7 +141,7 @@ def numbered_lines(
                 lines[0] = lines[0].removeprefix(BOM)
             rest = lines.pop()
             # A file may be full of empty lines: these cost next to nothing.
-            yield from ((at, line) for at, line in enumerate(lines, number) if line)
+            yield from filter(itemgetter(1), enumerate(lines, number))
             number += len(lines)
             limits.check("line", len(rest), partial(LogError, path))
     except LogError as error:
