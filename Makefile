@@ -5,14 +5,14 @@
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all boundscheck docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
+.PHONY: demo test test-all boundscheck kernels library docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
 test: lint types tests wheel
 
-test-all: coverage boundscheck docs
+test-all: coverage boundscheck kernels docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -46,7 +46,11 @@ ros1:
 	@command -v rosmaster >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -qq && \
 	apt-get install -y -qq --no-install-recommends $(ROS1:%=python3-%) >/dev/null; } || echo "no ROS 1: its tests will be skipped"
 
-tests: .venv/ready browser ros1
+# The kernels as a library for this machine; where they change, numba compiles them until this is made.
+library: .venv/ready
+	$(BIN)/python building/compile.py
+
+tests: library browser ros1
 	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
 
 coverage: .venv/ready
@@ -60,33 +64,36 @@ boundscheck: .venv/ready
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck LINEAMENT_BEAMS=8 $(BIN)/python -m pytest -n auto --dist worksteal \
 	tests/test_kernel_range.py tests/test_optimal_properties.py tests/test_twins.py tests/test_polylines.py tests/test_budget.py
 
+# The library, numba and Python find the same: the first two in every byte.
+kernels: library
+	NUMBA_CACHE_DIR=build/kernels $(BIN)/python tests/same_kernels.py
+
 # The site of the documents, with its tutorials run; what it needs is installed when it is first made.
 .venv/docs: requirements-docs.lock .venv/ready
 	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements-docs.lock
 	@touch $@
 
-docs: .venv/docs
+docs: .venv/docs library
 	mkdir -p build
-	$(BIN)/lineament warmup --quiet
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "the site is in build/site: open build/site/index.html"
 
-# The wheel is pure, and runs in an environment that has nothing else.
-wheel: .venv/ready
+# The wheel has the compiled kernels, and runs in an environment that has nothing else.
+wheel: library
 	rm -rf dist build/empty
-	$(BIN)/python -m build --no-isolation --quiet
+	$(BIN)/python -m build --no-isolation --quiet --sdist --wheel
 	$(PYTHON) -m venv build/empty
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
-	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-any.whl
+	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-*.whl
 	build/empty/$(notdir $(BIN))/python benchmarks/installed.py
 	cd build/empty && $(notdir $(BIN))/lineament demo --quiet -o demo && ls demo
 
 # The first minutes of a new user, from the built wheel in an empty environment: each step, and its time.
 .PHONY: new-user
-new-user: .venv/ready
+new-user: library
 	rm -rf dist
-	$(BIN)/python -m build --no-isolation --quiet
-	$(BIN)/python benchmarks/new_user.py dist/lineament-*-py3-none-any.whl
+	$(BIN)/python -m build --no-isolation --quiet --wheel
+	$(BIN)/python benchmarks/new_user.py dist/lineament-*-py3-none-*.whl
 
 # Do the tests fail when the code is wrong? A quarter of an hour for each area on two cores.
 mutants: .venv/ready
@@ -111,4 +118,4 @@ lines:
 
 clean:
 	rm -rf .venv dist build demo .coverage .coverage.*
-	find src -name '*.nb[ic]' -delete
+	find src \( -name '*.nb[ic]' -o -name '*.so' \) -delete

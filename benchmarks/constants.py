@@ -22,6 +22,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+# Compiled kernels have their constants as they were.
+os.environ["LINEAMENT_JIT"] = "1"
+
 import numpy as np
 from constants_sample import DATA, figures, measure, resampled, take_sample
 

@@ -10,7 +10,7 @@ from importlib.metadata import Distribution, distributions
 
 #: What comes with a new environment, and what is measured.
 APART = {"pip", "setuptools", "lineament"}
-MOST_PACKAGES, MOST_MEGABYTES = 22, 600
+MOST_PACKAGES, MOST_MEGABYTES = 20, 420
 
 
 def megabytes(package: Distribution) -> float:

@@ -73,7 +73,9 @@ def plain() -> Iterator[ModuleType]:
     for name in compiled:
         del sys.modules[name]
     numba.config.DISABLE_JIT = 1
-    yield importlib.import_module("lineament")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LINEAMENT_JIT", "1")
+        yield importlib.import_module("lineament")
     numba.config.DISABLE_JIT = before
     for name in packages():
         del sys.modules[name]

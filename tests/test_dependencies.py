@@ -38,7 +38,7 @@ def test_missing_package_is_named_with_what_installs_it(package, monkeypatch):
     with pytest.raises(LineamentError, match=line), needed_by("it"):
         __import__(package)
     with pytest.raises(ModuleNotFoundError), needed_by("it"):
-        raise ModuleNotFoundError(name="numba")
+        raise ModuleNotFoundError(name="numpy")
 
 
 @pytest.mark.parametrize(

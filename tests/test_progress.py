@@ -18,7 +18,6 @@ import lineament as ln
 from lineament import cli, progress
 from lineament.cli import progress as cli_progress
 from lineament.live import LiveConfig, Pipeline, run_live
-from lineament.methods.workspace import Block as WorkingBlock
 from lineament.progress import (
     Compiling,
     compiled_seconds,
@@ -46,127 +45,60 @@ def states(monkeypatch):
     compiler = progress._Compiler()
     compiler.show = states.append
     monkeypatch.setattr(progress, "_compiler", compiler)
-    monkeypatch.setattr(compiler, "hear", lambda: None)
     return states
 
 
-def _leaf():
-    return 1
-
-
-def _branch():
-    return leaf() + 1
-
-
-def _root():
-    return branch() + leaf() + len(str(module.elsewhere()))
-
-
-def _other():
-    return 2
-
-
-class Kernel:
-    """What `njit` would make of a function."""
-
-    def __init__(self, function):
-        self.py_func, self.overloads = function, {}
-
-
-leaf, branch, root, other = map(Kernel, (_leaf, _branch, _root, _other))
-module = ModuleType("module")
-module.elsewhere = other
-
-
-def run_method(block):
-    """A method's `run`, which calls a kernel and a function of Python that calls another."""
-    root(block)
-    block.attribute()
-
-
-class Block:
-    def attribute(self):
-        return SimpleNamespace(of=lone)
-
-
-lone = Kernel(lambda: 3)
-Block.attribute.__module__ = run_method.__module__ = "lineament.of_tests"
-
-
-def compile_all(clock, *kernels):
-    for kernel in kernels:
-        progress._compiler.start(kernel)
+def compile_all(clock, count):
+    for _ in range(count):
+        progress._compiler.start()
         clock.now += 1
-        progress._compiler.end(kernel)
-
-
-def test_the_functions_that_a_kernel_needs_are_found_in_its_code():
-    assert progress._needed(root).keys() == {_root, _branch, _leaf, _other}
-    assert progress._needed(leaf) == {_leaf: len(_leaf.__code__.co_code)}
-    assert progress._kernels_of((run_method,), (Block,)) == [root, lone]
-    assert progress._kernels_of((run_method, len), ()) == [root]
+        progress._compiler.end()
 
 
 def test_one_piece_of_work_is_shown_from_its_first_function_to_its_end(states, clock):
-    with compiling([run_method], [Block]):
-        progress._compiler.start(root)
+    progress._compiler.reason = "it is a test"
+    with compiling():
+        progress._compiler.start()
         assert states == []  # until it has taken half a second
-        compile_all(clock, leaf, branch, leaf, other)
+        compile_all(clock, 4)
         clock.now += 2
-        progress._compiler.end(root)
-        compile_all(clock, lone)
+        progress._compiler.end()
+        compile_all(clock, 1)
         assert not any(state.is_last for state in states)
     assert [state.is_first for state in states] == [True] + [False] * (len(states) - 1)
     assert [state.is_last for state in states] == [False] * (len(states) - 1) + [True]
-    assert [state.total for state in states] == [5] * len(states)
-    assert sorted(state.done for state in states) == [state.done for state in states]
-    assert (states[0].done, states[0].seconds, states[-1].done) == (1, 1.0, 5)
-    assert states[-1].left == 0
-    size = {
-        function: len(function.__code__.co_code) for function in (_root, _branch, _leaf, _other)
-    }
-    # A kernel takes longer by what it calls, and the first guess counts for two seconds.
-    before_root = states[-5]
-    assert before_root.done == 3
-    worked = sum(size.values()) - size[_root]
-    left = size[_root] + 0.15 * sum(size.values()) + len(lone.py_func.__code__.co_code) * 1.15
-    speed = (worked + 2 * 1500) / (before_root.seconds + 2)
-    assert before_root.left == pytest.approx(left / speed)
+    assert [state.done for state in states] == sorted(state.done for state in states)
+    assert (states[0].done, states[0].seconds, states[-1].done) == (1, 1.0, 6)
     assert compiled_seconds() == 7  # what is compiled within another is not counted twice
+    assert str(states[0]) == "compiling kernels (it is a test): 1 done in 1 s"
     assert str(states[-1]) == "compiled kernels in 7 s; they are cached for the next run"
 
 
-def test_kernels_from_the_cache_are_not_waited_for(states, clock, monkeypatch):
-    monkeypatch.setattr(root, "overloads", {(): None})
-    with compiling([run_method], [Block]):
-        compile_all(clock, lone)
-    assert {state.total for state in states} == {1}
-    states.clear()
-    with compiling([run_method], [Block]):
+def test_kernels_from_the_cache_are_not_waited_for(states):
+    with compiling():
         pass
     assert states == []
 
 
 def test_kernels_outside_of_a_piece_of_work_are_one_each(states, clock):
-    compile_all(clock, branch, other)
-    assert [str(state)[:8] for state in states if state.is_last] == ["compiled"] * 2
-    assert [state.total for state in states if state.is_last] == [2, 1]
+    compile_all(clock, 2)
+    assert [(state.done, state.seconds) for state in states if state.is_last] == [(1, 1), (1, 1)]
 
 
-def test_what_takes_no_time_or_is_hidden_is_not_shown(states, clock, monkeypatch):
-    monkeypatch.setattr(clock, "now", 0.0)
-    progress._compiler.start(leaf)
-    clock.now = 0.49
-    progress._compiler.end(leaf)
+def test_what_takes_no_time_or_is_hidden_is_not_shown(states, clock):
+    clock.now = 10.0
+    progress._compiler.start()
+    clock.now = 10.49
+    progress._compiler.end()
     with compiling_shown(None):
-        progress._compiler.start(branch)
+        progress._compiler.start()
         clock.now += 1
-        compile_all(clock, leaf)
-        assert compiling_now() == "compiling kernels, once: 1 of 2, 0 s left"
-        progress._compiler.end(branch)
+        compile_all(clock, 1)
+        assert compiling_now() == "compiling kernels (): 1 done in 2 s"
+        progress._compiler.end()
     assert states == []
     assert compiling_now() == ""
-    compile_all(clock, branch)
+    compile_all(clock, 1)
     assert states[-1].is_last
 
 
@@ -176,14 +108,17 @@ def test_nobody_to_show_it_to_does_not_end_the_work(clock):
         raise BrokenPipeError
 
     with compiling_shown(show):
-        compile_all(clock, leaf)
+        compile_all(clock, 1)
     assert compiled_seconds() == 1
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="numba compiles nothing")
 def test_numba_reports_what_it_compiles(monkeypatch):
     monkeypatch.setattr(progress, "_PATIENCE", 0.0)
-    states, before = [], compiled_seconds()
+    # The follower of this test hears numba, whether the kernels are compiled or not.
+    compiler, states = progress._Compiler(), []
+    monkeypatch.setattr(progress, "_compiler", compiler)
+    compiler.hear("it is a test")
     source = "def inner(x):\n    return x + 1\n\ndef outer(x):\n    return named_inner(x) * 2\n"
     exec(source, names := {})
     names["named_inner"] = njit(names["inner"])
@@ -193,14 +128,14 @@ def test_numba_reports_what_it_compiles(monkeypatch):
         count = len(states)
         assert outer(1) == 4
     assert len(states) == count
-    assert (states[0].done, states[0].total, states[-1].done) == (0, 2, 2)
+    assert (states[0].done, states[-1].done) == (0, 2)
     assert states[0].is_first
     assert states[-1].is_last
-    assert compiled_seconds() > before
+    assert compiled_seconds() > 0
 
 
 FIRST, NEXT, LAST = (
-    Compiling(done, 40, 9.7 + done, 17.6 - done, done == 1, done == 40) for done in (1, 2, 40)
+    Compiling("it is a test", done, 9.7 + done, done == 1, done == 40) for done in (1, 2, 40)
 )
 
 
@@ -299,20 +234,16 @@ def test_speeds_are_without_it(monkeypatch, capsys):
 
 def test_the_first_run_of_an_extractor_is_one_piece_of_work(monkeypatch):
     pieces = []
-
-    def record(functions, classes):
-        pieces.append((functions, classes))
-        return nullcontext()
-
-    monkeypatch.setattr("lineament.extractor.compiling", record)
+    monkeypatch.setattr(
+        "lineament.extractor.compiling", lambda: pieces.append(None) or nullcontext()
+    )
     scan = ln.LaserScan([2.0] * 9, 0.0, 0.01)
     extractor, other = ln.Extractor("pdbs"), ln.Extractor("liu")
     extractor(scan)
     extractor(scan)
     other.batch(np.full((3, 9), 2.0), angle_min=0.0, angle_increment=0.01)
     other(scan)
-    methods = [type(each.method) for each in (extractor, other)]
-    assert pieces == [([method.run], [method, WorkingBlock]) for method in methods]
+    assert len(pieces) == 2
 
 
 def test_kernels_of_a_demo_of_many_logs_and_of_a_node_are_loaded_first(tmp_path, monkeypatch):
@@ -368,11 +299,12 @@ def test_first_use_is_never_silent_and_the_second_is(tmp_path):
 
     def complaints():
         environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        environment["LINEAMENT_JIT"] = "1"
         ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert ran.returncode == 0
         return ran.stderr.splitlines()
 
     first, last = complaints()
-    assert first.startswith("compiling kernels, once: ")
+    assert first.startswith("compiling kernels (LINEAMENT_JIT is set): ")
     assert last.startswith("compiled kernels in ")
     assert complaints() == []

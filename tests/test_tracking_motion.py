@@ -8,7 +8,6 @@ import pytest
 from handmade import arc, corner, features, segment
 
 import lineament as ln
-from lineament.kernels import kernel
 from lineament.kernels.tracking.symmetric import diagonalise
 from lineament.motion import Matches, associate, estimate_motion
 from lineament.motion.association import KINDS
@@ -21,9 +20,8 @@ NONE = np.empty((0, 2), np.intp)
 WIDE = np.diag((0.1, 0.1, 0.1)) ** 2
 
 
-@kernel
-def _diagonalise(matrix, vectors):
-    diagonalise(matrix, vectors)
+#: What only kernels call has no wrapper for Python where numba compiles it.
+_diagonalise = getattr(diagonalise, "py_func", diagonalise)
 
 
 def symmetric_matrices():

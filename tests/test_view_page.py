@@ -248,7 +248,7 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
 
 def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     """A scan of a method that is being compiled."""
-    state = progress.Compiling(14, 40, 9.0, 18.0, is_first=False, is_last=False)
+    state = progress.Compiling("it is a test", 14, 9.0, is_first=False, is_last=False)
     monkeypatch.setattr(progress._compiler, "now", state)
     with served(log, ["pdbs"]) as (session, address):
         busy, extractor = threading.Lock(), session.extractors["pdbs"]
@@ -261,7 +261,7 @@ def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
         with busy:
             page.driver.get(address)
             text = "document.querySelector('.panel span')?.textContent"
-            page.wait(f"{text} === 'compiling kernels, once: 14 of 40, 18 s left'")
+            page.wait(f"{text} === 'compiling kernels (it is a test): 14 done in 9 s'")
             monkeypatch.setattr(progress._compiler, "now", None)
             page.wait(f"{text} === 'working …'")
         shown(page, 0)

@@ -15,6 +15,7 @@ EXTRAS = {
     "ezdxf": "cad",
     "foxglove": "foxglove",
     "fsspec": "remote",
+    "numba": "jit",
     "pandas": "pandas",
     "polars": "polars",
     "rerun": "rerun",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, ExitStack
 from typing import Any, cast
 
 import numpy as np
@@ -208,13 +207,8 @@ class Extractor:
         """Extract the features of one scan and keep every intermediate of the run."""
         return self._method.trace(scan, self(scan), self._noise_row)
 
-    def compiling(self) -> AbstractContextManager[None]:
-        """Take the kernels that are compiled within for one piece of work, which is shown."""
-        method = type(self._method)
-        return compiling([method.run], [method, Block])
-
     def _first_run(self, block: Block) -> None:
-        with self.compiling():
+        with compiling():
             self._method.run(block)
         self._run = self._method.run
 
@@ -299,10 +293,8 @@ def trace(
 
 
 def load_kernels(extractors: Iterable[Extractor]) -> None:
-    """Compile the kernels of some extractors as one piece of work, or load them from the cache."""
-    with ExitStack() as stack:
-        for extractor in (extractors := list(extractors)):
-            stack.enter_context(extractor.compiling())
+    """Run some extractors once, so that no scan waits for what the first one needs."""
+    with compiling():
         for extractor in extractors:
             extractor(WALL)
 

@@ -1,37 +1,64 @@
-"""Numba functions of arrays. They know no objects, files or methods, and check nothing.
+"""Functions of arrays. They know no objects, files or methods, and check nothing.
 
 Each works on the workspace of one scan and allocates nothing. In all of them, `floats` and `ints`
 are that workspace (see `layout`), `bearings` the cosines and sines of the beams, shape (2, n),
 `circular` is whether the scan is a full circle, and `noise` is (sigma, proportional, bearing,
-quantum), see `lineament.RangeNoise`. Parameters of a method come as a plain tuple, which Python
-passes in half the time of a named one; the kernel names them.
+quantum), see `lineament.RangeNoise`. Parameters of a method come as a plain tuple; the kernel
+names them.
+
+They are written for numba, and compiled by it when the package is built: `library` loads the
+result. Where that is not there, or not of this source, numba compiles on first use.
 """
 
 import math
+from functools import partial
 
-from numba import njit
+from ..errors import needed_by
+from ..progress import hear_compiler
+from .library import NoLibraryError, load
 
-#: Compiled on first use, cached on disk, without the GIL. No fastmath: NaN means something here.
-kernel = njit(cache=True, nogil=True, error_model="numpy")
+try:
+    _library = load()
+except NoLibraryError as reason:
+    #: Why numba compiles the kernels; "" if they are compiled.
+    by_numba = str(reason)
+    with needed_by(f"{by_numba}: lineament then"):
+        from numba import njit
+        from numba.extending import register_jitable as jitable
 
-_INTERNAL = {
-    "nogil": True,
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
+    hear_compiler(by_numba)  # Nobody should wait for it in silence.
+    _INTERNAL = {
+        "nogil": True,
+        "error_model": "numpy",
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+    }
+    #: What Python calls: without the GIL. No fastmath: NaN means something here.
+    kernel = njit(cache=True, nogil=True, error_model="numpy")
+    #: For what only kernels call: without the wrappers for Python and C, which take time to make.
+    helper = njit(**_INTERNAL)
+    #: For what takes tuples of arrays: to hand them over takes a tenth of a microsecond and more.
+    inlined = njit(forceinline=True, **_INTERNAL)
+    #: For what adds up many numbers: the order may change, so that four are added at once.
+    sums = njit(fastmath={"reassoc"}, **_INTERNAL)
+    #: For arithmetic whose last digit does not matter: a product and a sum are rounded at once.
+    contracted = njit(fastmath={"contract"}, **_INTERNAL)
+    #: Call of a kernel with arguments that stay the same, whose contents change.
+    bind = partial
+else:
+    by_numba = ""
 
-#: For what only kernels call: without the wrappers for Python and C, which take time to compile.
-helper = njit(**_INTERNAL)
+    def _as_it_is(function):
+        # What compiled kernels call is compiled with them.
+        return function
 
-#: For what takes tuples of arrays: to hand them over takes a tenth of a microsecond and more.
-inlined = njit(forceinline=True, **_INTERNAL)
+    kernel = _library.entry
+    helper = inlined = sums = contracted = jitable = _as_it_is
 
-#: For what adds up many numbers: the order may change, so that four are added at once.
-sums = njit(fastmath={"reassoc"}, **_INTERNAL)
+    def bind(entry, *arguments):
+        """Call of a kernel with arguments that stay the same, whose contents change."""
+        return entry.bind(*arguments)
 
-#: For arithmetic whose last digit does not matter: a product and a sum are rounded at once.
-contracted = njit(fastmath={"contract"}, **_INTERNAL)
 
 #: The fourth powers of larger ranges, and of the inverse of smaller ones, are no numbers [m].
 LARGEST = 1e60

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from . import LARGEST, contracted, helper, kernel
+from .arrays import Floats2, Singles2
 from . import layout as at
 
 F = np.float32
@@ -22,7 +23,16 @@ def scratch_shape(beams: int, half_width: int) -> tuple[int, int]:
 
 
 @kernel
-def filter_ranges(floats, range_min, range_max, sigma_d, sigma_r, half_width, circular, scratch):
+def filter_ranges(
+    floats: Floats2,
+    range_min: float,
+    range_max: float,
+    sigma_d: float,
+    sigma_r: float,
+    half_width: int,
+    circular: bool,
+    scratch: Singles2,
+):
     """Filter the ranges of a scan over index distance and range difference.
 
     ρ̃_i = ρ_i + Σ_j w (ρ_j - ρ_i) / Σ_j w, which is Σ_j w ρ_j / Σ_j w and keeps its digits: the

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from . import helper, kernel
+from .arrays import Floats2, Floats3, Ints2
 from . import layout as at
 from .rays import add_ray, least_squares, turn
 
@@ -21,7 +22,16 @@ WORST = 0.25
 
 
 @kernel
-def limit_pieces(floats, ints, bearings, max_vertices, link, worst, costs, follow):
+def limit_pieces(
+    floats: Floats2,
+    ints: Ints2,
+    bearings: Floats2,
+    max_vertices: int,
+    link: float,
+    worst: float,
+    costs: Floats3,
+    follow: Ints2,
+):
     """Simplify the pieces of a scan to at most `max_vertices` vertices.
 
     A chain of k pieces joined at corners has k + 1 vertices. Where there are too many,

@@ -5,11 +5,23 @@ import math
 import numpy as np
 
 from . import helper, kernel
+from .arrays import Floats1, Floats2, Ints2
 from . import layout as at
 
 
 @kernel
-def cluster(floats, ints, bearings, step, circular, noise, scale, floor, density_k, min_points):
+def cluster(
+    floats: Floats2,
+    ints: Ints2,
+    bearings: Floats2,
+    step: float,
+    circular: bool,
+    noise: Floats1,
+    scale: float,
+    floor: float,
+    density_k: float,
+    min_points: int,
+):
     """Part the usable beams of a scan into clusters.
 
     A point joins the cluster before it if its spacing is at most T_d = λ max(ρ_i, ρ_{i-1}) Δφ plus

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from . import helper, kernel
+from .arrays import Floats1
 
 #: What the response is: the interpretations of equation 22 and the text of Figure 9.
 TANGENT, PRODUCT, RELATIVE, CHORD_SCALED, PRODUCT_SCALED = range(5)
@@ -18,7 +19,13 @@ RESPONSES = {
 
 
 @kernel
-def response_along(x, y, radius, kind, out):
+def response_along(
+    x: Floats1,
+    y: Floats1,
+    radius: int,
+    kind: int,
+    out: Floats1,
+):
     """Response at every point of one cluster, open at its ends."""
     for i in range(len(x)):
         out[i] = corner_response(x, y, i, np.int64(0), len(x) - 1, radius, kind, False)

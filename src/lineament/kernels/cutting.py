@@ -9,12 +9,22 @@ import math
 import numpy as np
 
 from . import helper, kernel, sums
+from .arrays import Floats2, Ints2
 from . import layout as at
 from .corner_operator import corner_response
 
 
 @kernel
-def cut(floats, ints, radius, threshold, kind, min_points, both_sides, whole_support):
+def cut(
+    floats: Floats2,
+    ints: Ints2,
+    radius: int,
+    threshold: float,
+    kind: int,
+    min_points: int,
+    both_sides: bool,
+    whole_support: bool,
+):
     """Cut the clusters of a scan where the corner operator responds (Liu et al. 2023, steps 5-7).
 
     From points and clusters, candidates and pieces.

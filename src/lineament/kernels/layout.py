@@ -9,8 +9,9 @@ from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
-from numpy.typing import NDArray
+
+from . import jitable
+from .arrays import Floats1, Floats2, Ints1, Ints2, Shorts2
 
 #: Rows of `beams`: ranges as measured, and those that the partition is made on (NaN where not
 #: usable) [m].
@@ -51,15 +52,35 @@ EXTRA = 5
 class Workspace(NamedTuple):
     """Arrays of one scan, with `EXTRA` columns more than beams."""
 
-    beams: NDArray[np.float64]
-    points: NDArray[np.float64]
-    candidates: NDArray[np.float64]
-    response: NDArray[np.float64]  # by piece: of the corner at its first point
-    marks: NDArray[np.int64]
-    clusters: NDArray[np.int64]
-    pieces: NDArray[np.int64]
-    waiting: NDArray[np.int64]  # by piece that is to be searched
-    counts: NDArray[np.int64]
+    beams: Floats2
+    points: Floats2
+    candidates: Floats2
+    response: Floats1  # by piece: of the corner at its first point
+    marks: Ints2
+    clusters: Ints2
+    pieces: Ints2
+    waiting: Ints2  # by piece that is to be searched
+    counts: Ints1
+
+
+#: What is known of a sensor: range_min, range_max, step, whether the beams go around.
+Sensor = tuple[float, float, float, bool]
+
+
+class Tables(NamedTuple):
+    """The words of the features of all scans, and by scan the clusters of its beams.
+
+    `offsets` has a row a scan, and a column a table: where its records begin; while a scan is
+    written, the row behind it has where the next record goes.
+    """
+
+    segments: Floats2
+    corners: Floats2
+    edges: Floats2
+    arcs: Floats2
+    breakpoints: Floats2
+    clusters: Shorts2
+    offsets: Ints2
 
 
 #: A workspace with `moments`, by point, of the methods that fit lines by running sums, and with
@@ -67,36 +88,33 @@ class Workspace(NamedTuple):
 Extended = namedtuple("Extended", (*Workspace._fields, "moments", "rays", "vertices"))
 
 
-def workspace(beams: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def workspace(beams: int) -> tuple[Floats2, Ints2]:
     """Make the floats and the whole numbers of a workspace for scans of so many beams."""
     return np.zeros((30, beams + EXTRA)), np.zeros((14, beams + EXTRA), np.int64)
 
 
-_inlined = register_jitable
-
-
-@_inlined  # type: ignore[misc]  # without types
-def named(floats: NDArray[np.float64], ints: NDArray[np.int64]) -> Workspace:
+@jitable
+def named(floats: Floats2, ints: Ints2) -> Workspace:
     """Name the parts of a workspace, which are views."""
     return Workspace(*_parts(floats, ints))
 
 
-@_inlined  # type: ignore[misc]
-def extended(floats: NDArray[np.float64], ints: NDArray[np.int64]) -> Extended:
+@jitable
+def extended(floats: Floats2, ints: Ints2) -> Extended:
     """Name also the parts that only some methods need: a view takes 5 ns."""
     moments = floats[18:25].reshape(-1, MOMENTS)
     return Extended(*(_parts(floats, ints) + (moments, floats[25:30], ints[12:14])))  # noqa: RUF005
 
 
-@_inlined  # type: ignore[misc]
-def _parts(floats, ints):  # type: ignore[no-untyped-def]
+@jitable
+def _parts(floats, ints):
     return (
         floats[0:2], floats[2:14], floats[14:17], floats[17], ints[0:4], ints[4:6], ints[6:9],
         ints[9:11], ints[11],
     )  # fmt: skip
 
 
-@_inlined  # type: ignore[misc]
-def beams_of(floats: NDArray[np.float64]) -> NDArray[np.float64]:
+@jitable
+def beams_of(floats: Floats2) -> Floats2:
     """Return `beams` alone: a view costs 5 ns."""
     return floats[0:2]

@@ -1,8 +1,10 @@
 """The steps of Liu et al. 2023, one scan after the other."""
 
-from collections import namedtuple
+from typing import NamedTuple
 
 from . import kernel
+from .arrays import Floats1, Floats2, Floats3, Ints1, Ints2, Singles2
+from .layout import Sensor, Tables
 from . import layout as at
 from .bilateral import filter_ranges
 from .budget import LINK, WORST, limit_pieces
@@ -12,17 +14,41 @@ from .measuring import measure
 from .noise import estimate_noise
 
 
-#: Those of `methods.liu.Liu`; choices as the numbers that the kernels of the steps take.
-Parameters = namedtuple(
-    "Parameters",
-    "sigma_d sigma_r half_width spacing_scale noise_floor density_k min_points support_radius "
-    "threshold response recursion ends fit measure corner corner_trim max_vertices",
-)
+class Parameters(NamedTuple):
+    """Those of `methods.liu.Liu`; choices as the numbers that the kernels of the steps take."""
+
+    sigma_d: float
+    sigma_r: float
+    half_width: int
+    spacing_scale: float
+    noise_floor: float
+    density_k: float
+    min_points: int
+    support_radius: int
+    threshold: float
+    response: int
+    recursion: bool
+    ends: bool
+    fit: int
+    measure: int
+    corner: bool
+    corner_trim: int
+    max_vertices: int
 
 
 @kernel
 def extract_rows(
-    ranges, rows, bearings, sensor, given_noise, parameters, floats, ints, scratch, noises, tables
+    ranges: Floats2,
+    rows: Ints1,
+    bearings: Floats2,
+    sensor: Sensor,
+    given_noise: Floats1,
+    parameters: Parameters,
+    floats: Floats2,
+    ints: Ints2,
+    scratch: tuple[Singles2, Floats3, Ints2],
+    noises: Floats2,
+    tables: Tables,
 ):
     """Filter, cluster, cut and measure the first `rows` scans of `ranges`, shape (m, n).
 
@@ -47,7 +73,7 @@ def extract_rows(
     range_min, range_max, step, circular = sensor
     filter_scratch, costs, follow = scratch
     options = p.measure, p.fit, p.corner, p.corner_trim, 0.5 * p.support_radius, p.spacing_scale
-    for row in range(rows):
+    for row in range(rows[0]):
         for i in range(ranges.shape[1]):
             line[i] = ranges[row, i]
         noise = noises[row]

@@ -7,6 +7,8 @@ import numpy as np
 
 from ..features import records as col
 from . import helper, kernel
+from .arrays import Floats1, Floats2, Ints2
+from .layout import Tables
 from . import layout as at
 from .line_fit import fit_line, normal_variance, range_variance
 from .writing import (
@@ -35,7 +37,16 @@ class Options(NamedTuple):
 
 
 @kernel
-def measure(floats, ints, row, bearings, circular, noise, options, tables):
+def measure(
+    floats: Floats2,
+    ints: Ints2,
+    row: int,
+    bearings: Floats2,
+    circular: bool,
+    noise: Floats1,
+    options: Options,
+    tables: Tables,
+):
     """Write the features of a scan, from points, clusters and pieces.
 
     They come behind those of the scans before it. A piece whose line has no length is no segment:

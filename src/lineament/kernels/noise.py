@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from . import FARTHEST, NEAREST, helper, kernel, sums, usable
+from .arrays import Floats1, Floats2, Ints2
 from . import layout as at
 
 #: No scanner is better than this [m]; keeps covariances positive where ranges are noiseless.
@@ -42,7 +43,15 @@ _SHARE = 0.125
 
 
 @kernel
-def estimate_noise(floats, ints, bearings, range_min, range_max, given, noise):
+def estimate_noise(
+    floats: Floats2,
+    ints: Ints2,
+    bearings: Floats2,
+    range_min: float,
+    range_max: float,
+    given: Floats1,
+    noise: Floats1,
+):
     """Write the noise of a scan: as `given`, or, where that is NaN, estimated.
 
     It is NaN for a scan without a usable range. Where most ranges equal their neighbours, they lie

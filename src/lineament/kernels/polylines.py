@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from . import helper, kernel
+from .arrays import Floats2, Floats3, Ints2
 from . import layout as at
 from .rays import add_ray, least_squares, turn
 from .vertices import BEGIN, HELD, place_vertices
@@ -25,7 +26,17 @@ _TIE = 1e-9
 
 
 @kernel
-def fit_polylines(floats, ints, bearings, budget, max_missing, link, worst, costs, follow):
+def fit_polylines(
+    floats: Floats2,
+    ints: Ints2,
+    bearings: Floats2,
+    budget: int,
+    max_missing: int,
+    link: float,
+    worst: float,
+    costs: Floats3,
+    follow: Ints2,
+):
     """Fit polylines of at most `budget` vertices in all through the points of a scan.
 
     Such that Σ (error of the range)² over the points of polylines, and `worst`² for each other

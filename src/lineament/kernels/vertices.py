@@ -9,6 +9,7 @@ import numpy as np
 
 from ..features import records as col
 from . import helper, kernel
+from .arrays import Floats2, Ints2
 from . import layout as at
 from .rays import turn
 from .writing import write_end, write_opening
@@ -196,7 +197,14 @@ def _normal_equations(work, bearings, k, again):
 
 
 @kernel
-def hold_together(floats, ints, row, segments, corners, offsets):
+def hold_together(
+    floats: Floats2,
+    ints: Ints2,
+    row: int,
+    segments: Floats2,
+    corners: Floats2,
+    offsets: Ints2,
+):
     """Let the segments of a scan end in the vertices of its polylines, and corners be there.
 
     Centroids move to the nearest point of the new segment. Covariances and residuals remain those

@@ -8,7 +8,6 @@ from importlib.util import find_spec
 
 from ..errors import needed_by, needs
 from ..extractor import WALL
-from ..motion import Tracker
 from ..output.feature_points import feature_points
 from ..output.ros_messages import RosMessages
 from ..progress import compiling
@@ -58,7 +57,7 @@ def run_live(
             source, sinks = _ends(config, stack, write)
             pipeline = Pipeline(config)
             # The motion of tracks is estimated from the second scan on.
-            with compiling([Tracker.__call__] if config.track else [], [Tracker]):
+            with compiling():
                 for frame in (pipeline("", WALL), pipeline("", WALL)):
                     feature_points(frame.features, frame.tracks)
         is_stopped()  # From here on a signal ends a node that runs, and not a start.

@@ -173,7 +173,9 @@ def hypotheses(local: Array, plan: Array, by_turn: Array, most: int) -> Array:
     boxes = np.zeros((2, columns * rows * n_slots, 4))
     voters = np.zeros(boxes.shape[:2], np.int32)
     touched = np.empty(boxes.shape[:2], np.int64)
-    counts = vote(local, plan, (by_turn, slots, n_slots), settings, boxes, voters, touched)
+    counts = np.zeros(2, np.int64)
+    turns = by_turn, slots, n_slots
+    vote(local, plan, unit(plan[:, 2]), turns, settings, boxes, voters, touched, counts)
     found = np.concatenate([boxes[k, touched[k, :count]] for k, count in enumerate(counts)])
     if len(found) > most:
         least = np.partition(found[:, 0], -most)[-most]

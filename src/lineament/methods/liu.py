@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..kernels import bind
 from ..kernels.bilateral import scratch_shape
 from ..kernels.corner_operator import RESPONSES
 from ..kernels.layout import FILTERED, RANGE
@@ -160,11 +161,13 @@ class Liu(MethodBase):
 
     def run(self, block: Block) -> None:
         """Filter, cluster, cut and fit the scans of a block."""
-        parameters, scratch = block.own
-        extract_rows(
-            block.ranges, block.rows, block.bearings, block.sensor, block.noise, parameters,
-            block.floats, block.ints, scratch, block.noises, block.tables,
-        )  # fmt: skip
+        if block.call is None:
+            parameters, scratch = block.own
+            block.call = bind(
+                extract_rows, block.ranges, block.extent, block.bearings, block.sensor, block.noise,
+                parameters, block.floats, block.ints, scratch, block.noises, block.tables,
+            )  # fmt: skip
+        block.call()
 
     def intermediates(self, block: Block) -> dict[str, Any]:
         """Return what a trace has besides the features of the scan that was run, by name."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features.records import CORNERS, SEGMENTS
+from ..kernels import bind
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.optimal import layout as at
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
@@ -99,12 +100,14 @@ class Optimal(MethodBase):
         if self.max_vertices:
             MethodBase.run(self, block)
             return
-        # Plain tuples: named ones take numba a microsecond to recognise.
-        limits = block.range_min, block.range_max, block.circular, self.evidence, self.max_missing
-        extract_rows(
-            block.ranges, block.rows, block.bearings, block.noise, limits, block.own[0],
-            block.tables, block.noises, block.counts,
-        )  # fmt: skip
+        if block.call is None:
+            limits = block.range_min, block.range_max, block.circular
+            block.call = bind(
+                extract_rows, block.ranges, block.extent, block.bearings, block.noise,
+                (*limits, self.evidence, self.max_missing), block.own[0], block.tables,
+                block.noises, block.counts,
+            )  # fmt: skip
+        block.call()
 
     def find(self, block: Block) -> None:
         """Lay the polylines of a map through the scan that a block has taken."""

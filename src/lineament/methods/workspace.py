@@ -15,10 +15,7 @@ from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure
 from ..kernels.noise import estimate_noise
 from ..kernels.rivals.pdbs import part_by_distance
-from ..progress import hear_compiler
 from ..scan import LaserScan
-
-hear_compiler()  # Nobody should wait for it in silence.
 
 Array = NDArray[np.float64]
 
@@ -51,7 +48,9 @@ class Block:
     def __init__(self, frame: LaserScan, noise: Array, capacity: int, own: Any = None) -> None:
         n = len(frame)
         self.frame, self.capacity, self.beams = frame, capacity, n
-        self.rows = self.row = 0
+        self.row = 0
+        #: How many scans it has, where kernels read it.
+        self.extent = np.zeros(1, np.int64)
         self.bearings = np.stack((np.cos(frame.angles), np.sin(frame.angles)))
         self.step, self.circular = frame.angle_increment, frame.is_full_circle
         self.range_min, self.range_max = frame.range_min, frame.range_max
@@ -67,6 +66,13 @@ class Block:
         self.features = tuple(map(words, self._records))
         self.clusters = np.empty((capacity, n), np.int32)
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
+        #: What runs all kernels over it, of a method that has one for them; its arrays stay.
+        self.call: Callable[[], Any] | None = None
+
+    @property
+    def rows(self) -> int:
+        """How many scans it has."""
+        return int(self.extent[0])
 
     def fits(self, scan: LaserScan) -> bool:
         """Whether a scan has the bearings and range limits that the block was made for."""
@@ -83,8 +89,8 @@ class Block:
 
     def load(self, ranges: Array) -> None:
         """Take in the ranges of some scans, shape (m, n), or of one, shape (n,)."""
-        self.rows = 1 if ranges.ndim == 1 else len(ranges)
-        self.ranges[: self.rows] = ranges
+        self.extent[0] = rows = 1 if ranges.ndim == 1 else len(ranges)
+        self.ranges[:rows] = ranges
 
     def take(self, row: int) -> None:
         """Put a scan, and its noise, into the workspace, for kernels that are called one by one."""
@@ -125,7 +131,7 @@ class Block:
 
     @property
     def tables(self) -> tuple[NDArray[Any], ...]:
-        """Results of the kernels, as in `kernels.optimal.layout.Tables`."""
+        """Results of the kernels, as in `kernels.layout.Tables`."""
         return *self.features, self.clusters, self.offsets
 
     def raw(self) -> list[bytes]:
@@ -195,15 +201,14 @@ def run_batch(rows: Array, blocks: Sequence[Block], run: Callable[[Block], None]
         """Run over some of the rows; arrays go to the batch at once, records are returned."""
         block, written = blocks[k], []
         share = range(m * k // len(blocks), m * (k + 1) // len(blocks))
-        own = block.clusters, block.noises
         for start in share[:: block.capacity]:
             part = slice(start, min(start + block.capacity, share.stop))
             block.load(rows[part])
-            block.clusters, block.noises = batch.clusters[part], batch.noises[part]
             run(block)
-            batch.counts[part] = np.diff(block.offsets[: block.rows + 1], axis=0)
+            count = block.rows
+            batch.clusters[part], batch.noises[part] = block.clusters[:count], block.noises[:count]
+            batch.counts[part] = np.diff(block.offsets[: count + 1], axis=0)
             written.append(block.raw())
-        block.clusters, block.noises = own
         return written
 
     if len(blocks) == 1:

@@ -103,7 +103,12 @@ def associate(
     moved[1][:, C_COVARIANCE + 3] += both
     move(*moved, x, y, theta)
     sides = before.corners["convex"].astype(np.int8), now.corners["convex"].astype(np.int8)
-    owners = kernel(earlier, moved, sides, spread, (x, y), float(roughness), gates)
+    owners = tuple(np.empty(len(table), np.int64) for table in earlier)
+    rows = max(map(len, moved))
+    columns = max(len(one) + len(other) for one, other in zip(earlier, moved, strict=True))
+    floats, ints = np.empty((3, columns + 1)), np.empty((3, columns + 1), np.int64)
+    scratch = np.empty((rows, columns)), floats, ints
+    kernel(earlier, moved, sides, spread, (x, y), float(roughness), gates, scratch, owners)
     return Matches(before, now, *map(_pairs, owners))
 
 

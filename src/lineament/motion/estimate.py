@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..kernels.tracking.motion import NOT_POSITIVE, NOT_THERE
 from ..kernels.tracking.motion import estimate_motion as kernel
+from ..kernels.tracking.residuals import COLUMNS
 from ..scan import Array, Pose
 from ..scan.poses import Twist, twist_between
 from .association import KINDS, Matches, chi_square, matrix_of, words_of
@@ -120,16 +121,21 @@ def estimate_motion(
     spread = _UNKNOWN if covariance is None else matrix_of(covariance)
     before, now = matches.before, matches.now
     x, y, theta = map(float, prior)
+    pairs = tuple(np.array(getattr(matches, kind), np.int64, order="C") for kind in KINDS)
+    count, later = sum(map(len, pairs)), np.zeros(len(now.segments), np.int64)
+    matrices, vectors = np.empty((5, 3, 3)), np.empty((3, 3))
+    scratch = matrices, vectors, np.empty((count, COLUMNS)), np.empty(count), later
     found = np.empty((3, 3, 3))
     lost = kernel(
         words_of(before),
         words_of(now),
         np.array(now.corners["segments"], order="C"),
-        tuple(np.array(getattr(matches, kind), np.int64, order="C") for kind in KINDS),
+        pairs,
         (x, y, theta),
         spread,
         float(roughness),
         (chi_square(_RIGHT, 2), chi_square(0.5, 2)),
+        scratch,
         found,
     )
     if lost == NOT_POSITIVE:

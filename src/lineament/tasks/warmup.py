@@ -1,14 +1,15 @@
-"""Compile and cache the kernels before they are needed."""
+"""Load the kernels before they are needed, and compile them where no library fits."""
 
 import time
 from collections.abc import Sequence
 
 
 def warm_up(methods: Sequence[str] = ()) -> float:
-    """Compile the kernels of some methods (default: `optimal`) and of the tracker, for the cache.
+    """Run some methods (default: `optimal`) and the tracker once.
 
-    Returns the seconds that it takes, the import of numba included; a ValueError if a method does
-    not exist.
+    Returns the seconds that it takes, imports included; a ValueError if a method does not exist.
+    Only where no compiled library of the kernels fits is there something to wait for: numba
+    compiles them then, and caches them.
     """
     started = time.perf_counter()
     from ..extractor import WALL, Extractor, load_kernels
@@ -19,7 +20,7 @@ def warm_up(methods: Sequence[str] = ()) -> float:
 
     tracker = Tracker()
     extractors = [Extractor(name) for name in methods or (DEFAULT_METHOD,)]
-    with compiling([Tracker.__call__], [Tracker]):
+    with compiling():
         load_kernels(extractors)
         for features in (extractors[0](WALL), extractors[0](WALL)):
             feature_points(features, tracker(features))

@@ -3,6 +3,7 @@
 import math
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints1
 from .layout import cell_of
 
 #: Beyond such a squared deviation a wall does not explain a beam.
@@ -102,7 +103,16 @@ def _passes(walls, grid, begins, members, origin, end, direction, pose, shy, spr
 
 
 @kernel
-def judge(poses, beams, walls, grid, begins, members, settings, found):
+def judge(
+    poses: Floats2,
+    beams: Floats2,
+    walls: Floats2,
+    grid: Floats1,
+    begins: Ints1,
+    members: Ints1,
+    settings: tuple[float, float, float, float, float, float],
+    found: Floats2,
+):
     """Sum up the evidence of beams for poses.
 
     Rows of `found` become the log-likelihood ratio, and the weights of the beams that are

@@ -8,6 +8,7 @@ A wall is a row of `WALL_COLUMNS` numbers, a local wall one of `LOCAL_COLUMNS`, 
 import math
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints1
 
 #: start x, y; direction x, y; length; whether it is seen from its left alone; variance of its
 #: offset at the middle, covariance of offset and angle, variance of the angle.
@@ -21,7 +22,13 @@ BEAM_COLUMNS = 10
 
 
 @kernel
-def list_walls(walls, grid, margin, begins, members):
+def list_walls(
+    walls: Floats2,
+    grid: Floats1,
+    margin: float,
+    begins: Ints1,
+    members: Ints1,
+):
     """Count the walls within a margin of each cell in `begins`, or list them if `members` has room.
 
     Call it with no members, make `begins` the running sum, and call it again.

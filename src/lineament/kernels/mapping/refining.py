@@ -3,6 +3,7 @@
 import math
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Floats3, Ints1, Ints2
 from .layout import cell_of
 
 
@@ -54,7 +55,17 @@ def _joint(local, wall, a, same, rough):
 
 
 @kernel
-def refine(poses, local, walls, grid, begins, members, settings, pairs, information):
+def refine(
+    poses: Floats2,
+    local: Floats2,
+    walls: Floats2,
+    grid: Floats1,
+    begins: Ints1,
+    members: Ints1,
+    settings: tuple[float, float, float, float, float],
+    pairs: Ints2,
+    information: Floats3,
+):
     """Move poses to where the local walls lie on the walls, by weighted least squares.
 
     `settings`: deviations of the first poses [m, rad], roughness [m], gate of χ², rounds. `pairs`,

@@ -2,9 +2,8 @@
 
 import math
 
-import numpy as np
-
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Floats3, Ints1, Ints2, Shorts2
 
 
 @helper
@@ -32,18 +31,27 @@ def _count(box, weight, x, y, theta):
 
 
 @kernel
-def vote(local, plan, turns, settings, boxes, voters, touched):
+def vote(
+    local: Floats2,
+    plan: Floats2,
+    units: Floats2,
+    turns: tuple[Floats1, Ints2, int],
+    settings: tuple[float, float, float, int, float, float, float],
+    boxes: Floats3,
+    voters: Shorts2,
+    touched: Ints2,
+    counts: Ints1,
+):
     """Count votes for poses in boxes: an anchor of the local map has one a box, its first.
 
     There are two sets of boxes, which overlap by half. Rows of `boxes`, (2, n, 4), become the votes
-    and the mean pose; returns how many boxes of each set are in `touched`. `turns`: votes of the
-    walls by degrees, the slot of each box of turns in either set, how many slots.
+    and the mean pose; `touched` lists those of each set that have votes, and `counts`, which are 0
+    before, how many. `units` are the directions of the plan's anchors. `turns`: votes of the walls
+    by degrees, the slot of each box of turns in either set, how many slots.
     """
     low_x, low_y, size, rows, alike, least, of_ends = settings
     by_turn, slots, n_slots = turns
     full, n_turns = 2.0 * math.pi, slots.shape[1]
-    counts = [0, 0]
-    cosines, sines = np.cos(plan[:, 2]), np.sin(plan[:, 2])
     for i in range(len(local)):
         x, y, angle = local[i, 0], local[i, 1], local[i, 2]
         cosine, sine = math.cos(angle), math.sin(angle)
@@ -56,7 +64,8 @@ def vote(local, plan, turns, settings, boxes, voters, touched):
             weight = by_turn[int(theta * 360.0 / full + 0.5) % 360]
             if weight < least:
                 continue
-            c, s = cosines[j] * cosine + sines[j] * sine, sines[j] * cosine - cosines[j] * sine
+            ux, uy = units[j, 0], units[j, 1]
+            c, s = ux * cosine + uy * sine, uy * cosine - ux * sine
             px, py = plan[j, 0] - c * x + s * y, plan[j, 1] - s * x - c * y
             for k in range(2):
                 shift = 0.5 * k
@@ -69,11 +78,10 @@ def vote(local, plan, turns, settings, boxes, voters, touched):
                     counts[k] += 1
                 voters[k, at] = i + 1
                 _count(boxes[k, at], share * weight, px, py, theta)
-    return counts[0], counts[1]
 
 
 @kernel
-def choose(poses, order, way, turn, chosen):
+def choose(poses: Floats2, order: Ints1, way: float, turn: float, chosen: Ints1) -> int:
     """Choose poses in an order, each farther from all before than a way or a turn; how many."""
     count = 0
     for k in order:

@@ -114,7 +114,8 @@ def list_clusters(beams, count, clusters):
     the first measurement, the last cluster goes on there.
     """
     beam, broken = beams[at.BEAM], beams[at.BROKEN]
-    clusters[:] = -1
+    for i in range(len(clusters)):
+        clusters[i] = -1
     begin, found, size = 0, 0, 0
     while begin < count and not broken[begin]:
         begin += 1

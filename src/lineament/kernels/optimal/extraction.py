@@ -5,9 +5,11 @@ import math
 import numpy as np
 
 from .. import inlined, kernel
+from ..arrays import Floats1, Floats2, Ints1
 from ...features import records as to
 from ..noise import LEAST_SIGMA, fit_noise
 from ..writing import write_arc, write_breaks, write_segment
+from ..layout import Tables
 from . import layout as at
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
@@ -17,7 +19,17 @@ from .partition import clearest_border, fill_sums, merge_lines, partition
 
 
 @kernel
-def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noises, counts):
+def extract_rows(
+    ranges: Floats2,
+    rows: Ints1,
+    bearings: Floats2,
+    given: Floats1,
+    settings: tuple[float, float, bool, float, int],
+    arrays: at.Work,
+    results: Tables,
+    noises: Floats2,
+    counts: Ints1,
+):
     """Find and measure the features of some scans. The last one's stay in the workspace.
 
     Parameters
@@ -34,17 +46,17 @@ def extract_rows(ranges, rows, bearings, given, settings, arrays, results, noise
         Limits of the ranges [m]; whether the beams go around; price of a line; missing beams over
         which a surface goes on.
     arrays, results : tuples of arrays
-        As in `layout.Work` and `layout.Tables`.
+        As in `layout.Work` and `kernels.layout.Tables`.
     noises : float64 array, shape (m, 5)
         Written: the noise of each scan.
     counts : int64 array, shape (3 or more,)
         Written: measurements, lines and surfaces of the last scan.
     """
     range_min, range_max, circular, evidence, missing = settings
-    work, tables = at.Work(*arrays), at.Tables(*results)
+    work, tables = at.Work(*arrays), Tables(*results)
     beams, spans, n, estimated = work.beams, work.spans, ranges.shape[1], math.isnan(given[0])
     limits = range_min, range_max
-    for row in range(rows):
+    for row in range(rows[0]):
         start, closed, lines = np.int64(0), False, np.int64(0)
         count = list_points(work, ranges[row], start, limits, bearings)
         _estimate_noise(work, count, given)

@@ -40,7 +40,8 @@ def measure(work, surfaces, estimated):
             if not (long and count > 1 and last - first + 1 >= LEAST):
                 continue
         else:
-            p[:] = pieces[k]
+            for i in range(at.PIECES):
+                p[i] = pieces[k, i]
         kept += 1
     if estimated:
         scale = _scatter_of_means(work, kept)

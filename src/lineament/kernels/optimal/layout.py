@@ -2,8 +2,7 @@
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from ..arrays import Floats1, Floats2, Ints2
 
 #: Of `points`, by measurement in beam order (on a full circle from any beam on): place and range
 #: [m]; least energy of the measurements before; by group, the least energy with a line from one of
@@ -38,28 +37,12 @@ SUMS = 6
 class Work(NamedTuple):
     """The arrays of one scan: noise is (constant, growth, variance of a bearing, uncertainty)."""
 
-    points: NDArray[np.float64]
-    beams: NDArray[np.int64]
-    spans: NDArray[np.int64]
-    pieces: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    noise: NDArray[np.float64]
-
-
-class Tables(NamedTuple):
-    """The words of the features of all scans, and by scan the clusters of its beams.
-
-    `offsets` has a row a scan, and a column a table: where its records begin; while a scan is
-    written, the row behind it has where the next record goes.
-    """
-
-    segments: NDArray[np.float64]
-    corners: NDArray[np.float64]
-    edges: NDArray[np.float64]
-    arcs: NDArray[np.float64]
-    breakpoints: NDArray[np.float64]
-    clusters: NDArray[np.int32]
-    offsets: NDArray[np.int64]
+    points: Floats2
+    beams: Ints2
+    spans: Ints2
+    pieces: Floats2
+    sums: Floats2
+    noise: Floats1
 
 
 class Scan(NamedTuple):

@@ -5,21 +5,37 @@ Communications of the ACM 15 (1972).
 """
 
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2, Shorts2
 from .. import layout as at
 from ..line_fit import range_variance
 from .stretches import is_piece, prepare, refined_run, take_run
 
 
-Parameters = namedtuple("Parameters", "resolution min_points min_length max_misses epsilon sigmas")
+class Parameters(NamedTuple):
+    """Those of the method."""
+
+    resolution: float
+    min_points: int
+    min_length: float
+    max_misses: int
+    epsilon: float
+    sigmas: float
 
 
 @kernel
-def find_by_votes(floats, ints, noise, parameters, votes, normals):
+def find_by_votes(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    parameters: Parameters,
+    votes: Shorts2,
+    normals: Floats2,
+):
     """Find the lines of a scan: from points and clusters, the ends of pieces.
 
     `parameters` are a tuple, see `Parameters`, and `methods.hough.Hough`; `votes` is the

@@ -9,13 +9,22 @@ import math
 import numpy as np
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2
 from .. import layout as at
 from ..line_fit import normal_variance
 from .stretches import line_of_sums
 
 
 @kernel
-def track_lines(floats, ints, noise, threshold, noise_factor, max_misses, min_points):
+def track_lines(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    threshold: float,
+    noise_factor: float,
+    max_misses: int,
+    min_points: int,
+):
     """Grow lines along the clusters of a scan.
 
     A line begins with three points. The next point is one of its points if the line predicts it:

@@ -8,6 +8,8 @@ M.-J. Aldon, *Line extraction in 2D range images for mobile robotics* (2004).
 import math
 
 from .. import LARGEST, helper, kernel, usable
+from ..arrays import Floats1, Floats2, Ints2
+from ..layout import Sensor
 from .. import layout as at
 from ..clustering import list_points, part_points
 from ..line_fit import range_variance
@@ -17,7 +19,16 @@ FIXED, DIETMAYER, SANTOS, LEE, BORGES_ALDON = range(5)
 
 
 @kernel
-def part_by_distance(floats, ints, bearings, sensor, noise, rule, max_missing, min_points):
+def part_by_distance(
+    floats: Floats2,
+    ints: Ints2,
+    bearings: Floats2,
+    sensor: Sensor,
+    noise: Floats1,
+    rule: tuple[int, float, float],
+    max_missing: int,
+    min_points: int,
+):
     """Part the usable beams of a scan into clusters, by their distances alone.
 
     From RANGE, FILTERED (the usable ranges, as measured), the points with their thresholds

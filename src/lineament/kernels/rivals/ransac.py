@@ -4,11 +4,12 @@ M. A. Fischler, R. C. Bolles, *Random sample consensus*, Communications of the A
 """
 
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2
 from .. import layout as at
 from .stretches import is_piece, longest_run, prepare, refined_run, take_run
 
@@ -16,13 +17,26 @@ from .stretches import is_piece, longest_run, prepare, refined_run, take_run
 PERIOD = 2147483647
 
 
-Parameters = namedtuple(
-    "Parameters", "trials window min_points min_length max_misses epsilon sigmas seed"
-)
+class Parameters(NamedTuple):
+    """Those of the method."""
+
+    trials: int
+    window: int
+    min_points: int
+    min_length: float
+    max_misses: int
+    epsilon: float
+    sigmas: float
+    seed: int
 
 
 @kernel
-def find_by_consensus(floats, ints, noise, parameters):
+def find_by_consensus(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    parameters: Parameters,
+):
     """Find the lines of a scan: from points and clusters, the ends of pieces.
 
     `parameters` are a tuple, see `Parameters`, and `methods.ransac.Ransac`.

@@ -4,18 +4,32 @@ H. Gao, X. Zhang, Y. Fang, J. Yuan, *A line segment extraction algorithm using l
 seeded region growing*, International Journal of Advanced Robotic Systems 15 (2018).
 """
 
-from collections import namedtuple
+from typing import NamedTuple
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2
 from .. import layout as at
 from .stretches import is_piece, prepare, stretch_line
 
 
-Parameters = namedtuple("Parameters", "s_num p_min l_min delta epsilon sigmas")
+class Parameters(NamedTuple):
+    """Those of the method."""
+
+    s_num: int
+    p_min: int
+    l_min: float
+    delta: float
+    epsilon: float
+    sigmas: float
 
 
 @kernel
-def grow_regions(floats, ints, noise, parameters):
+def grow_regions(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    parameters: Parameters,
+):
     """Find the straight regions of a scan, which may overlap where walls meet.
 
     From points and clusters, the ends of pieces. `parameters` are a tuple, see `Parameters`, and

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2
 from .. import layout as at
 from ..line_fit import normal_variance
 from .stretches import fill_moments, joint_line, stretch_line
@@ -27,7 +28,13 @@ _LEAST_SINE = 0.05
 
 
 @kernel
-def settle(floats, ints, noise, epsilon, reach):
+def settle(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    epsilon: float,
+    reach: float,
+):
     """Merge, cut apart and join the pieces of a scan.
 
     Neighbours in a cluster are merged if one line fits both; else each point about their border
@@ -67,7 +74,12 @@ def settle(floats, ints, noise, epsilon, reach):
 
 
 @kernel
-def merge_alike(floats, ints, noise, epsilon):
+def merge_alike(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    epsilon: float,
+):
     """Merge neighbours that one line fits; those that still touch meet in a corner.
 
     The second half of split-and-merge, and no more than that.
@@ -83,7 +95,10 @@ def merge_alike(floats, ints, noise, epsilon):
 
 
 @kernel
-def divide_overlaps(floats, ints):
+def divide_overlaps(
+    floats: Floats2,
+    ints: Ints2,
+):
     """Give each point of two overlapping neighbours to the nearer line (Gao et al. 2018)."""
     work = at.extended(floats, ints)
     fill_moments(work)

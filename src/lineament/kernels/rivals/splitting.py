@@ -10,13 +10,23 @@ import math
 import numpy as np
 
 from .. import helper, kernel
+from ..arrays import Floats1, Floats2, Ints2
 from .. import layout as at
 from ..cutting import add_candidate, add_side, list_pieces, next_candidate
 from ..line_fit import WEIGHTED, fit_line, range_variance
 
 
 @kernel
-def split(floats, ints, noise, by_line, threshold, proportion, noise_factor, min_points):
+def split(
+    floats: Floats2,
+    ints: Ints2,
+    noise: Floats1,
+    by_line: bool,
+    threshold: float,
+    proportion: float,
+    noise_factor: float,
+    min_points: int,
+):
     """Split the clusters of a scan into straight pieces that meet at points.
 
     A piece is split at the point farthest from the chord of its ends if it is not straight, and

@@ -2,37 +2,36 @@
 
 import math
 
-import numpy as np
-
 from .. import helper
+
+#: Rows of the scratch of whole numbers: the row of each column, or -1; the column before it on the
+#: way; whether it is reached. And of floats: price of each row, and of each column; the least that
+#: it takes to reach it.
+OWNER, VIA, DONE = range(3)
+PRICES, PRICE, LEAST = range(3)
 
 
 @helper
-def assign(cost):
+def assign(cost, rows, columns, ints, floats):
     """Give each row a column: the Hungarian method, by shortest augmenting paths (Kuhn 1955).
 
-    `cost`, shape (m, n), is inf where it is not allowed; each row must be left with a column,
-    whatever the others take. Returns the row of each column, or -1, shape (n,).
+    `cost`, of so many rows and columns, is inf where it is not allowed; each row must be left with
+    a column, whatever the others take. Writes the row of each column, or -1, to OWNER. Both
+    scratches have three rows, of one column more than that.
     """
-    rows, columns = cost.shape
-    owner, via = np.full(columns + 1, -1, np.int64), np.empty(columns + 1, np.int64)
-    prices, price = np.zeros(rows), np.zeros(columns + 1)
-    least, done = np.empty(columns + 1), np.empty(columns + 1, np.bool_)
+    owner, via, done = ints[OWNER], ints[VIA], ints[DONE]
+    prices, price, least = floats[PRICES], floats[PRICE], floats[LEAST]
+    for j in range(columns + 1):
+        owner[j], price[j], prices[j] = -1, 0.0, 0.0
     for i in range(rows):
-        least[:], done[:] = math.inf, False
+        _reset(least, done)
         # The row begins beside all columns; from each next one, its owner looks further.
         last = columns
         owner[last] = i
         while owner[last] >= 0:
-            done[last] = True
-            row, nearest, following = owner[last], math.inf, last
-            for j in range(columns):
-                if not done[j]:
-                    reduced = cost[row, j] - prices[row] - price[j]
-                    if reduced < least[j]:
-                        least[j], via[j] = reduced, last
-                    if least[j] < nearest:
-                        nearest, following = least[j], j
+            done[last] = 1
+            row = owner[last]
+            following = _nearest(cost[row], prices[row], last, columns, ints, floats)
             # The prices of the rows that are reached rise, so that the nearest column is free.
             by = least[following]
             for j in range(columns + 1):
@@ -46,4 +45,25 @@ def assign(cost):
             owner[last] = owner[via[last]]
             last = via[last]
         owner[columns] = -1
-    return owner[:columns]
+
+
+@helper
+def _nearest(cost, own_price, last, columns, ints, floats):
+    """Reach on from a row, whose column is `last`; the nearest column that was not reached."""
+    via, done, price, least = ints[VIA], ints[DONE], floats[PRICE], floats[LEAST]
+    nearest, following = math.inf, last
+    for j in range(columns):
+        if not done[j]:
+            reduced = cost[j] - own_price - price[j]
+            if reduced < least[j]:
+                least[j], via[j] = reduced, last
+            if least[j] < nearest:
+                nearest, following = least[j], j
+    return following
+
+
+@helper
+def _reset(least, done):
+    """Nothing is reached."""
+    for j in range(len(done)):
+        least[j], done[j] = math.inf, 0

@@ -2,11 +2,13 @@
 
 import math
 
-import numpy as np
-
 from .. import helper, kernel
-from .assignment import assign
+from ..arrays import Bytes1, Floats2, Ints1, Ints2
+from .assignment import OWNER, assign
 from ...features import records as at
+
+#: Words of segments, corners and arcs, a row each (see `records`).
+Tracked = tuple[Floats2, Floats2, Floats2]
 
 #: Length over which a surface, or a sensor, is off by the same [m].
 _PATCH = 0.3
@@ -17,7 +19,14 @@ _LEAST_LENGTH = 2.220446049250313e-16
 
 
 @kernel
-def move(segments, corners, arcs, x, y, theta):
+def move(
+    segments: Floats2,
+    corners: Floats2,
+    arcs: Floats2,
+    x: float,
+    y: float,
+    theta: float,
+):
     """Move the words of features (see `records`) by a pose, and their covariances with them."""
     c, s = math.cos(theta), math.sin(theta)
     for k in range(len(segments)):
@@ -49,7 +58,17 @@ def _move_point(row, place, covariance, size, c, s, x, y):
 
 
 @kernel
-def associate(before, now, sides, spread, origin, roughness, gates):
+def associate(
+    before: Tracked,
+    now: Tracked,
+    sides: tuple[Bytes1, Bytes1],
+    spread: Floats2,
+    origin: tuple[float, float],
+    roughness: float,
+    gates: tuple[float, float],
+    scratch: tuple[Floats2, Floats2, Ints2],
+    owners: tuple[Ints1, Ints1, Ints1],
+):
     """Find which features of two frames are the same.
 
     Parameters
@@ -66,19 +85,20 @@ def associate(before, now, sides, spread, origin, roughness, gates):
         How far surfaces are from straight and round [m].
     gates : (float, float)
         Largest squares e'S⁻¹e of two and of three components.
-
-    Returns
-    -------
-    (segments, corners, arcs)
-        int64 arrays: for each earlier feature the later one, or -1.
+    scratch : (cost, floats, ints)
+        Of m rows and n columns, 3 and n + 1, 3 and n + 1, for m later features of a kind and n of
+        both frames.
+    owners : (segments, corners, arcs)
+        Written: for each earlier feature the later one, or -1.
     """
+    cost = scratch[0]
     a, b = before[0], now[0]
-    cost = _fresh_cost(len(b), len(a), gates[0])
+    _forbid_all(cost, len(b), len(a), gates[0])
     for j in range(len(a)):
         _compare_segment(a[j], b, j, spread, origin, roughness, gates[0], cost)
-    segments = assign(cost)[: len(a)]
+    _assign(len(b), len(a), scratch, owners[0])
     a, b = before[1], now[1]
-    cost = _fresh_cost(len(b), len(a), gates[0])
+    _forbid_all(cost, len(b), len(a), gates[0])
     for i in range(len(b)):
         x, y = b[i, at.C_POSITION], b[i, at.C_POSITION + 1]
         xx, xy, yy = _point_spread(x - origin[0], y - origin[1], spread, roughness)
@@ -93,24 +113,33 @@ def associate(before, now, sides, spread, origin, roughness, gates):
                 )
                 if square <= gates[0]:
                     cost[i, j] = square
-    corners = assign(cost)[: len(a)]
+    _assign(len(b), len(a), scratch, owners[1])
     a, b = before[2], now[2]
-    cost = _fresh_cost(len(b), len(a), gates[1])
+    _forbid_all(cost, len(b), len(a), gates[1])
     for i in range(len(b)):
         for j in range(len(a)):
             square = _compare_arcs(a[j], b[i], spread, origin, roughness)
             if square <= gates[1]:
                 cost[i, j] = square
-    return segments, corners, assign(cost)[: len(a)]
+    _assign(len(b), len(a), scratch, owners[2])
 
 
 @helper
-def _fresh_cost(rows, columns, gate):
-    """Costs where nothing is allowed but to stay alone: each row in a column for itself."""
-    cost = np.full((rows, columns + rows), math.inf)
+def _forbid_all(cost, rows, columns, gate):
+    """Fill costs where nothing is allowed but to stay alone: each row in a column for itself."""
     for i in range(rows):
+        for j in range(columns + rows):
+            cost[i, j] = math.inf
         cost[i, columns + i] = 2.0 * gate
-    return cost
+
+
+@helper
+def _assign(rows, columns, scratch, owner):
+    """Write the later feature of each earlier one, or -1, at the least total cost."""
+    cost, floats, ints = scratch
+    assign(cost, rows, columns + rows, ints, floats)
+    for j in range(columns):
+        owner[j] = ints[OWNER, j]
 
 
 @helper

@@ -2,12 +2,11 @@
 
 import math
 
-import numpy as np
-
 from .. import helper, kernel
-from .association import turned
+from ..arrays import Floats1, Floats2, Floats3, Ints1, Ints2, Shorts2
+from .association import Tracked, turned
 from ...features import records as at
-from .residuals import COLUMNS, ERROR, FEIGNED, INFORMATION, JACOBIAN, SQUARE, fill_residuals
+from .residuals import ERROR, FEIGNED, INFORMATION, JACOBIAN, SQUARE, fill_residuals
 from .symmetric import diagonalise, invert
 
 #: What it returns for a bad prior or bad pairs.
@@ -20,7 +19,18 @@ _ROUNDS, _SMALL = 20, 1e-7
 
 
 @kernel
-def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantiles, found):
+def estimate_motion(
+    before: Tracked,
+    now: Tracked,
+    sides: Shorts2,
+    pairs: tuple[Ints2, Ints2, Ints2],
+    prior: tuple[float, float, float],
+    spread: Floats2,
+    roughness: float,
+    quantiles: tuple[float, float],
+    scratch: tuple[Floats3, Floats2, Floats2, Floats1, Ints1],
+    found: Floats3,
+) -> int:
     """Estimate a motion by Gauss-Newton.
 
     Parameters
@@ -39,6 +49,8 @@ def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantil
         How far surfaces are from straight and round [m].
     quantiles : (float, float)
         Of e'Σ⁻¹e: beyond the first, pairs count less; the second is the median.
+    scratch : (float64 arrays, int64 array)
+        Of shape (5, 3, 3); (3, 3); (pairs, COLUMNS); (pairs,); zeros, one for each later segment.
     found : float64 array, shape (3, 3, 3)
         Written: the motion in the first row of all, its covariance, and by row the directions
         that are not observed.
@@ -49,13 +61,11 @@ def estimate_motion(before, now, sides, pairs, prior, spread, roughness, quantil
         The number of directions that are not observed; NOT_POSITIVE if `spread` is not positive
         definite, NOT_THERE if pairs name features that are not there.
     """
-    matrices, vectors = np.empty((5, 3, 3)), np.empty((3, 3))
-    known, information, feigned, total, kept = matrices
-    scale, gradient, off = vectors
+    matrices, vectors, rows, squares, matched = scratch
+    known, information, feigned = matrices[0], matrices[1], matrices[2]
+    total, kept = matrices[3], matrices[4]
+    scale, gradient, off = vectors[0], vectors[1], vectors[2]
     state, covariance, directions = found[0, 0], found[1], found[2]
-    count = len(pairs[0]) + len(pairs[1]) + len(pairs[2])
-    rows, squares = np.empty((count, COLUMNS)), np.empty(count)
-    matched = np.zeros(len(now[0]), np.bool_)
     if not invert(spread, known):
         return NOT_POSITIVE
     if not _mark(before, now, pairs, matched):
@@ -89,7 +99,7 @@ def _mark(before, now, pairs, matched):
             if not (0 <= i < len(before[kind]) and 0 <= j < len(now[kind])):
                 return False
     for k in range(len(pairs[0])):
-        matched[pairs[0][k, 1]] = True
+        matched[pairs[0][k, 1]] = 1
     return True
 
 
