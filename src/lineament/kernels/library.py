@@ -80,15 +80,17 @@ def words_of(kind: Any) -> Iterator[str]:
         yield "d" if kind is float else "q"
 
 
-def _flat(values: Iterable[Any]) -> Iterator[Any]:
-    """Yield what a table has for these arguments."""
+def _flat(values: Iterable[Any]) -> list[Any]:
+    """Return what a table has for these arguments."""
+    words: list[Any] = []
     for value in values:
         if type(value) is np.ndarray:
-            yield id(value)
+            words.append(id(value))
         elif isinstance(value, tuple):
-            yield from _flat(value)
+            words += _flat(value)
         else:
-            yield value
+            words.append(value)
+    return words
 
 
 class Entry:
