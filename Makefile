@@ -118,4 +118,4 @@ lines:
 
 clean:
 	rm -rf .venv dist build demo .coverage .coverage.*
-	find src \( -name '*.nb[ic]' -o -name '*.so' \) -delete
+	find src \( -name '*.nb[ic]' -o -name '*.so' -o -name '*.sha256' \) -delete

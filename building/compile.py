@@ -154,8 +154,8 @@ def linker() -> list[str] | None:
     return None
 
 
-def link(code: bytes, state: str, out: Path) -> None:
-    """Link an object file to a library, which ends with a hash and appears when it is whole."""
+def link(code: bytes, out: Path) -> None:
+    """Link an object file to a library, and seal it."""
     command = linker()
     if command is None:
         raise SystemExit("no linker: neither cc nor the Python package ziglang is installed")
@@ -164,9 +164,8 @@ def link(code: bytes, state: str, out: Path) -> None:
         obj.write_bytes(code)
         # The symbols of the C library are found when it is loaded: those of any version do.
         subprocess.run([*command, "-shared", "-o", library, obj, "-lm"], check=True)
-        with library.open("ab") as file:
-            file.write(state.encode())
         library.replace(out)
+        loader().seal(out).write_text(loader().sealed(out))
 
 
 def main() -> None:
@@ -179,7 +178,7 @@ def main() -> None:
         if loader().is_current(out):
             return
     ask_numba_for(level)
-    from lineament.kernels.library import state, symbol
+    from lineament.kernels.library import symbol
 
     code, found = {}, kernels()
     for k, kernel in enumerate(found):
@@ -187,7 +186,7 @@ def main() -> None:
         print(f"\r\033[K{level}: {k + 1} of {len(found)}, {name}", end="", flush=True)
         result = compiled(kernel)
         code[name] = result.fndesc.llvm_func_name, result.library.get_llvm_str()
-    link(object_of(code), state(), out)
+    link(object_of(code), out)
     print(f"\r\033[K{out.name}: {out.stat().st_size / 1000:.0f} kB, {len(found)} kernels")
 
 

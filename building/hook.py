@@ -39,7 +39,8 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
         if sum(run.wait() for run in runs):
             raise SystemExit("the kernels could not be compiled, see above")
         for out in outs.values():
-            build_data["force_include"][str(out)] = f"lineament/kernels/{out.name}"
+            for file in (out, loader().seal(out)):
+                build_data["force_include"][str(file)] = f"lineament/kernels/{file.name}"
         build_data["pure_python"] = False
         tag = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["tag"] = f"py3-none-{tag}"

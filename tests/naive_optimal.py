@@ -43,7 +43,7 @@ def expected_variance(square, degrees, prior=0.012**2, spread=4.5):
 
     The peak of -(λ - c)²/2s - (k/2)(λ + u exp(-λ)) solves λ = c - w + w u exp(-λ), w = s k/2.
     """
-    ratio, weight, peaks = max(square / prior, 1e-30), spread * degrees / 2, []
+    ratio, weight, peaks = min(max(square / prior, 1e-30), 1e4), spread * degrees / 2, []
     for centre in (-spread / 2, spread / 2):
         level = centre
         if weight:

@@ -159,7 +159,7 @@ def test_features_need_neither_numba_nor_a_folder_to_write_to(copy):
         ),
         (
             lambda folder: [
-                path.write_bytes(library.state().encode())
+                (path.write_bytes(b"none"), library.seal(path).write_text(library.sealed(path)))
                 for path in folder.glob(f"*{library.SUFFIX}")
             ],
             "cannot be loaded (",

@@ -53,9 +53,19 @@ def state() -> str:
     return hashlib.sha256(whole).hexdigest()[:16]
 
 
+def seal(path: Path) -> Path:
+    """Return the file that says of which kernels a library is."""
+    return path.with_suffix(".sha256")
+
+
+def sealed(path: Path) -> str:
+    """Return what its seal has where a library is whole, and of the kernels as they are."""
+    return hashlib.sha256(state().encode() + path.read_bytes()).hexdigest()
+
+
 def is_current(path: Path) -> bool:
-    """Whether a library is whole, and of the kernels as they are: the file ends with their hash."""
-    return path.exists() and path.read_bytes().endswith(state().encode())
+    """Whether a library is whole, and of the kernels as they are."""
+    return seal(path).exists() and path.exists() and seal(path).read_text() == sealed(path)
 
 
 def levels() -> list[str]:
