@@ -156,7 +156,7 @@ def methods(name: str) -> None:
 @methods_option("Name of the method; may be given again.  [default: optimal]")
 @QUIET
 def warmup(methods: tuple[str, ...], quiet: bool) -> None:
-    """Compile and cache the kernels of a method."""
+    """Load the kernels of a method; compile and cache them where no library fits."""
     from ..tasks.warmup import warm_up
 
     with wrong_usage():

@@ -62,8 +62,9 @@ class Block:
         self.work = at.named(self.floats, self.ints)
         self.counts = self.work.counts
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
-        self._records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
-        self.features = tuple(map(words, self._records))
+        records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
+        self.features = tuple(map(words, records))
+        self._bytes = [(memoryview(table.view(np.uint8)), table.itemsize) for table in records]
         self.clusters = np.empty((capacity, n), np.int32)
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
         #: What runs all kernels over it, of a method that has one for them; its arrays stay.
@@ -139,8 +140,8 @@ class Block:
         counts = self.offsets[self.rows].tolist()
         # Numpy would copy records field by field, several times slower, and not their padding.
         return [
-            records[:count].tobytes() if count else b""
-            for records, count in zip(self._records, counts, strict=True)
+            bytes(table[: count * size])
+            for (table, size), count in zip(self._bytes, counts, strict=True)
         ]
 
     def written(self) -> list[NDArray[np.void]]:
