@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import helper, kernel
+from . import helper, kernel, sums
 from .arrays import Floats1
 
 #: What the response is: the interpretations of equation 22 and the text of Figure 9.
@@ -50,18 +50,17 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
     before, after = _support(i, first, last, radius, closed)
     if before == 0 or after == 0:
         return 0.0
-    period = last - first
     s2, s3, s4, arcs = 0.0, 0.0, 0.0, 0.0
     sx, sy, ssx, ssy = 0.0, 0.0, 0.0, 0.0
     for side in range(2):
         sign = 2 * side - 1
         near_x, near_y, arc = x[i], y[i], 0.0
         for k in range(1, (after if side else before) + 1):
-            j = _neighbour(i, sign * k, first, period, closed)
+            j = _around(i + sign * k, first, last)
             arc += math.sqrt((x[j] - near_x) * (x[j] - near_x) + (y[j] - near_y) * (y[j] - near_y))
             near_x, near_y = x[j], y[j]
             s, dx, dy = sign * arc, near_x - x[i], near_y - y[i]
-            square = s * s
+            square = arc * arc
             arcs += arc
             s2 += square
             s3 += square * s
@@ -77,27 +76,27 @@ def corner_response(x, y, i, first, last, radius, kind, closed):
         bx, by = sx, sy
     if bx == 0.0 and by == 0.0:
         return 0.0
-    return _accumulate(x, y, i, before, after, first, period, closed, (bx, by), arcs, kind)
+    return _accumulate(x, y, i, before, after, first, last, (bx, by), arcs, kind)
 
 
 @helper
-def _accumulate(x, y, i, before, after, first, period, closed, tangent, arcs, kind):
+def _accumulate(x, y, i, before, after, first, last, tangent, arcs, kind):
     """Add up the distances of a support to its tangent and its chord, by the form of response."""
     bx, by = tangent
-    to_tangent = _distance_sum(x, y, i, before, after, first, period, closed, i, bx, by)
+    low, high = i - before, i + after
+    to_tangent = _distance_sum(x, y, low, high, first, last, i, bx, by)
     if kind == TANGENT:
         return to_tangent
     if kind == RELATIVE:
         return to_tangent / arcs
-    a = _neighbour(i, -before, first, period, closed)
-    b = _neighbour(i, after, first, period, closed)
+    a, b = _around(low, first, last), _around(high, first, last)
     cx, cy = x[b] - x[a], y[b] - y[a]
     square = cx * cx + cy * cy
     if kind != PRODUCT and square == 0.0:
         return 0.0
     if kind == CHORD_SCALED:
         return to_tangent / math.sqrt(square)
-    product = to_tangent * _distance_sum(x, y, i, before, after, first, period, closed, a, cx, cy)
+    product = to_tangent * _distance_sum(x, y, low, high, first, last, a, cx, cy)
     return product if kind == PRODUCT else product / square
 
 
@@ -112,20 +111,39 @@ def _support(i, first, last, radius, closed):
 
 
 @helper
-def _neighbour(i, offset, first, period, closed):
-    return first + (i - first + offset) % period if closed else i + offset
+def _around(i, first, last):
+    """Return a point of a cluster; beyond an end of a closed one it is beside the other end."""
+    if i < first:
+        return i + last - first
+    return i - (last - first) if i > last else i
 
 
 @helper
-def _distance_sum(x, y, i, before, after, first, period, closed, origin, ux, uy):
-    """Sum of the distances of a support to the line through a point along (ux, uy) (21, 22)."""
-    norm = math.sqrt(ux * ux + uy * uy)
-    total = 0.0
-    for k in range(-before, after + 1):
-        j = _neighbour(i, k, first, period, closed)
-        dx, dy = x[j] - x[origin], y[j] - y[origin]
-        if norm > 0.0:
-            total += abs(uy * dx - ux * dy) / norm
-        else:
-            total += math.sqrt(dx * dx + dy * dy)
-    return total
+def _distance_sum(x, y, low, high, first, last, origin, ux, uy):
+    """Sum of the distances of points low … high to the line through one along (ux, uy) (21, 22).
+
+    Those beyond an end of a closed cluster are beside its other end.
+    """
+    total, x0, y0 = 0.0, x[origin], y[origin]
+    if low < first:
+        beyond = slice(_around(low, first, last), last)
+        total += _distances(x[beyond], y[beyond], x0, y0, ux, uy)
+        low = first
+    if high > last:
+        beyond = slice(first + 1, _around(high, first, last) + 1)
+        total += _distances(x[beyond], y[beyond], x0, y0, ux, uy)
+        high = last
+    return total + _distances(x[low : high + 1], y[low : high + 1], x0, y0, ux, uy)
+
+
+@sums
+def _distances(x, y, x0, y0, ux, uy):
+    """Sum of the distances of points to a line, or to its point if its direction has no length."""
+    norm, total = math.sqrt(ux * ux + uy * uy), 0.0
+    if norm == 0.0:
+        for i in range(len(x)):
+            total += math.sqrt((x[i] - x0) * (x[i] - x0) + (y[i] - y0) * (y[i] - y0))
+        return total
+    for i in range(len(x)):
+        total += abs(uy * (x[i] - x0) - ux * (y[i] - y0))
+    return total / norm

@@ -112,15 +112,18 @@ def farthest_from_chord(x, y, first, last, margin, away):
     chord = math.sqrt(cx * cx + cy * cy)
     # Slices, as numba need not look for negative indices where a loop begins at 0.
     x, y = x[first + margin : last - margin + 1], y[first + margin : last - margin + 1]
-    best, point = 0.0, 0
+    point = 0
     for i in range(len(x)):
         px, py = x[i] - x0, y[i] - y0
-        d = abs(cx * py - cy * px) if chord > 0.0 else px * px + py * py
-        away[i] = d
-        best = max(best, d)
-    # First how far, then which: each a loop that does several points at once.
-    while away[point] < best:
+        away[i] = abs(cx * py - cy * px) if chord > 0.0 else px * px + py * py
+    # First how far, then which: each a loop that does several points at once. Numbers from 0 on
+    # have the order of their bits.
+    bits, largest = away[: len(x)].view(np.int64), np.int64(0)
+    for i in range(len(x)):
+        largest = max(largest, bits[i])
+    while bits[point] < largest:
         point += 1
+    best = away[point]
     return first + margin + point, best / chord if chord > 0.0 else math.sqrt(best)
 
 

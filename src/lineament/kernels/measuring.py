@@ -127,6 +127,12 @@ def _join_clusters(work):
     The pieces of a map go over jumps, and over points that are in no cluster.
     """
     label, clusters, cut = work.marks[at.LABEL], work.clusters, work.pieces
+    inside = True
+    for k in range(work.counts[at.PIECES]):
+        own = label[cut[at.FIRST, k]]
+        inside = inside and own >= 0 and own == label[cut[at.LAST, k]]
+    if inside:
+        return
     before, n, piece, reached = np.int64(-1), np.int64(0), np.int64(0), np.int64(-1)
     for i in range(work.counts[at.POINTS]):
         own, goes_on = label[i], i <= reached or (label[i] >= 0 and label[i] == before)
@@ -147,8 +153,7 @@ def _join_clusters(work):
 def _has_length(row):
     """Whether a segment's ends are apart: of measurements along their beams, they may not be."""
     x1, y1, x2, y2 = row[col.S_START], row[col.S_START + 1], row[col.S_END], row[col.S_END + 1]
-    along = math.cos(row[col.S_ANGLE]) * (x2 - x1) + math.sin(row[col.S_ANGLE]) * (y2 - y1)
-    return along > _ROUNDING * (abs(x1) + abs(y1) + abs(x2) + abs(y2))
+    return row[col.S_LENGTH] > _ROUNDING * (abs(x1) + abs(y1) + abs(x2) + abs(y2))
 
 
 @helper

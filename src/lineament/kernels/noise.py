@@ -66,13 +66,17 @@ def estimate_noise(
     ranges, points, beam = work.beams[at.RANGE], work.points, work.marks[at.BEAM]
     x, y, rho = points[at.X], points[at.Y], points[at.RHO]
     count, any_usable = np.int64(0), False
+    nearest, farthest = max(range_min, NEAREST), min(range_max, FARTHEST)
     for i in range(bearings.shape[1]):
-        r = ranges[i]
-        any_usable |= usable(r, range_min, range_max)
-        if usable(r, max(range_min, NEAREST), min(range_max, FARTHEST)):
-            beam[count] = i
-            rho[count], x[count], y[count] = r, r * bearings[0, i], r * bearings[1, i]
-            count += 1
+        beam[count] = i
+        count += usable(ranges[i], nearest, farthest)
+    for i in range(bearings.shape[1] if count == 0 else 0):
+        any_usable |= usable(ranges[i], range_min, range_max)
+    any_usable |= count > 0
+    for i in range(count):
+        b = beam[i]
+        r = ranges[b]
+        rho[i], x[i], y[i] = r, r * bearings[0, b], r * bearings[1, b]
     constant, growth, noise[4], square = fit_noise(points, beam, count, at.SPACING, at.SPARE)
     if square <= LEAST_SIGMA * LEAST_SIGMA:
         constant = max(constant, _rounding_variance(rho, points[at.SPACING], count))
@@ -169,12 +173,15 @@ def _fill_triples(points, beam, count, row):
     x1, y1, rho1, x2, y2 = x[1:], y[1:], rho[1:], x[2:], y[2:]
     beam2, triple1 = beam[2:], triple[1:]
     total, used = 0.0, 0.0
+    # Two loops: of one over so many arrays the compiler does no four at once.
     for i in range(count - 2):
         outer = x[i] * y2[i] - y[i] * x2[i]
         inner = x[i] * y1[i] - y[i] * x1[i] + x1[i] * y2[i] - y1[i] * x2[i]
         error = rho1[i] * (inner - outer) / outer
+        triple1[i] = error * error / 1.5
+    for i in range(count - 2):
         neighbours = beam2[i] - beam[i] == 2
-        triple1[i] = error * error / 1.5 if neighbours else math.inf
+        triple1[i] = triple1[i] if neighbours else math.inf
         total += rho1[i] * rho1[i] if neighbours else 0.0
         used += 1.0 if neighbours else 0.0
     triple[0] = triple[max(count - 1, 0)] = math.inf
@@ -187,7 +194,8 @@ def _least_third(points, count, row, spare, low, high):
     rho, triple, kept, n = points[at.RHO], points[row], points[spare], 0.0
     for i in range(count):
         square = rho[i] * rho[i]
-        kept[i] = triple[i] if (low <= square) & (square < high) else math.inf
+        kept[i] = triple[i] if low <= square < high else math.inf
+    for i in range(count):
         n += 1.0 if kept[i] < math.inf else 0.0
     if n == 0.0:
         return 0.0, 0.0, 0.0

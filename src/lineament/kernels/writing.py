@@ -25,9 +25,10 @@ def write_segment(places, beam, first, last, count, line, misfit, segments, ints
     if c * (x[last] - x[first]) + s * (y[last] - y[first]) < 0.0:
         # The fit has left out measurements at the ends.
         c, s, covariance = -c, -s, -covariance
-    for end, i in ((at.S_START, first), (at.S_END, last)):
-        along = c * (x[i] - cx) + s * (y[i] - cy)
-        write_end(segments, k, end, cx + along * c, cy + along * s)
+    along = c * (x[first] - cx) + s * (y[first] - cy)
+    row[at.S_START], row[at.S_START + 1] = cx + along * c, cy + along * s
+    along = c * (x[last] - cx) + s * (y[last] - cy)
+    write_end(segments, k, at.S_END, cx + along * c, cy + along * s)
     row[at.S_CENTROID], row[at.S_CENTROID + 1], row[at.S_ANGLE] = cx, cy, math.atan2(s, c)
     row[at.S_COVARIANCE], row[at.S_COVARIANCE + 1] = var_offset, covariance
     row[at.S_COVARIANCE + 2], row[at.S_COVARIANCE + 3] = covariance, var_angle
@@ -76,16 +77,16 @@ def intersect(lines, a, b, x, y, near, corners, k):
     py = (n1x * d2 - n2x * d1) / determinant
     if math.sqrt((px - x) * (px - x) + (py - y) * (py - y)) > near:
         return False
-    start = _place_along(lines, a, lines[a, at.S_START], lines[a, at.S_START + 1])
-    end = _place_along(lines, b, lines[b, at.S_END], lines[b, at.S_END + 1])
-    if not _place_along(lines, a, px, py) > max(start, 0.0):
-        return False
-    if not _place_along(lines, b, px, py) < min(end, 0.0):
+    start = _place_along(lines, a, n1y, -n1x, lines[a, at.S_START], lines[a, at.S_START + 1])
+    end = _place_along(lines, b, n2y, -n2x, lines[b, at.S_END], lines[b, at.S_END + 1])
+    along_a = _place_along(lines, a, n1y, -n1x, px, py)
+    along_b = _place_along(lines, b, n2y, -n2x, px, py)
+    if not (along_a > max(start, 0.0) and along_b < min(end, 0.0)):
         return False
     write_end(lines, a, at.S_END, px, py)
     write_end(lines, b, at.S_START, px, py)
-    s1 = offset_variance(lines, a, px, py) / (determinant * determinant)
-    s2 = offset_variance(lines, b, px, py) / (determinant * determinant)
+    s1 = _offset_variance(lines, a, along_a) / (determinant * determinant)
+    s2 = _offset_variance(lines, b, along_b) / (determinant * determinant)
     write_place(corners, k, px, py, s1, n2y, -n2x, s2, n1y, -n1x)
     return True
 
@@ -104,21 +105,20 @@ def write_place(corners, k, x, y, first, ax, ay, second, bx, by):
 
 
 @helper
-def offset_variance(lines, k, px, py):
-    """Variance of a line's offset at a point: that at its centroid, with the lever arm."""
-    t = _place_along(lines, k, px, py)
+def _offset_variance(lines, k, along):
+    """Variance of a line's offset at a place along it: that at its centroid, with the lever arm."""
     return (
         lines[k, at.S_COVARIANCE]
-        + 2.0 * t * lines[k, at.S_COVARIANCE + 1]
-        + t * t * lines[k, at.S_COVARIANCE + 3]
+        + 2.0 * along * lines[k, at.S_COVARIANCE + 1]
+        + along * along * lines[k, at.S_COVARIANCE + 3]
     )
 
 
 @helper
-def _place_along(lines, k, px, py):
-    """Place of a point along a line, from its centroid."""
+def _place_along(lines, k, c, s, px, py):
+    """Place of a point along a line of direction (c, s), from its centroid."""
     dx, dy = px - lines[k, at.S_CENTROID], py - lines[k, at.S_CENTROID + 1]
-    return math.cos(lines[k, at.S_ANGLE]) * dx + math.sin(lines[k, at.S_ANGLE]) * dy
+    return c * dx + s * dy
 
 
 @helper
@@ -174,7 +174,8 @@ def write_breaks(places, beam, first, last, clusters, circular, gap, beams, brea
 def _write_break(places, beam, before, after, gap, beams, breaks, ints, k):
     """Of a jump the nearer side occludes. Over many missing beams a surface may go on unseen."""
     near = before if places[2, before] <= places[2, after] else after
-    is_gap = (beam[after] - beam[before]) % beams > gap
+    apart = beam[after] - beam[before]
+    is_gap = apart + (beams if apart < 0 else 0) > gap
     kind = np.int64(at.GAP if is_gap else at.JUMP)
     occluder = np.int64(-1) if is_gap else beam[near]
     _write_mark(places, near, beam[before], beam[after], kind, occluder, breaks, ints, k)

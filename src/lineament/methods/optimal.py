@@ -90,7 +90,7 @@ class Optimal(MethodBase):
             np.zeros((at.BEAMS, n), np.int64),
             np.zeros((at.SPANS, n), np.int64),
             np.zeros((n, at.PIECES)),
-            np.zeros((n, at.SUMS)),
+            np.zeros((at.SUMS, n)),
             np.zeros(4),
         )
         return arrays, np.empty((PLANES, n, vertices)), np.empty((n, vertices), np.int64)
@@ -170,7 +170,7 @@ def _evidence(work: at.Work, surfaces: int) -> dict[str, Array]:
     rise = np.full(surfaces + 1, np.inf)
     for k in range(1, surfaces):
         if kind[k - 1] == kind[k] == at.LINE:
-            sums = [work.sums[end[m]] - work.sums[first[m]] for m in (k - 1, k)]
+            sums = [work.sums[:, end[m]] - work.sums[:, first[m]] for m in (k - 1, k)]
             rise[k] = _chi_square(sums[0] + sums[1]) - sum(map(_chi_square, sums))
     return {
         "segments": np.minimum(rise[:-1], rise[1:])[kind == at.LINE],

@@ -7,7 +7,7 @@ import numpy as np
 from .. import helper, inlined, sums
 from . import layout as at
 from .constants import ARC_RADIUS, ARC_TURN, CLUTTER, LEAST, MOST_DEVIATION, RARE, SIGMAS, TAU
-from .partition import solve
+from .costs import solve
 
 #: Steps of Gauss and Newton from the algebraic circle, to see whether there is one and to fit it.
 _SEED, _STEPS = np.int64(1), np.int64(3)
@@ -78,13 +78,16 @@ def _looks_round(points, first, last, noise):
     if not cross > 0.0:
         return False
     ux, uy = (by * a - ay * b) / (2.0 * cross), (ax * b - bx * a) / (2.0 * cross)
+    # Most lines are straight, and ask for no root.
+    if ux * ux + uy * uy > 4.0 * ARC_RADIUS * ARC_RADIUS:
+        return False
     r, square = math.sqrt(ux * ux + uy * uy), mx * mx + my * my
     near = 2.0 * SIGMAS * math.sqrt(noise[0] + noise[1] * square)
     for i in (quarter, first + last - quarter):
         dx, dy = x[i] - mx - ux, y[i] - my - uy
         if not abs(math.sqrt(dx * dx + dy * dy) - r) <= near:
             return False
-    return r <= 2.0 * ARC_RADIUS and math.hypot(ax - bx, ay - by) >= 0.5 * ARC_TURN * r
+    return math.hypot(ax - bx, ay - by) >= 0.5 * ARC_TURN * r
 
 
 @helper

@@ -15,7 +15,9 @@ from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
 from .fits import measure
 from .joining import join_all
-from .partition import clearest_border, fill_sums, merge_lines, partition
+from .costs import fill_sums
+from .merging import clearest_border, merge_lines
+from .partition import partition
 
 
 @kernel

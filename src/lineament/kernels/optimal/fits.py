@@ -7,7 +7,8 @@ from ..line_fit import TOTAL, direction
 from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
 from .constants import LEAST, SIGMAS, TAU
-from .partition import solve, surface_variance
+from .costs import solve
+from .merging import surface_variance
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
 _TOGETHER = 4
@@ -144,12 +145,7 @@ def _scatter_of_means(work, surfaces):
         return 1.0
     mean, limit = 1.0, math.inf
     for _ in range(2):
-        total, kept = 0.0, 0
-        for i in range(used):
-            if squares[i] <= limit:
-                total += squares[i]
-                kept += 1
-        mean = total / kept
+        mean = _mean_within(squares, used, limit)
         limit = SIGMAS * SIGMAS * mean
     mean, _ = expected_variance(mean, used / _OVERLAP, 1.0)
     # Nothing is known better than the best scanner measures it.
@@ -157,17 +153,30 @@ def _scatter_of_means(work, surfaces):
 
 
 @sums
+def _mean_within(squares, count, limit):
+    """Return the mean of those of the first `count` squares that are within a limit."""
+    total, kept = 0.0, 0.0
+    for i in range(count):
+        within = squares[i] <= limit
+        total += squares[i] if within else 0.0
+        kept += 1.0 if within else 0.0
+    return total / kept
+
+
+@sums
 def _second_differences(points, a, b, noise, error, squares):
     """Square the second differences of means of four errors, in units of those of white noise."""
-    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
+    x, y, rho, constant, growth = points[at.X], points[at.Y], points[at.RHO], noise[0], noise[1]
     for i in range(len(x)):
-        variance = noise[0] + noise[1] * rho[i] * rho[i]
+        variance = constant + growth * rho[i] * rho[i]
         error[i] = (rho[i] - rho[i] / (a * x[i] + b * y[i])) / math.sqrt(variance)
+    # In place: the sum of four from each one on.
+    error1, error2, error3 = error[1:], error[2:], error[3:]
+    for i in range(len(x) + 1 - _TOGETHER):
+        error[i] = error[i] + error1[i] + error2[i] + error3[i]
+    second, third = error[_TOGETHER:], error[2 * _TOGETHER :]
     for i in range(len(x) + 1 - 3 * _TOGETHER):
-        first = error[i] + error[i + 1] + error[i + 2] + error[i + 3]
-        second = error[i + 4] + error[i + 5] + error[i + 6] + error[i + 7]
-        third = error[i + 8] + error[i + 9] + error[i + 10] + error[i + 11]
-        difference = first - 2.0 * second + third
+        difference = error[i] - 2.0 * second[i] + third[i]
         squares[i] = difference * difference / (6.0 * _TOGETHER)
 
 

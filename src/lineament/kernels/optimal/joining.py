@@ -10,7 +10,16 @@ from ..writing import grade_corner, write_edge, write_end, write_opening, write_
 from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
-from .partition import gap, joint_cost, surface_variance
+from .costs import joint_cost
+from .merging import gap, surface_variance
+
+
+@helper
+def around(i, n):
+    """Return the number from 0 to n - 1 of what is at most once around more, or less."""
+    if i < 0:
+        return i + n
+    return i - n if i >= n else i
 
 
 @inlined
@@ -18,12 +27,12 @@ def join_all(work, tables, scan, surfaces, closed):
     """Write the corners where surfaces meet, and the edges where they end."""
     spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
     for k in range(surfaces):
-        m = (k + 1) % surfaces
+        m = around(k + 1, surfaces)
         if m > k or (closed and m < k):
             _join(work, tables, scan, k, m)
     # Through a slit, a surface behind may show between two lines.
     for k in range(surfaces):
-        m = (k + 2) % surfaces
+        m = around(around(k + 1, surfaces) + 1, surfaces)
         both_end = spans[at.END, k] == spans[at.START, m] == 0
         if both_end and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
             i, j = spans[at.LAST, k], spans[at.FIRST, m]
@@ -42,7 +51,7 @@ def _join(work, tables, scan, k, m):
     points, beam, broken = work.points, work.beams[at.BEAM], work.beams[at.BROKEN]
     kinds, pieces = work.spans[at.KIND], work.pieces
     i, j = work.spans[at.LAST, k], work.spans[at.FIRST, m]
-    joined = (beam[j] - beam[i]) % scan.beams - 1 <= scan.missing
+    joined = around(beam[j] - beam[i], scan.beams) - 1 <= scan.missing
     if joined and kinds[k] == at.ARC:
         joined = kinds[m] == at.LINE and is_on(points, pieces[k], j, work.noise, TAU)
     elif joined and kinds[m] == at.ARC:
@@ -171,18 +180,18 @@ def _add_edge(work, tables, scan, k, way):
     i, count, n = spans[at.LAST if way > 0 else at.FIRST, k], scan.count, scan.beams
     jump = math.inf
     for ahead in range(1, LEAST + 1):
-        t = (i + way * ahead) % count if scan.circular else i + way * ahead
+        t = around(i + way * ahead, count) if scan.circular else i + way * ahead
         if 0 <= t < count:
             jump = min(jump, rho[t] - rho[i])
-    next_beam = beam[(i + way) % count]
+    next_beam = beam[around(i + way, count)]
     hides = SIGMAS * math.sqrt(surface_variance(points, i, noise)) < jump < math.inf
-    if not hides or (way * (next_beam - beam[i])) % n - 1 > scan.missing:
+    if not hides or around(way * (next_beam - beam[i]), n) - 1 > scan.missing:
         return
     ux, uy = way * p[at.UX], way * p[at.UY]
     # The spacing is that of the beams on the line: bearings are better known than ranges.
     here, before = p[at.A] * x[i] + p[at.B] * y[i], p[at.A] * x[i - way] + p[at.B] * y[i - way]
     dx, dy = x[i] / here - x[i - way] / before, y[i] / here - y[i - way] / before
-    spacing = abs(ux * dx + uy * dy) / ((way * (beam[i] - beam[i - way])) % n)
+    spacing = abs(ux * dx + uy * dy) / around(way * (beam[i] - beam[i - way]), n)
     along = ux * (x[i] - p[at.CX]) + uy * (y[i] - p[at.CY]) + 0.5 * spacing
     sine = (ux * x[i] + uy * y[i]) / rho[i]
     px, py = p[at.CX] + along * ux, p[at.CY] + along * uy

@@ -13,81 +13,12 @@ import numpy as np
 
 from .. import contracted, helper, inlined
 from . import layout as at
-from .constants import BEND, CLUTTER, LEAST, RARE, SIGMAS, TAU
+from .constants import CLUTTER, LEAST
+from .costs import cost, costs_from, costs_on
 
 #: Measurements of the blocks that bound χ² from below, candidates of a group, groups of a row, and
 #: candidates that run along. They change the time, not the result.
 BLOCK, GROUP, ROW, RUNNERS = 8, 16, 16, 3
-
-
-@contracted
-def fill_sums(points, count, constant, growth, sums):
-    """Sum w (xx, xy, yy, x, y, 1), w = ρ² / (σ² + τ²), of all measurements before each one.
-
-    A line is a x + b y = 1, and 1 - a x - b y the error of ρ over ρ: linear whatever the direction
-    of the line (inverse-range regression).
-    """
-    x, y, rho = points[at.X], points[at.Y], points[at.RHO]
-    constant += TAU * TAU
-    xx, xy, yy, sx, sy, s = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for column in range(at.SUMS):
-        sums[0, column] = 0.0
-    for i in range(count):
-        square = rho[i] * rho[i]
-        w = square / (constant + growth * square)
-        wx, wy = w * x[i], w * y[i]
-        xx, xy, yy = xx + wx * x[i], xy + wx * y[i], yy + wy * y[i]
-        sx, sy, s = sx + wx, sy + wy, s + w
-        sums[i + 1, 0], sums[i + 1, 1], sums[i + 1, 2] = xx, xy, yy
-        sums[i + 1, 3], sums[i + 1, 4], sums[i + 1, 5] = sx, sy, s
-
-
-@contracted
-def solve(sums, i, j):
-    """Return the line a x + b y = 1 of least squares of measurements i … j - 1; 0, 0 if none."""
-    xx, xy, yy = sums[j, 0] - sums[i, 0], sums[j, 1] - sums[i, 1], sums[j, 2] - sums[i, 2]
-    x, y, determinant = sums[j, 3] - sums[i, 3], sums[j, 4] - sums[i, 4], xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
-        return 0.0, 0.0
-    return (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant
-
-
-@contracted
-def chi_square(xx, xy, yy, x, y, s):
-    """χ² of the line of least squares, by sums; inf where they determine none."""
-    determinant = xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
-        return math.inf
-    return max(s - (x * (x * yy - y * xy) + y * (y * xx - x * xy)) / determinant, 0.0)
-
-
-@contracted
-def cost(sums, i, j):
-    """χ² of the line of least squares through the measurements i … j - 1."""
-    p, q = sums[i], sums[j]
-    return chi_square(q[0] - p[0], q[1] - p[1], q[2] - p[2], q[3] - p[3], q[4] - p[4], q[5] - p[5])
-
-
-@helper
-def joint_cost(sums, i, j, k, m):
-    """Rise of χ² if the measurements i … j - 1 and k … m - 1 are on one line, not on two."""
-    p, q, r, s = sums[i], sums[j], sums[k], sums[m]
-    joint = chi_square(
-        q[0] - p[0] + s[0] - r[0], q[1] - p[1] + s[1] - r[1], q[2] - p[2] + s[2] - r[2],
-        q[3] - p[3] + s[3] - r[3], q[4] - p[4] + s[4] - r[4], q[5] - p[5] + s[5] - r[5],
-    )  # fmt: skip
-    return joint - cost(sums, i, j) - cost(sums, k, m)
-
-
-@inlined
-def clearest_border(work, lines):
-    """Return the line that χ² rises the most by if it and the one before become one; 0 if none."""
-    first, last, found, largest = work.spans[at.FIRST], work.spans[at.LAST], np.int64(0), -1.0
-    for k in range(1, lines):
-        rise = joint_cost(work.sums, first[k - 1], last[k - 1] + 1, first[k], last[k] + 1)
-        if rise > largest:
-            found, largest = k, rise
-    return found
 
 
 @inlined
@@ -124,62 +55,124 @@ def _part_stretch(work, first, last, evidence):
     least run along: they are always evaluated, and do not count for their group.
     """
     points, beams, sums = work.points, work.beams, work.sums
-    energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
-    lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
-    origin, runner, value = beams[at.ORIGIN], beams[at.RUNNER], points[at.VALUE]
-    running, ends, begins = points[at.RUNNING], points[at.ENDS], points[at.BEGINS]
-    price, most = CLUTTER * evidence, max(1.0, (LEAST - 1) * CLUTTER) * evidence
-    for j in range(first + 1, min(first + LEAST, last + 1)):
-        energy[j], origin[j] = energy[j - 1] + price, -1
-    if last - first < LEAST:
+    energy, origin, begin = points[at.ENERGY], beams[at.ORIGIN], first + LEAST
+    for j in range(first + 1, min(begin, last + 1)):
+        energy[j], origin[j] = energy[j - 1] + CLUTTER * evidence, -1
+    low = _follow_line(energy, origin, sums, first, last, evidence)
+    if low > last:
         return
-    _bound_blocks(ends, begins, sums, first, last)
-    oldest, bound = np.int64(0), math.inf
+    _bound_blocks(points[at.BLOCKS], sums, first, last)
     for r in range(RUNNERS):
-        runner[r] = first
-    total = energy[first + LEAST - 1]
-    for j in range(first + LEAST, last + 1):
-        i, leader, least = j - LEAST, np.int64(-1), math.inf
-        for r in range(RUNNERS):
-            c = runner[r]
-            value[r] = energy[c] + evidence + cost(sums, c, j)
-            leader = c if value[r] < least else leader
-            least = min(value[r], least)
-        found = leader if least < total + price else np.int64(-1)
-        total = min(least, total + price)
-        q, place = (i - first) // GROUP, (i - first) % GROUP
-        running[i] = math.inf if i == first else 0.0
-        new = energy[i] + evidence - begins[i] + running[i]
-        key[q] = min(key[q], new) if place else new
-        row_key[q // ROW] = min(row_key[q // ROW], new) if place or q % ROW else new
-        lowest[q] = min(lowest[q], energy[i] + evidence) if place else energy[i] + evidence
-        anchor[q] = i
-        bound = min(bound, new)
-        if bound + ends[j] < total:
-            total, found, oldest = _open_groups(
-                points, beams, sums, first, j, oldest, evidence, total, found
+        beams[at.RUNNER, r] = first
+    points[at.BASE, first], oldest, bound = math.inf, np.int64(0), math.inf
+    for start in range(begin, last + 1, GROUP):
+        end = min(start + GROUP, last + 1)
+        if start < low:
+            key = _add_group(points, beams, first, start, end, evidence)
+            bound = min(bound, key)
+        else:
+            oldest, bound = _part_block(
+                points, beams, sums, first, start, end, oldest, bound, evidence
             )
-            # What is so far above can never be the least again.
-            while oldest < q and key[oldest] + ends[j] > total + most:
-                oldest += 1
-            bound = math.inf
-            for k in range(oldest // ROW, q // ROW + 1):
-                bound = min(bound, row_key[k])
-        energy[j], origin[j] = total, found
 
 
 @contracted
-def _open_groups(points, beams, sums, first, j, oldest, evidence, total, found):
+def _follow_line(energy, origin, sums, first, last, evidence):
+    """Follow the first line as long as its χ² is at most the price of clutter.
+
+    It is the best then: two lines, or one and clutter, cost as much at least. Returns the
+    measurement, the first of a group of ends, before which the least energies are known.
+    """
+    limit = energy[first] + evidence + CLUTTER * evidence
+    for low in range(first + LEAST, last + 1, GROUP):
+        high = min(low + GROUP, last + 1)
+        costs_on(sums, first, low, high, energy[first] + evidence, energy)
+        for j in range(low, high):
+            if not energy[j] <= limit:
+                return low
+            origin[j] = first
+    return last + 1
+
+
+@contracted
+def _part_block(points, beams, sums, first, low, high, oldest, bound, evidence):
+    """Find the least energies of the ends low … high, whose candidates are the last group.
+
+    `bound` is the least key of the groups before. Returns the first group that may still be
+    opened, and the least key.
+    """
+    energy, base, blocks, ahead = (
+        points[at.ENERGY], points[at.BASE], points[at.BLOCKS], points[at.AHEAD :]
+    )  # fmt: skip
+    origin, runner, price = beams[at.ORIGIN], beams[at.RUNNER], CLUTTER * evidence
+    most = max(1.0, (LEAST - 1) * CLUTTER) * evidence
+    for r in range(RUNNERS):
+        costs_on(sums, runner[r], low, high, energy[runner[r]] + evidence, ahead[r])
+    q, key, lowest, anchor = (low - first - LEAST) // GROUP, math.inf, math.inf, first
+    total = energy[low - 1]
+    for j in range(low, high):
+        i, leader, least = j - LEAST, 0, math.inf
+        anchor = i
+        for r in range(RUNNERS):
+            leader = r if ahead[r, j] < least else leader
+            least = min(ahead[r, j], least)
+        found = runner[leader] if least < total + price else np.int64(-1)
+        total = min(least, total + price)
+        own, ended = energy[i] + evidence, blocks[(j - first) // BLOCK]
+        base[i] = own if i > first else math.inf
+        key = min(key, base[i] - blocks[(i - first + BLOCK - 1) // BLOCK])
+        lowest = min(lowest, own)
+        if min(bound, key) + ended < total:
+            _set_group(points, beams, q, key, lowest, anchor)
+            total, found, oldest = _open_groups(
+                points, beams, sums, first, j, high, oldest, evidence, total, found
+            )
+            # What is so far above can never be the least again.
+            while oldest < q and points[at.KEY, oldest] + ended > total + most:
+                oldest += 1
+            key, lowest, bound = points[at.KEY, q], points[at.LOWEST, q], math.inf
+            anchor = beams[at.ANCHOR, q]
+            for row in range(oldest // ROW, q // ROW + 1):
+                bound = min(bound, points[at.ROW_KEY, row])
+        energy[j], origin[j] = total, found
+    _set_group(points, beams, q, key, lowest, anchor)
+    return oldest, min(bound, key)
+
+
+@helper
+def _add_group(points, beams, first, low, high, evidence):
+    """Make a group of the candidates for ends from low … high, and return its key."""
+    energy, base, blocks = points[at.ENERGY], points[at.BASE], points[at.BLOCKS]
+    q, key, lowest = (low - first - LEAST) // GROUP, math.inf, math.inf
+    for i in range(low - LEAST, high - LEAST):
+        base[i] = energy[i] + evidence if i > first else math.inf
+        key = min(key, base[i] - blocks[(i - first + BLOCK - 1) // BLOCK])
+        lowest = min(lowest, energy[i] + evidence)
+    _set_group(points, beams, q, key, lowest, high - 1 - LEAST)
+    return key
+
+
+@helper
+def _set_group(points, beams, q, key, lowest, anchor):
+    """Write the key of the last group, the least energy before its lines, and its anchor."""
+    points[at.KEY, q], points[at.LOWEST, q], beams[at.ANCHOR, q] = key, lowest, anchor
+    others = points[at.ROW_KEY, q // ROW] if q % ROW else math.inf
+    points[at.ROW_KEY, q // ROW] = min(others, key)
+
+
+@contracted
+def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, found):
     """Open the groups whose key is less than the least energy before measurement j.
 
     The least candidate of a group that is now less than a runner takes its place, and the runner
     goes back to its own group. Returns the least energy, the candidate that it is of, and the first
     group that may still be opened.
     """
-    ended, began = points[at.ENDS, j], points[at.BEGINS, j]
+    blocks = points[at.BLOCKS]
+    ended, began = blocks[(j - first) // BLOCK], blocks[(j - first + BLOCK - 1) // BLOCK]
     energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
     lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
-    running, runner, value = points[at.RUNNING], beams[at.RUNNER], points[at.VALUE]
+    base, now = points[at.BASE], points[at.SCRATCH]
     last, back = j - LEAST + 1, oldest
     groups = (last - 1 - first) // GROUP + 1
     for row in range(oldest // ROW, (groups - 1) // ROW + 1):
@@ -198,114 +191,56 @@ def _open_groups(points, beams, sums, first, j, oldest, evidence, total, found):
             if key[q] + began >= total:
                 lower = min(lower, key[q])
                 continue
+            high = min(low + GROUP, last)
+            costs_from(sums, low, high, j, base, now)
             least, second, best = math.inf, math.inf, low
-            for c in range(low, min(low + GROUP, last)):
-                now = energy[c] + evidence + cost(sums, c, j) + running[c]
-                second = min(second, max(least, now))
-                best = c if now < least else best
-                least = min(least, now)
+            for c in range(low, high):
+                second = min(second, max(least, now[c]))
+                best = c if now[c] < least else best
+                least = min(least, now[c])
             found = best if least < total else found
             total = min(least, total)
-            worst = 0
-            for r in range(1, RUNNERS):
-                worst = r if value[r] > value[worst] else worst
-            runs = least < value[worst]
+            runs, worst = _is_runner(points, j, least)
             key[q] = (second if runs else least) - began
             lower = min(lower, key[q])
             if low + GROUP <= last:
                 anchor[q], lowest[q] = j, key[q] + began
             if runs:
-                out, group = runner[worst], (runner[worst] - first) // GROUP
-                running[out], running[best] = 0.0, math.inf
-                key[group] = min(key[group], value[worst] - began)
+                out = beams[at.RUNNER, worst]
+                group = (out - first) // GROUP
+                base[out], base[best] = energy[out] + evidence, math.inf
+                key[group] = min(key[group], points[at.AHEAD + worst, j] - began)
                 row_key[group // ROW] = min(row_key[group // ROW], key[group])
                 rest = cost(sums, out, anchor[group])
                 rest = energy[out] + evidence + (rest if rest < math.inf else 0.0)
                 lowest[group] = min(lowest[group], rest)
                 back = min(back, group)
-                runner[worst], value[worst] = best, least
+                beams[at.RUNNER, worst], points[at.AHEAD + worst, j] = best, least
+                before = energy[best] + evidence
+                costs_on(sums, best, j + 1, end, before, points[at.AHEAD + worst])
         row_key[row] = min(row_key[row], lower)
     return total, found, back
 
 
 @helper
-def _bound_blocks(ends, begins, sums, first, last):
-    """Sum the χ² of the blocks of measurements that end by each one, and that begin before it.
+def _is_runner(points, j, least):
+    """Whether a candidate is less than the worst of the runners, and which that is."""
+    worst = 0
+    for r in range(1, RUNNERS):
+        worst = r if points[at.AHEAD + r, j] > points[at.AHEAD + worst, j] else worst
+    return least < points[at.AHEAD + worst, j], worst
+
+
+@helper
+def _bound_blocks(blocks, sums, first, last):
+    """Sum the χ² of the blocks before each block of measurements.
 
     A line over some blocks costs at least as much as each has with a line for itself.
     """
-    total, begins[first] = 0.0, 0.0
+    total, b = 0.0, 0
     for low in range(first, last + 1, BLOCK):
-        high, own = low + BLOCK, 0.0
-        if high <= last:
-            own = cost(sums, low, high)
-            own = own if own < math.inf else 0.0
-        for i in range(low, min(high, last + 1)):
-            ends[i] = total
-        total += own
-        for i in range(low + 1, min(high, last) + 1):
-            begins[i] = total
-
-
-@inlined
-def merge_lines(work, lines, evidence):
-    """Merge neighbours that are one wall that bends, first those whose χ² rises the least.
-
-    Returns how many lines are left.
-    """
-    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.KEY]
-    for k in range(1, lines):
-        rises[k] = _rise(work, k)
-    while lines > 1:
-        k = 1
-        for m in range(2, lines):
-            k = m if rises[m] < rises[k] else k
-        if not rises[k] < RARE * evidence:
-            break
-        last[k - 1] = last[k]
-        lines -= 1
-        for m in range(k, lines):
-            first[m], last[m], rises[m] = first[m + 1], last[m + 1], rises[m + 1]
-        for m in range(max(k - 1, 1), min(k + 1, lines)):
-            rises[m] = _rise(work, m)
-    return lines
-
-
-@inlined
-def _rise(work, k):
-    """Rise of χ² if a line and the one before become one; inf where these are no wall that bends.
-
-    They then turn by little, and are no farther apart at their border than by chance.
-    """
-    spans, sums, points = work.spans, work.sums, work.points
-    start, border, end = spans[at.FIRST, k - 1], spans[at.FIRST, k], spans[at.LAST, k] + 1
-    if border > spans[at.LAST, k - 1] + 1 or work.beams[at.BROKEN, border]:
-        return math.inf
-    a, b = solve(sums, start, border)
-    c, d = solve(sums, border, end)
-    if not a * c + b * d > BEND * math.sqrt((a * a + b * b) * (c * c + d * d)):
-        return math.inf
-    step = gap(points, border - 1, border, a - c, b - d)
-    if step * step > SIGMAS * SIGMAS * surface_variance(points, border, work.noise):
-        return math.inf
-    return joint_cost(sums, start, border, border, end)
-
-
-@helper
-def surface_variance(points, i, noise):
-    """Variance of a measurement about the line of its surface."""
-    return TAU * TAU + noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i]
-
-
-@helper
-def gap(points, i, j, a, b):
-    """Range by which one line is before another at the beams of i and j, the lesser of both [m].
-
-    The lines differ by a x + b y in ρ over their ranges; 0 where they cross between those beams,
-    less than 0 where the first is behind.
-    """
-    here = (a * points[at.X, i] + b * points[at.Y, i]) * points[at.RHO, i]
-    there = (a * points[at.X, j] + b * points[at.Y, j]) * points[at.RHO, j]
-    if here * there <= 0.0:
-        return 0.0
-    return here if abs(here) < abs(there) else there
+        blocks[b], own = total, 0.0
+        if low + BLOCK <= last:
+            own = cost(sums, low, low + BLOCK)
+        total, b = total + (own if own < math.inf else 0.0), b + 1
+    blocks[b] = total
