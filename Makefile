@@ -102,6 +102,11 @@ mutants: .venv/ready
 bench: .venv/ready
 	$(BIN)/python benchmarks/speed.py
 
+# Counts the work of the kernels over fixed scans: is it that of the counts stored?
+.PHONY: bench-check
+bench-check: .venv/ready
+	$(BIN)/python benchmarks/work.py
+
 # Draws recorded scans (LINEAMENT_DATA) and the stages of each, to be looked at.
 pictures: .venv/ready
 	$(BIN)/python benchmarks/contact_sheet.py -o build/pictures
