@@ -9,6 +9,7 @@ import pytest
 from small_experiments import silent, small  # noqa: F401
 
 import lineament as ln
+from lineament import LineamentError
 from lineament.logs import save_npz
 from lineament.reproduce import (
     Setting,
@@ -18,6 +19,7 @@ from lineament.reproduce import (
     scans,
     tracking,
 )
+from lineament.reproduce.report import reproduce
 from lineament.reproduce.two_corners import DISTANCE, WORLD
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, drive, room
@@ -84,6 +86,20 @@ class TestMuseum:
         assert places == [0, 5, 6, 8, 10]
         assert museum.views_of_two(several[:4]) is None
         assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
+
+
+def test_the_museums_bag_is_not_overwritten_and_what_is_named_is_run(tmp_path):
+    bag = tmp_path / "figures.json"
+    bag.write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(LineamentError, match=r"figures\.json"):
+        reproduce(tmp_path, ["definitions"], Setting(museum=bag))
+    assert bag.read_bytes() == b"#ROSBAG V2.0"
+    reports = []
+    page = reproduce(tmp_path / "new", ["fig7"], Setting(1, seeds=1), reports.append)
+    numbers = json.loads((page.parent / "figures.json").read_text(encoding="utf-8"))
+    assert list(numbers["experiments"]) == ["definitions"]
+    assert (numbers["recordings"], numbers["museum"]) == (False, False)
+    assert reports
 
 
 class TestTracking:

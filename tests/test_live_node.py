@@ -156,7 +156,7 @@ def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
     scan = wall("a", 1.1, time_increment=0.001)
     total, (first, second), lines = run(
         [heard(moving(np.nan, 0.0, 0.0)), scan],
-        [scan, heard(moving(9.0, 9.0, 9.0)), heard(moving(1.0, 0.0, 0.0))],
+        [scan, heard(moving(0.0, math.inf, 0.0)), heard(moving(1.0, 0.0, 0.0))],
         deskew="/odom",
         laser_pose=(0.2, 0.1, 0.5),
     )
@@ -172,6 +172,15 @@ def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
     total, _, lines = run(batch, [wall("a", time_increment=1e-3)], deskew="/odom")
     assert (total.scans, total.malformed) == (1, 1)
     assert lines[0].startswith("a scan of a makes no sense: twist (1.0, 0.0, 0.0) for 1e+22 s")
+
+
+def test_publishers_whose_names_are_made_up_do_not_fill_the_screen(monkeypatch):
+    monkeypatch.setattr("lineament.live.node._MOST_FAULTY", 2)
+    bad = [received_scan(name, b"", "cdr", "sensor_msgs/LaserScan") for name in "abca"]
+    total, _, lines = run(bad[:2], bad[2:])
+    assert total.malformed == 4
+    faults = [line.partition(" makes no sense")[0] for line in lines]
+    assert faults == ["a scan of a", "a scan of b"]
 
 
 def test_what_was_skipped_in_a_log_is_written_at_its_end(tmp_path):
@@ -549,6 +558,11 @@ def test_reports_worked_by_hand():
     assert (report.level, str(report)) == (3, "no scans, 0 publishers")
     assert np.isnan(report.invalid)
     assert counters.report(13.5, publishers=1).rate == 0.0
+
+
+def test_a_source_and_sinks_that_lose_nothing():
+    report = Counters(0.0).report(1.0, publishers=1)
+    assert report.since == report.total == (0, 0, 0, 0, 0)
 
 
 def test_a_message_is_read_when_it_is_processed():
