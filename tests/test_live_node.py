@@ -9,7 +9,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from live_driving import cdr_scan, garbage
+from live_driving import cdr_scan, garbage, waited_for
 
 import lineament as ln
 from lineament.live import (
@@ -583,3 +583,9 @@ def test_an_inbox_keeps_the_newest_of_each_publisher():
     for number in range(100):
         inbox.put(Received(f"{number}", list, 0.0))
     assert (len(inbox.take(0)), inbox.lost) == (64, 39)
+
+
+def test_an_inbox_is_waited_for():
+    inbox = Inbox(depth=2)
+    (came,) = waited_for(inbox.take, lambda: inbox.put(Received("a", list, 1.0)))
+    assert came.arrived == 1.0
