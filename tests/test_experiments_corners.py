@@ -141,6 +141,7 @@ class TestTwoCorners:
         assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
         off, spread, share = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
         assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
+        assert off.columns == ("method", "place 1", "place 2")
         assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
         assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
 
