@@ -75,6 +75,16 @@ def test_the_twist_is_the_mean_of_the_last_two_motions():
     assert tracker.twist == pytest.approx(((0.4 + 0.8) / 2, 0.0, 0.0), abs=1e-3)
 
 
+@pytest.mark.parametrize(("duration", "is_known"), [(0.0021, True), (0.0019, False)])
+def test_a_speed_of_more_than_50_metres_a_second_is_of_a_wrong_stamp(duration, is_known):
+    """10 cm in 2.1 ms and in 1.9 ms: 48 and 53 m/s. The way is known all the same."""
+    tracker = Tracker(roughness=0.0)
+    tracker(frame(0.0))
+    tracks = tracker(frame(duration, (0.1, 0.0, 0.0)))
+    np.testing.assert_allclose(tracks.motion.pose, (0.1, 0.0, 0.0), atol=1e-3)
+    assert (tracker.twist is not None) == is_known
+
+
 def test_beams_are_timed_from_the_one_whose_time_the_stamp_is():
     """Between beams, and outside of them; of regular bearings and others."""
     regular = LaserScan([1.0] * 5, -0.2, 0.1, scan_time=2 * math.pi)
