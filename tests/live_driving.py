@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
@@ -239,6 +239,15 @@ def connected(peer: Any, source: Source, topic: str, *kind: Any) -> None:
     before = source.publishers
     peer.publish(topic, *kind)
     eventually(lambda: peer.listeners(topic) and source.publishers > before)
+
+
+def waited_for(receive: Callable[[float], list[Received]], send: Callable[[], object]) -> Any:
+    """Return what is received while nothing has come yet, once it is sent."""
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(receive, DEADLINE)
+        assert not wait([waiting], timeout=0.05).done
+        send()
+        return waiting.result(DEADLINE / 2)
 
 
 def received(source: Source, n: int = 1) -> list[Received]:

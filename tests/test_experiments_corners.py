@@ -1,4 +1,4 @@
-"""Figure 9 and Table 2: the parts of the experiments on corners, by hand."""
+"""Figure 9, Table 2 and what the paper leaves open: parts of the experiments, by hand."""
 
 import math
 
@@ -8,11 +8,13 @@ from handmade import corner, features
 from small_experiments import PAPER
 
 import lineament as ln
+from lineament.methods.stages import bilateral_filter
 from lineament.reproduce import (
     Setting,
     grid,
     repetition,
     scans,
+    sensitivity,
     two_corners,
 )
 from lineament.reproduce.grid import Parameters
@@ -139,6 +141,7 @@ class TestTwoCorners:
         assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
         off, spread, share = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
         assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
+        assert off.columns == ("method", "place 1", "place 2")
         assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
         assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
 
@@ -163,3 +166,39 @@ class TestTwoCorners:
         error = np.sqrt(np.mean((distances - DISTANCE) ** 2))
         # 4 standard deviations of a standard deviation of 190 draws are 0.2 of it.
         assert 0.8 < error / two_corners.distance_bound(pose) < 1.4
+
+
+class TestSensitivity:
+    """What the paper leaves open: its filter more than once, and bands by hand."""
+
+    def test_ranges_are_filtered_so_many_times(self):
+        scan = ln.LaserScan([2.0, 2.0, 2.05, 2.0, 2.0, 2.1], -0.3, 0.1, range_min=0.2, range_max=9)
+        assert sensitivity._filtered([scan], 0) == [scan]
+        once = ln.LaserScan(bilateral_filter(scan), -0.3, 0.1, range_min=0.2, range_max=9)
+        for times, expected in ((1, once.ranges), (2, bilateral_filter(once))):
+            (found,) = sensitivity._filtered([scan], times)
+            np.testing.assert_allclose(found.ranges, expected)
+            assert np.abs(found.ranges - scan.ranges).max() > 0.01
+            assert (found.angle_min, found.angle_increment) == (-0.3, 0.1)
+            assert (found.range_min, found.range_max) == (0.2, 9.0)
+
+    def test_bands_by_hand(self):
+        """The first parameter goes from 2 to 5, the second from 1 to 3, the third is unknown."""
+        alone = {
+            "a": {"x": {"recall": 5.0}, "y": {"recall": 2.0}, "z": {"recall": math.nan}},
+            "b": {"x": {"recall": 3.0}, "y": {"recall": 1.0}},
+        }
+        bands = sensitivity._bands({"recall": 4.0}, alone)
+        assert bands == {"recall": {"low": 1.0, "high": 5.0, "by": "a"}}
+
+    def test_two_parameters_together_are_a_table_of_both(self):
+        rows, columns = (list(sensitivity.OPEN[name]) for name in sensitivity.TOGETHER)
+        together = {
+            (row, column): {"recall": 10 * i + k, "both": -1}
+            for i, row in enumerate(rows)
+            for k, column in enumerate(columns)
+        }
+        table = sensitivity._table_together(together, "recall", "Found")
+        assert table.columns[1:] == tuple(columns)
+        for i, (name, *cells) in enumerate(table.rows):
+            assert (name, cells) == (rows[i], [10 * i + k for k in range(len(columns))])

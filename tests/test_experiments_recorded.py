@@ -9,6 +9,7 @@ import pytest
 from small_experiments import silent, small  # noqa: F401
 
 import lineament as ln
+from lineament import LineamentError
 from lineament.logs import save_npz
 from lineament.reproduce import (
     Setting,
@@ -18,6 +19,7 @@ from lineament.reproduce import (
     scans,
     tracking,
 )
+from lineament.reproduce.report import reproduce
 from lineament.reproduce.two_corners import DISTANCE, WORLD
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, drive, room
@@ -69,6 +71,38 @@ class TestMuseum:
         assert (np.diff([scan.stamp for scan in in_row]) > 0.09).all()
         assert in_row[0].stamp > frames[0].stamp
 
+    def test_more_scans_than_there_are_are_all(self, bag):
+        stamps = [scan.stamp for scan in ln.open_log(bag, topic=museum.TOPIC)]
+        frames, in_row = museum.read(bag, 10 * len(stamps))
+        assert [scan.stamp for scan in frames] == stamps
+        assert [scan.stamp for scan in in_row] == stamps[len(stamps) // 3 :]
+
+    def test_distances_by_hand(self, monkeypatch):
+        """Of nine views the first, the third, ... are the five places; a method may find none."""
+        monkeypatch.setattr(museum, "distance_found", lambda found, a, b: found + a - b)
+        corners = {1: (2.0, True), 2: (1.0, False)}
+        views = [museum.View(k, None, 0.1 * k, corners) for k in range(9)]
+        found = {
+            "two": [1.30, math.nan, 1.34, *[math.nan] * 6],
+            "one": [math.nan, 1.3, *[math.nan] * 7],
+            "none": [math.nan] * 9,
+        }
+        methods = {name: distances.__getitem__ for name, distances in found.items()}
+        two, one, none = museum._distances(views, 1, 2, methods).values()
+        assert (two["found"], two["mean"]) == pytest.approx((2 / 9, 2.32))
+        assert two["deviation"] == pytest.approx(0.04 / math.sqrt(2))
+        np.testing.assert_allclose(two["places"], [2.30, 2.34, *[math.nan] * 3])
+        assert (one["found"], one["mean"]) == pytest.approx((1 / 9, 2.3))
+        assert none["found"] == 0
+        assert [math.isnan(of["deviation"]) for of in (one, none)] == [True, True]
+        assert math.isnan(none["mean"])
+        table = museum._distance_table({contenders.LIU_PAPER: two, "none": none}, 9)
+        first, last = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
+        assert (first["here: mean [m]"], first["place 1 [m]"]) == ("2.320", "2.300")
+        assert first["standard deviation [mm]"] == pytest.approx(40 / math.sqrt(2))
+        assert first["found in [%]"] == pytest.approx(200 / 9)
+        assert last["here: mean [m]"] is last["place 5 [m]"] is last["paper: mean [m]"] is None
+
     def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
         def view(way, **corners):
             places = {"a": (0, True), "b": (2, False), "c": (3.5, False), "f": (9, False)}
@@ -84,6 +118,20 @@ class TestMuseum:
         assert places == [0, 5, 6, 8, 10]
         assert museum.views_of_two(several[:4]) is None
         assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
+
+
+def test_the_museums_bag_is_not_overwritten_and_what_is_named_is_run(tmp_path):
+    bag = tmp_path / "figures.json"
+    bag.write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(LineamentError, match=r"figures\.json"):
+        reproduce(tmp_path, ["definitions"], Setting(museum=bag))
+    assert bag.read_bytes() == b"#ROSBAG V2.0"
+    reports = []
+    page = reproduce(tmp_path / "new", ["fig7"], Setting(1, seeds=1), reports.append)
+    numbers = json.loads((page.parent / "figures.json").read_text(encoding="utf-8"))
+    assert list(numbers["experiments"]) == ["definitions"]
+    assert (numbers["recordings"], numbers["museum"]) == (False, False)
+    assert reports
 
 
 class TestTracking:

@@ -4,6 +4,7 @@ import re
 import pytest
 
 from lineament.errors import LineamentError
+from lineament.limits import LIMITS
 from lineament.live import LiveConfig, read_config
 from lineament.live.config import resolved
 
@@ -105,3 +106,12 @@ def test_a_file_that_makes_no_sense_is_one_line(tmp_path, content, message):
         read_config(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_is_as_long_as_a_line_of_a_log_at_most(tmp_path):
+    path = tmp_path / "live.toml"
+    path.write_bytes(b"#" * LIMITS.line)
+    assert read_config(path) == {}
+    path.write_bytes(b"#" * (LIMITS.line + 1))
+    with pytest.raises(LineamentError, match=f"it has more than {LIMITS.line} bytes"):
+        read_config(path)

@@ -20,6 +20,7 @@ from live_driving import (
     odometry_message,
     received,
     scan_message,
+    waited_for,
 )
 from ros_bags import store
 
@@ -80,6 +81,13 @@ def test_scan(participant, peer):
     assert peer.listeners("/scan") == 1
     participant.close()
     eventually(lambda: peer.listeners("/scan") == 0)
+
+
+def test_a_message_is_waited_for(participant, peer):
+    source = source_of(participant)
+    connected(peer, source, "/scan", "LaserScan")
+    (came,) = waited_for(source.receive, lambda: peer.write("/scan", scan_message(7)))
+    assert came.read().stamp == 7.500000001
 
 
 def test_odometry_comes_before_the_scan(participant, peer):

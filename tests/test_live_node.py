@@ -1,4 +1,4 @@
-"""The loop of a node over messages in memory, its pipeline, and its counters."""
+"""The loop of a node over messages in memory, and its pipeline."""
 
 import math
 import struct
@@ -9,7 +9,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from live_driving import cdr_scan, garbage
+from live_driving import garbage
 
 import lineament as ln
 from lineament.live import (
@@ -22,9 +22,8 @@ from lineament.live import (
     ReplaySource,
     RosSink,
 )
-from lineament.live.counters import Counters
 from lineament.live.pipeline import time_of, twist_of_laser
-from lineament.live.received import Inbox, received_scan
+from lineament.live.received import received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
@@ -156,7 +155,7 @@ def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
     scan = wall("a", 1.1, time_increment=0.001)
     total, (first, second), lines = run(
         [heard(moving(np.nan, 0.0, 0.0)), scan],
-        [scan, heard(moving(9.0, 9.0, 9.0)), heard(moving(1.0, 0.0, 0.0))],
+        [scan, heard(moving(0.0, math.inf, 0.0)), heard(moving(1.0, 0.0, 0.0))],
         deskew="/odom",
         laser_pose=(0.2, 0.1, 0.5),
     )
@@ -172,6 +171,15 @@ def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
     total, _, lines = run(batch, [wall("a", time_increment=1e-3)], deskew="/odom")
     assert (total.scans, total.malformed) == (1, 1)
     assert lines[0].startswith("a scan of a makes no sense: twist (1.0, 0.0, 0.0) for 1e+22 s")
+
+
+def test_publishers_whose_names_are_made_up_do_not_fill_the_screen(monkeypatch):
+    monkeypatch.setattr("lineament.live.node._MOST_FAULTY", 2)
+    bad = [received_scan(name, b"", "cdr", "sensor_msgs/LaserScan") for name in "abca"]
+    total, _, lines = run(bad[:2], bad[2:])
+    assert total.malformed == 4
+    faults = [line.partition(" makes no sense")[0] for line in lines]
+    assert faults == ["a scan of a", "a scan of b"]
 
 
 def test_what_was_skipped_in_a_log_is_written_at_its_end(tmp_path):
@@ -393,6 +401,20 @@ def deskewed(pipeline: Pipeline, scan: ln.LaserScan) -> bool:
     return pipeline("one", scan).straight is not scan
 
 
+def test_ranges_in_millimetres_and_a_stamp_of_the_last_beam():
+    """A wall 2 m ahead; 101 beams in 0.1 s, by the time of the last of them."""
+    scan = ln.LaserScan(1e3 * WALL, -0.5, 0.01, stamp=5.0, time_increment=1e-3, range_max=1e4)
+    frame = Pipeline(LiveConfig(scale=1e-3, stamp="last", deskew="/odom"))("one", scan)
+    np.testing.assert_allclose(frame.scan.ranges, WALL)
+    assert (frame.scan.range_max, frame.scan.stamp_beam) == (10.0, 100)
+    assert frame.features.segments["centroid"][0, 0] == pytest.approx(2.0)
+    pipeline = Pipeline(LiveConfig(scale=1e-3, stamp="last", deskew="/odom"))
+    pipeline.hear(moving(1.0, 0.0, 0.0, stamp=5.0))
+    # As seen 0.1 s later, and so 10 cm nearer, the beam to the side was longer.
+    first = pipeline("one", scan).straight.points[0]
+    np.testing.assert_allclose(first, (1.9, 2 * math.tan(-0.5)), atol=1e-6)
+
+
 def test_odometry_holds_for_half_a_second():
     pipeline = Pipeline(LiveConfig(deskew="/odom"))
     scan = sweep(10.0, time_increment=1e-3)
@@ -504,68 +526,3 @@ def test_deskewed_features_are_those_of_a_scanner_at_rest_whichever_way_it_turns
 
     assert off(found) < 0.002
     assert off(skewed) > 0.02
-
-
-# Counters.
-
-
-def test_reports_worked_by_hand():
-    counters = Counters(10.0)
-    scan = ln.LaserScan([2.0, 2.0, np.nan, 2.0], 0.0, 0.01)
-    features = ln.extract(sweep())
-    for latency in (0.001, 0.003, 0.002):
-        counters.add(scan, features, latency)
-    counters.dropped, counters.malformed = 2, 1
-    report = counters.report(11.5, publishers=1, lost=4, unsent=5)
-    assert (report.since, report.rate, report.level) == ((3, 2, 4, 1, 5), 2, 1)
-
-    assert report.values == {
-        "rate [1/s]": "2.00",
-        "latency p50 [ms]": "2.000",
-        "latency p99 [ms]": "2.980",
-        "dropped": "2",
-        "lost": "4",
-        "malformed": "1",
-        "unsent": "5",
-        "invalid beams [%]": "25.0",
-        **{f"{name} per scan": f"{n:.1f}" for name, n in features.counts().items()},
-        "publishers": "1",
-        "scans in all": "3",
-        "dropped in all": "2",
-        "lost in all": "4",
-        "malformed in all": "1",
-    }
-    assert str(report).startswith(
-        "2.0 scans/s, latency 2.00 ms (p99 2.98), 2 dropped, 4 lost, 1 malformed, "
-        "25.0 % of beams invalid, per scan: 1.0 segments, 0.0 corners"
-    )
-    counters.add(scan, features, 0.001)
-    report = counters.report(12.5, publishers=1, lost=4, unsent=5)
-    assert (report.since, report.level) == ((1, 0, 0, 0, 0), 0)
-    assert report.totals == "4 scans, 2 dropped, 4 lost, 1 malformed messages"
-    counters.add(scan, features, 0.001)
-    assert counters.report(13.0, publishers=1, lost=4, unsent=6).level == 1
-    report = counters.report(13.5, publishers=0, lost=4, unsent=6)
-    assert (report.level, str(report)) == (3, "no scans, 0 publishers")
-    assert np.isnan(report.invalid)
-    assert counters.report(13.5, publishers=1).rate == 0.0
-
-
-def test_a_message_is_read_when_it_is_processed():
-    scan = received_scan("a", cdr_scan(5), "cdr", "sensor_msgs/LaserScan")
-    assert (len(scan.read()), scan.read().stamp) == (5, 7.0)
-    with pytest.raises(ValueError, match="type of scans is 'Image', expected one of sensor_msgs/"):
-        received_scan("a", b"", "cdr", "Image")
-
-
-def test_an_inbox_keeps_the_newest_of_each_publisher():
-    inbox = Inbox(depth=2)
-    for arrived, name in enumerate("aabaa"):
-        inbox.put(Received(name, list, float(arrived), is_odometry=False), missing=arrived == 2)
-    for arrived in (0.5, 3.5, 9.0):
-        inbox.put(Received("a", list, arrived, is_odometry=True))
-    assert [one.arrived for one in inbox.take(0)] == [2.0, 3.0, 3.5, 4.0, 9.0]
-    assert (inbox.lost, inbox.take(0)) == (3, [])
-    for number in range(100):
-        inbox.put(Received(f"{number}", list, 0.0))
-    assert (len(inbox.take(0)), inbox.lost) == (64, 39)

@@ -162,6 +162,18 @@ def test_when_a_motion_is_known(before, now, expected, is_known):
     assert (relocated(before, now, expected) is not None) == is_known
 
 
+def test_two_walls_of_which_one_is_turned_to_either_side_give_the_turn_between():
+    """Of a corner of 3 m by 3 m the walls are off by 55 mrad, about their middles."""
+    middles, motion = [(1.5, 0.0), (0.0, 1.5)], (2.0, -1.0, 1.5)
+    before, later = (
+        features(segments=[wall(m, 3.0, a) for m, a in zip(middles, angles, strict=True)]).segments
+        for angles in ((0.0, math.pi / 2), (0.055, math.pi / 2 - 0.055))
+    )
+    expected = [WIDE, ((1.6, -0.6, 1.1), np.full(3, 0.4))]
+    found = relocated(before, seen_after(motion, later), expected)
+    np.testing.assert_allclose(found, motion, atol=3e-3)
+
+
 def test_a_room_that_is_the_same_from_both_ends():
     ends = [(-4, -2), (4, -2), (4, 2), (-4, 2)]
     walls = [segment(b, a, 0, 9) for a, b in zip(ends, [*ends[1:], ends[0]], strict=True)]

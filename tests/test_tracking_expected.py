@@ -67,12 +67,35 @@ def test_odometry_is_expected_to_3_cm_10_mrad_and_a_tenth():
     np.testing.assert_allclose(deviations, (0.03 + 0.04, 0.03 + 0.04, 0.01 + 0.03), atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("duration", "way", "turn"),
+    [(0.1, 0.1 + 0.5 * 0.05, 0.1), (9.0, 0.1 + 0.25 + 0.5 * 8, math.pi)],
+)
+def test_where_nothing_is_seen_the_motion_is_known_as_it_was_expected(duration, way, turn):
+    tracker = moving((0.05, 0.0, 0.0), 0.1)
+    motion = tracker(replace(features(60), stamp=0.3 + duration)).motion
+    assert len(motion.unobserved) == 3
+    np.testing.assert_allclose(motion.pose, (0.5 * min(duration, 1.0), 0.0, 0.0), atol=1e-3)
+    spread = np.diag((way, way, turn)) ** 2
+    np.testing.assert_allclose(motion.covariance, spread, rtol=1e-2, atol=1e-9)
+
+
 def test_the_twist_is_the_mean_of_the_last_two_motions():
     tracker = Tracker()
     assert tracker.twist is None
     for stamp, x in ((0.0, 0.0), (0.1, 0.02), (0.2, 0.06), (0.3, 0.14)):
         tracker(frame(stamp, (x, 0.0, 0.0)))
     assert tracker.twist == pytest.approx(((0.4 + 0.8) / 2, 0.0, 0.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(("duration", "is_known"), [(0.0021, True), (0.0019, False)])
+def test_a_speed_of_more_than_50_metres_a_second_is_of_a_wrong_stamp(duration, is_known):
+    """10 cm in 2.1 ms and in 1.9 ms: 48 and 53 m/s. The way is known all the same."""
+    tracker = Tracker(roughness=0.0)
+    tracker(frame(0.0))
+    tracks = tracker(frame(duration, (0.1, 0.0, 0.0)))
+    np.testing.assert_allclose(tracks.motion.pose, (0.1, 0.0, 0.0), atol=1e-3)
+    assert (tracker.twist is not None) == is_known
 
 
 def test_beams_are_timed_from_the_one_whose_time_the_stamp_is():

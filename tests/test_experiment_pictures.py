@@ -1,0 +1,175 @@
+"""The pictures of the experiments: what is drawn is what was computed, and where it is."""
+
+import math
+
+import numpy as np
+import pytest
+from handmade import features
+from panels import angle_of, by_label, drawn, notes, texts_of
+from small_experiments import PAPER
+
+import lineament as ln
+from lineament.output import canvas
+from lineament.reproduce import arena, grid, layers, museum, noise, real, repetition
+from lineament.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
+from lineament.scan.poses import compose
+from lineament.simulation import World, truth
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """The figures that are made, in place of their bytes."""
+    figures = []
+    monkeypatch.setattr(canvas, "figure_bytes", figures.append)
+    return figures
+
+
+def test_figures_2_and_3_have_raw_and_filtered_points_and_their_spacing(shown):
+    noise._figure(0)
+    plan, spacing = shown[0].axes
+    raw, filtered, noisy = (by_label(plan)[name] for name in ("raw", "filtered", "noise point"))
+    assert angle_of(raw) == pytest.approx(np.linspace(-30, 30, 181))
+    np.testing.assert_allclose(angle_of(filtered), angle_of(raw))
+    assert 0 < len(noisy) < 20
+    assert {tuple(point) for point in noisy.tolist()} < {tuple(point) for point in raw.tolist()}
+    # What is no noise point is on one of the three walls, to six deviations of 1 cm.
+    good = [tuple(point) not in set(map(tuple, noisy.tolist())) for point in raw.tolist()]
+    depths = raw[good, 0]
+    assert np.min([abs(depths - x) for x in (2.6, 3.0, 4.0)], axis=0).max() < 0.1
+    curves = by_label(spacing)
+    np.testing.assert_allclose(curves["raw"][:, 0], angle_of(raw))
+    steps = np.hypot(*np.diff(raw, axis=0).T)
+    np.testing.assert_allclose(curves["raw"][1:, 1], steps, atol=1e-9)
+    steps = np.hypot(*np.diff(filtered, axis=0).T)
+    np.testing.assert_allclose(curves["filtered"][1:, 1], steps, atol=1e-9)
+
+
+def test_figure_5_counts_the_clusters(shown):
+    scan = ln.LaserScan([2.0] * 9, -0.4, 0.1)
+    found = {name: features(9, clusters=c) for name, c in (
+        ("two", [0, 0, 0, -1, -1, 1, 1, 1, 1]), ("one", [0] * 9))}  # fmt: skip
+    layers._clusters(scan, found)
+    titles = [(axes.get_title(loc="left"), texts_of(axes)) for axes in shown[0].axes]
+    assert titles == [("two", "2 clusters"), ("one", "1 cluster")]
+
+
+def test_figure_9_has_the_median_and_the_range_of_the_seeds(shown):
+    """AR is the radius over 100, and 0.1, 0.2, 0.5 more by the seed; at another threshold 0."""
+    grids = [
+        {
+            grid.Parameters(form, half_width, radius, threshold): {
+                "of_actual": (threshold == grid.THRESHOLD) * (radius / 100 + more)
+            }
+            for form in grid.FORMS
+            for half_width in grid.HALF_WIDTHS
+            for radius in (5, 6, 8)
+            for threshold in (0.5, grid.THRESHOLD)
+        }
+        for more in (0.2, 0.5, 0.1)
+    ]
+    repetition._figure(grids, "support_radius", "fig9a", "x", "")
+    repetition._figure(grids, "threshold", "fig9b", "x", "")
+    by_radius, by_threshold = ([of for of in figure.axes if of.lines] for figure in shown)
+    assert len(by_radius) == len(by_threshold) == len(grid.HALF_WIDTHS)
+    for axes in by_radius:
+        peak, *curves = drawn(axes)
+        assert set(peak[:, 0]) == {grid.RADIUS}
+        for curve in curves:
+            np.testing.assert_allclose(curve, [(5, 0.25), (6, 0.26), (8, 0.28)])
+        for band in axes.collections:
+            x, y = band.get_paths()[0].vertices.T
+            assert (x.min(), x.max()) == (5, 8)
+            assert (y.min(), y.max()) == pytest.approx((0.15, 0.58))
+    for axes in by_threshold:
+        peak, *curves = drawn(axes)
+        assert set(peak[:, 0]) == {grid.THRESHOLD}
+        for curve in curves:
+            np.testing.assert_allclose(curve, [(0.5, 0), (grid.THRESHOLD, 0.26)])
+        assert axes.get_xscale() == "log"
+
+
+class _Ranked:
+    """Corners of which so many and such a share are repeated, as less certain ones come."""
+
+    def __init__(self, n):
+        self.n = n
+
+    def curve(self):
+        return np.arange(1, self.n + 1), 1 / np.arange(1, self.n + 1)
+
+
+@pytest.mark.parametrize("logs", [1, 2, 3])
+def test_curves_of_repeated_corners_begin_where_they_do_not_scatter(shown, logs):
+    assert real._curves({}) == []
+    (figure,) = real._curves(
+        {f"log {k}": {"a": _Ranked(20), "b": _Ranked(30)} for k in range(logs)}
+    )
+    assert len(shown[0].axes) == logs
+    assert f"from the {real.FIRST + 1}th on" in figure.caption
+    for k, axes in enumerate(shown[0].axes):
+        assert axes.get_title(loc="left") == f"log {k}"
+        for curve, n in zip(drawn(axes), (20, 30), strict=True):
+            count = np.arange(real.FIRST + 1, n + 1)
+            np.testing.assert_allclose(curve, np.column_stack((count, 100 / count)))
+
+
+def in_frame(pose, points):
+    """World coordinates of points of a scan, rounded."""
+    return [tuple(np.round(compose(pose, (*point, 0.0))[:2], 6)) for point in points]
+
+
+def test_figure_13_has_the_room_the_places_and_both_corners_in_each(shown):
+    rng = np.random.default_rng(0)
+    views = [(PAPER.scan(WORLD, pose, rng), truth(WORLD, pose, PAPER)) for pose in POSES]
+    _figure(views)
+    room, *panels = shown[0].axes
+    marks = notes(room)
+    assert [text for text, _ in marks] == ["A", "B", "1", "2", "3", "4", "5"]
+    np.testing.assert_allclose([at for _, at in marks[:2]], (A, B))
+    np.testing.assert_allclose([at for _, at in marks[2:]], [pose[:2] for pose in POSES])
+    corners = [tuple(np.round(corner, 6)) for corner in (A, B)]
+    for arrow, (x, y, theta) in zip(room.patches, POSES, strict=True):
+        tip = max(arrow.get_xy(), key=lambda point, x=x, y=y: math.dist(point, (x, y)))
+        assert angle_of([np.subtract(tip, (x, y))]) == pytest.approx(math.degrees(theta), abs=0.1)
+    for k, (axes, pose) in enumerate(zip(panels, POSES, strict=True), 1):
+        assert axes.get_title(loc="left") == f"Place {k}"
+        assert in_frame(pose, [at for text, at in notes(axes) if text in "AB"]) == corners
+
+
+def test_the_name_of_a_corner_stands_before_it_on_the_line_of_sight():
+    axes = canvas.new_figure(4, 4).subplots()
+    scan = ln.LaserScan([5.0] * 9, -0.4, 0.1)
+    draw_place(axes, 3, scan, features(9), np.array((4.0, 3.0)), np.array((0.0, -2.0)))
+    names = {text.get_text(): text for text in axes.texts}
+    for name, toward in (("A", (-0.8, -0.6)), ("B", (0.0, 1.0))):
+        off = np.array(names[name].xyann)
+        assert 5 < np.hypot(*off) < 40  # points
+        np.testing.assert_allclose(off / np.hypot(*off), toward, atol=1e-12)
+
+
+def test_the_museums_places_are_at_equal_parts_of_the_way(shown):
+    scan = ln.LaserScan([5.0] * 9, -0.4, 0.1)
+    places = {7: (np.array((4.0, 3.0)), True), 9: (np.array((0.0, -2.0)), False)}
+    views = [museum.View(scan, features(9), way, places) for way in np.linspace(0, 4, 9)]
+    museum._places(views, 7, 9)
+    titles = [axes.get_title(loc="left") for axes in shown[0].axes]
+    assert titles == [f"Place {k}" for k in range(1, 6)]
+    for axes in shown[0].axes:
+        marks = {text: at for text, at in notes(axes) if text in "AB"}
+        assert marks == {"A": (4.0, 3.0), "B": (0.0, -2.0)}
+
+
+def test_corners_of_the_arena_are_drawn_for_each_method_that_found_some(shown):
+    walls = World([[0, 0, 4, 0], [4, 0, 4, 3]])
+    known = arena.Arena([], [], walls, np.array([(4.0, 0.0)]))
+    some = {"recall": 0.5, "false": 0.25}
+    scores = {f"m{k}": (some, np.array([(4.0, 0.1 * k)])) for k in range(1, 6)}
+    figure = arena.arena_figure("arena, static", known, scores | {"none": (some, np.empty((0, 2)))})
+    assert figure.name == "arena-static"
+    assert [axes.get_title(loc="left") for axes in shown[0].axes] == list(scores)
+    for axes, (_, found) in zip(shown[0].axes, scores.values(), strict=True):
+        assert "found 50 %, false 25 %" in texts_of(axes)
+        *drawn_walls, real_corners, positions = drawn(axes)
+        assert [wall.tolist() for wall in drawn_walls] == walls.segments.reshape(-1, 2, 2).tolist()
+        assert real_corners.tolist() == [[4, 0]]
+        np.testing.assert_array_equal(positions, found)
