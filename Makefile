@@ -12,7 +12,7 @@ demo: .venv/ready
 
 test: lint types tests wheel
 
-test-all: coverage boundscheck kernels docs
+test-all: bench-check coverage boundscheck kernels docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
