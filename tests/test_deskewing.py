@@ -52,6 +52,9 @@ def test_a_turn_by_hand():
     assert (still.range_max, still.scan_time, still.time_increment) == (9.0, 0.0, 0.0)
     assert still.intensities.tolist() == [5, 6, 7]
     assert ln.deskew(still, (0.0, 0.0, 0.5)) is still
+    # More than half a turn, at 2 rad/s with a beam each second: the bearings go on.
+    turned = ln.deskew(ln.LaserScan([1.0] * 3, 0.0, 0.1, time_increment=1.0), (0.0, 0.0, 2.0))
+    np.testing.assert_allclose(turned.angles, [0.0, 2.1, 4.2], atol=1e-8)
     # As fast to the right as the beams go to the left: all are straight ahead, one after the other.
     ahead = ln.deskew(ln.LaserScan([1.0, 2.0, 3.0], 0.0, 0.1, time_increment=0.1), (0, 0, -1.0))
     np.testing.assert_allclose(ahead.angles, 0.0, atol=1e-8)

@@ -166,9 +166,8 @@ PINNED: dict[str, dict[str, float]] = {
 FIGURES = {
     "definitions": {"fig1", "fig4", "fig6", "fig7", "fig8"},
     "noise": {"fig2-3"},
-    "layers": {"fig5", "fig10"},
+    "layers": {"fig5"},
     "repetition": {"fig9a", "fig9b"},
-    "scenes": {"fig11-room", "fig11-office"},
     "two_corners": {"fig13"},
     "tracking": {"tracking"},
     "all_methods": {"methods"},

@@ -300,6 +300,21 @@ class TestVerdicts:
         )
         assert judged["Figure 10"][1] == "in part"
 
+    @pytest.mark.parametrize(
+        ("figure", "number", "value"),
+        [("fig1", "off", 0.03), ("fig4", "ratio", 0.9), ("fig4", "beyond", 0.2),
+         ("fig6", "off", 0.03), ("fig7", "off", 0.1), ("fig8", "stage", 1.1)],
+    )  # fmt: skip
+    def test_a_definition_does_not_hold_where_one_of_its_numbers_is_off(
+        self, figure, number, value
+    ):
+        numbers = copy.deepcopy(NUMBERS)
+        numbers["definitions"]["fig6"]["off"] = 0.0
+        place = f"Figure {figure[3:]}"
+        assert self.judged(numbers)[place][1] == "holds"
+        numbers["definitions"][figure][number] = value
+        assert self.judged(numbers)[place][1] == "does not"
+
     def test_the_same_is_not_better(self):
         numbers = copy.deepcopy(NUMBERS)
         numbers["layers"]["utm30lx"] = numbers["layers"]["paper"]
