@@ -1,7 +1,7 @@
 """A new user with nothing but the wheel: each step in an empty environment, and how long it takes.
 
 Run: python benchmarks/new_user.py dist/lineament-*.whl (`make new-user`). The steps are commands
-that README names, and a notebook that is executed; kernels are compiled there. With
+that README names, and a notebook that is executed. With
 LINEAMENT_DATA a recorded log is tried as well. A step that fails ends it, with exit status 1.
 """
 
@@ -39,7 +39,7 @@ class NewUser:
         self.folder, self.steps = folder, list[tuple[str, str, float]]()
         self.bin = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
         kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        self.env = kept | {"NUMBA_CACHE_DIR": str(folder / "kernels"), "MPLBACKEND": "agg"}
+        self.env = kept | {"MPLBACKEND": "agg"}
 
     def timed(self, step: str, shown: str, work: Callable[[], object]) -> None:
         print(f"{step} ...", flush=True)
@@ -100,7 +100,7 @@ def main() -> None:
         drive = ("lineament", "simulate", "building", "--scans", "400", "-o")
         user.runs("a log to try", *drive, "drive.npz", makes="drive.npz")
         first = ("lineament", "extract", "drive.npz", "-o", "features.csv")
-        user.runs("first extract, compiles", *first, makes="features.csv")
+        user.runs("first extract", *first, makes="features.csv")
         user.runs("second extract", *first[:-1], "features.parquet", makes="features.parquet")
         plot = ("lineament", "plot", "drive.npz", "--scan", "40", "-o", "scan.png")
         user.runs("first plot", *plot, makes="scan.png")

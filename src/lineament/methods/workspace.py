@@ -64,7 +64,10 @@ class Block:
         # Zeros, as the padding between fields is written out too. No scan has more than n + 1.
         records = [np.zeros(capacity * (n + 1), dtype) for dtype in TABLES.values()]
         self.features = tuple(map(words, records))
-        self._bytes = [(memoryview(table.view(np.uint8)), table.itemsize) for table in records]
+        self._bytes = [
+            (memoryview(table.view(np.uint8)), table.itemsize)  # type: ignore[arg-type]
+            for table in records
+        ]
         self.clusters = np.empty((capacity, n), np.int32)
         self.offsets = np.zeros((capacity + 1, len(TABLES)), np.int64)
         #: What runs all kernels over it, of a method that has one for them; its arrays stay.
