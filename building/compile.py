@@ -43,7 +43,9 @@ def loader() -> Any:
 def ask_numba_for(level: str) -> None:
     """Set what numba reads when it is imported."""
     cpu, features = (level, FEATURES[level]) if level in FEATURES else ("generic", "")
-    os.environ |= {"LINEAMENT_JIT": "1", "NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": features}
+    os.environ |= {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": features}
+    # Whatever whoever builds has set for something else.
+    os.environ |= {"LINEAMENT_JIT": "1", "NUMBA_DISABLE_JIT": "0", "NUMBA_BOUNDSCHECK": "0"}
     sys.path.insert(0, str(ROOT / "src"))
 
 
