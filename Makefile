@@ -78,10 +78,12 @@ docs: .venv/docs library
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "the site is in build/site: open build/site/index.html"
 
-# The wheel has the compiled kernels, and runs in an environment that has nothing else.
+# The wheel has the compiled kernels, and runs in an environment that has nothing else. One that is for this
+# machine alone is made by `make test`; for all of its kind by `make wheel LEVELS=`.
+LEVELS ?= native
 wheel: library
 	rm -rf dist build/empty
-	$(BIN)/python -m build --no-isolation --quiet --sdist --wheel
+	LINEAMENT_LEVELS=$(LEVELS) $(BIN)/python -m build --no-isolation --quiet --sdist --wheel
 	$(PYTHON) -m venv build/empty
 	sed -n 's/ *\\$$//; /^[a-z].*==/p' requirements.lock > build/constraints.txt
 	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-*.whl

@@ -13,6 +13,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,8 @@ FEATURES = {
     "x86-64-v3": "+avx,+avx2,+bmi,+bmi2,+cx16,+f16c,+fma,+lzcnt,+movbe,+popcnt,+sahf,+sse3,"
     "+sse4.1,+sse4.2,+ssse3,+xsave",
 }
+#: Kernels that take half of the time.
+FIRST_HALF = ("lineament_optimal", "lineament_tracking", "lineament_mapping")
 
 
 def levels(machine: str) -> list[str]:
@@ -117,7 +121,7 @@ end:
 
 
 def object_of(code: dict[str, tuple[str, str]]) -> bytes:
-    """Link the code of all kernels, and make an object file of it.
+    """Link the code of some kernels, and make an object file of it.
 
     `code` has for each the name of numba's function and LLVM's text.
     """
@@ -156,18 +160,30 @@ def linker() -> list[str] | None:
     return None
 
 
-def link(code: bytes, out: Path) -> None:
-    """Link an object file to a library, and seal it."""
-    command = linker()
-    if command is None:
-        raise SystemExit("no linker: neither cc nor the Python package ziglang is installed")
+def link(objects: list[bytes], out: Path) -> None:
+    """Link object files to a library, and seal it."""
     with tempfile.TemporaryDirectory(dir=out.parent) as folder:
-        obj, library = Path(folder, "kernels.o"), Path(folder, out.name)
-        obj.write_bytes(code)
-        # The symbols of the C library are found when it is loaded: those of any version do.
-        subprocess.run([*command, "-shared", "-o", library, obj, "-lm"], check=True)
+        library = Path(folder, out.name)
+        files = [Path(folder, f"{k}.o") for k in range(len(objects))]
+        for file, code in zip(files, objects, strict=True):
+            file.write_bytes(code)
+        subprocess.run([*(linker() or ()), "-shared", "-o", library, *files, "-lm"], check=True)
         library.replace(out)
         loader().seal(out).write_text(loader().sealed(out))
+
+
+def part_of(share: int) -> bytes:
+    """Compile one of two halves of the kernels, which take the same time, to an object file."""
+    from lineament.kernels.library import symbol
+
+    code = {}
+    for kernel in kernels():
+        name = symbol(kernel.__module__, kernel.__name__)
+        if name.startswith(FIRST_HALF) == (share == 0):
+            result = compiled(kernel)
+            code[name] = result.fndesc.llvm_func_name, result.library.get_llvm_str()
+            print(f"compiled {name}", flush=True)
+    return object_of(code)
 
 
 def main() -> None:
@@ -179,17 +195,13 @@ def main() -> None:
         out = ROOT / KERNELS / f"{level}{loader().SUFFIX}"
         if loader().is_current(out):
             return
+    if linker() is None:
+        raise SystemExit("no linker: neither cc nor the Python package ziglang is installed")
     ask_numba_for(level)
-    from lineament.kernels.library import symbol
-
-    code, found = {}, kernels()
-    for k, kernel in enumerate(found):
-        name = symbol(kernel.__module__, kernel.__name__)
-        print(f"\r\033[K{level}: {k + 1} of {len(found)}, {name}", end="", flush=True)
-        result = compiled(kernel)
-        code[name] = result.fndesc.llvm_func_name, result.library.get_llvm_str()
-    link(object_of(code), out)
-    print(f"\r\033[K{out.name}: {out.stat().st_size / 1000:.0f} kB, {len(found)} kernels")
+    # Names of numba's own are not unique from process to process: each half keeps its to itself.
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        link(list(pool.map(part_of, range(2))), out)
+    print(f"{out.name}: {out.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":
