@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
+from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -44,12 +45,14 @@ def loader() -> Any:
     return module
 
 
-def ask_numba_for(level: str) -> None:
+def ask_numba_for(level: str, cache: str) -> None:
     """Set what numba reads when it is imported."""
     cpu, features = (level, FEATURES[level]) if level in FEATURES else ("generic", "")
     os.environ |= {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": features}
     # Whatever whoever builds has set for something else.
     os.environ |= {"LINEAMENT_JIT": "1", "NUMBA_DISABLE_JIT": "0", "NUMBA_BOUNDSCHECK": "0"}
+    # Numba's cache has kernels whose own file is the same, and does not see what they call change.
+    os.environ["NUMBA_CACHE_DIR"] = cache
     sys.path.insert(0, str(ROOT / "src"))
 
 
@@ -120,31 +123,27 @@ end:
 """
 
 
-def object_of(code: dict[str, tuple[str, str]]) -> bytes:
-    """Link the code of some kernels, and make an object file of it.
+def object_of(name: str, inner: str, code: str) -> bytes:
+    """Make an object file of a kernel: of numba's function `inner` and all that it calls.
 
-    `code` has for each the name of numba's function and LLVM's text.
+    Each kernel has a copy of what it calls, as numba's have: a copy that was optimised within
+    another kernel may add up in another order.
     """
     import llvmlite.binding as llvm
     from numba import config
 
     from lineament.kernels.library import REFUSED
 
-    whole = llvm.parse_assembly(f'target triple = "{llvm.get_process_triple()}"')
+    whole = llvm.parse_assembly(code)
     machine = llvm.Target.from_default_triple().create_target_machine(
         cpu=config.CPU_NAME, features=config.CPU_FEATURES, opt=3, reloc="pic", codemodel="default"
     )
-    whole.data_layout = str(machine.target_data)
-    for name, (inner, text) in code.items():
-        whole.link_in(llvm.parse_assembly(text))
-        whole.link_in(llvm.parse_assembly(ENTRY.format(inner=inner, name=name, refused=REFUSED)))
+    whole.link_in(llvm.parse_assembly(ENTRY.format(inner=inner, name=name, refused=REFUSED)))
     whole.link_in(llvm.parse_assembly(SUPPORT))
     for value in (*whole.functions, *whole.global_variables):
-        if not value.is_declaration and value.name not in code:
+        if not value.is_declaration and value.name != name:
             value.linkage = "internal"
-    # What all kernels share is there once; what no entry calls goes.
-    options = llvm.create_pipeline_tuning_options(speed_level=1)
-    builder = llvm.create_pass_builder(machine, options)
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(whole, builder)
@@ -172,18 +171,19 @@ def link(objects: list[bytes], out: Path) -> None:
         loader().seal(out).write_text(loader().sealed(out))
 
 
-def part_of(share: int) -> bytes:
-    """Compile one of two halves of the kernels, which take the same time, to an object file."""
+def part_of(share: int) -> list[bytes]:
+    """Compile one of two halves of the kernels, which take the same time, to object files."""
     from lineament.kernels.library import symbol
 
-    code = {}
+    objects = []
     for kernel in kernels():
         name = symbol(kernel.__module__, kernel.__name__)
         if name.startswith(FIRST_HALF) == (share == 0):
             result = compiled(kernel)
-            code[name] = result.fndesc.llvm_func_name, result.library.get_llvm_str()
+            inner, code = result.fndesc.llvm_func_name, result.library.get_llvm_str()
+            objects.append(object_of(name, inner, code))
             print(f"compiled {name}", flush=True)
-    return object_of(code)
+    return objects
 
 
 def main() -> None:
@@ -197,10 +197,10 @@ def main() -> None:
             return
     if linker() is None:
         raise SystemExit("no linker: neither cc nor the Python package ziglang is installed")
-    ask_numba_for(level)
-    # Names of numba's own are not unique from process to process: each half keeps its to itself.
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        link(list(pool.map(part_of, range(2))), out)
+    with tempfile.TemporaryDirectory() as empty:
+        ask_numba_for(level, empty)
+        with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+            link(list(chain(*pool.map(part_of, range(2)))), out)
     print(f"{out.name}: {out.stat().st_size / 1000:.0f} kB")
 
 
