@@ -48,6 +48,7 @@ ros1:
 
 # The kernels as a library for this machine; where they change, numba compiles them until this is made.
 library: .venv/ready
+	@command -v cc >/dev/null || $(BIN)/python -m pip install --quiet ziglang
 	$(BIN)/python building/compile.py
 
 tests: library browser ros1
