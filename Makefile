@@ -62,13 +62,11 @@ coverage: .venv/ready
 
 # No kernel reads or writes outside of its arrays: with checked indices, also of all scans of up to eight beams.
 boundscheck: .venv/ready
-	rm -rf build/boundscheck
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck LINEAMENT_BEAMS=8 $(BIN)/python -m pytest -n auto --dist worksteal \
 	tests/test_kernel_range.py tests/test_optimal_properties.py tests/test_twins.py tests/test_polylines.py tests/test_budget.py
 
 # The library, numba and Python find the same: the first two in every byte.
 kernels: library
-	rm -rf build/kernels
 	NUMBA_CACHE_DIR=build/kernels $(BIN)/python tests/same_kernels.py
 
 # The site of the documents, with its tutorials run; what it needs is installed when it is first made.

@@ -51,7 +51,7 @@ def ask_numba_for(level: str, cache: str) -> None:
     os.environ |= {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": features}
     # Whatever whoever builds has set for something else.
     os.environ |= {"LINEAMENT_JIT": "1", "NUMBA_DISABLE_JIT": "0", "NUMBA_BOUNDSCHECK": "0"}
-    # Numba's cache has kernels whose own file is the same, and does not see what they call change.
+    # Nothing is kept of the way from the source to the library.
     os.environ["NUMBA_CACHE_DIR"] = cache
     sys.path.insert(0, str(ROOT / "src"))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import os
 import random
@@ -24,16 +23,6 @@ from lineament import LaserScan, open_log
 
 # A program for a Python that has ROS 1.
 collect_ignore = ["ros1_peer.py"]
-
-# Numba caches a kernel by its own file, and does not see changes in those that it calls: a folder
-# for each state of all kernels, which the commands that the tests start share.
-_ROOT = Path(__file__).parents[1]
-_SOURCES = [
-    _ROOT / "src/lineament/features/records.py",
-    *(_ROOT / "src/lineament/kernels").rglob("*.py"),
-]
-_STATE = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(_SOURCES))).hexdigest()[:16]
-os.environ.setdefault("NUMBA_CACHE_DIR", str(_ROOT / "build" / "numba" / _STATE))
 
 # The same examples in every run: a failure on one machine is one on all.
 settings.register_profile("lineament", derandomize=True, deadline=None)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
@@ -200,3 +201,22 @@ def test_the_source_of_every_kernel_is_in_its_hash(tmp_path, monkeypatch):
         assert library.state() != before, path.name
         path.write_text(text)
     assert library.state() == before
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="numba compiles nothing")
+def test_numba_sees_that_a_kernel_calls_a_changed_function(copy):
+    """Of what it has cached, numba itself compares only the file of the kernel."""
+    kernels = copy.kernels
+    (kernels / "inner.py").write_text(
+        "from . import helper\n\n@helper\ndef inner(x):\n    return x + 1\n"
+    )
+    (kernels / "outer.py").write_text(
+        "from . import kernel\nfrom .inner import inner\n\n"
+        "@kernel\ndef outer(x):\n    return inner(x)\n"
+    )
+    code = "del sys.modules['numba']\nfrom lineament.kernels.outer import outer\nprint(outer(1))"
+    assert copy(code, LINEAMENT_JIT="1").stdout == "2\n"
+    text = (kernels / "inner.py").read_text()
+    (kernels / "inner.py").write_text(text.replace("x + 1", "x + 2"))
+    assert copy(code, LINEAMENT_JIT="1").stdout == "3\n"

@@ -12,10 +12,11 @@ result. Where that is not there, or not of this source, numba compiles on first 
 
 import math
 from functools import partial
+from pathlib import Path
 
 from ..errors import needed_by
 from ..progress import hear_compiler
-from .library import NoLibraryError, load
+from .library import HERE, NoLibraryError, load, state
 
 try:
     _library = load()
@@ -23,7 +24,7 @@ except NoLibraryError as reason:
     #: Why numba compiles the kernels; "" if they are compiled.
     by_numba = str(reason)
     with needed_by(f"{by_numba}: lineament then"):
-        from numba import njit
+        from numba import config, njit
         from numba.extending import register_jitable as jitable
 
     hear_compiler(by_numba)  # Nobody should wait for it in silence.
@@ -33,8 +34,17 @@ except NoLibraryError as reason:
         "no_cpython_wrapper": True,
         "no_cfunc_wrapper": True,
     }
-    #: What Python calls: without the GIL. No fastmath: NaN means something here.
-    kernel = njit(cache=True, nogil=True, error_model="numpy")
+    # Of a cached kernel numba compares its own file, not what it calls: each state has a folder.
+    _CACHE = str(Path(config.CACHE_DIR or HERE / "__pycache__") / state())
+
+    def kernel(function):
+        """Compile what Python calls: without the GIL. No fastmath: NaN means something here."""
+        before, config.CACHE_DIR = config.CACHE_DIR, _CACHE
+        try:
+            return njit(cache=True, nogil=True, error_model="numpy")(function)
+        finally:
+            config.CACHE_DIR = before
+
     #: For what only kernels call: without the wrappers for Python and C, which take time to make.
     helper = njit(**_INTERNAL)
     #: For what takes tuples of arrays: to hand them over takes a tenth of a microsecond and more.

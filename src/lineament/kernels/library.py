@@ -23,13 +23,13 @@ import numpy as np
 
 HERE = Path(__file__).parent
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-#: What a CPU of each level has, as Linux names it, the newest first; the others are read by none.
+#: What a CPU of each level has, by the names of Linux, the fastest first.
 _OF_V2 = "cx16 lahf_lm popcnt sse4_1 sse4_2 ssse3"
 LEVELS = {
     "x86-64-v3": f"{_OF_V2} abm avx avx2 bmi1 bmi2 f16c fma movbe",
     "x86-64-v2": _OF_V2,
 }
-#: Any of these asks for the Python functions, which numba compiles or does not.
+#: Each of these asks for the kernels as numba has them: compiled at first use, or plain Python.
 _BY_NUMBA = ("LINEAMENT_JIT", "NUMBA_DISABLE_JIT", "NUMBA_BOUNDSCHECK")
 #: What a function returns that was given other arrays than it was compiled for.
 REFUSED = -(2**63)
@@ -38,7 +38,7 @@ _HEAD = object.__basicsize__
 
 
 class NoLibraryError(Exception):
-    """There is no library of these kernels for this machine; the text says why, without a stop."""
+    """There is no library of these kernels for this machine; the text says why."""
 
 
 def sources() -> list[Path]:
@@ -81,7 +81,7 @@ def levels() -> list[str]:
 
 
 def words_of(kind: Any) -> Iterator[str]:
-    """Yield the kind of each word of an argument: ``q`` for arrays and whole numbers, or ``d``."""
+    """Yield the format of each word of an argument: ``d`` for floats, ``q`` for all else."""
     if hasattr(kind, "_fields"):
         yield from chain(*map(words_of, get_type_hints(kind, include_extras=True).values()))
     elif getattr(kind, "__origin__", None) is tuple:

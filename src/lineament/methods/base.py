@@ -27,7 +27,7 @@ class MethodBase:
     least_response: ClassVar[float] = 0.0
 
     def __post_init__(self) -> None:
-        # Each gets the type of its default, for numba compiles for each type.
+        # Each gets the type of its default: kernels are compiled for that.
         for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
             bounds, value = field.metadata.get("bounds"), getattr(self, field.name)
             if bounds is not None:  # a plain field of somebody's method is taken as it is
