@@ -93,6 +93,7 @@ def wall_with_bumps(seed):
     return LaserScan(ranges, -1.0, 2.0 / n), float(rng.choice([3.0, 6.0, 12.0, 25.0, 60.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "log",
     ["carmen/intel-corrected.log.gz", "truth/jackal_static_data.npz", "text/tinyslam_exp1.dat.gz"],
