@@ -104,7 +104,10 @@ def test_lengths_have_no_unit(plain, name):
                         scale = 2.0**power
                     expected = before[field] if power == 0 and np.isscalar(scale) else None
                     expected = before[field] * scale if expected is None else expected
-                    np.testing.assert_array_equal(after[field], expected, err_msg=field)
+                    # But for the last digit of what is next to 0, which has fewer of them.
+                    np.testing.assert_allclose(
+                        after[field], expected, rtol=0, atol=1e-300, err_msg=field
+                    )
     assert found > 20
 
 
