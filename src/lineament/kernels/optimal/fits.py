@@ -203,7 +203,8 @@ def _soften_borders(work, surfaces):
             continue
         if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
             continue
-        variance = work.noise[0] + work.noise[1] * work.points[at.RHO, border] ** 2
+        rho = work.points[at.RHO]
+        variance = work.noise[0] + work.noise[1] * rho[border - 1] * rho[border]
         off = _border_deviation(sums, start, border, end, 1.0 + TAU * TAU / variance)
         low, high = border - 1, border + 1
         _add_change(pieces[k - 1], solve(sums, start, low), solve(sums, start, high), 0.5 * off)
