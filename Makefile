@@ -69,9 +69,9 @@ coverage: library
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
 
-# No kernel reads or writes outside of its arrays: with checked indices, also of all scans of up to eight beams.
+# No kernel reads or writes outside of its arrays: with checked indices.
 boundscheck: .venv/ready
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck LINEAMENT_BEAMS=8 $(BIN)/python -m $(PYTEST) \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck $(BIN)/python -m $(PYTEST) \
 	tests/test_kernel_range.py tests/test_optimal_properties.py tests/test_twins.py tests/test_polylines.py tests/test_budget.py
 
 # The library, numba and Python find the same: the first two in every byte.
