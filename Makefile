@@ -5,14 +5,16 @@
 PYTHON ?= python3
 BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 
-.PHONY: demo test test-all boundscheck kernels library docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
+PYTEST = pytest -n auto --dist worksteal
+
+.PHONY: demo test test-all slow boundscheck kernels library docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
 demo: .venv/ready
 	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
-test: lint types tests wheel
+test: lint types tests
 
-test-all: bench-check coverage boundscheck kernels docs
+test-all: bench-check wheel slow coverage boundscheck kernels docs
 
 .venv/ready: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
@@ -52,17 +54,24 @@ library: .venv/ready
 	$(BIN)/python building/compile.py
 
 tests: library browser ros1
-	$(BIN)/python -m pytest -n auto --dist worksteal --durations=5
+	$(BIN)/python -m $(PYTEST) -m 'not slow' --durations=5
 
-coverage: .venv/ready
+slow: library browser ros1
+	$(BIN)/python -m $(PYTEST) -m slow --durations=5
+
+# Of all lines by the quick tests; of the kernels', as plain Python, by these.
+OF_KERNELS := $(addprefix tests/test_,$(addsuffix .py,twins budget line_rules liu pdbs polylines \
+	optimal_partition optimal_scenes methods tracking tracking_motion mapping_parts locating_parts))
+coverage: library
 	rm -f .coverage .coverage.*
-	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n auto --dist worksteal -m 'not slow'
+	$(BIN)/coverage run -m $(PYTEST) -m 'not slow'
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m $(PYTEST) -m 'not slow' $(OF_KERNELS)
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --fail-under=95 --skip-covered
 
-# No kernel reads or writes outside of its arrays: with checked indices, also of all scans of up to eight beams.
+# No kernel reads or writes outside of its arrays: with checked indices.
 boundscheck: .venv/ready
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck LINEAMENT_BEAMS=8 $(BIN)/python -m pytest -n auto --dist worksteal \
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/boundscheck $(BIN)/python -m $(PYTEST) \
 	tests/test_kernel_range.py tests/test_optimal_properties.py tests/test_twins.py tests/test_polylines.py tests/test_budget.py
 
 # The library, numba and Python find the same: the first two in every byte.
@@ -79,8 +88,8 @@ docs: .venv/docs library
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 	@echo "the site is in build/site: open build/site/index.html"
 
-# The wheel has the compiled kernels, and runs in an environment that has nothing else. One that is for this
-# machine alone is made by `make test`; for all of its kind by `make wheel LEVELS=`.
+# The wheel has the compiled kernels, and runs in an environment that has nothing else. It is for this machine's
+# level of the CPU; that for all is made by `make wheel LEVELS=`.
 LEVELS ?= native
 wheel: library
 	rm -rf dist build/empty

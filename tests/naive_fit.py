@@ -25,6 +25,36 @@ def principal_line(points, weights):
     return centroid, math.atan2(vectors[1, 1], vectors[0, 1])
 
 
+def beamwise_line(points, weights):
+    """Centroid, and direction of the line a x + b y = 1 of least weighted squares of 1 - a x - b y.
+
+    By eigenvectors where all points are on one beam.
+    """
+    root = np.sqrt(weights)
+    normal, _, rank, _ = np.linalg.lstsq(root[:, np.newaxis] * points, root, rcond=1e-9)
+    centroid, angle = principal_line(points, weights)
+    return centroid, math.atan2(normal[0], -normal[1]) if rank == 2 else angle
+
+
+def second_order(covariance, centroid, angle):
+    """Covariance with variances by which the squares of errors are 1, not to first order only.
+
+    The slope m across the beams is normal with variance s, the angle atan m, and the offset by the
+    cosine of it what the error along the beams is: E e²/v by the derivatives of the arctangent.
+    """
+    off = math.cos(angle) * centroid[1] - math.sin(angle) * centroid[0]
+    m = math.sqrt(max(centroid @ centroid / max(off**2, 1e-6 * centroid @ centroid) - 1, 0.0))
+    first = 1 / (1 + m**2)
+    second, third = -2 * m * first**2, (6 * m**2 - 2) * first**3
+    s = covariance[1, 1] / first**2
+    angles = 1 + s * (15 / 4 * (second / first) ** 2 - 2 * third / first)
+    both = covariance.diagonal() * [1 + s * first, angles]
+    both[1] = min(both[1], math.pi**2 / 12)
+    most = math.sqrt(1 - 2e-9) * math.sqrt(both[0] * both[1])
+    cross = min(max(covariance[0, 1], -most), most)
+    return np.array([[both[0], cross], [cross, both[1]]])
+
+
 def estimate(points, bearings, rho, noise, fit, passes=2):
     """Centroid, direction from first to last, weights."""
     weights = np.ones(len(points))
@@ -34,25 +64,30 @@ def estimate(points, bearings, rho, noise, fit, passes=2):
         centroid, (run, rise) = line_of(points, Paper(fit=fit))
         angle = math.atan2(rise, run)
     else:
-        centroid, angle = principal_line(points, weights)
+        fitted = beamwise_line if fit == "weighted" else principal_line
+        centroid, angle = fitted(points, weights)
     for _ in range(passes if fit == "weighted" else 0):
         weights = 1 / normal_variances(angle, bearings, rho, noise)
-        centroid, angle = principal_line(points, weights)
+        centroid, angle = beamwise_line(points, weights)
     if np.array([math.cos(angle), math.sin(angle)]) @ (points[-1] - points[0]) < 0:
         angle += math.pi
     return centroid, math.remainder(angle, 2 * math.pi), weights
 
 
 def fit_line(points, bearings, rho, noise, fit, passes=2):
-    """Line with its covariance: to first order offset = Σwe/W, angle = Σwte/Σwt²."""
+    """Line with its covariance: to first order offset = Σwe/W, angle = Σwte/Σwt².
+
+    The angle of an eigenvector is, by the perturbation of a matrix, Σte/(Σt² - Σe²).
+    """
     centroid, angle, _ = estimate(points, bearings, rho, noise, fit, passes)
     u = np.array([math.cos(angle), math.sin(angle)])
     t, e = (points - centroid) @ u, (points - centroid) @ [-u[1], u[0]]
     variances = normal_variances(angle, bearings, rho, noise)
     weights = 1 / variances if fit == "weighted" else np.ones(len(points))
     offset_gain = weights / weights.sum()
-    if t.any():
-        gain = np.array([offset_gain, weights * t / (weights @ t**2)])
+    spread = weights @ t**2 - (e @ e if fit == "total" else 0.0)
+    if spread > 0:
+        gain = np.array([offset_gain, weights * t / spread])
         covariance = gain * variances @ gain.T
         if fit == "weighted":
             covariance[[0, 1], [1, 0]] = 0.0  # independent at the centroid of these weights
@@ -64,7 +99,7 @@ def fit_line(points, bearings, rho, noise, fit, passes=2):
         "end": centroid + t[-1] * u,
         "centroid": centroid,
         "angle": angle,
-        "covariance": covariance,
+        "covariance": second_order(covariance, centroid, angle),
         "n_points": len(points),
         "rms": math.sqrt(np.mean(e**2)),
     }

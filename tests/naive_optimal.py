@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from naive_fit import beamwise_line
 from scipy.special import wrightomega
 
 from lineament import LaserScan
@@ -181,8 +182,23 @@ def surface_line(xy, rho, noise):
     return np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
 
 
-def border_covariance(xy, rho, noise, segment, without, more):
-    """What comes to a segment's covariance as its border lies anywhere between two measurements.
+def border_deviation(xy, rho, noise, border):
+    """Root mean square of by how many measurements a border between two lines is off.
+
+    It lies one elsewhere with the odds exp -Δχ²/2, at the scale of the noise.
+    """
+
+    def odds(i):
+        own = chi_square(xy[:i], rho[:i], noise) + chi_square(xy[i:], rho[i:], noise)
+        variance = variance_of(rho[border], noise)
+        return math.exp(-own / 2 * (variance + SURFACE**2) / variance)
+
+    elsewhere = odds(border - 1) + odds(border + 1)
+    return math.sqrt(elsewhere / (odds(border) + elsewhere))
+
+
+def border_covariance(xy, rho, noise, segment, without, more, off):
+    """What comes to a segment's covariance as its border is `off` by so many measurements.
 
     By the lines of `without` and of `more` measurements than it has, by one at that border.
     """
@@ -194,12 +210,15 @@ def border_covariance(xy, rho, noise, segment, without, more):
         places.append(
             ((1 - line @ segment["centroid"]) / across, -math.atan(line @ along / across))
         )
-    change = np.subtract(*places) * 0.5 / math.sqrt(12)
+    change = np.subtract(*places) * off / 2
     return np.outer(change, change)
 
 
 def fitted_line(xy, rho, noise):
-    """Centroid, direction, variances of offset and angle, rms, misfit, number of what counts."""
+    """Centroid, direction, variances of offset and angle, rms, misfit, number of what counts.
+
+    The variances are those of the first order.
+    """
     normal = surface_line(xy, rho, noise)
     distance = 1 / np.linalg.norm(normal)
     normal = normal * distance
@@ -208,9 +227,10 @@ def fitted_line(xy, rho, noise):
     counts = (xy @ normal - distance) ** 2 <= DEVIATIONS**2 * (across + SURFACE**2 * share)
     xy, across = xy[counts], across[counts]
     centroid = np.average(xy, axis=0, weights=1 / across)
-    scatter = ((xy - centroid).T / across) @ (xy - centroid)
-    (_, along), axes = np.linalg.eigh(scatter)
-    direction = axes[:, 1] * (1 if axes[:, 1] @ (xy[-1] - xy[0]) > 0 else -1)
+    _, angle = beamwise_line(xy, 1 / across)
+    direction = np.array([math.cos(angle), math.sin(angle)])
+    direction *= np.sign(direction @ (xy[-1] - xy[0]))
+    along = np.sum(((xy - centroid) @ direction) ** 2 / across)
     total = np.sum(1 / across)
     off = (xy - centroid) @ [-direction[1], direction[0]]
     square = np.average(off**2, weights=1 / across)

@@ -106,6 +106,7 @@ def random_pieces(rng):
     return ranges, angles, pieces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_no_way_costs_less(seed):
     rng = np.random.default_rng(seed)

@@ -26,6 +26,7 @@ def test_walls_meet_at_their_ends_with_free_space_to_the_left(seed):
         assert not is_free(plan, middles - aside).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_the_way_is_free_and_closes_after_every_corridor(seed):
     storey = office(seed, (60, 40))
@@ -97,6 +98,7 @@ def test_free_poses_and_people():
     assert np.hypot(*(kept[:, :2] - at[:2]).T).min() > 0.5
 
 
+@pytest.mark.slow
 def test_wheels_are_exact_without_faults_and_wrong_by_what_is_asked():
     half, n = 2.0, 200
     arc = [(half * math.sin(a), half * (1 - math.cos(a)), a) for a in np.linspace(0, 3, n)]

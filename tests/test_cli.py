@@ -207,6 +207,7 @@ def test_keep_going_delivers_the_whole_scans_and_counts_the_rest(tmp_path, capsy
     assert "broken.log:2" in said
 
 
+@pytest.mark.slow
 def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, capsys):
     one, two, trace, dark = (tmp_path / f"{name}.png" for name in ("one", "two", "trace", "dark"))
     base = ["plot", str(npz), "--scan", "3"]
@@ -224,6 +225,7 @@ def test_plot_draws_methods_side_by_side_and_stages(npz, tmp_path, capsys):
     assert "#ffffff" not in svg.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_demo_on_a_log_makes_table_and_page(npz, tmp_path, capsys):
     folder = tmp_path / "deep" / "demo"
     assert run(["demo", str(npz), "-o", str(folder)]) == 0
@@ -449,6 +451,7 @@ def test_imports_are_light(code, heavy):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.slow
 def test_compare_writes_a_page_and_a_table(npz, tmp_path, capsys):
     given = ["compare", str(npz), "--scan", "1", "-m", "pdbs", "-m", "liu", "-o"]
     assert run([*given, str(tmp_path / "a.html")]) == 0

@@ -53,6 +53,7 @@ def test_format_whose_package_is_missing(ending, package, tmp_path, monkeypatch)
         open_writer(tmp_path / f"a.{ending}")
 
 
+@pytest.mark.slow
 def test_commands_work_without_any_extra(tmp_path):
     script = """
 import sys

@@ -57,6 +57,7 @@ def test_it_looks_to_where_the_walls_open(turn, opening, flips):
     assert math.remainder(theta - turn, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_covariance_by_small_errors_of_the_walls():
     """Each wall is moved by its own errors: the pose follows as its covariance says."""
     rng = np.random.default_rng(2)

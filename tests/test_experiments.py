@@ -175,6 +175,7 @@ FIGURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
@@ -203,6 +204,7 @@ def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
     assert here == pytest.approx(PINNED[name], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_seeds_are_merged_and_recordings_are_read_once(data):
     reports, setting = [], Setting(1, 4, data, seeds=2)
@@ -232,6 +234,7 @@ def test_without_recordings_nothing_is_measured(name, tmp_path):
         assert findings.tables == findings.figures == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", ["fig1", "fig6"])
 def test_figures_of_definitions_show_what_is_there(figure):
     assert definitions.run(Setting(), silent).numbers[figure]["off"] < 0.01
@@ -254,6 +257,7 @@ def test_operator_by_definition_is_that_of_the_code():
         np.testing.assert_allclose(np.vstack((s, s**2)) @ (off - fit), 0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_scene_of_figure_10_has_as_many_clusters_and_corners(seed):
     true = layers.like_figure_10(seed).truth

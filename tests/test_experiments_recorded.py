@@ -44,6 +44,7 @@ class TestMuseum:
             items.append(("another", int(1e9 * scan.stamp), other))
         return write(tmp_path, "rosbag1", items, "museum")
 
+    @pytest.mark.slow
     @pytest.mark.usefixtures("small")
     def test_bag_gives_figures_11_to_13_and_tables_2_and_3(self, bag, monkeypatch):
         monkeypatch.setattr(museum, "SCANS_A_FRAME", 20)
@@ -120,6 +121,7 @@ class TestMuseum:
         assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
 
 
+@pytest.mark.slow
 def test_the_museums_bag_is_not_overwritten_and_what_is_named_is_run(tmp_path):
     bag = tmp_path / "figures.json"
     bag.write_bytes(b"#ROSBAG V2.0")

@@ -111,6 +111,7 @@ def test_endings(tmp_path, ending, start):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "columns"), [(1, 1), (4, 3), (10, 4)])
 def test_one_panel_a_method_with_its_errors_below(n, columns):
     scan, features = room()
@@ -242,6 +243,7 @@ def texts_drawn(figure):
     return texts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXTREMES)
 def test_every_scan_fills_its_panel_and_no_text_covers_another(name, tmp_path):
     scan, shown = EXTREMES[name], {"optimal": "optimal", "liu:scale_free": "liu:scale_free"}
@@ -584,6 +586,7 @@ def test_map_moves_features_by_their_poses(drawn):
     assert many.collections[0].get_alpha() == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(hostile()))
 def test_hostile_scans_are_drawn(tmp_path, case, monkeypatch):
     monkeypatch.setattr(canvas, "DPI", 50)  # quicker

@@ -41,6 +41,7 @@ def samples(tmp_path_factory):
     return own_samples(tmp_path_factory.mktemp("samples"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 def test_samples_are_logs(samples, folders, options):
     """Else damage would show nothing."""
@@ -48,6 +49,7 @@ def test_samples_are_logs(samples, folders, options):
         assert check(sample, folders, options)
 
 
+@pytest.mark.slow
 @settings_of_all
 @given(st.integers(min_value=0))
 def test_damaged_logs(samples, folders, seed):
@@ -62,6 +64,7 @@ def test_any_bytes(folders, magic, data):
     check(Sample("any", {"log": magic + data}, "log"), folders, {})
 
 
+@pytest.mark.slow
 @settings_of_all
 @given(st.text(alphabet='0123456789.,-+e;\t\n {}[]":naifx', max_size=300))
 def test_any_text(folders, text):
@@ -88,6 +91,7 @@ def test_where_lengths_and_offsets_stand(samples):
     assert (28, ">I") in sizes(database) or b"SQLite" not in database  # size in pages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("target", "inputs"),
     [
@@ -103,6 +107,7 @@ def test_inputs_of_each_kind(target, inputs, tmp_path):
     assert len(outcomes) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no limits of memory")
 def test_a_run_goes_on_where_it_was_interrupted(tmp_path):
     script = Path(__file__).with_name("fuzzing.py")

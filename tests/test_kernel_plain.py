@@ -79,6 +79,7 @@ def of(module, scan, factor):
     return module.LaserScan(factor * scan.ranges, angles=scan.angles, **limits)
 
 
+@pytest.mark.slow
 @every_name
 def test_lengths_have_no_unit(plain, name):
     """To the last digit: a new length that is not in the lists above fails here."""
@@ -103,14 +104,19 @@ def test_lengths_have_no_unit(plain, name):
                         scale = 2.0**power
                     expected = before[field] if power == 0 and np.isscalar(scale) else None
                     expected = before[field] * scale if expected is None else expected
-                    np.testing.assert_array_equal(after[field], expected, err_msg=field)
+                    # But for the last digit of what is next to 0, which has fewer of them.
+                    np.testing.assert_allclose(
+                        after[field], expected, rtol=0, atol=1e-300, err_msg=field
+                    )
     assert found > 20
 
 
 @pytest.mark.usefixtures("plain")
 def test_the_lengths_are_all_there():
     """Each name is one of a module of the kernels or methods."""
-    modules = [importlib.import_module("lineament.methods.optimal"), *packages().values()]
+    for name in NAMES:
+        made(name)
+    modules = packages().values()
     for name in (*LENGTHS, *SQUARES):
         assert any(hasattr(module, name) for module in modules), name
 
@@ -145,6 +151,7 @@ def strict(own):
     return own.view(Strict) if isinstance(own, np.ndarray) else own
 
 
+@pytest.mark.slow
 @every_name
 def test_no_index_counts_from_the_end(plain, name):
     method, workspace = made(name), importlib.import_module("lineament.methods.workspace")

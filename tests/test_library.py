@@ -138,6 +138,7 @@ def test_features_need_neither_numba_nor_a_folder_to_write_to(copy):
     assert sorted(copy.kernels.rglob("*")) == before  # an image may be read-only
 
 
+@pytest.mark.slow
 @compiled
 @pytest.mark.parametrize(
     ("spoil", "reason"),

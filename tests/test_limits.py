@@ -48,6 +48,7 @@ def test_every_limit_has_a_crafted_file():
     assert logs | plans - {""} == {*NAMES, ""} - {"fetch"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no figure of memory here")
 @pytest.mark.parametrize("name", CRAFTED)
 def test_a_crafted_file_ends_in_one_line(name, tmp_path):

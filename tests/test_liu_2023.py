@@ -145,6 +145,7 @@ def test_recorded_scans_are_reproduced(data_dir, log, changes):
     assert ties <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scan", OTHERS.values(), ids=OTHERS)
 def test_other_scans_are_reproduced(scan):
     for changes in VARIANTS.values():

@@ -125,6 +125,7 @@ def test_garbage_comes_and_is_refused_in_one_line(participant, peer):
     assert (len(bad), source.lost) == (len(messages), 0)
 
 
+@pytest.mark.slow
 def test_a_publisher_that_is_killed_and_comes_again_beside_another(
     participant, peer, remote, domain
 ):
@@ -144,6 +145,7 @@ def test_a_publisher_that_is_killed_and_comes_again_beside_another(
     assert names[0] != names[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reliability", ["best-effort", "reliable"])
 def test_a_burst_is_accounted_for(participant, remote, reliability):
     source, n = source_of(participant, depth=8, reliability=reliability), 50
@@ -216,6 +218,7 @@ def test_a_message_serialised_by_others_is_read_by_others(participant, remote):
         publisher.publish(Message("/made", kind, b"\7\7\7\7"))
 
 
+@pytest.mark.slow
 def test_a_reader_that_stands_still_delays_nobody(participant, remote):
     publisher = DdsPublisher(participant)
     publisher.advertise("/scan", SCAN)
@@ -278,6 +281,7 @@ source.receive(0.01)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["", "participant.close()", "raise SystemExit(0)"])
 def test_a_process_ends_cleanly(domain, end):
     text = PROGRAM.format(domain=domain, end=end)

@@ -196,6 +196,7 @@ def test_garbage_comes_and_is_refused_in_one_line(node, scanner, topic):
     assert source.publishers == 1
 
 
+@pytest.mark.slow
 def test_a_publisher_that_is_killed_is_waited_for(node, topic):
     source = Ros1Source(node, LiveConfig(topic=topic))
     for stamp in (1, 2):
@@ -348,6 +349,7 @@ def program(master: None) -> Iterator[subprocess.Popen]:  # noqa: ARG001
         process.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("listens", [False, True])
 def test_a_node_ends_when_it_is_replaced_or_though_a_listener_stands_still(program, listens):
     node = program(NODE)
@@ -362,6 +364,7 @@ def test_a_node_ends_when_it_is_replaced_or_though_a_listener_stands_still(progr
     assert node.returncode == 0
 
 
+@pytest.mark.slow
 def test_the_command_from_scan_to_features(program, scanner):
     warm_up(["optimal"])  # The program should not wait for a compiler.
     live = program(LIVE)

@@ -78,6 +78,7 @@ def errors(found, truth):
     return np.array(rows).reshape(-1, 3).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odometry", [True, False])
 def test_followed_from_the_first_metres_on(storey, drive, odometry):
     scans, truth = drive
@@ -92,6 +93,7 @@ def test_followed_from_the_first_metres_on(storey, drive, odometry):
     assert len(looks) < 0.8 * len(found)
 
 
+@pytest.mark.slow
 def test_a_map_of_a_drive_is_a_plan_whose_doors_are_open(tmp_path):
     """`lineament map`, then `locate` with the same furniture: nothing passes through walls."""
     place = office(4, (30, 20))
@@ -104,6 +106,7 @@ def test_a_map_of_a_drive_is_a_plan_whose_doors_are_open(tmp_path):
     assert np.mean([where.evidence.contradicted for where in found]) < 0.01
 
 
+@pytest.mark.slow
 def test_scans_that_say_how_long_they_sweep_are_deskewed(storey):
     """At 1 m/s, sweeps of 25 ms: what is seen moves by 25 mm."""
     scans = list(drive_scans(storey.world, storey.waypoints[:3], SENSORS["utm30lx"],
@@ -118,6 +121,7 @@ def test_scans_that_say_how_long_they_sweep_are_deskewed(storey):
     assert np.median(skewed) > 0.004
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mirrored", "another"])
 def test_never_located_on_a_plan_of_another_building(storey, drive, kind):
     other = storey.mirrored() if kind == "mirrored" else office(SEED + 50, SIZE).plan
@@ -315,6 +319,7 @@ def test_the_viewer_locates_logs_on_a_plan(files):
         assert json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))["where"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "typical"), [("jackal_static_data", 0.01), ("jackal_mocap_02171554", 0.015)]
 )

@@ -174,6 +174,7 @@ def test_a_gigabyte_without_a_scan(tmp_path, name, beginning, problem):
 # Damage
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", scan_texts())
 @pytest.mark.parametrize("pack", [bytes, gzip.compress])
 def test_cut_off_anywhere(write, name, pack):
@@ -298,6 +299,7 @@ NO_LOG = {
 PARTS = ("metadata.yaml", "-shm", "-wal")
 
 
+@pytest.mark.slow
 def test_each_recording_opens_or_says_why_not(data_dir):
     seen, logs = set(), 0
     folders = {path.parent for path in data_dir.rglob("metadata.yaml")}

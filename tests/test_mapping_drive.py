@@ -90,6 +90,7 @@ POSES = np.array([(0.3 * k - 1.5, 0.1 * k, 0.4 * k) for k in range(12)])
 LOOSE = edges(POSES, [(k, k + 1) for k in range(11)], sigma=1.0)
 
 
+@pytest.mark.slow
 def test_walls_have_the_covariance_that_they_scatter_by():
     """NEES of the walls, in the frame of the first pose, whose errors the others share."""
     true_angle = np.arange(8) // 2 * math.pi / 2

@@ -128,6 +128,15 @@ def test_identical_rooms_are_ambiguous_and_the_right_one_is_among_them():
     assert locate(ln.extract(alone), plan_of(other)).verdict == "located"
 
 
+def test_a_right_pose_is_not_refined_away():
+    """A wrong pair of walls moved it by 0.2 m, and a place 18 m off was called located."""
+    building, rng = office(34, (24.0, 18.0), identical=0.0), np.random.default_rng(4290404217)
+    pose = building.free_pose(rng)
+    where = locate(ln.extract(SENSOR.scan(building.world, pose, rng)), plan_of(building.plan))
+    assert where.verdict == "located"
+    assert error(where, pose) < (0.01, 0.002)
+
+
 def test_place_that_is_its_own_mirror_image_is_ambiguous():
     """A niche in the middle of one wall: a mirrored plan would look the same."""
     room = [(0, 0), (5, 0), (5, 4), (3, 4), (3, 4.6), (2, 4.6), (2, 4), (0, 4), (0, 0)]

@@ -43,6 +43,7 @@ def test_derivatives_are_those_of_differences(motion):
     np.testing.assert_allclose(_twist_covariance(Motion(*motion, SPREAD), 0.1), expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_pose_and_its_covariance_add_up():
     odometer, truth = Odometer(), (0.0, 0.0, 0.0)
     first = odometer(tracks(None), 5.0)
@@ -99,6 +100,7 @@ def test_a_drive_ends_within_its_covariance():
     assert 2 < np.mean(of_twists) < 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", [0.1, math.inf])
 def test_the_skew_of_a_sweep_adds_up_and_is_in_the_covariance(sweep):
     """Turning to and fro: what is lost to the left is not won back to the right."""

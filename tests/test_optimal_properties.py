@@ -160,6 +160,7 @@ def assert_ends(edge, segments):
     assert segment[beam[edge["side"]]] == edge["beam"]
 
 
+@pytest.mark.slow
 @every_extractor
 @pytest.mark.parametrize("source", ["hostile", "random", *SENSORS])
 def test_features_are_sound(extractor, source):

@@ -150,6 +150,7 @@ def test_full_disk_leaves_one_line_and_nothing_else(tmp_path, ending):
     assert target.stat().st_size > 900
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".parquet", ".mcap", ".rrd", ".dxf"])
 def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
     target = tmp_path / f"features{ending}"

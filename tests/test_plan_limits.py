@@ -62,6 +62,7 @@ def ends(tmp_path_factory):
     return {name: line.removeprefix(f"{folder}/") for name, line in zip(PLANS, lines, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANS)
 def test_a_crafted_plan_ends_in_one_line(name, ends):
     limit, _, limits, said = PLANS[name]

@@ -66,6 +66,7 @@ def changed(data, at, form, value):
 # --- cut off, flipped, overwritten
 
 
+@pytest.mark.slow
 @every_kind
 def test_cut_off_anywhere(altered, kind):
     """What comes before the cut is read; nothing else is made up."""

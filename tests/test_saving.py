@@ -28,6 +28,7 @@ def names(folder):
 # Any format
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_a_simulated_drive_comes_back_as_it_was(tmp_path, sensor, ending):

@@ -107,6 +107,7 @@ def naive_cast(world, pose, angle):
     return min(found for found in met if found[0] > 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_as_naive_on_random_worlds_from_one_pose_or_one_a_beam(seed):
     rng = np.random.default_rng(seed)

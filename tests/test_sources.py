@@ -237,6 +237,7 @@ def test_nothing_is_written_where_an_archive_says(tmp_path, temporary):
     assert not list(tmp_path.rglob("*.log"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2, zipfile.ZIP_DEFLATED])
 def test_damaged_archives(tmp_path, write, method):
     with zipfile.ZipFile(tmp_path / "whole.zip", "w", method) as archive:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from liu_2023 import Paper, corner_response, polar
-from naive_fit import fit_line, jacobian_covariance
+from naive_fit import fit_line, jacobian_covariance, second_order
 from worlds import (
     BOX,
     NOISE,
@@ -185,7 +185,8 @@ def test_fits_equal_their_twins(fit, seed):
 def test_covariance_is_that_of_moved_measurements(fit, seed):
     angles, rho, noise = seen_wall(seed, 1e-5)
     line = stages.fit_line(polar(rho, angles), noise=RangeNoise(*noise), fit=fit)
-    expected = jacobian_covariance(angles, rho, noise, fit)
+    first_order = jacobian_covariance(angles, rho, noise, fit)
+    expected = second_order(first_order, line["centroid"], line["angle"])
     scale = np.sqrt(np.outer(*[np.diag(expected)] * 2))
     np.testing.assert_allclose(line["covariance"] / scale, expected / scale, atol=2e-3)
 

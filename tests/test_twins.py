@@ -96,12 +96,14 @@ def assert_same(name, scan):
     return assert_same_pieces(extractor.method, scan, find, extractor.noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
 @pytest.mark.parametrize("name", [*FAST, "ransac, bearings", "hough, coarse", "region_growing"])
 def test_degenerate_scans(name, scan):
     assert_same(name, untied(scan) if name in SPLITTERS else scan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*FAST, *(n for n in FINDERS if "region" in n or "paper" in n)])
 @settings(max_examples=15)
 @given(seed=st.integers(0, 2**32 - 1))

@@ -229,6 +229,7 @@ def found(log, index, method=METHODS[0]):
     return Extractor(method)(open_log(log).scan(index))
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_log_and_its_first_scan(page, log):
     features = found(log, 0)
     assert page.text("#log option:checked") == "corner.npz"
@@ -246,6 +247,7 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
     assert colours > 20
 
 
+@pytest.mark.slow
 def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     """A scan of a method that is being compiled."""
     state = progress.Compiling("it is a test", 14, 9.0, is_first=False, is_last=False)
@@ -358,6 +360,7 @@ def test_wheel_and_drag_move_the_view(page):
     assert page.run(state) == pytest.approx([x - 40 / scale, y - 20 / scale, scale])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [NARROW, WIDE])
 @pytest.mark.parametrize(
     ("scheme", "color"), [("dark", "rgb(13, 17, 23)"), ("light", "rgb(255, 255, 255)")]
@@ -464,6 +467,7 @@ KEYS = [
 ]
 
 
+@pytest.mark.slow
 def test_all_that_can_be_clicked_has_a_key(page):
     for keys, script, expected in KEYS:
         page.press(keys)
@@ -597,6 +601,7 @@ def test_a_scan_is_drawn_the_same_at_any_pose(page):
     assert np.count_nonzero(abs(moved) > 100) < 300  # the end of the beam that goes out of it
 
 
+@pytest.mark.slow
 def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
     page.open(f"{address}#log=drive.npz&scan=7")
     page.press("cmw+lvv46")
@@ -635,6 +640,7 @@ def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
         assert other.driver.get_log("browser") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("touch", [False, True])
 def test_what_is_shared_is_saved(page, address, folder, tmp_path, touch):
     page.resize(*(NARROW if touch else WIDE), touch=touch)

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 #: Blocks of 16 measurements bound less than blocks of 8, so that more groups are opened.
 SLOWER = """
@@ -29,6 +31,7 @@ def run(*arguments):
     )
 
 
+@pytest.mark.slow
 def test_work_is_what_is_stored():
     done = run("work.py")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

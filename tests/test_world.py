@@ -29,6 +29,7 @@ FOUND = features(
 )
 
 
+@pytest.mark.slow
 def test_covariances_with_that_of_the_pose_hold_by_monte_carlo():
     """Of 20 000 draws a variance is known to 1 %: white, what was drawn has unit covariance."""
     known, rng, n = FOUND.transform(*POSE, SPREAD), np.random.default_rng(1), 20_000
@@ -199,6 +200,7 @@ def test_docs_on_pandas(world):
     assert found["walls"].to_dict() == pytest.approx(walls)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("world")
 @pytest.mark.parametrize("version", [2, 3])
 def test_docs_on_tables_of_two_versions(version):

@@ -19,6 +19,13 @@ FITS = {
     "slope_intercept": SLOPE_INTERCEPT,
 }
 
+#: Least normal, over what points in all directions have: less is rounding, of points on one beam.
+_ALONG = 1e-9
+#: Least square of the cosine of an incidence.
+_GRAZING = 1e-6
+#: Variance of an angle that may be any [rad²].
+_ANY_ANGLE = math.pi**2 / 12.0
+
 
 @sums
 def fit_line(x, y, rho, first, last, noise, kind):
@@ -69,11 +76,13 @@ def fit_line(x, y, rho, first, last, noise, kind):
     if weighted:
         oa = 0.0  # At their own centroid these are independent, but for the last iteration.
     var_offset, rms = oo / (w_sum * w_sum), math.sqrt(squares / len(x))
-    if t_sum == 0.0:
+    if kind == TOTAL:
+        t_sum -= squares  # The angle of the larger eigenvalue goes by how much larger it is.
+    if not t_sum > 0.0:
         # Points that coincide have no direction: any angle is as good.
-        return cx, cy, c, s, var_offset, 0.0, math.pi**2 / 12.0, rms
-    var_angle = aa / (t_sum * t_sum)
-    covariance = as_covariance(oa / (w_sum * t_sum), var_offset, var_angle)
+        return cx, cy, c, s, var_offset, 0.0, _ANY_ANGLE, rms
+    first_order = var_offset, oa / (w_sum * t_sum), aa / (t_sum * t_sum)
+    var_offset, covariance, var_angle = second_order(first_order, cx, cy, c, s)
     return cx, cy, c, s, var_offset, covariance, var_angle, rms
 
 
@@ -99,8 +108,12 @@ def _line(x, y, rho, noise, c, s, weighted, kind):
     sxx -= sx * sx / total
     sxy -= sx * sy / total
     syy -= sy * sy / total
-    c, s = direction(sxx, sxy, syy, kind)
-    return x0 + sx / total, y0 + sy / total, c, s
+    cx, cy = x0 + sx / total, y0 + sy / total
+    if kind == WEIGHTED:
+        c, s = direction_along_beams(sxx, sxy, syy, cx, cy)
+    else:
+        c, s = direction(sxx, sxy, syy, kind)
+    return cx, cy, c, s
 
 
 @helper
@@ -119,6 +132,38 @@ def direction(sxx, sxy, syy, kind):
 
 
 @helper
+def direction_along_beams(sxx, sxy, syy, cx, cy):
+    """Return the direction of the line a x + b y = 1 of least squares, from second moments.
+
+    These, C, are about the centroid c. The normal is C⁻¹c but for its length: 1 - a x - b y is the
+    error of a range over that of the line, whatever the line's direction. Where all points lie on
+    one beam, it is that of the larger eigenvalue.
+    """
+    u, v = sxy * cx - sxx * cy, syy * cx - sxy * cy
+    norm, reach = math.sqrt(u * u + v * v), (sxx + syy) * (abs(cx) + abs(cy))
+    if not norm > _ALONG * reach:
+        return direction(sxx, sxy, syy, TOTAL)
+    return u / norm, v / norm
+
+
+@helper
+def second_order(first_order, cx, cy, c, s):
+    """(Co)variances of a line's offset and angle from those of the first order, which are less.
+
+    Ranges give the slope m = tan ψ across the beams, ψ the incidence, with a variance that does
+    not depend on it. The first order v of an angle f(m) = atan m is taken at an estimate, which is
+    off as well: its NEES is 1 + v (15/4 f₂² - 2 f₁ f₃)/f₁⁴ = 1 + (4 + 3 m²) v, by derivatives of
+    f. That of the offset, cos ψ times an error along the beams, is 1 + (1 + m²) v.
+    """
+    var_offset, covariance, v = first_order
+    square, distance = cx * cx + cy * cy, c * cy - s * cx
+    steep = square / max(distance * distance, _GRAZING * square)  # 1 + m²
+    var_offset, var_angle = var_offset * (1.0 + steep * v), v * (1.0 + (1.0 + 3.0 * steep) * v)
+    var_angle = min(var_angle, _ANY_ANGLE)
+    return var_offset, as_covariance(covariance, var_offset, var_angle), var_angle
+
+
+@helper
 def normal_variance(distance, rho, noise):
     """Variance of a point along a line's normal, b = σ_r² cos²ψ + ρ² σ_φ² sin²ψ.
 
@@ -126,7 +171,7 @@ def normal_variance(distance, rho, noise):
     grazing so that no point gets all the weight.
     """
     square = max(rho * rho, 1e-300)  # Not 0 for the least of ranges.
-    near = max(distance * distance, 1e-6 * square)
+    near = max(distance * distance, _GRAZING * square)
     return range_variance(rho, noise) * near / square + noise[2] * noise[2] * (square - near)
 
 

@@ -193,7 +193,9 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
         found = evidence_of(tried, some(query.beams, count), plan.index, _WIDE)
         tried = tried[distinct(tried, found[:, 0], _NEAR, most)]
-    poses, _, _ = refined(refined(tried, query, plan.index, COARSE)[0], query, plan.index, FINE)
+    # What is near enough may be moved away by a wrong pair of walls that is looked for far off.
+    starts = np.concatenate((tried, refined(tried, query, plan.index, COARSE)[0]))
+    poses, _, _ = refined(starts, query, plan.index, FINE)
     found = evidence_of(poses, query.beams, plan.index, _TIGHT)
     # Poses some way off along both axes of the local map may look alike.
     best = poses[found[:, 0].argmax()]

@@ -234,8 +234,8 @@ def fit_line(points: ArrayLike, *, noise: NoiseLike | None = None, fit: str = "t
     points : array_like, shape (m, 2)
         Points in beam order, in the frame of the sensor [m]; m ≥ 2.
     noise : RangeNoise or float, optional
-        Noise of the ranges, or its sigma [m], for the covariance and the weights; 1 m (unit
-        variance) if not given.
+        Noise of the ranges, or its sigma [m], for the covariance and the weights; 1 m if not
+        given, which leaves an angle unknown (the covariance is not linear in the variance).
     fit
         As in `Liu`; y = kx + b is x = ky + b where it is steeper than 45°.
 

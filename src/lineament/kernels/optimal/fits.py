@@ -3,19 +3,17 @@
 import math
 
 from .. import helper, inlined, sums
-from ..line_fit import TOTAL, direction
+from ..line_fit import direction_along_beams, second_order
 from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
 from .constants import LEAST, SIGMAS, TAU
-from .costs import solve
+from .costs import cost, solve
 from .merging import surface_variance
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
 _TOGETHER = 4
 #: Of overlapping second differences of their means, so many count as one.
 _OVERLAP = 3.4
-#: Deviation of what lies anywhere between two measurements, in their spacing.
-_WITHIN = 0.5 / math.sqrt(12.0)
 
 
 @inlined
@@ -51,7 +49,19 @@ def measure(work, surfaces, estimated):
                 pieces[k, at.OO] *= scale
                 pieces[k, at.AA] *= scale
     _soften_borders(work, kept)
+    for k in range(kept):
+        _to_second_order(spans, pieces[k], k)
     return kept
+
+
+@helper
+def _to_second_order(spans, p, k):
+    """Raise the covariance of a line to what its errors are where these are not small."""
+    if spans[at.KIND, k] == at.LINE:
+        first_order = p[at.OO], p[at.OA], p[at.AA]
+        p[at.OO], p[at.OA], p[at.AA] = second_order(
+            first_order, p[at.CX], p[at.CY], p[at.UX], p[at.UY]
+        )
 
 
 @inlined
@@ -103,10 +113,10 @@ def fit_line(points, first, end, a, b, noise, piece):
         sxx, sxy, syy = sxx + w * dx * dx, sxy + w * dx * dy, syy + w * dy * dy
         used += 1.0 if counts else 0.0
     sxx, sxy, syy = sxx - sx * sx / total, sxy - sx * sy / total, syy - sy * sy / total
-    ux, uy = direction(sxx, sxy, syy, TOTAL)
+    cx, cy = x0 + sx / total, y0 + sy / total
+    ux, uy = direction_along_beams(sxx, sxy, syy, cx, cy)
     if ux * (x[len(x) - 1] - x0) + uy * (y[len(y) - 1] - y0) < 0.0:
         ux, uy = -ux, -uy
-    cx, cy = x0 + sx / total, y0 + sy / total
     along = ux * ux * sxx + 2.0 * ux * uy * sxy + uy * uy * syy
     mean_square = max(sxx + syy - along, 0.0) / total
     distance = ux * cy - uy * cx
@@ -184,8 +194,7 @@ def _second_differences(points, a, b, noise, error, squares):
 def _soften_borders(work, surfaces):
     """Add to the covariances what comes of borders that could as well lie elsewhere.
 
-    A border lies anywhere between two measurements, and where a wall bends, it may move far until
-    χ² rises by 1: by one deviation. The lines turn by as much with it.
+    With a border that is off by a measurement, both of its lines turn.
     """
     spans, pieces, sums = work.spans, work.pieces, work.sums
     for k in range(1, surfaces):
@@ -194,13 +203,31 @@ def _soften_borders(work, surfaces):
             continue
         if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
             continue
+        rho = work.points[at.RHO]
+        variance = work.noise[0] + work.noise[1] * rho[border - 1] * rho[border]
+        off = _border_deviation(sums, start, border, end, 1.0 + TAU * TAU / variance)
         low, high = border - 1, border + 1
-        _add_change(pieces[k - 1], solve(sums, start, low), solve(sums, start, high))
-        _add_change(pieces[k], solve(sums, low, end), solve(sums, high, end))
+        _add_change(pieces[k - 1], solve(sums, start, low), solve(sums, start, high), 0.5 * off)
+        _add_change(pieces[k], solve(sums, low, end), solve(sums, high, end), 0.5 * off)
 
 
 @helper
-def _add_change(piece, line, other):
+def _border_deviation(sums, start, border, end, scale):
+    """Return by how many measurements a border is off, a root mean square.
+
+    It lies elsewhere with the odds exp -Δχ²/2, at the scale of the noise; by one at most, and not
+    where too few are left for a line.
+    """
+    least, odds = cost(sums, start, border) + cost(sums, border, end), 0.0
+    for i in (border - 1, border + 1):
+        if i - start >= LEAST and end - i >= LEAST:
+            rise = scale * (cost(sums, start, i) + cost(sums, i, end) - least)
+            odds += math.exp(-0.5 * rise) if rise > 0.0 else 1.0
+    return math.sqrt(odds / (1.0 + odds))
+
+
+@helper
+def _add_change(piece, line, other, share):
     """Add a share of the change from one line to another as a deviation of a piece."""
     ux, uy, cx, cy = piece[at.UX], piece[at.UY], piece[at.CX], piece[at.CY]
     along, across = line[0] * ux + line[1] * uy, line[1] * ux - line[0] * uy
@@ -208,8 +235,8 @@ def _add_change(piece, line, other):
     if across * across_too == 0.0:
         return
     offset = (1.0 - line[0] * cx - line[1] * cy) / across
-    offset = _WITHIN * (offset - (1.0 - other[0] * cx - other[1] * cy) / across_too)
-    angle = _WITHIN * (math.atan(along_too / across_too) - math.atan(along / across))
+    offset = share * (offset - (1.0 - other[0] * cx - other[1] * cy) / across_too)
+    angle = share * (math.atan(along_too / across_too) - math.atan(along / across))
     piece[at.OO] += offset * offset
     piece[at.OA] += offset * angle
     piece[at.AA] += angle * angle
