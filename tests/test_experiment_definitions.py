@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from panels import angle_of, beside, by_label, drawn, notes, texts_of
+from panels import angle_of, assert_legible, beside, by_label, drawn, notes, texts_of
 
 from lineament.reproduce import definitions
 
@@ -17,7 +17,9 @@ def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
         (definitions._parabolas, "Figure 7", False),
         (definitions._tangent, "Figure 8", False),
     ):
-        axes = draw()[2].axes[0]
+        figure = draw()[2]
+        assert_legible(figure)
+        axes = figure.axes[0]
         assert axes.get_title(loc="left").startswith(name)
         assert ([[0.0, 0.0]] in [points.tolist() for points in drawn(axes)]) == has_scanner
 
@@ -25,11 +27,11 @@ def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
 def test_figure_1_has_the_field_of_view_and_one_beam_with_its_coordinates():
     _, _, figure, _ = definitions._scan()
     (axes,) = figure.axes
-    first, last, fan, beam, down, across, _, _, turn = drawn(axes)[:9]
-    for side, bearing in ((first, -80), (last, 80)):
-        assert side[0].tolist() == [0, 0]
-        assert angle_of(side[1]) == pytest.approx(bearing)
-    for arc, begin, end in ((fan, -80, 80), (turn, 0, angle_of(beam[1]))):
+    noisy_point, sensor, view, beam, down, across, x_axis, y_axis, turn = drawn(axes)[:9]
+    assert sensor.tolist() == view[[0]].tolist() == view[[-1]].tolist() == [[0, 0]]
+    assert x_axis.tolist() == [[0, 0], [1, 0]]
+    assert y_axis.tolist() == [[0, 0], [0, 1]]
+    for arc, begin, end in ((view[1:-1], -80, 80), (turn, 0, angle_of(beam[1]))):
         assert np.ptp(np.hypot(*arc.T)) == pytest.approx(0)
         assert angle_of(arc[[0, -1]]) == pytest.approx((begin, end))
     x, y = beam[1]
@@ -43,9 +45,15 @@ def test_figure_1_has_the_field_of_view_and_one_beam_with_its_coordinates():
     np.testing.assert_allclose(by_label(axes)["corner"], places["corner"], atol=0.01)
     assert len(by_label(axes)["breakpoint"]) >= 3
     assert places["breakpoint"] == [(2.3, 0.5), (1.8, 2.2), (0.7, -1.75)]
-    (noisy,) = places["noise point"]
-    assert math.hypot(*noisy) == pytest.approx(3.7)
-    assert places[r"$(x_i, y_i)$"] == [(x, y)]
+    assert noisy_point.tolist() == [list(place) for place in places["noise point"]]
+    assert np.hypot(*noisy_point.T) == pytest.approx(3.7)
+    at = {text.get_text().strip(): np.array(text.get_position()) for text in axes.texts}
+    np.testing.assert_allclose(at[r"$\rho_i$"], beam[1] / 2)
+    np.testing.assert_allclose(at["$(x_i, y_i)$"], (x, y))
+    for name, arc, bearing in (("160°", view, 0), (r"$\theta_1 = -80°$", view, -80),
+                               (r"$\theta_i$", turn, 15)):  # fmt: skip
+        assert np.hypot(*(arc - at[name]).T).min() == 0
+        assert angle_of(at[name]) == pytest.approx(bearing, abs=0.5)
 
 
 def test_figure_4_has_the_spacing_of_neighbours_on_a_wall():
@@ -85,10 +93,9 @@ def test_figure_6_has_the_farthest_point_from_each_chord():
         np.testing.assert_array_equal(branch[away.argmax()], vertex)
         assert beside(foot - chord[0], direction) == pytest.approx(0, abs=1e-12)
         assert (foot - vertex) @ direction == pytest.approx(0, abs=1e-12)
-        texts = dict(notes(axes))
-        assert f"d = {away.max():.2f} m" in texts
+        texts = {text.strip(): place for text, place in notes(axes)}
+        assert f"step {k}: d = {away.max():.2f} m" in texts_of(axes)
         np.testing.assert_array_equal((texts["first"], texts["last"]), chord)
-        assert f"step {k}: " in texts_of(axes)
         if "accepted" in texts_of(axes):
             found.append(vertex.tolist())
             ends.append(vertex.tolist())
@@ -110,10 +117,12 @@ def test_figure_7_has_the_distances_of_two_parabolas_and_their_sums():
         for (base, tip), point in zip(stems.get_segments(), points, strict=True):
             np.testing.assert_allclose((base, tip), [(point[0], 0), point])
         along = [line for line in drawn(plan) if np.allclose(line[:, 1], bend * line[:, 0] ** 2)]
-        assert [len(line) > 50 for line in along] == [True, False]
-    at = {text.get_text(): text.get_position() for text in plan.texts}
-    assert at["A"][0] == pytest.approx(parabolas[0][definitions.RADIUS + 4, 0])
-    assert at["B"][0] == pytest.approx(parabolas[0][definitions.RADIUS + 5, 0])
+        assert [len(line) for line in along] == [50, len(points)]
+        assert along[0][[0, -1], 0].tolist() == points[[0, -1], 0].tolist()
+    marks = [line[0].tolist() for line in drawn(plan) if len(line) == 1]
+    at = {text.get_text().strip(): list(text.get_position()) for text in plan.texts}
+    assert [at["A"], at["B"]] == marks
+    assert marks == [[parabolas[0][definitions.RADIUS + k, 0], 0] for k in (4, 5)]
 
 
 def test_figure_7_says_how_far_the_operator_is_off_where_it_is_worst(monkeypatch):
@@ -145,12 +154,15 @@ def test_figure_8_has_the_fits_by_arc_length_and_the_distances_to_the_tangent():
         assert np.interp(0, curve[1:, 0], np.gradient(curve[:, 1], curve[:, 0])[1:]) == (
             pytest.approx(slope, abs=0.02)
         )
-        assert f"{slope:.2f}" in texts_of(fit)
+        (legend,) = fit.get_legend().get_texts()
+        assert f"'(0) = {slope:.2f}" in legend.get_text()
+        assert [line[[0, -1], 0].tolist() for line in (curve, tangent)] == [[*arc[[0, -1], 0]]] * 2
         slopes.append(slope)
     direction = np.array(slopes) / np.hypot(*slopes)
     _, support_again, _, line, *stems = drawn(last)
     np.testing.assert_array_equal(support_again, support)
-    np.testing.assert_allclose(line.mean(axis=0), target)
+    assert beside(line - target, direction) == pytest.approx(0, abs=1e-6)
+    np.testing.assert_array_equal(line, [stems[0][1], stems[-1][1]])
     assert beside(line[1] - line[0], direction) == pytest.approx(0, abs=1e-6)
     for stem, point in zip(stems, support, strict=True):
         np.testing.assert_array_equal(stem[0], point)
@@ -160,3 +172,10 @@ def test_figure_8_has_the_fits_by_arc_length_and_the_distances_to_the_tangent():
     assert sum(lengths) == pytest.approx(numbers["sum"])
     assert f"Σ d = {sum(lengths):.2f} m" in texts_of(last)
     assert numbers["stage"] == pytest.approx(numbers["sum"])
+
+
+def test_table_1_has_the_memory_of_this_machine(monkeypatch):
+    sizes = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**21}
+    monkeypatch.setattr(definitions.os, "sysconf", sizes.__getitem__, raising=False)
+    rows = {name: cells for name, *cells in definitions._machines().rows}
+    assert rows["memory"] == ["8 GB", "8 GiB"]

@@ -5,12 +5,22 @@ import math
 import numpy as np
 import pytest
 from handmade import features
-from panels import angle_of, by_label, drawn, notes, texts_of
+from panels import angle_of, assert_apart, assert_legible, by_label, drawn, notes, texts_of
 from small_experiments import PAPER
 
 import lineament as ln
 from lineament.output import canvas
-from lineament.reproduce import arena, grid, layers, museum, noise, real, repetition
+from lineament.reproduce import (
+    arena,
+    grid,
+    layers,
+    museum,
+    noise,
+    real,
+    repetition,
+    similarity,
+)
+from lineament.reproduce.findings import dot_chart, log_axis
 from lineament.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
 from lineament.scan.poses import compose
 from lineament.simulation import World, truth
@@ -42,6 +52,8 @@ def test_figures_2_and_3_have_raw_and_filtered_points_and_their_spacing(shown):
     np.testing.assert_allclose(curves["raw"][1:, 1], steps, atol=1e-9)
     steps = np.hypot(*np.diff(filtered, axis=0).T)
     np.testing.assert_allclose(curves["filtered"][1:, 1], steps, atol=1e-9)
+    for figure in shown:
+        assert_legible(figure)
 
 
 def test_figure_5_counts_the_clusters(shown):
@@ -51,6 +63,8 @@ def test_figure_5_counts_the_clusters(shown):
     layers._clusters(scan, found)
     titles = [(axes.get_title(loc="left"), texts_of(axes)) for axes in shown[0].axes]
     assert titles == [("two", "2 clusters"), ("one", "1 cluster")]
+    for figure in shown:
+        assert_legible(figure)
 
 
 def test_figure_9_has_the_median_and_the_range_of_the_seeds(shown):
@@ -86,6 +100,8 @@ def test_figure_9_has_the_median_and_the_range_of_the_seeds(shown):
         for curve in curves:
             np.testing.assert_allclose(curve, [(0.5, 0), (grid.THRESHOLD, 0.26)])
         assert axes.get_xscale() == "log"
+    for figure in shown:
+        assert_legible(figure)
 
 
 class _Ranked:
@@ -111,6 +127,8 @@ def test_curves_of_repeated_corners_begin_where_they_do_not_scatter(shown, logs)
         for curve, n in zip(drawn(axes), (20, 30), strict=True):
             count = np.arange(real.FIRST + 1, n + 1)
             np.testing.assert_allclose(curve, np.column_stack((count, 100 / count)))
+    for figure in shown:
+        assert_legible(figure)
 
 
 def in_frame(pose, points):
@@ -123,17 +141,19 @@ def test_figure_13_has_the_room_the_places_and_both_corners_in_each(shown):
     views = [(PAPER.scan(WORLD, pose, rng), truth(WORLD, pose, PAPER)) for pose in POSES]
     _figure(views)
     room, *panels = shown[0].axes
-    marks = notes(room)
+    marks = [(text.strip(), at) for text, at in notes(room)]
     assert [text for text, _ in marks] == ["A", "B", "1", "2", "3", "4", "5"]
     np.testing.assert_allclose([at for _, at in marks[:2]], (A, B))
     np.testing.assert_allclose([at for _, at in marks[2:]], [pose[:2] for pose in POSES])
     corners = [tuple(np.round(corner, 6)) for corner in (A, B)]
-    for arrow, (x, y, theta) in zip(room.patches, POSES, strict=True):
-        tip = max(arrow.get_xy(), key=lambda point, x=x, y=y: math.dist(point, (x, y)))
-        assert angle_of([np.subtract(tip, (x, y))]) == pytest.approx(math.degrees(theta), abs=0.1)
+    for arrow, (x, y, theta) in zip(room.collections, POSES, strict=True):
+        assert arrow.XY.tolist() == [[x, y]]
+        assert angle_of([(arrow.U[0], arrow.V[0])]) == pytest.approx(math.degrees(theta))
     for k, (axes, pose) in enumerate(zip(panels, POSES, strict=True), 1):
         assert axes.get_title(loc="left") == f"Place {k}"
         assert in_frame(pose, [at for text, at in notes(axes) if text in "AB"]) == corners
+    for figure in shown:
+        assert_legible(figure)
 
 
 def test_the_name_of_a_corner_stands_before_it_on_the_line_of_sight():
@@ -173,3 +193,48 @@ def test_corners_of_the_arena_are_drawn_for_each_method_that_found_some(shown):
         assert [wall.tolist() for wall in drawn_walls] == walls.segments.reshape(-1, 2, 2).tolist()
         assert real_corners.tolist() == [[4, 0]]
         np.testing.assert_array_equal(positions, found)
+    for figure in shown:
+        assert_legible(figure)
+
+
+@pytest.mark.parametrize(("count", "columns", "rows"), [(0, 4, 1), (1, 1, 1), (3, 3, 1), (4, 3, 2)])
+def test_panels_are_as_many_as_asked_for_and_as_wide_as_high(count, columns, rows):
+    figure, panels = canvas.new_panels(count, columns)
+    assert list(panels) == figure.axes
+    assert len(panels) == count
+    assert figure.get_size_inches().tolist() == [9, 9 * rows / columns]
+
+
+def test_errors_of_methods_are_strips_with_one_axis_below(monkeypatch):
+    scan = ln.LaserScan([5.0, 5.0, math.nan], -0.1, 0.1)
+    errors = iter([[0.02, 0.5, math.nan], [0.02, math.nan, math.nan]])
+    monkeypatch.setattr(similarity, "similarity_errors", lambda *_: np.array(next(errors)))
+    figure = similarity.error_strips(scan, {"a": features(3), "b": features(3)})
+    assert [axes.get_title(loc="right") for axes in figure.axes] == [
+        *("a: 100 % explained", "b: 50 % explained")]  # fmt: skip
+    assert [axes.get_xlabel() for axes in figure.axes] == ["", "bearing [°]"]
+    for axes in figure.axes:
+        _, paper = drawn(axes)
+        assert set(paper[:, 1]) == {0.01}
+        labels = [(label.get_position()[1], label.get_text()) for label in axes.get_yticklabels()]
+        assert labels == [(0.001, "1 mm"), (0.01, "1 cm"), (0.1, "0.1 m"), (1.0, "1 m")]
+    assert_legible(figure)
+
+
+def test_rows_of_a_chart_are_legible(shown):
+    rows = {f"method {k}, shared steps": {"f1": k / 40, "t": 2.0**k} for k in range(40)}
+    dot_chart({"one": rows, "other": rows}, {"F1": ("f1", 1), "time": ("t", 1)}, ["time"])
+    assert_legible(shown[0])
+    assert_apart(shown[0].axes[0].get_yticklabels())
+
+
+@pytest.mark.parametrize(("high", "numbers"), [(150, [2, 5, 10, 20, 50, 100]),
+                                               (400, [10, 100])])  # fmt: skip
+def test_a_log_axis_has_numbers_at_1_2_and_5_while_these_are_few(high, numbers):
+    axes = canvas.new_figure(4, 3).subplots()
+    axes.set_xlim(2, high)
+    log_axis(axes.xaxis)
+    assert axes.get_xscale() == "log"
+    assert [x for x in axes.get_xticks() if 2 <= x <= high] == pytest.approx(numbers)
+    assert not len(axes.get_xticks(minor=True))
+    assert axes.xaxis.get_major_formatter()(0.5, 0) == "0.5"

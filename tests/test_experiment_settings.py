@@ -10,7 +10,7 @@ SETTINGS = {
     "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
               "FACE_FROM": 0.1, "FACE_TO": 0.6},
     "compare": {"_TIMED": 50},
-    "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISE": (263, 3.7),
+    "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISY": 263, "_NOISE": 3.7,
                     "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75))},
     "grid": {"HALF_WIDTHS": (2, 8), "RADIUS": 6, "THRESHOLD": 0.66, "GATE": 0.1,
              "RADII": (3, 4, 5, 6, 7, 8, 10, 12, 16), "SCENES_A_FRAME": 2,

@@ -102,6 +102,19 @@ def new_figure(width: float, height: float, *, dark: bool = False) -> Figure:
     return figure
 
 
+def new_panels(count: int, columns: int, height: float = 1.0, **given: Any) -> tuple[Figure, Any]:
+    """Make a figure as wide as a page, and so many panels (n,) in it, at most `columns` in a row.
+
+    Their `height` is that of a row, of the width of a column.
+    """
+    rows = max(math.ceil(count / columns), 1)
+    figure = new_figure(PAGE_WIDTH, PAGE_WIDTH * height * rows / columns)
+    panels = figure.subplots(rows, columns, squeeze=False, **given).ravel()
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
 def theme_of(artist: Artist) -> Theme:
     """Return the colours that can be seen on the paper of a figure, whoever made it."""
     from matplotlib.colors import to_rgba

@@ -127,6 +127,20 @@ def _reach(scan: LaserScan) -> Array:
     return np.asarray(np.interp(bins + 1, known, farthest[known]))
 
 
+def draw_name(axes: Axes, name: str, at: Array, viewer: Array, color: str) -> None:
+    """Write the name of a place on the line of sight to it, where no wall can be."""
+    axes.annotate(
+        name,
+        (float(at[0]), float(at[1])),
+        xytext=tuple(30 * (viewer - at) / math.dist(viewer, at)),
+        textcoords="offset points",
+        ha="left" if viewer[0] > at[0] else "right",
+        va="center",
+        color=color,
+        arrowprops={"arrowstyle": "-", "color": color},
+    )
+
+
 def draw_segments(axes: Axes, segments: NDArray[np.void]) -> None:
     """Draw lines with a short mark across each end."""
     label, ink = "segment", theme_of(axes).ink

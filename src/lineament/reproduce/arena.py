@@ -135,19 +135,14 @@ def arena_figure(
 ) -> Figure:
     """Draw the corners that the methods found in all scans, on the map of the arena."""
     scores = {method: found for method, found in scores.items() if len(found[1])}
-    columns = 4
-    rows = max(-(-len(scores) // columns), 1)
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.0 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels[len(scores) :]:
-        axes.remove()
+    figure, panels = canvas.new_panels(len(scores), 4)
     ends = arena.walls.segments.reshape(-1, 2)
-    for axes, (method, (numbers, positions)) in zip(panels, scores.items(), strict=False):
+    for axes, (method, (numbers, positions)) in zip(panels, scores.items(), strict=True):
         about = f"found {100 * numbers['recall']:.0f} %, false {100 * numbers['false']:.0f} %"
         canvas.style_plane(axes, method, about, ends)
-        axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK, linewidth=1.0)
-        axes.plot(*arena.corners.T, "o", markersize=9, mfc="none", mec=canvas.FAINT)
-        axes.plot(*positions.T, ".", markersize=3, alpha=0.4, color=canvas.CORNER_COLOR)
+        axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK)
+        axes.plot(*arena.corners.T, "o", mfc="none", mec=canvas.FAINT)
+        axes.plot(*positions.T, ".", color=canvas.CORNER_COLOR)
     return Figure(
         name.replace(", ", "-"),
         f"{name}: corners that each method found in all scans (red), the fitted walls and the real "

@@ -3,6 +3,7 @@
 import math
 import os
 from importlib.metadata import version
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 #: range [m].
 _CORNER, _EDGES = (3.0, -1.6), ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75))
 _WALLS = [[_EDGES[2], _CORNER, (3.3, 0.2)], _EDGES[:2]]
-_NOISE = 263, 3.7
+_NOISY, _NOISE = 263, 3.7
 #: Vertices of the cluster of Figure 6 [m].
 _STEPS = [(3.0, -1.6), (3.0, 0.3), (1.9, 0.5), (1.7, 1.6)]
 
@@ -49,27 +50,8 @@ def run(_: Setting, progress: Progress) -> Findings:
 Drawn = tuple[str, str, Any, dict[str, float]]
 
 
-def _note(axes: Axes, text: str, at: Any, by: tuple[float, float], color: str = canvas.INK) -> None:
-    """Write a text so many points beside a place, with a thin line between."""
-    x, y = at
-    axes.annotate(
-        text,
-        (float(x), float(y)),
-        xytext=by,
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=9,
-        color=color,
-        zorder=8,
-        arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.6, "shrinkB": 4},
-    )
-
-
-def _line(
-    axes: Axes, start: Any, end: Any, style: str = "-", lw: float = 0.9, color: str = canvas.INK
-) -> None:
-    axes.plot(*np.transpose([start, end]), style, lw=lw, color=color)
+def _line(axes: Axes, start: Any, end: Any, style: str = "-", color: str = canvas.INK) -> None:
+    axes.plot(*np.transpose([start, end]), style, color=color)
 
 
 def _without_noise(world: World, step: float) -> LaserScan:
@@ -82,44 +64,41 @@ def _scan() -> Drawn:
     """Figure 1: the coordinates, and what a scan shows of edges, corners and noise."""
     scan = _without_noise(World.of_polygons(_WALLS), 1 / 3)
     ranges = scan.ranges.copy()
-    ranges[_NOISE[0]] = _NOISE[1]
+    ranges[_NOISY] = _NOISE
     scan = LaserScan(ranges, scan.angle_min, scan.angle_increment)
     found = Extractor("liu:scale_free")(scan)
-    figure = canvas.new_figure(6.5, 6.2)
-    axes = figure.subplots()
-    canvas.style_plane(axes, "Figure 1", "", np.array([(-0.1, -2.1), (3.9, 2.2)]))
-    for bearing in (scan.angles[0], scan.angles[-1]):
-        _line(axes, (0, 0), 2.3 * np.array((math.cos(bearing), math.sin(bearing))), lw=0.6)
-    fan = np.linspace(scan.angles[0], scan.angles[-1], 90)
-    axes.plot(0.6 * np.cos(fan), 0.6 * np.sin(fan), color=canvas.FAINT, lw=0.8)
-    axes.text(0.65, 0.12, "160°", fontsize=9)
-    axes.text(0.4, -1.3, r"$\theta_1 = -80°$", fontsize=9)
+    figure, (axes,) = canvas.new_panels(1, 1)
+    shown = drawing.draw_beams(axes, scan, found.clusters)
+    canvas.style_plane(axes, "Figure 1", "", shown)
+    bearings = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))
+    view = 0.6 * bearings
+    axes.plot(*np.vstack(((0, 0), view, (0, 0))).T, color=canvas.FAINT)
+    axes.text(*view[len(scan) // 2], " 160°", va="bottom")
+    axes.text(*view[0], r" $\theta_1 = -80°$", va="top")
     beam = 330
     x, y = point = scan.points[beam]
     _line(axes, (0, 0), point, color=_BLUE)
     _line(axes, (x, 0), point, ":", color=_BLUE)
     _line(axes, (0, y), point, ":", color=_BLUE)
-    axes.axhline(0, color=canvas.FAINT, lw=0.7, zorder=0)
-    axes.axvline(0, color=canvas.FAINT, lw=0.7, zorder=0)
-    turn = np.linspace(0, scan.angles[beam], 20)
-    axes.plot(1.1 * np.cos(turn), 1.1 * np.sin(turn), color=_BLUE, lw=0.9)
-    axes.text(1.17, 0.14, r"$\theta_i$", color=_BLUE, fontsize=11)
-    axes.text(0.64 * x, 0.79 * y, r"$\rho_i$", color=_BLUE, fontsize=11)
-    _note(axes, r"$(x_i, y_i)$", point, (34, 10), _BLUE)
-    xs, ys = scan.points.T
-    axes.scatter(xs, ys, s=8, c=canvas.PALETTE[found.clusters], linewidths=0, zorder=3)
-    noise = scan.points[_NOISE[0]]
-    axes.plot(*noise, "x", ms=6, color="#57606a", zorder=4)
-    drawing.draw_sensor(axes)
+    axes.axhline(0, color=canvas.FAINT)
+    axes.axvline(0, color=canvas.FAINT)
+    turn = 1.1 * bearings[len(scan) // 2 : beam + 1]
+    axes.plot(*turn.T, color=_BLUE)
+    axes.text(*turn[len(turn) // 2], r" $\theta_i$", color=_BLUE)
+    axes.text(*(point / 2), r"$\rho_i$ ", color=_BLUE, ha="right", va="bottom")
+    axes.text(x, y, " $(x_i, y_i)$", color=_BLUE, va="bottom")
     drawing.draw_breakpoints(axes, found.breakpoints)
-    drawing.draw_points(axes, found, extent=5.0)
-    _note(axes, "corner", _CORNER, (-34, 26), _RED)
-    _note(axes, "noise point", noise, (-20, 26), "#57606a")
-    for edge, by in zip(_EDGES, ((-52, -8), (44, 4), (20, -18)), strict=True):
-        _note(axes, "breakpoint", edge, by, canvas.BREAK_COLOR)
+    drawing.draw_points(axes, found, extent=np.inf)
+    for name, color, *places in (
+        ("corner", _RED, _CORNER),
+        ("noise point", canvas.LIGHT.text, scan.points[_NOISY]),
+        ("breakpoint", canvas.BREAK_COLOR, *_EDGES),
+    ):
+        for place in places:
+            drawing.draw_name(axes, name, np.array(place), np.zeros(2), color)
     corners, breaks = found.corners["position"], found.breakpoints["position"]
     off = [_away(corners, _CORNER), *(_away(breaks, edge) for edge in _EDGES)]
-    labelled = float(found.clusters[_NOISE[0]] < 0)
+    labelled = float(found.clusters[_NOISY] < 0)
     caption = (
         "A scan in the coordinates of the paper: beam i with bearing and range, and what it calls "
         "breakpoints, corners and noise points, as the method finds them (liu:scale_free)."
@@ -138,18 +117,20 @@ def _spacing() -> Drawn:
     trace = Extractor("liu", half_width=0).trace(
         SENSORS["paper"].scan(wall, _ORIGIN, np.random.default_rng(0))
     )
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
-    plan, axes = figure.subplots(1, 2)
+    figure, (plan, axes) = canvas.new_panels(2, 2)
     points = scan.points[scan.valid]
-    canvas.style_plane(plan, "Figure 4", "beams 5° apart", np.vstack((points, [(0, -1)])))
+    canvas.style_plane(plan, "Figure 4", "beams 5° apart", np.vstack((points, (0, 0))))
     for point in points:
-        _line(plan, (0, 0), point, lw=0.5, color=canvas.FAINT)
-    plan.plot(*points.T, "o", ms=4, color=_BLUE, zorder=3)
+        _line(plan, (0, 0), point, color=canvas.FAINT)
+    plan.plot(*points.T, "o", color=_BLUE)
     drawing.draw_sensor(plan)
-    middles, steps = (points[1:] + points[:-1]) / 2, np.hypot(*np.diff(points, axis=0).T)
-    for k, by in ((0, (-4, -16)), (len(steps) - 1, (0, 22))):
-        _line(plan, points[k], points[k + 1], lw=2, color=_RED)
-        _note(plan, f"{steps[k]:.2f} m", middles[k], by, _RED)
+    steps = []
+    for pair in (points[:2], points[-2:]):
+        _line(plan, *pair, color=_RED)
+        steps.append(math.dist(*pair))
+        middle, (x, y) = pair.mean(axis=0), pair[1] - pair[0]
+        behind = middle + np.array((y, -x))
+        drawing.draw_name(plan, f"{steps[-1]:.2f} m", middle, behind, _RED)
     canvas.style(axes, "", "beams ⅓° apart", "range [m]", "spacing of neighbours [m]")
     order = np.argsort(trace.scan.ranges)
     order = order[np.isfinite(trace.spacing[order])]
@@ -157,16 +138,16 @@ def _spacing() -> Drawn:
         of[order] for of in (trace.scan.ranges, trace.spacing, trace.distance_threshold)
     )
     least = far * trace.scan.angle_increment
-    axes.plot(far, spacing, ".", color=_BLUE, ms=4, label="spacing on the wall")
+    axes.plot(far, spacing, ".", color=_BLUE, label="spacing on the wall")
     axes.plot(far, least, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$")
-    axes.plot(far, limit, color=_RED, lw=1.2, label=r"threshold $T_d$ (equation 10)")
-    axes.legend(fontsize=8, frameon=False)
+    axes.plot(far, limit, color=_RED, label=r"threshold $T_d$ (equation 10)")
+    axes.legend(frameon=False)
     caption = (
         "The spacing of neighbouring points grows with their range, and with the incidence on the "
         "wall: so does the threshold of the clusters."
     )
     beyond = float((spacing > limit).mean())
-    return "fig4", caption, figure, {"ratio": float(steps[-1] / steps[0]), "beyond": beyond}
+    return "fig4", caption, figure, {"ratio": steps[-1] / steps[0], "beyond": beyond}
 
 
 def _chords() -> Drawn:
@@ -174,33 +155,25 @@ def _chords() -> Drawn:
     scan = _without_noise(World.of_polygons([_STEPS]), 1 / 3)
     points = scan.points[scan.valid]
     found = primary_corners(points, response="relative", threshold=0.5, support_radius=RADIUS)
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 4.6)
+    figure, panels = canvas.new_panels(3, 3)
     ends = [0, len(points) - 1]
-    for k, (axes, candidate) in enumerate(zip(figure.subplots(1, 3), found, strict=False)):
+    for k, (axes, candidate) in enumerate(zip(panels, found, strict=False)):
         beam, distance = int(candidate["beam"]), float(candidate["chord_distance"])
         first = max(end for end in ends if end < beam)
         last = min(end for end in ends if end > beam)
         start, end, corner = points[first], points[last], points[beam]
-        along = (end - start) / np.hypot(*(end - start))
-        about = "accepted" if candidate["accepted"] else "rejected: the branch ends"
-        shown = np.array([(1.3, -1.6), *_STEPS, (3.5, 1.6)])
-        canvas.style_plane(axes, "" if k else "Figure 6", f"step {k + 1}: {about}", shown)
-        axes.plot(*points.T, ".", ms=3.5, color=canvas.FAINT)
-        axes.plot(*points[first : last + 1].T, ".", ms=4.5, color=_BLUE)
+        along = (end - start) / math.dist(start, end)
+        verdict = "accepted" if candidate["accepted"] else "rejected, the branch ends"
+        about = f"step {k + 1}: d = {distance:.2f} m, {verdict}"
+        canvas.style_plane(axes, "" if k else "Figure 6", about, points)
+        axes.plot(*points.T, ".", color=canvas.FAINT)
+        axes.plot(*points[first : last + 1].T, ".", color=_BLUE)
         _line(axes, start, end, "--")
-        foot = start + along * ((corner - start) @ along)
-        _line(axes, corner, foot, color=_RED, lw=1.3)
-        axes.plot(*corner, "D", ms=6, mfc="none", mec=_RED, mew=1.4)
-        side = 1 if foot[0] > corner[0] + 0.01 else -1
-        for text, place, by, color in (
-            (f"d = {distance:.2f} m", foot, 5 * side, _RED),
-            ("first", start, 7, canvas.INK),
-            ("last", end, 7, canvas.INK),
-        ):
-            beside = {"xytext": (by, 0), "ha": "left" if by > 0 else "right", "va": "center"}
-            given = {"textcoords": "offset points", "fontsize": 9, "color": color}
-            axes.annotate(text, place, **beside, **given)
-        axes.plot(*np.transpose([start, end]), "o", ms=5, color=canvas.INK)
+        _line(axes, corner, start + along * ((corner - start) @ along), color=_RED)
+        axes.plot(*corner, "D", mfc="none", mec=_RED)
+        axes.annotate("  first", start, va="bottom")
+        axes.annotate("  last", end, va="top")
+        axes.plot(*np.transpose([start, end]), "o", color=canvas.INK)
         if candidate["accepted"]:
             ends.append(beam)
     caption = (
@@ -216,29 +189,28 @@ def _chords() -> Drawn:
 def _parabolas() -> Drawn:
     """Figure 7: the distance to the tangent grows with the curvature of a parabola."""
     bends, x = (1.6, 0.6), np.linspace(-0.75, 0.75, 2 * RADIUS + 1)
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.9)
-    plan, axes = figure.subplots(1, 2)
+    figure, (plan, axes) = canvas.new_panels(2, 2)
     about = f"support radius {RADIUS}"
     canvas.style(plan, "Figure 7", about, "along the tangent", "distance to it")
-    fine = np.linspace(-0.8, 0.8, 200)
+    fine = np.linspace(x[0], x[-1])
     for bend, color in zip(bends, (_RED, _BLUE), strict=True):
         plan.plot(fine, bend * fine**2, color=color, label=f"$y = {bend} x^2$")
-        plan.vlines(x, 0, bend * x**2, color=color, lw=1.0, alpha=0.6)
-        plan.plot(x, bend * x**2, "o", ms=4, color=color)
+        plan.vlines(x, 0, bend * x**2, color=color)
+        plan.plot(x, bend * x**2, "o", color=color)
         axes.plot(2 * bend, bend * (x**2).sum(), "o", color=color)
     for k, name in ((RADIUS + 4, "A"), (RADIUS + 5, "B")):
-        plan.plot(x[k], 0, "o", ms=4, color=canvas.INK)
-        plan.text(x[k], -0.045, name, ha="center", fontsize=9)
-    plan.axhline(0, color=canvas.INK, lw=0.9)
-    plan.legend(fontsize=9, frameon=False, loc="upper center")
+        plan.plot(x[k], 0, "o", color=canvas.INK)
+        plan.text(x[k], 0, f" {name}", va="bottom")
+    plan.axhline(0, color=canvas.INK)
+    plan.legend(frameon=False, loc="upper center")
     about = "corner_response, form “tangent”"
     canvas.style(axes, "", about, "curvature at the vertex", "cumulative distance to the tangent")
     curvatures = np.linspace(0.0, 4.0, 17)
     sampled = (np.column_stack((x, k / 2 * x**2)) for k in curvatures)
     given: dict[str, Any] = {"support_radius": RADIUS, "response": "tangent"}
     responses = [corner_response(points, **given)[RADIUS] for points in sampled]
-    axes.plot(curvatures, responses, color=canvas.INK, lw=1.2, label="of sampled parabolas")
-    axes.legend(fontsize=8, frameon=False)
+    axes.plot(curvatures, responses, color=canvas.INK, label="of sampled parabolas")
+    axes.legend(frameon=False)
     caption = (
         "Of two parabolas with the same tangent, the more curved one is farther from it at the "
         "same places: the cumulative distance is proportional to the curvature. The operator’s "
@@ -273,41 +245,33 @@ def _tangent() -> Drawn:
     s, slopes, bends = fitted(points, at, RADIUS)
     support, target = points[at - RADIUS : at + RADIUS + 1], points[at]
     tangent = slopes / np.hypot(*slopes)
-    distances = (support - target) @ np.array((-tangent[1], tangent[0]))
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 6.4)
-    panels = figure.subplots(2, 3).ravel()
-    for axes, letter, about in (
-        (panels[0], "Figure 8  (a)", f"support of a target, radius {RADIUS}"),
-        (panels[5], "(f)", "tangent, and distances to it"),
-    ):
-        canvas.style_plane(
-            axes, letter, about, np.vstack((support, target + np.outer((-0.38, 0.38), tangent)))
-        )
-        axes.plot(*points.T, ".", ms=3, color=canvas.FAINT)
-        axes.plot(*support.T, "o", ms=4, color=_BLUE)
-        axes.plot(*target, "o", ms=6, color=_RED, zorder=5)
-    fine = np.linspace(s[0], s[-1], 100)
-    for k, name in enumerate("xy"):
-        for axes, letter in ((panels[1 + k], "bc"[k]), (panels[3 + k], "de"[k])):
-            fit = letter in "de"
-            about = f"{name}(s), fitted" if fit else f"{name} by arc length"
-            canvas.style(axes, f"({letter})", about, "arc length s [m]", f"{name} [m]")
-            axes.plot(s, support[:, k], "o", ms=4, color=_BLUE)
-            axes.plot(0, target[k], "o", ms=6, color=_RED, zorder=5)
-            if fit:
-                axes.plot(fine, bends[k] * fine**2 + slopes[k] * fine + target[k], color=_GREEN)
-                axes.plot(fine, slopes[k] * fine + target[k], ":", color=canvas.INK, lw=1)
-                axes.text(
-                    *(0.05, 0.06 if slopes[k] < 0 else 0.9),
-                    f"${name}'(0) = {slopes[k]:.2f}$",
-                    transform=axes.transAxes,
-                    fontsize=9,
-                )
-    _line(panels[5], target - 0.38 * tangent, target + 0.38 * tangent, color=_GREEN, lw=1.4)
-    for point, distance in zip(support, distances, strict=True):
-        _line(panels[5], point, point - distance * np.array((-tangent[1], tangent[0])), color=_RED)
+    normal = np.array((-tangent[1], tangent[0]))
+    distances = (support - target) @ normal
+    feet = support - np.outer(distances, normal)
     total = float(np.abs(distances).sum())
-    panels[5].text(0.04, 0.05, f"Σ d = {total:.2f} m", transform=panels[5].transAxes, fontsize=9)
+    figure, (support_at, *by_arc, last) = canvas.new_panels(6, 3)
+    for axes, letter, about in (
+        (support_at, "Figure 8  (a)", f"support of a target, radius {RADIUS}"),
+        (last, "(f)", f"tangent, and distances to it: Σ d = {total:.2f} m"),
+    ):
+        canvas.style_plane(axes, letter, about, np.vstack((support, feet)))
+        axes.plot(*points.T, ".", color=canvas.FAINT)
+        axes.plot(*support.T, "o", color=_BLUE)
+        axes.plot(*target, "o", color=_RED)
+    fine = np.linspace(s[0], s[-1])
+    kinds = product(("{} by arc length", "{}(s), fitted"), enumerate("xy"))
+    for axes, letter, (about, (k, name)) in zip(by_arc, "bcde", kinds, strict=True):
+        canvas.style(axes, f"({letter})", about.format(name), "arc length s [m]", f"{name} [m]")
+        axes.plot(s, support[:, k], "o", color=_BLUE)
+        axes.plot(0, target[k], "o", color=_RED)
+        if "fitted" in about:
+            axes.plot(fine, bends[k] * fine**2 + slopes[k] * fine + target[k], color=_GREEN)
+            slope = f"${name}'(0) = {slopes[k]:.2f}$"
+            axes.plot(fine, slopes[k] * fine + target[k], ":", color=canvas.INK, label=slope)
+            axes.legend(frameon=False)
+    _line(last, feet[0], feet[-1], color=_GREEN)
+    for point, foot in zip(support, feet, strict=True):
+        _line(last, point, foot, color=_RED)
     caption = (
         "The corner detection operator at a target (red), beams 1° apart: support, abscissa and "
         "ordinate by arc length, their least squares parabolas through the target, whose slopes "

@@ -257,11 +257,11 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
         canvas.style(axes, "", xlabel=fill(label, 22))
         for color, (name, methods) in zip(canvas.PALETTE, numbers.items(), strict=False):
             values = [factor * methods.get(row, {}).get(key, math.nan) for row in rows]
-            dots = {"color": color, "markersize": 5, "alpha": 0.85, "label": name}
+            dots = {"color": color, "label": name}
             axes.plot(values, range(len(rows)), "o", **dots)
         if label in log_axes:
             log_axis(axes.xaxis)
-        axes.set_yticks(range(len(rows)), rows, fontsize=8)
+        axes.set_yticks(range(len(rows)), rows)
     canvas.add_legend(figure)
     return canvas.figure_bytes(figure)
 

@@ -122,8 +122,8 @@ def like_figure_10(seed: int) -> Frame:
 
 def _clusters(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     """Draw the clusters alone, side by side, with the ends of surfaces."""
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.8)
-    for axes, (name, features) in zip(figure.subplots(1, len(found)), found.items(), strict=True):
+    figure, panels = canvas.new_panels(len(found), len(found))
+    for axes, (name, features) in zip(panels, found.items(), strict=True):
         shown = drawing.draw_beams(axes, scan, features.clusters)
         clusters = len(np.unique(features.clusters[features.clusters >= 0]))
         canvas.style_plane(axes, name, canvas.count(clusters, "cluster"), shown)

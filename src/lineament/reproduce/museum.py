@@ -9,19 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
+from ..evaluation.similarity import SimilarityScores, similarity_scores
 from ..extractor import Extractor
 from ..features import Features
 from ..logs import open_log
 from ..methods import DEFAULT_METHOD
 from ..motion import Tracker
-from ..output import canvas, drawing
+from ..output import canvas
 from ..scan import Array, LaserScan
 from ..scan.poses import compose
 from .contenders import LIU_PAPER, PDBS_LINES, Extract, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
 from .scans import frame_times
 from .scenes import pictures
+from .similarity import error_strips
 from .two_corners import DISTANCE, distance_found, draw_place
 
 #: The topic of the scans in a bag of the Deutsches Museum, 2-D, by Cartographer.
@@ -236,19 +237,14 @@ def _metres(length: float) -> str | None:
 def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     """Draw the similarity error of each beam, by method."""
     shown = [name for name in (LIU_PAPER, "iepf:paper", PDBS_LINES) if name in found]
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 2.0 * len(shown))
-    for axes, name in zip(figure.subplots(len(shown), 1, squeeze=False)[:, 0], shown, strict=True):
-        drawing.draw_errors(axes, scan, similarity_errors(scan, found[name]))
-        axes.set_title(name, loc="right", fontsize=10, fontweight="bold", color=canvas.INK)
-    caption = "The museum, the same scan: similarity error of each beam."
+    figure = error_strips(scan, {name: found[name] for name in shown})
+    caption = "The museum, the same scan: similarity error of each beam. Dashed: 0.01 m."
     return Figure("museum-fig12", caption, canvas.figure_bytes(figure))
 
 
 def _places(views: Sequence[View], a: int, b: int) -> Figure:
     """Draw what is found from the five places."""
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 6.4)
-    *panels, unused = figure.subplots(2, 3).ravel()
-    unused.remove()
+    figure, panels = canvas.new_panels(PLACES, 3)
     for k, (axes, view) in enumerate(zip(panels, _at_places(views), strict=True), 1):
         places = (view.corners[number][0] for number in (a, b))
         draw_place(axes, k, view.scan, view.features, *places)

@@ -196,23 +196,22 @@ def _figure(seed: int) -> Figure:
     filtered = bilateral_filter(scan)
     noisy = abs(scan.ranges - sensor.ideal(world, origin)[0]) > OFF
     bearings = np.column_stack((np.cos(scan.angles), np.sin(scan.angles)))
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 4.4)
-    plan, spacing = figure.subplots(1, 2, width_ratios=[1, 1.5])
+    figure, (plan, spacing) = canvas.new_panels(2, 2)
     canvas.style_plane(plan, "Figure 2", "raw and filtered points", scan.points)
-    plan.plot(*scan.points.T, ".", color=_RAW, markersize=5, label="raw")
-    plan.plot(*(filtered[:, np.newaxis] * bearings).T, ".", color=_FILTERED, ms=3, label="filtered")
-    plan.plot(*scan.points[noisy].T, "o", mfc="none", color=canvas.INK, ms=9, label="noise point")
+    plan.plot(*scan.points.T, "o", color=_RAW, mfc="none", label="raw")
+    plan.plot(*(filtered[:, np.newaxis] * bearings).T, ".", color=_FILTERED, label="filtered")
+    plan.plot(*scan.points[noisy].T, "x", color=canvas.INK, label="noise point")
     drawing.draw_sensor(plan)
     about = "distance of each point to the one before it"
     canvas.style(spacing, "Figure 3", about, "bearing [°]", "spacing [m]")
     x = np.degrees(scan.angles)
     for name, half_width, color in (("raw", 0, _RAW), ("filtered", HALF_WIDTH, _FILTERED)):
         trace = Extractor("liu", half_width=half_width).trace(scan)
-        spacing.plot(x, trace.spacing, color=color, linewidth=1.1, label=name)
-    spacing.plot(x, trace.distance_threshold, "--", color=canvas.INK, lw=1, label="threshold")
+        spacing.plot(x, trace.spacing, color=color, label=name)
+    spacing.plot(x, trace.distance_threshold, "--", color=canvas.INK, label="threshold")
     log_axis(spacing.yaxis)
     for axes in (plan, spacing):
-        axes.legend(fontsize=8, frameon=False)
+        axes.legend(frameon=False)
     caption = (
         "Noise points between and on walls. Those close to a wall are pulled towards it; the "
         "others stay, and their spacing stays above the threshold."

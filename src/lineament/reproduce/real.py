@@ -286,18 +286,15 @@ def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
     """Draw how many corners are repeated against the share of them, as less certain ones come."""
     if not ranked:
         return []
-    figure = canvas.new_figure(11, 3.6 * -(-len(ranked) // 2))
-    panels = figure.subplots(-(-len(ranked) // 2), 2, squeeze=False).ravel()
-    for axes, (log, found) in zip(panels, ranked.items(), strict=False):
+    figure, panels = canvas.new_panels(len(ranked), 2)
+    for axes, (log, found) in zip(panels, ranked.items(), strict=True):
         canvas.style(axes, log, "", "corners repeated", "share repeated [%]")
         for k, (method, of) in enumerate(found.items()):
             count, rate = (part[FIRST:] for part in of.curve())
             line = {"linestyle": "-" if k < len(canvas.PALETTE) else "--", "label": method}
             color = canvas.PALETTE[k % len(canvas.PALETTE)]
-            axes.plot(count, 100 * rate, color=color, linewidth=1.6, **line)
+            axes.plot(count, 100 * rate, color=color, **line)
         axes.set_ylim(0, 100)
-    for axes in panels[len(ranked) :]:
-        axes.remove()
     canvas.add_legend(figure)
     caption = (
         "Corners found again from another place, less chance, ranked by their quality: how many "

@@ -167,11 +167,10 @@ def _figures(setting: Setting, progress: Progress) -> tuple[Figure, ...]:
 
 def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) -> Figure:
     """Draw AR along one of the two parameters; a panel for each half-width."""
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 3.8)
-    panels = figure.subplots(1, len(HALF_WIDTHS), sharey=True)
+    figure, panels = canvas.new_panels(len(HALF_WIDTHS), len(HALF_WIDTHS), sharey=True)
     for axes, half_width in zip(panels, HALF_WIDTHS, strict=True):
         canvas.style(axes, f"half-width of the filter: {half_width} beams")
-        axes.axvline(RADIUS if field == "support_radius" else THRESHOLD, color=canvas.FAINT, lw=3)
+        axes.axvline(RADIUS if field == "support_radius" else THRESHOLD, color=canvas.FAINT)
         for form, color in _COLORS.items():
             paper = Parameters(form, half_width, RADIUS, THRESHOLD)
             # Those that differ from it in this field at most.
@@ -179,15 +178,14 @@ def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) 
             x = [getattr(p, field) for p in along]
             values = [sorted(grid[p]["of_actual"] for grid in grids) for p in along]
             low, middle, high = zip(*((v[0], v[len(v) // 2], v[-1]) for v in values), strict=True)
-            axes.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
-            axes.plot(x, middle, color=color, marker="o", markersize=3.5, label=form)
-        axes.set_xlabel(label, fontsize=10)
-        axes.set_ylim(-0.02, 1.0)
+            axes.fill_between(x, low, high, color=color, alpha=0.15)
+            axes.plot(x, middle, color=color, marker="o", label=form)
+        axes.set_xlabel(label)
         if field == "threshold":
             axes.set_xscale("log")
             axes.set_xticks([], minor=True)
             ticks = (0.05, 0.1, 0.2, 0.5, 1.0)
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    panels[0].set_ylabel("AR of the actual corners", fontsize=10)
+    panels[0].set_ylabel("AR of the actual corners")
     canvas.add_legend(figure)
     return Figure(name, caption, canvas.figure_bytes(figure))

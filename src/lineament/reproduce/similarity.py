@@ -1,9 +1,13 @@
 """Figure 12: how many measurements are explained, and how far they are from their lines."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
 from ..extractor import Extractor
+from ..features import Features
 from ..methods import DEFAULT_METHOD
 from ..methods.stages import bilateral_filter
 from ..output import canvas, drawing
@@ -100,20 +104,23 @@ def _table(where: str, scores: dict[str, SimilarityScores]) -> Table:
     )
 
 
-def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 2.4 * len(SHOWN))
-    panels = figure.subplots(len(SHOWN), 1, sharex=True)
-    for axes, name in zip(panels, SHOWN, strict=True):
-        errors = similarity_errors(scan, methods[name](scan))
+def error_strips(scan: LaserScan, found: Mapping[str, Features]) -> Any:
+    """Draw the similarity error of each beam, a strip for each method."""
+    figure, panels = canvas.new_panels(len(found), 1, height=0.25, sharex=True)
+    for axes, (name, features) in zip(panels, found.items(), strict=True):
+        errors = similarity_errors(scan, features)
         drawing.draw_errors(axes, scan, errors)
         about = f"{name}: {100 * np.isfinite(errors).sum() / scan.valid.sum():.0f} % explained"
-        axes.set_title(about, loc="right", fontsize=10, fontweight="bold", color=canvas.INK)
+        axes.set_title(about, loc="right", fontsize="medium", fontweight="bold", color=canvas.INK)
         axes.label_outer()
-        axes.set_yticks(
-            [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0], ["", "1 mm", "1 cm", "0.1 m", "1 m", ""]
-        )
+        axes.set_yticks([1e-3, 1e-2, 0.1, 1.0], ["1 mm", "1 cm", "0.1 m", "1 m"])
         axes.minorticks_off()
-        axes.axhline(SMALL, color=canvas.CORNER_COLOR, linewidth=1, linestyle="--")
+        axes.axhline(SMALL, color=canvas.CORNER_COLOR, linestyle="--")
+    return figure
+
+
+def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:
+    figure = error_strips(scan, {name: methods[name](scan) for name in SHOWN})
     least = f"{1e3 * drawing.LEAST_ERROR:g} mm"
     caption = (
         f"Similarity error of each explained measurement of a scan, {where}: that whose largest "

@@ -190,21 +190,20 @@ def _in_mm(length: float | None) -> float | None:
 
 def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
     """Draw the room with the five places, and a scan from each."""
-    figure = canvas.new_figure(canvas.PAGE_WIDTH, 6.4)
-    panels = figure.subplots(2, 3).ravel()
-    room = panels[0]
+    figure, (room, *panels) = canvas.new_panels(1 + len(POSES), 3)
     canvas.style_plane(room, "The room", "and the five places", WORLD.segments.reshape(-1, 2))
-    room.plot(*WORLD.segments.reshape(-1, 2, 2).T, color=canvas.INK, linewidth=1.2)
-    room.plot(*np.array((A, B)).T, ":", color=canvas.CORNER_COLOR, linewidth=1.2)
+    room.plot(*WORLD.segments.reshape(-1, 2, 2).T, color=canvas.INK)
+    room.plot(*np.array((A, B)).T, ":", color=canvas.CORNER_COLOR)
     for name, vertex in (("A", A), ("B", B)):
-        _label(room, name, vertex, np.mean(POSES, axis=0)[:2])
+        drawing.draw_name(
+            room, name, vertex, WORLD.segments.reshape(-1, 2).mean(axis=0), canvas.CORNER_COLOR
+        )
     for k, (axes, (x, y, theta), (scan, features)) in enumerate(
-        zip(panels[1:], POSES, views, strict=True), 1
+        zip(panels, POSES, views, strict=True), 1
     ):
         c, s = math.cos(theta), math.sin(theta)
-        room.arrow(x, y, 0.4 * c, 0.4 * s, width=0.02, color=canvas.INK)
-        room.plot(x, y, "o", markersize=5, color=canvas.INK)
-        room.annotate(str(k), (x, y), xytext=(7, -9), textcoords="offset points", fontsize=9)
+        room.quiver(x, y, c, s, angles="xy", color=canvas.INK)
+        room.annotate(f"{k} ", (x, y), ha="right", va="center")
         turn = np.array([[c, -s], [s, c]])
         draw_place(axes, k, scan, features, *((vertex - (x, y)) @ turn for vertex in (A, B)))
     canvas.add_legend(figure)
@@ -223,18 +222,4 @@ def draw_place(axes: Axes, k: int, scan: LaserScan, features: Features, a: Array
     canvas.style_plane(axes, f"Place {k}", "in the frame of the scanner", shown)
     drawing.draw_features(axes, features, scan, extent=6.0)
     for name, vertex in (("A", a), ("B", b)):
-        _label(axes, name, vertex, np.zeros(2))
-
-
-def _label(axes: Axes, name: str, at: Array, viewer: Array) -> None:
-    """Write the name of a corner on the line of sight to it, where no wall can be."""
-    toward = (viewer - at) / math.dist(viewer, at)
-    axes.annotate(
-        *(name, (float(at[0]), float(at[1])), tuple(15 * toward)),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=11,
-        fontweight="bold",
-        color=canvas.CORNER_COLOR,
-    )
+        drawing.draw_name(axes, name, vertex, np.zeros(2), canvas.CORNER_COLOR)
