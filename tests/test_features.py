@@ -1,12 +1,14 @@
 """Features and FeatureBatch: moving, tables, views; their fields, declared once."""
 
+import copy
 import json
 import math
+import pickle
 
 import numpy as np
 import pytest
 from test_tables import random_features
-from worlds import NOISE
+from worlds import NOISE, random_scan
 
 import lineament as ln
 from lineament.features import TABLES, Features, make_records, noise_of, noise_row
@@ -78,6 +80,23 @@ def test_features_are_made_by_name():
     """As the tables are more than they were: by place, one would be taken for another."""
     with pytest.raises(TypeError, match="positional"):
         Features(*(make_records(name, []) for name in TABLES), np.zeros(0, np.int32))
+
+
+def pickled(features):
+    return pickle.loads(pickle.dumps(features))
+
+
+@pytest.mark.parametrize("noise", [None, NOISE])
+@pytest.mark.parametrize("copied", [lambda of: of, copy.copy, copy.deepcopy, pickled])
+def test_fields_are_those_of_their_scan_whenever_they_are_asked_for(copied, noise):
+    extractor = ln.Extractor(noise=noise)
+    scans = [random_scan(seed, 90) for seed in range(6)]
+    later = [copied(extractor(scan)) for scan in scans]
+    for scan, features in zip(scans, later, strict=True):
+        now = ln.Extractor(noise=noise)(scan)
+        assert features.to_dict() == now.to_dict()
+        assert features.segments is features.segments
+        assert not hasattr(features, "lines")
 
 
 def test_batch_views():

@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .features import TABLES, FeatureBatch, Features, noise_of, noise_row
+from .features import TABLES, FeatureBatch, Features, noise_row
+from .features.records import BREAKPOINTS, SEGMENTS
 from .methods import DEFAULT_METHOD, Method, get_method
 from .methods.trace import Trace
 from .methods.workspace import Block, Blocks, block_capacity, run_batch
@@ -100,21 +101,11 @@ class Extractor:
         block = self._blocks.take(scan) or self._new_block(scan, 1)
         block.load(scan.ranges)
         (self._run or self._first_run)(block)
-        segments, corners, edges, arcs, breakpoints = block.written()
-        features = Features(
-            segments=segments,
-            corners=corners,
-            edges=edges,
-            arcs=arcs,
-            breakpoints=breakpoints,
-            clusters=np.frombuffer(block.clusters.tobytes(), np.int32),
-            stamp=scan.stamp,
-            frame_id=scan.frame_id,
-            noise=self._noise or noise_of(block.noises[0]),
-            scan=scan,
-        )
+        tables, clusters = block.raw(), block.clusters.tobytes()
+        noise = block.noises[0].copy()
         self._blocks.append(block)
-        is_empty = not (len(segments) or len(breakpoints))
+        features = Features.as_written(tables, clusters, noise, self._noise, scan)
+        is_empty = not (tables[SEGMENTS] or tables[BREAKPOINTS])
         if is_empty or scan.range_max > FAR:
             warn_of_units(scan.ranges, scan.range_min, scan.range_max, is_empty)
         return features

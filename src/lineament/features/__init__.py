@@ -1,8 +1,9 @@
 """What is found in a scan, and its fields: their types, units and columns are declared once."""
 
 from .batch import FeatureBatch
-from .features import Features, noise_of, noise_row
+from .features import Features
 from .records import ARC, BREAKPOINT, CORNER, EDGE, SEGMENT, TABLES, make_records
+from .written import noise_of, noise_row
 
 __all__ = [
     "ARC",

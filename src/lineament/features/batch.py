@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._copies import ReadOnly, locked
-from .features import Features, Tabled, noise_of, sizes
+from .features import Features, Tabled, sizes
 from .records import TABLES
+from .written import noise_of
 
 if TYPE_CHECKING:
     import pyarrow as pa

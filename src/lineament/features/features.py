@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from .._copies import ReadOnly
 from .._lazy import Pictured
 from ..errors import needed_by
-from ..scan import LaserScan, NoiseLike, RangeNoise
+from ..scan import LaserScan, RangeNoise
 from ..scan.fields import checked_pose, covariance_of_pose, nanoseconds
 from .records import TABLES
+from .written import Late
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +58,7 @@ class Tabled:
 
 
 @dataclass(slots=True, eq=False, repr=False, kw_only=True)
-class Features(Tabled, ReadOnly, Pictured):
+class Features(Tabled, Late, ReadOnly, Pictured):
     """All features of one scan. The arrays are read-only.
 
     ``len(features)`` counts the records of its five tables, ``features["corners"]`` is a table by
@@ -230,19 +231,6 @@ class Features(Tabled, ReadOnly, Pictured):
             **{name: _records(getattr(self, name)) for name in TABLES},
             "clusters": self.clusters.tolist(),
         }
-
-
-def noise_row(noise: NoiseLike | None) -> NDArray[np.float64]:
-    """Write the parts of a noise as the kernels take them, NaN where it is not given."""
-    if noise is None:
-        return np.full(5, np.nan)
-    return np.array(astuple(RangeNoise.of(noise)))
-
-
-def noise_of(row: NDArray[np.float64]) -> RangeNoise | None:
-    """Name the parts of a noise; None if they are NaN (no valid beam to estimate from)."""
-    parts = row.tolist()
-    return None if math.isnan(parts[0]) else RangeNoise(*parts)
 
 
 def _add_pose_covariance(
