@@ -126,7 +126,7 @@ def _spacing() -> Drawn:
     drawing.draw_sensor(plan)
     steps = []
     for pair in (points[:2], points[-2:]):
-        _line(plan, *pair, color=_RED)
+        _line(plan, pair[0], pair[1], color=_RED)
         steps.append(math.dist(*pair))
         middle, (x, y) = pair.mean(axis=0), pair[1] - pair[0]
         behind = middle + np.array((y, -x))
