@@ -202,6 +202,11 @@ def test_every_experiment_returns_tables_figures_and_its_numbers(name, data):
         for key in path.split("/"):
             here[path] = here[path][int(key) if isinstance(here[path], list) else key]
     assert here == pytest.approx(PINNED[name], rel=1e-3)
+    if name == "all_methods":  # of what finds clusters alone, nothing else is scored
+        control = numbers["lms181"][contenders.PARTITION_ONLY]
+        scored = {key.split("_")[0] for key in control}
+        assert not scored & {"corner", "segment", "arc"}
+        assert {"corner", "segment"} <= {key.split("_")[0] for key in numbers["lms181"]["iepf"]}
 
 
 @pytest.mark.slow

@@ -117,6 +117,10 @@ class TestMuseum:
         assert [v.way for v in museum._at_places(views)] == [v.way for v in views]
         places = [several.index(v) for v in museum._at_places(several)]
         assert places == [0, 5, 6, 8, 10]
+        # The whole way counts, not that from the second view on.
+        late = [view(at, a=1, b=1) for at in (0.0, 2.0, 2.1, 2.2, 2.5)]
+        late += [view(3.0 + 0.5 * k, a=1, c=1) for k in range(5)]
+        assert museum.views_of_two(late)[2] == ord("b")
         assert museum.views_of_two(several[:4]) is None
         assert museum.views_of_two([view(k, b=1, c=1) for k in range(9)]) is None
 

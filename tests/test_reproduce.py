@@ -23,7 +23,10 @@ from lineament.reproduce import (
     Findings,
     Setting,
     Table,
+    definitions,
     experiment_names,
+    noise,
+    run_experiments,
 )
 from lineament.reproduce.claims import CLAIMS, WORDS, bands, verdicts
 from lineament.reproduce.findings import cell_text, dot_chart, median_of, merged_findings
@@ -118,6 +121,24 @@ def test_chart_draws_what_is_finite(monkeypatch):
     drawn = [np.asarray(line.get_xdata(), float) for line in f1.lines]
     np.testing.assert_array_equal(drawn, [[np.nan, 100.0], [200.0, np.nan]])
     assert (f1.get_xscale(), time.get_xscale()) == ("linear", "log")
+
+
+@pytest.mark.parametrize(("label", "lines"), [("errors of all corners.", 1),
+                                              ("errors of some corners.", 2)])  # fmt: skip
+def test_labels_of_a_chart_have_lines_of_22_letters(label, lines, monkeypatch):
+    shown = []
+    monkeypatch.setattr("lineament.reproduce.findings.canvas.figure_bytes", shown.append)
+    dot_chart({"one": {"a": {"f1": 1.0}}}, {label: ("f1", 1)}, [])
+    assert len(shown[0].axes[0].get_xlabel().split("\n")) == lines
+
+
+def test_what_no_seed_changes_runs_once(monkeypatch):
+    ran = []
+    for module in (definitions, noise):
+        monkeypatch.setattr(module, "run", lambda one, _: ran.append(one.seed) or findings())
+    run_experiments(["definitions"], Setting(1, 3, seeds=2), print)
+    run_experiments(["noise"], Setting(1, 3, seeds=2), print)
+    assert ran == [3, 3, 4]
 
 
 def test_nothing_is_run_for_a_folder_that_cannot_be(tmp_path):

@@ -30,6 +30,7 @@ _COLUMNS = {
     "F1": ("breakpoint_f1", 1),
     "Rand index": ("rand_index", 1),
 }
+_COUNTS = {"clusters": ("clusters", 1), "corners": ("corners", 1)}
 
 
 def run(setting: Setting, progress: Progress) -> Findings:
@@ -68,12 +69,12 @@ def run(setting: Setting, progress: Progress) -> Findings:
         }
         for name, features in found.items()
     }
-    rows = {"paper": dict(zip(("clusters", "corners"), PAPER_COUNTS, strict=True))} | counts
+    rows = {"paper": dict(zip(_COUNTS, PAPER_COUNTS, strict=True))} | counts
     tables.append(
         Table.of_numbers(
             "Figure 10: clusters and corners of a scene with as many as the paper’s",
             rows,
-            {"clusters": ("clusters", 1), "corners": ("corners", 1)},
+            _COUNTS,
             "The paper’s scene is not available.",
         )
     )
