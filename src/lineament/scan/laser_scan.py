@@ -164,14 +164,12 @@ class LaserScan(ReadOnly, Pictured):
 
     def _changed(self, **fields: Any) -> Self:
         """Return a copy with other fields, which are checked already."""
+        # What is made when first asked for is of the old fields; irregular bearings were given.
+        made = ("valid", "points", "angles")[: 2 + self.is_regular] if "ranges" in fields else ()
         other = self.__class__.__new__(self.__class__)
-        own = other.__dict__
-        own.update(vars(self))
-        if "ranges" in fields:
-            # What is made when first asked for is of the old ones; irregular bearings were given.
-            for name in ("valid", "points", "angles")[: 2 + self.is_regular]:
-                own.pop(name, None)
-        own.update(fields)
+        other.__dict__.update(vars(self), **fields)
+        for name in made:
+            other.__dict__.pop(name, None)
         return other
 
     def __repr__(self) -> str:
