@@ -320,6 +320,9 @@ def test_features_in_a_notebook(scan):
     assert len(lines) == len(features.segments)
     dots = "".join(e.get("d") for e in found["path"] if e.get("stroke-linecap"))
     assert dots.count("h0") > 300  # some share a place
+    bar = next(e.get("d") for e in found["path"] if "v4H" in e.get("d"))
+    lowest = max(float(y) for y in re.findall(r"M[-\d.]+ ([-\d.]+)", dots))
+    assert float(bar.partition(" ")[2].partition("v")[0]) > lowest  # the bar is below all
     assert "corners" in "".join(found["text"][0].itertext())
     assert "arcs" not in "".join(found["text"][0].itertext())
     rows = [[cell.text for cell in row] for row in found["tr"][1:]]

@@ -137,6 +137,14 @@ def test_many_noisy_views_give_the_room(seed):
     assert sum(wall.length for wall in main) > 0.9 * sum(wall.length for wall in plan._walls)
 
 
+@pytest.mark.parametrize(("deviations", "walls"), [(2.5, 1), (3.5, 2)])
+def test_a_short_line_is_of_a_wall_within_three_deviations_of_its_angle(deviations, walls):
+    sigma = math.radians(2)
+    x, y = 0.3 * math.cos(deviations * sigma), 0.3 * math.sin(deviations * sigma)
+    plan = plan_of([WALL], [line((2 - x, -y), (2 + x, y), sigma=(0.002, sigma))])
+    assert len(plan._walls) == walls
+
+
 def test_plans_are_bounded(monkeypatch):
     monkeypatch.setattr("lineament.output.floor_plan.MOST", 40)
     plan = FloorPlan()
