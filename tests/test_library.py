@@ -125,7 +125,7 @@ def copy(tmp_path):
 
 FEATURES = """
 import lineament as ln
-print(len(ln.extract([2.0] * 90, angle_min=-0.4, angle_increment=0.01).segments))
+print(len(ln.extract([2.0] * 90, angle_min=-0.2, angle_increment=0.005).segments))
 """
 COMMAND = "from lineament.cli import run; sys.exit(run(['extract', 'a.csv', '-o', 'b.csv']))"
 

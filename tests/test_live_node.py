@@ -145,10 +145,10 @@ def test_most_beams():
     """The limits of logs hold for messages too."""
     pipeline = Pipeline(LiveConfig(limits={"beams": 500}))
     for n in (1, 500):
-        pipeline("a", ln.LaserScan(np.ones(n), 0.0, 1e-3))
+        pipeline("a", ln.LaserScan(np.ones(n), 0.0, 5e-4))
     for n, problem in ((0, "has no beams"), (501, "has 501 beams in a scan, more than the limit")):
         with pytest.raises(ValueError, match=problem):
-            pipeline("a", ln.LaserScan(np.ones(n), 0.0, 1e-3))
+            pipeline("a", ln.LaserScan(np.ones(n), 0.0, 5e-4))
 
 
 def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():

@@ -408,7 +408,7 @@ def test_scan_and_log_in_a_notebook(scan, log):
 
 
 def test_control_characters_of_names_do_not_reach_a_page():
-    hostile = ln.LaserScan([1.0] * 9, -0.5, 0.1, frame_id="a\x1b]0;b\x07\u202e<b>")
+    hostile = ln.LaserScan([1.0] * 9, -0.5, 0.05, frame_id="a\x1b]0;b\x07\u202e<b>")
     html = hostile._repr_html_()
     assert "a\\x1b]0;b\\x07\\u202e&lt;b&gt;" in html
     assert not any(letter in html for letter in "\x1b\x07\u202e")

@@ -125,6 +125,33 @@ def test_a_log_without_a_valid_range_is_an_error(tmp_path):
         assert len(list(open_log(path))) == 3  # Reading it is none.
 
 
+def test_ranges_of_no_metres_are_warned_of():
+    """Negative ones, and those that are read from the wrong bytes; but codes are silent."""
+    spans = (-WALL, "-4.6[0-9]* to -2.5"), (1e6 * WALL, r"2.5e\+06 to 4.6[0-9]*e\+06")
+    for ranges, span in spans:
+        with pytest.warns(LineamentWarning, match=f"all ranges are {span}, expected some from 0"):
+            assert ln.extract(ranges, **BEARINGS).segments.size == 0
+    codes = np.resize([-1.0, -2.0, math.inf, math.nan, 0.0], 201)
+    assert ln.extract(codes, **BEARINGS).segments.size == 0
+
+
+@pytest.mark.parametrize("largest", [30.0, 81.83, 65.535])
+def test_one_range_of_many_beams_is_no_wall(largest):
+    """A wall is not that round: of 50 beams, half a radian; of 49, and below `range_max`, none."""
+    ranges = WALL.copy()
+    ranges[100:150] = largest
+    match = rf"50 beams have exactly .* {largest:g} m: .* no return\? \(range_max={largest:g}\)"
+    with pytest.warns(LineamentWarning, match=match):
+        round_wall = ln.extract(ranges, **BEARINGS)
+    found = ln.extract(ranges, **BEARINGS, range_max=largest)
+    assert len(round_wall.segments) > len(found.segments)
+    with pytest.warns(LineamentWarning, match=match):
+        Extractor().batch([WALL, ranges], **BEARINGS)
+    ranges[100] = 2.5
+    ln.extract(ranges, **BEARINGS)
+    Extractor().batch([ranges], **BEARINGS)
+
+
 def test_a_log_in_millimetres_with_its_limits_is_scaled(tmp_path):
     path = log_of(tmp_path / "mm.npz", [MILLIMETRES], range_max=30_000.0, pose=(1.0, 2.0, 3.0))
     assert "in millimetres? (scale=0.001)" in str(summarize(open_log(path)))

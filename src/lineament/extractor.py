@@ -107,7 +107,7 @@ class Extractor:
         features = Features.as_written(tables, clusters, noise, self._noise, scan)
         is_empty = not (tables[SEGMENTS] or tables[BREAKPOINTS])
         if is_empty or scan.range_max > FAR:
-            warn_of_units(scan.ranges, scan.range_min, scan.range_max, is_empty)
+            warn_of_units(scan.ranges, scan, is_empty)
         return features
 
     def batch(
@@ -182,9 +182,8 @@ class Extractor:
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
         is_empty = found.counts.sum(axis=1) == 0
-        limits = frame.range_min, frame.range_max
         doubtful = range(m) if frame.range_max > FAR else np.flatnonzero(is_empty)
-        any(warn_of_units(rows[i], *limits, is_empty[i]) for i in doubtful)
+        any(warn_of_units(rows[i], frame, is_empty[i]) for i in doubtful)
         return FeatureBatch(
             **found.records,
             clusters=found.clusters,

@@ -16,7 +16,7 @@ from ..errors import needed_by
 from ..scan import LaserScan, RangeNoise
 from ..scan.fields import checked_pose, covariance_of_pose, nanoseconds
 from .records import TABLES
-from .written import Late
+from .written import LazyFields
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,7 +58,7 @@ class Tabled:
 
 
 @dataclass(slots=True, eq=False, repr=False, kw_only=True)
-class Features(Tabled, Late, ReadOnly, Pictured):
+class Features(Tabled, LazyFields, ReadOnly, Pictured):
     """All features of one scan. The arrays are read-only.
 
     ``len(features)`` counts the records of its five tables, ``features["corners"]`` is a table by

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import astuple
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,12 @@ from .records import TABLES
 _TABLES = {name: (k, dtype) for k, (name, dtype) in enumerate(TABLES.items())}
 
 
-class Late:
-    """Has fields that take longer to make than to write, and of which few are asked for."""
+class LazyFields:
+    """Makes its tables, clusters and noise when they are first asked for.
+
+    A scan's features are made in a fraction of the time that all their fields take, and of these
+    few are read.
+    """
 
     __slots__ = ("_written",)
 
@@ -34,13 +38,12 @@ class Late:
         scan: LaserScan,
     ) -> Self:
         """Take the bytes of the tables in their order, and the noise, given or as its row."""
-        made: Any = cls.__new__(cls)
-        made._written = tables, clusters, row
-        made.scan, made.stamp, made.frame_id = scan, scan.stamp, scan.frame_id
+        features: Any = cls.__new__(cls)
+        features._written = tables, clusters, row
+        features.scan, features.stamp, features.frame_id = scan, scan.stamp, scan.frame_id
         if noise is not None:
-            made.noise = noise
-        features: Self = made
-        return features
+            features.noise = noise
+        return cast("Self", features)
 
     if not TYPE_CHECKING:  # To which any name would then be a field.
 

@@ -73,7 +73,7 @@ def plot(
     Examples
     --------
     >>> import lineament as ln
-    >>> scan = ln.LaserScan([2.0] * 50, angle_min=-0.25, angle_increment=0.01)
+    >>> scan = ln.LaserScan([2.0] * 50, angle_min=-0.125, angle_increment=0.005)
     >>> ln.plot(scan, method="liu").get_xlabel()
     'x [m]'
     """

@@ -1,9 +1,14 @@
 """What speaks against metres and radians: numbers that no 2-D scanner gives in these units."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import warn
 from .fields import Array
+
+if TYPE_CHECKING:
+    from .laser_scan import LaserScan
 
 #: Half of the ranges of a scan are never beyond this [m]. The scanners that reach farthest see a
 #: white wall at 80 to 250 m, but most of what is around them is nearer: the median of a scan is 24
@@ -13,13 +18,20 @@ FAR = 200.0
 CODES = 1e6
 #: Limits that no scanner has: it is blind up to this range, or beyond this one [m].
 _BLIND, _SHORT = 10.0, 0.1
+#: Scanners have no more codes, and of a ring of sonars no more are equal by chance.
+_FEW = 8
+#: No surface is at one range to the last digit over so much [rad]: a wall at 1 m varies by 3 cm.
+_ROUND = 0.5
 
 
-def warn_of_units(ranges: Array, range_min: float, range_max: float, is_empty: bool) -> bool:
-    """Warn of a `doubt`, which is looked for where there can be one; return whether there is."""
-    message = ""
-    if is_empty or ((ranges > FAR) & (ranges < CODES)).any():
-        message = doubt(ranges, range_min, range_max)
+def warn_of_units(ranges: Array, scan: "LaserScan", is_empty: bool) -> bool:
+    """Warn of a `doubt`, or of `no_return`, where there can be one; return whether there is."""
+    message, range_max = "", min(scan.range_max, CODES)
+    largest = float(ranges.max(initial=0.0, where=ranges < range_max))
+    if is_empty or largest > FAR:
+        message = doubt(ranges, scan.range_min, scan.range_max)
+    if not is_empty and not message:
+        message = no_return(ranges, largest, scan.angle_increment)
     if message:
         warn(message)
     return bool(message)
@@ -51,7 +63,10 @@ def doubt(ranges: Array, range_min: float, range_max: float) -> str:
     """
     finite = ranges[(ranges > 0) & (ranges < CODES)]
     if not len(finite):
-        return ""
+        other = np.unique(ranges[np.isfinite(ranges) & (ranges != 0)])
+        if len(other) <= _FEW:
+            return ""
+        return f"all ranges are {other[0]:g} to {other[-1]:g}, expected some from 0 to {CODES:g} m"
     least, median, largest = finite.min(), np.median(finite), finite.max()
     valid = finite[(finite >= range_min) & (finite < range_max)]
     if len(valid):
@@ -71,3 +86,23 @@ def doubt(ranges: Array, range_min: float, range_max: float) -> str:
             "(scale=0.001)"
         )
     return ""
+
+
+def no_return(ranges: Array, largest: float, step: float) -> str:
+    """Return what the largest of ranges stands for, with the way out; "" if it is a distance.
+
+    A scanner to which nothing comes back along a beam may give the farthest that it sees, of which
+    many beams would be a round wall.
+
+    Examples
+    --------
+    >>> no_return(np.append(np.full(90, 30.0), np.linspace(2.0, 3.0, 90)), 30.0, 0.0175)
+    '90 beams have exactly the largest range, 30 m: do they stand for no return? (range_max=30)'
+    """
+    equal = np.count_nonzero(ranges == largest)
+    if equal <= _FEW or equal * step < _ROUND:
+        return ""
+    return (
+        f"{equal} beams have exactly the largest range, {largest:.9g} m: do they stand for no "
+        f"return? (range_max={largest:.9g})"
+    )
