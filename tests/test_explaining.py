@@ -151,7 +151,6 @@ def test_pdbs_finds_clusters_alone():
     assert explained(wall_with([], []), 5, "pdbs")[0].outcome == "clustered"
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 def test_a_ring_ends_nowhere():
     scan = LaserScan(np.full(720, 1.0), 0.0, np.radians(0.5))
     for beam in (0, 360, 719):
@@ -192,7 +191,6 @@ QUICK = ("optimal", "liu", "iepf")
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in METHODS if name not in QUICK]
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 @pytest.mark.parametrize("method", [*QUICK, *SLOW])
 def test_every_beam_has_an_answer_that_agrees_with_the_features(method):
     scans = [hall("rplidar", 5)]

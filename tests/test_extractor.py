@@ -63,7 +63,6 @@ def test_batch_equals_single_scans_whatever_the_threads(name, noise):
     assert {len(bytes_) for bytes_ in data.values()} == {1}  # the gaps in records too
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 def test_order_of_scans_and_reuse_do_not_matter():
     scans = [*DEGENERATE.values(), *(random_scan(k) for k in range(4))]
     frame = {"angle_min": 0.0, "angle_increment": 0.01}
@@ -182,7 +181,6 @@ measurement = st.one_of(
 METHODS = [name for name in method_names() if not name.startswith(("optimal", "pdbs"))]
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 @settings(max_examples=150)
 @given(
     ranges=st.lists(measurement, max_size=60),
@@ -199,7 +197,6 @@ def test_hostile_scans_give_sound_features(ranges, name, full, limited, given):
     assert_sound(extractor(scan), scan, extractor.method)
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 @pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize(
     ("noise", "seeds"),

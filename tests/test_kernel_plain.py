@@ -201,7 +201,6 @@ def work_of_all(module, n):
     return {name: work_of(module, extractor, scan) for name, scan in hard_scans(n).items()}
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 @pytest.mark.parametrize("n", [181, 540, pytest.param(2160, marks=pytest.mark.slow)])
 def test_no_scan_takes_much_longer_than_others_of_its_size(plain, n):
     work = work_of_all(plain, n)
@@ -209,7 +208,6 @@ def test_no_scan_takes_much_longer_than_others_of_its_size(plain, n):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 def test_a_beam_takes_as_long_among_many(plain):
     """Of a long wall, all that came before could be where its line begins."""
     few, many = (work_of_all(plain, n) for n in (540, 4320))

@@ -97,7 +97,6 @@ def test_no_rule_bridges_a_doorway():
             assert kinds == ["gap"] * (missing > 5) + ["scan_end"] * 2
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 def test_cluster_over_the_seam_is_one():
     angles = full_circle(720)
     ranges = np.where(abs(angles) > 2.6, wall(angles, 2.0, 180.0), 6.0)

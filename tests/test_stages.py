@@ -273,7 +273,6 @@ CORNERS = {"support_radius": 5, "threshold": 0.15, "response": "relative", "recu
 CORNERS |= {"ends": "excluded"}
 
 
-@pytest.mark.filterwarnings("ignore:.* do they stand for no return")
 @pytest.mark.parametrize("scan", SCANS.values(), ids=SCANS)
 @pytest.mark.parametrize("noise", [None, RangeNoise(sigma=0.02)])
 def test_trace_is_made_of_the_stages(scan, noise):
