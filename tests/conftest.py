@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import random
 import signal
@@ -143,3 +144,24 @@ def started(tmp_path: Path, domain: int) -> Iterator[Callable[..., Any]]:
 def pytest_make_parametrize_id(val):
     """Name bytes by their number: what gzip makes holds the time, and workers compare names."""
     return f"{len(val)} bytes" if isinstance(val, bytes) else None
+
+
+@pytest.fixture
+def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
+    """Compare what an experiment returns with what was approved; figures by what they show."""
+    from approved import NUMBER, assert_approved, figure_lines, numbers_of
+
+    from lineament.output import canvas
+
+    drawn: list[str] = []
+    monkeypatch.setattr(canvas, "figure_bytes", lambda f, *_: drawn.extend(figure_lines(f)) or b"")
+
+    def compare(name: str, findings: Any) -> None:
+        written = json.loads(json.dumps(findings.to_dict(), allow_nan=False))
+        # Of prose only the numbers: the rest can be read in the source.
+        for prose in (written, written["figures"], *written["tables"]):
+            for key in {"note", "text", *written["figures"]} & prose.keys():
+                prose[key] = " ".join(NUMBER.findall(str(prose[key])))
+        assert_approved(f"experiments/{name}", [*numbers_of(written), *drawn])
+
+    return compare
