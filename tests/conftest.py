@@ -148,10 +148,11 @@ def pytest_make_parametrize_id(val):
 
 @pytest.fixture
 def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
-    """Compare what an experiment returns with what was approved; figures by what they show."""
+    """Compare what an experiment returns, and its verdicts, with what was approved."""
     from approved import NUMBER, assert_approved, figure_lines, numbers_of
 
     from lineament.output import canvas
+    from lineament.reproduce.claims import bands, verdicts
 
     drawn: list[str] = []
     monkeypatch.setattr(canvas, "figure_bytes", lambda f, *_: drawn.extend(figure_lines(f)) or b"")
@@ -162,6 +163,10 @@ def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Any], None]:
         for prose in (written, written["figures"], *written["tables"]):
             for key in {"note", "text", *written["figures"]} & prose.keys():
                 prose[key] = " ".join(NUMBER.findall(str(prose[key])))
-        assert_approved(f"experiments/{name}", [*numbers_of(written), *drawn])
+        judged = [[c.figure, *of] for c, *of in verdicts({name: findings}) if c.experiment == name]
+        bands_of = list(bands({name: findings}).items())
+        assert_approved(
+            f"experiments/{name}", [*numbers_of(written), *numbers_of(judged + bands_of), *drawn]
+        )
 
     return compare

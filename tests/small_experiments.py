@@ -39,7 +39,7 @@ def small(monkeypatch):
     for module, changes in (
         (contenders, few),
         (noise, {"best_parameters": lambda *_: CHOSEN}),
-        (scans, {"_COPIES": 1, "_BATCHES": 1, "time": SimpleNamespace(perf_counter=clock)}),
+        (scans, {"_COPIES": 1, "_BATCHES": 2, "time": SimpleNamespace(perf_counter=clock)}),
         (definitions, {"machine": lambda: "this one", "version": lambda _: "1"}),
         (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),
         (all_methods, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES": ("room", "hall")}),

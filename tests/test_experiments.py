@@ -73,7 +73,7 @@ def data(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_returns_tables_figures_and_its_numbers(name, data, approve):
     reports = []
-    found = run_experiments([name], Setting(frames=1, data=data, seeds=1), reports.append)
+    found = run_experiments([name], Setting(frames=2, data=data, seeds=1), reports.append)
     assert list(found) == [name]
     assert reports[0] == f"{name} (1/1): starting"
     assert len(reports) > (name != "museum")
