@@ -371,6 +371,11 @@ class TestVerdicts:
         places = [{"mean": mean, "found": 0.4 + 0.2 * (mean is not None)} for mean in means]
         judged = self.judged({"two_corners": {"places": {"liu, paper’s numbers": places}}})
         assert judged["Table 2"][1] == word
+        known = [mean for mean in means if mean is not None] or [0]
+        assert f"{min(known):.3f} to {max(known):.3f} m" in judged["Table 2"][0] or known == [0]
+        shares = [100 * place["found"] for place in places]
+        about = f"{min(shares):.0f} % (worst place) to {max(shares):.0f} % (best)"
+        assert about in judged["Figure 13"][0]
         found = {place["found"] >= 0.5 for place in places}
         words = {frozenset([True]): "holds", frozenset([False]): "does not"}
         assert judged["Figure 13"][1] == words.get(frozenset(found), "in part")
