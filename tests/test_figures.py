@@ -296,6 +296,11 @@ def test_a_corridor_is_drawn_larger_across_and_says_so():
         assert mark[2] == pytest.approx(math.degrees(math.atan(aspect)))
 
 
+def test_a_plan_is_drawn_larger_by_the_round_factor_that_just_fills_it():
+    shapes = [(1.0, 0.4 / 2.9), (1.0, 0.08), (1.0, 0.081), (1.0, 7.0), (1.0, 6.9)]
+    assert [canvas._aspect(np.array(shape)) for shape in shapes] == [1, 5, 2, 1 / 5, 1 / 2]
+
+
 def test_a_few_beams_far_out_do_not_shrink_the_plan():
     scan = EXTREMES["room"]
     for far, label in (((), "x [m]"), ((100, 101), "x [m] · 2 beams farther out not shown")):
