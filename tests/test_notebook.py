@@ -363,6 +363,17 @@ def test_notebooks_show_what_was_approved(scan, log):
     assert_approved("notebook", [*lines, *drawn])
 
 
+@pytest.mark.parametrize(("pixels", "shown"), [(3.9, 0), (4.1, 1)])
+def test_ellipses_that_a_diamond_hides_are_not_drawn(scan, pixels, shown):
+    found = ln.extract(scan)
+    bar = re.search(r"v4H([\d.]+)v-4.*?>([\d.]+) m", found._repr_html_(), re.DOTALL)
+    metre = (float(bar[1]) - notebook.MARGIN) / float(bar[2])
+    corners = found.corners[:1].copy()
+    corners["covariance"] = (pixels / metre) ** 2 / (-2 * math.log(0.05)) * np.eye(2)
+    html = notebook.svg(scan, replace(found, corners=corners))
+    assert html.count("<polygon") == shown
+
+
 def test_the_longest_and_best_come_first_and_the_others_are_counted(scan):
     features = ln.extract(scan)
     corners = np.repeat(features.corners[:1], 8)

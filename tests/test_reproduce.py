@@ -268,6 +268,12 @@ class TestSeeds:
             *((7, tmp_path, 1, 2), (8, None, 1, 2), (9, None, 1, 2)),
         ]
 
+    def test_a_table_as_text_has_columns_flush_right_but_the_first(self):
+        text = str(Table("T", ("m", "n", "F1"), (("liu", 1500.25, None), ("b", 0.00001, "x"))))
+        assert text.splitlines() == [
+            *("m           n  F1", "liu      1500   –", "b    1.00e-05   x"),
+        ]  # fmt: skip
+
     def test_median_is_an_item_and_the_lower_one_of_two(self):
         assert median_of(["ccc", "a", "bb"], len) == "bb"
         assert median_of(["ccc", "a", "bb", "dddd"], len) == "bb"
