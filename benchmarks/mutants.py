@@ -49,7 +49,7 @@ AREAS: dict[str, tuple[str, str]] = {
     "output": (
         "output",
         "output plans* figures notebook writers_mcap ros_messages feature_points world tables "
-        "experiment_pictures experiment_definitions",
+        "experiment_pictures experiment_definitions live_foxglove",
     ),
     "mapping": ("mapping", "mapping* locating* relocation"),
     "motion": (

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import random
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
@@ -143,3 +144,30 @@ def started(tmp_path: Path, domain: int) -> Iterator[Callable[..., Any]]:
 def pytest_make_parametrize_id(val):
     """Name bytes by their number: what gzip makes holds the time, and workers compare names."""
     return f"{len(val)} bytes" if isinstance(val, bytes) else None
+
+
+@pytest.fixture
+def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Compare what an experiment reports, returns and means with what was approved."""
+    from approved import NUMBER, assert_approved, figure_lines, numbers_of
+
+    from lineament.output import canvas
+    from lineament.reproduce.claims import CLAIMS, bands
+
+    drawn: list[str] = []
+    monkeypatch.setattr(canvas, "figure_bytes", lambda f, *_: drawn.extend(figure_lines(f)) or b"")
+
+    def compare(name: str, findings: Any, reports: Iterable[str] = ()) -> None:
+        written = json.loads(json.dumps(findings.to_dict(), allow_nan=False))
+        # Of prose only the numbers: the rest can be read in the source.
+        for prose in (written, written["figures"], *written["tables"]):
+            for key in {"note", "text", *written["figures"]} & prose.keys():
+                prose[key] = " ".join(NUMBER.findall(str(prose[key])))
+        for claim in (claim for claim in CLAIMS if claim.experiment == name):
+            here, margins = claim.judge(findings.numbers)
+            written[claim.place] = [here, *map(float, margins)]
+        steps = [report.split(": ", 1)[-1] for report in reports]
+        lines = [" > ".join(steps), *numbers_of(written | bands({name: findings})), *drawn]
+        assert_approved(f"experiments/{name}", lines)
+
+    return compare

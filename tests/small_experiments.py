@@ -1,10 +1,14 @@
 """Experiments on little: a small setting, and a folder of recordings."""
 
+from itertools import accumulate, count
+from types import SimpleNamespace
+
 import pytest
 
 from lineament.reproduce import (
     all_methods,
     contenders,
+    definitions,
     grid,
     layers,
     noise,
@@ -29,12 +33,16 @@ def silent(about):
 
 @pytest.fixture
 def small(monkeypatch):
-    """Few methods, sensors, kinds and parameters, and times of single calls."""
+    """Few methods, sensors, kinds and parameters; each call takes 1 µs longer than the last."""
+    clock = (0.5e-6 * k for k in accumulate(count())).__next__
     few = {"METHODS": ("liu", "pdbs", "iepf"), "best_parameters": lambda *_: CHOSEN}
+    here = {"machine": lambda: "this one", "version": lambda _: "1"}
+    here["os"] = SimpleNamespace(sysconf=lambda _: 2**16)
     for module, changes in (
         (contenders, few),
         (noise, {"best_parameters": lambda *_: CHOSEN}),
-        (scans, {"_COPIES": 1, "_BATCHES": 1}),
+        (scans, {"_COPIES": 1, "_BATCHES": 2, "time": SimpleNamespace(perf_counter=clock)}),
+        (definitions, here),
         (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),
         (all_methods, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES": ("room", "hall")}),
         (success, {"MORE": 2}),

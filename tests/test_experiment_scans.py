@@ -91,6 +91,14 @@ def test_scan_pairs_are_apart_by_way_or_by_turn(tmp_path):
     assert len(scan_pairs(tmp_path / "log.npz", 2)) == 2
 
 
+def test_scan_pairs_are_sought_behind_a_scan_and_not_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr(scans, "_SEARCHED", 2)
+    for way, expected in (([0, 0.5, 1.0], [(0, 1), (1, 2)]), ([0, 0, 0, 0.5], [(1, 3), (2, 3)])):
+        walk(tmp_path / "log.npz", [(x, 0.0, 0.0) for x in way])
+        stamps = [(a.stamp, b.stamp) for a, b in scan_pairs(tmp_path / "log.npz", 9)]
+        assert stamps == expected
+
+
 def test_scan_pairs_over_the_turn_of_the_angle(tmp_path):
     """From -179° to 179° is a turn of 2°, from there to 160° one of 19°."""
     walk(tmp_path / "log.npz", [(0.0, 0.0, math.radians(a)) for a in (-179, 179, 160)])

@@ -146,12 +146,12 @@ class TestTwoCorners:
         assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
 
     def test_drawn_is_the_scan_with_the_median_error(self, monkeypatch):
-        """Errors of 1, 3 and 2 cm, and one without both corners, which is the worst."""
+        """Errors of 1, 3 and -2 cm, and one without both corners, which is the worst."""
         along, (x, y, turn) = (B - A) / DISTANCE, POSES[0]
         rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
         found = [
             features(corners=[corner(*((place - (x, y)) @ rotation)) for place in places])
-            for places in [(A, B + off * along) for off in (0.01, 0.03, 0.02)] + [(A,)]
+            for places in [(A, B + off * along) for off in (0.01, 0.03, -0.02)] + [(A,)]
         ]
         monkeypatch.setattr(two_corners, "batch_of", lambda *_: found)
         assert two_corners._median_view(None, range(4), POSES[0]) == (2, found[2])

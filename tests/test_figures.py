@@ -8,6 +8,7 @@ import matplotlib.image
 import matplotlib.text
 import numpy as np
 import pytest
+from approved import assert_approved, figure_lines, numbers_of
 from handmade import features as features_of
 from handmade import segment
 from matplotlib.collections import LineCollection
@@ -293,6 +294,11 @@ def test_a_corridor_is_drawn_larger_across_and_says_so():
         # The marks across the ends of a segment stand across it on the paper.
         mark = next(line.get_marker() for line in axes.lines if line.get_marker()[0] == 2)
         assert mark[2] == pytest.approx(math.degrees(math.atan(aspect)))
+
+
+def test_a_plan_is_drawn_larger_by_the_round_factor_that_just_fills_it():
+    shapes = [(1.0, 0.4 / 2.9), (1.0, 0.08), (1.0, 0.081), (1.0, 7.0), (1.0, 6.9)]
+    assert [canvas._aspect(np.array(shape)) for shape in shapes] == [1, 5, 2, 1 / 5, 1 / 2]
 
 
 def test_a_few_beams_far_out_do_not_shrink_the_plan():
@@ -621,3 +627,46 @@ def test_wrong_arguments(tmp_path):
         with pytest.raises(LineamentError, match=problem):
             figures.plot_map([], tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["scan", "scans", "corner", "map", "stages", "evidence"])
+def test_figures_show_what_was_approved(name):
+    """Where all parts are, their sizes, colours and order, and texts."""
+    scan, features = room()
+    features.edges = np.repeat(features.edges, 2)
+    features.edges["position"][1] = (0.25, 1.5)
+    unsure = replace(features, corners=features.corners.copy())
+    unsure.corners["covariance"] = np.nan
+    errors = {name: np.linspace(0, 0.03, 81) * k for k, name in enumerate("ab")}
+    far, title = EXTREMES["corridor along x"], f"{'a long name' * 9} · scan 7"
+    candidates = np.zeros(3, CANDIDATE)
+    candidates["beam"], candidates["accepted"] = [40, 20, 30], [True, False, False]
+    candidates["response"] = [12.5, 3.25, 1.125]
+    stages_of = {"filtered": 0.5 * scan.ranges, "candidates": candidates, "threshold": 10.0}
+    found = {
+        "scan": lambda: [
+            figures.scan_figure(scan, dict.fromkeys(errors, features), errors, title="A"),
+            figures.scan_figure(scan, dict.fromkeys("ab", unsure), panel=3.0, farthest=2.1),
+            figures.scan_figure(far, {"a": features_of(len(far), segments=[SLOPE])}, dark=True),
+            figures.scan_figure(lone(0), dict.fromkeys("abcdefghij", features_of(360)), panel=2.0),
+        ],
+        "scans": lambda: [figures.scans_figure([("a", scan, features)] * 2, title=title)],
+        "corner": lambda: [figures.corner_figure(scan, of, 0) for of in (features, unsure)],
+        "map": lambda: [
+            figures.map_figure([((2.0, k, k / 2), features) for k in range(n)], dark=n == 0)
+            for n in (0, 2, 100)
+        ],
+        "stages": lambda: [stages.trace_figure(trace_of(scan, features, **stages_of), title="A")],
+        "evidence": lambda: [stages.trace_figure(ln.trace(EXTREMES["room"]), dark=True)],
+    }[name]()
+    lines = [line for figure in found for line in figure_lines(figure)]
+    assert_approved(f"figures/{name}", lines)
+
+
+def test_numbers_stand_where_was_approved():
+    """Thirty in a row among points: near, far or none, by what they would hide."""
+    rng = np.random.default_rng(7)
+    crowd = rng.normal(0, 1, (150, 2)) * (20, 30) - (30, 0)
+    places = [text.get_position() for text in labels([(4 * k - 60, k) for k in range(30)], crowd)]
+    assert 8 < len(places) < 30
+    assert_approved("figures/numbers", numbers_of([[*map(float, place)] for place in places]))

@@ -10,6 +10,8 @@ from dataclasses import fields, replace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from approved import assert_approved, figure_lines
+from handmade import arc, breakpoint_at, edge, features
 from matplotlib import pyplot
 from worlds import BOX, full_circle, room
 
@@ -337,6 +339,39 @@ def test_features_in_a_notebook(scan):
     unsure = replace(features, corners=corners)
     assert len(parsed(unsure._repr_html_())["polygon"]) == 1
     assert "more" not in html
+
+
+def test_notebooks_show_what_was_approved(scan, log):
+    """A scan with each kind of feature, a log, nothing, and what `plot` draws."""
+    found = ln.extract(scan)
+    corners = np.repeat(found.corners[:1], 7)
+    corners["covariance"][0], corners["quality"] = [[0.04, 0.01], [0.01, 0.02]], np.arange(7) / 7
+    corners["position"] += 0.1 * np.arange(7)[:, np.newaxis]
+    by_hand = features(
+        n=360,
+        edges=[edge(1, 0.2, segment=3), edge(1.2, 0.1)],
+        arcs=[arc(0.5, -0.5, 0.25, 300, 320, sigma=0.02), arc(-1, 0, 0.1, 500, 501)],
+        breakpoints=[breakpoint_at(3, 4)],
+        clusters=np.arange(360) // 30 - 1,
+    )
+    every = replace(by_hand, segments=found.segments, corners=corners, scan=scan)
+    axes = [ln.plot(every), ln.plot(replace(every, scan=None)), ln.plot(scan, method="liu")]
+    shown = every, replace(every, scan=None), scan.with_pose((1.0, 2.0, 0.3)), log, scan[:0]
+    lines = [line for one in shown for line in one._repr_html_().splitlines()]
+    drawn = [line for of in axes for line in figure_lines(of.figure)]
+    lines = [line.replace(log.name, "drive.npz") for line in lines]
+    assert_approved("notebook", [*lines, *drawn])
+
+
+@pytest.mark.parametrize(("pixels", "shown"), [(3.9, 0), (4.1, 1)])
+def test_ellipses_that_a_diamond_hides_are_not_drawn(scan, pixels, shown):
+    found = ln.extract(scan)
+    bar = re.search(r"v4H([\d.]+)v-4.*?>([\d.]+) m", found._repr_html_(), re.DOTALL)
+    metre = (float(bar[1]) - notebook.MARGIN) / float(bar[2])
+    corners = found.corners[:1].copy()
+    corners["covariance"] = (pixels / metre) ** 2 / (-2 * math.log(0.05)) * np.eye(2)
+    html = notebook.svg(scan, replace(found, corners=corners))
+    assert html.count("<polygon") == shown
 
 
 def test_the_longest_and_best_come_first_and_the_others_are_counted(scan):

@@ -3,6 +3,7 @@
 import base64
 import json
 import os
+import re
 import shutil
 import signal
 import struct
@@ -19,6 +20,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
+from approved import assert_approved
 from test_tables import random_features
 from test_writers_mcap import FOUND
 
@@ -360,6 +362,11 @@ def test_recording_is_whole_and_has_everything(tmp_path):
         *("[[[1.0, 0.0, 0.0], [1.0, 2.0, 0.0]], ", "[[1.0, 2.0, 0.0]]", "[[-1.0, 3.0, 0.0]]"),
     ):
         assert numbers in text, numbers
+    lines = []
+    for part in text.split("entity_path: ")[1:]:
+        rows = re.findall(r"row_\w+ *┆ (249 .*)│ │", part)
+        lines += [" ".join((part.split()[0], *row.split())) for row in rows]
+    assert_approved("recording", sorted(lines))
 
 
 def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):

@@ -3,9 +3,11 @@
 import math
 import xml.etree.ElementTree as ET
 
+import ezdxf
 import numpy as np
 import pytest
-from handmade import arc, corner, features, segment
+from approved import assert_approved, numbers_of
+from handmade import arc, corner, edge, features, segment
 
 from lineament import LaserScan
 from lineament.output import open_writer
@@ -127,3 +129,52 @@ def test_arcs_and_ellipses_become_strips():
     assert len(strip) == 49
     assert np.ptp(along) == pytest.approx(0.8)
     np.testing.assert_allclose(markers.points, [(3, 2), (-1, 2), (1, 4), (1, 0)])
+
+
+@pytest.mark.parametrize("ending", [".svg", ".dxf"])
+@pytest.mark.parametrize("n", [1, 12])
+def test_plans_show_what_was_approved(tmp_path, ending, n):
+    """A room with a column and a noisy wall, as one scan shows it, and twelve that drift."""
+    rng, path = np.random.default_rng(3), tmp_path / f"a{ending}"
+    with open_writer(path) as writer:
+        for k in range(n):
+            noise = rng.normal(0, 0.004, (4, 2))
+            walls = [((0, 0), (4, 0.3)), ((4, 0.3), (3.7, 3)), ((1, 3), (0.9, 2)), ((2, 2), (2, 3))]
+            found = features(
+                segments=[
+                    line(start + off, end - off, sigma=(0.01, 0.003 * (1 + i)))
+                    for i, (start, end), off in zip(range(4 - k % 3), walls, noise, strict=False)
+                ],
+                corners=[corner(4, 0.3, sigma=0.02), corner(3.7, 3 + 0.02 * (k % 2))],
+                edges=[edge(0, 0), edge(2, 2)],
+                arcs=[arc(1.5, 1, 0.25, 20, 60 + k), arc(3, 1.5, 0.1, 0, 200)],
+            )
+            found.corners["covariance"][0, 0, 1] = found.corners["covariance"][0, 1, 0] = 2e-4
+            scan = LaserScan([1.3] * 100, 0.0, 0.01, pose=(0.01 * k, 0.0, 0.001 * k))
+            writer.write(found, scan)
+    if ending == ".dxf":
+        unlike = {"handle", "owner"}  # numbers that ezdxf gives
+        space = ezdxf.readfile(path).modelspace()
+        lines = [
+            f"{e.dxftype()} { ({k: v for k, v in e.dxfattribs().items() if k not in unlike}) }"
+            for e in space
+        ]
+    else:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    assert_approved(f"plans/{n}{ending}", lines)
+
+
+def test_views_of_a_wall_are_added_up_as_was_approved():
+    """Noisy views of three walls, two of which the poses have moved: all that a plan holds."""
+    rng, plan = np.random.default_rng(5), FloorPlan()
+    for k in range(40):
+        y = 0.1 * (k % 2) * (k < 30)
+        ends = np.sort(rng.uniform(0, 6, 2)), rng.uniform(0, 3, 2)
+        segments = [line((ends[0][0], y), (ends[0][1], y + rng.normal(0, 0.01)))]
+        segments += [line((6.1, ends[1][0]), (6.1 + rng.normal(0, 0.01), ends[1][1]))]
+        plan.add(features(segments=segments))
+    walls = [plan.walls(least) for least in (1, 2, 9)]
+    rows = [
+        [*w["start"].tolist(), *w["end"].tolist(), float(w["views"])] for of in walls for w in of
+    ]
+    assert_approved("plans/walls", numbers_of(rows))

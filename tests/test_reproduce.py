@@ -268,6 +268,12 @@ class TestSeeds:
             *((7, tmp_path, 1, 2), (8, None, 1, 2), (9, None, 1, 2)),
         ]
 
+    def test_a_table_as_text_has_columns_flush_right_but_the_first(self):
+        text = str(Table("T", ("m", "n", "F1"), (("liu", 1500.25, None), ("b", 0.00001, "x"))))
+        assert text.splitlines() == [
+            *("m           n  F1", "liu      1500   –", "b    1.00e-05   x"),
+        ]  # fmt: skip
+
     def test_median_is_an_item_and_the_lower_one_of_two(self):
         assert median_of(["ccc", "a", "bb"], len) == "bb"
         assert median_of(["ccc", "a", "bb", "dddd"], len) == "bb"
@@ -371,6 +377,11 @@ class TestVerdicts:
         places = [{"mean": mean, "found": 0.4 + 0.2 * (mean is not None)} for mean in means]
         judged = self.judged({"two_corners": {"places": {"liu, paper’s numbers": places}}})
         assert judged["Table 2"][1] == word
+        known = [mean for mean in means if mean is not None] or [0]
+        assert f"{min(known):.3f} to {max(known):.3f} m" in judged["Table 2"][0] or known == [0]
+        shares = [100 * place["found"] for place in places]
+        about = f"{min(shares):.0f} % (worst place) to {max(shares):.0f} % (best)"
+        assert about in judged["Figure 13"][0]
         found = {place["found"] >= 0.5 for place in places}
         words = {frozenset([True]): "holds", frozenset([False]): "does not"}
         assert judged["Figure 13"][1] == words.get(frozenset(found), "in part")

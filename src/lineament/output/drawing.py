@@ -195,7 +195,7 @@ def draw_arcs(axes: Axes, arcs: NDArray[np.void], scan: LaserScan) -> None:
     label, color = "arc", theme_of(axes).arc
     for arc in arcs[np.isfinite(arcs["center"]).all(axis=1) & np.isfinite(arcs["radius"])]:
         for span, name, line in (
-            ((0.0, 2 * math.pi), "", {"linewidth": 0.5, "linestyle": (0, (2, 3)), "zorder": 4.05}),
+            ((0.0, 2 * math.pi), "", {"linewidth": 0.5, "linestyle": ":", "zorder": 4.05}),
             (arc_span(arc, scan), label, {"linewidth": 2.0, "zorder": 4.1}),
         ):
             turn = np.linspace(*span, 181)
