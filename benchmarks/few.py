@@ -42,13 +42,17 @@ def wall(distance: float, incidence: float) -> Shape:
     return shape
 
 
-def corner(distance: float) -> Shape:
-    """Make corners of two walls that are seen alike; their truth is a place."""
+def corner(distance: float, least: float = 90.0) -> Shape:
+    """Make corners of two walls that are seen alike; their truth is a place.
+
+    Their angle is right, or any from the `least` to 180°.
+    """
 
     def shape(n: int, step: float, rng: np.random.Generator) -> tuple[Array, Array]:
         far = distance if distance > 0 else rng.uniform(1.0, 4.0)
-        bearings = (np.arange(2 * n) - (2 * n - 1) / 2) * step
-        return far / (np.cos(bearings) + abs(np.sin(bearings))), np.array([far, 0.0, 0.0])
+        half = math.radians(rng.uniform(least, 180.0) if least < 90 else least) / 2
+        bearings = abs(np.arange(2 * n) - (2 * n - 1) / 2) * step
+        return far * math.sin(half) / np.sin(half + bearings), np.array([far, 0.0, 0.0])
 
     return shape
 
@@ -73,6 +77,7 @@ SCENES = {
     "wall at 2 m, 60°": (wall(2.0, 60.0), "segments", 1, STEP),
     "wall at 5 m, 60°": (wall(5.0, 60.0), "segments", 1, STEP),
     "corner at 2 m": (corner(2.0), "corners", 1, STEP),
+    "corner at 2 m, 60–180°": (corner(2.0, 60.0), "corners", 1, STEP),
     "column at 1 m": (column(1.0), "arcs", 1, COLUMN_STEP),
     "30 walls": (wall(0.0, 90.0), "segments", OBJECTS, 0.0),
     "30 corners": (corner(0.0), "corners", OBJECTS, 0.0),
@@ -111,7 +116,7 @@ def errors_of(batch: FeatureBatch, table: str, owner: Array, turns: Array, truth
 def measure(extractor: Extractor, name: str, n: int, sigma: float, seed: int) -> NormalisedErrors:
     """Normalised errors of the features of some random scans of a scene."""
     shape, table, objects, step = SCENES[name]
-    rng, runs = np.random.default_rng((seed, n)), 500 if objects == 1 else 16
+    rng, runs = np.random.default_rng((seed, n)), 4000 if objects == 1 else 64
     beams = (2 if table == "corners" else 1) * n
     step = step if objects == 1 else 2 * math.pi / (objects * (beams + FREE))
     width = beams + FREE

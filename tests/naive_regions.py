@@ -270,12 +270,10 @@ def cut_apart(points, one, other):
     if not borders:
         begin = max(c, near + 1)
         return ((a, near), (begin, d)) if begin < d else (one, other)
-    lines = line(points[a : near + 1]), line(points[far + 1 : d + 1])
-    first, second = (((points @ normal - distance) ** 2) for normal, distance, _ in lines)
     best, least = None, math.inf
     for i in borders:
-        cost = first[borders[0] + 1 : i + 1].sum() - second[borders[0] + 1 : i + 1].sum()
-        if cost < least - 1e-12:
+        cost = line(points[a : i + 1])[2] + line(points[i + 1 : d + 1])[2]
+        if cost < (1 - 1e-9) * least - 1e-12:
             best, least = i, cost
     return (a, best), (best + 1, d)
 

@@ -170,7 +170,7 @@ def test_seed_is_all_that_changes_the_draws():
     ranges = np.minimum(wall(angles, 2.0, 0.0), wall(angles, 2.5, 60.0))
     scan = scan_of(ranges + 0.03 * np.random.default_rng(1).normal(size=len(angles)), angles)
     cuts = {
-        Extractor(Ransac(trials=1, seed=s), noise=NOISE)(scan).segments.tobytes()
+        Extractor(Ransac(trials=1, seed=s, settling=False), noise=NOISE)(scan).segments.tobytes()
         for s in (1, 1, 7, 7, 99)
     }
     assert 1 < len(cuts) <= 3

@@ -22,11 +22,12 @@ SHARED = {
     "distance": "> 0",
     "settling": bool,
     "reach": "≥ 0",
+    "corner_trim": 0,
     "grazing_angle": "acute",
     "max_missing": 0,
     "max_vertices": 0,
 }
-MERGED = SHARED | {"threshold": "≥ 0", "unevenness": "≥ 0", "corner_trim": 0, "min_points": 2}
+MERGED = SHARED | {"threshold": "≥ 0", "unevenness": "≥ 0", "min_points": 2}
 NEAR = SHARED | {"epsilon": "≥ 0", "sigmas": "≥ 0", "fit": FITS, "noise_factor": "≥ 0"}
 RUNS = NEAR | {"min_points": 3, "min_length": "≥ 0", "max_misses": 0}
 BOUNDS = {

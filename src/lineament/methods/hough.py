@@ -31,8 +31,8 @@ class Hough(NearMethod):
     3. *Peak*: of the cell with the most votes, take the longest run of consecutive points near
        its line, fit a line, take the longest run near that, and again.
     4. Withdraw the run's votes, and look for the next peak, until none has `min_points`.
-    5. *Settle* neighbouring pieces: about their border each point goes to the nearer line; those
-       that one line fits are merged, those whose lines meet at their ends have a corner there.
+    5. *Settle* neighbouring pieces: their border is put where both lines fit best; those that
+       one line fits are merged, those whose lines meet at their ends have a corner there.
     """
 
     name = "hough"

@@ -24,8 +24,8 @@ class IEPF(PieceMethod):
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
     2. *Split* each cluster at the point farthest from the chord of its ends if that distance is
        above its tolerance; then both sides in turn.
-    3. *Merge* neighbours that one line fits as well, let each point at a border go to the nearer
-       line, and put corners where lines meet.
+    3. *Merge* neighbours that one line fits as well, put borders where both lines fit best,
+       and corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + proportion ρ + noise_factor σ_r``. The
     preset `paper` is the method as published: step 2 alone, of the whole scan, with a fixed

@@ -26,8 +26,8 @@ class LineTracking(PieceMethod):
        ``noise_factor`` standard deviations of that distance, in which the noise of the point and
        that of the line count. It ends where it does not predict `max_misses` points in a row and
        one more; there the next line begins.
-    3. *Merge* neighbours that one line fits as well, let each point at a border go to the nearer
-       line (a tracker runs past corners, where both are near), and put corners where lines meet.
+    3. *Merge* neighbours that one line fits as well, put borders where both lines fit best
+       (a tracker runs past corners), and corners where lines meet.
     """
 
     name = "line_tracking"

@@ -36,11 +36,14 @@ class LineMethod(MethodBase):
     )
     settling: bool = parameter(
         True,
-        "whether neighbours are merged, points about their border go to the nearer line, and "
+        "whether neighbours are merged, their border is where both lines fit best, and "
         "lines meet in corners, for all methods alike; else as published",
     )
     reach: float = parameter(
         6.0, "spacings from the ends of two pieces within which their lines meet in a corner", low=0
+    )
+    corner_trim: int = parameter(
+        1, "measurements next to a corner that the last fits leave out", low=0
     )
     grazing_angle: float = parameter(
         math.radians(6.0),
@@ -100,9 +103,6 @@ class PieceMethod(LineMethod):
     unevenness: float = parameter(
         0.01, "misfit of walls, by which lines may differ and still be merged", low=0, unit="m"
     )
-    corner_trim: int = parameter(
-        1, "measurements next to a corner that the last fits leave out", low=0
-    )
     min_points: int = parameter(3, "clusters of fewer points are noise", low=2)
 
     def finish(self, block: Block) -> None:
@@ -136,4 +136,4 @@ class NearMethod(LineMethod):
     def finish(self, block: Block) -> None:
         """Settle the borders and fit."""
         self.settle(block, self.epsilon)
-        self.measure(block, fit=FITS[self.fit])
+        self.measure(block, fit=FITS[self.fit], trim=self.corner_trim)

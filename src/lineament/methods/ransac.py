@@ -24,8 +24,8 @@ class Ransac(NearMethod):
     2. *Sample* pairs of near points, and take the line through the pair whose longest run of
        consecutive points near it has the most; two runs of the same number: the earlier pair.
     3. *Fit* a line to that run, take the longest run near it, and again.
-    4. *Settle* neighbouring pieces: about their border each point goes to the nearer line; those
-       that one line fits are merged, those whose lines meet at their ends have a corner there.
+    4. *Settle* neighbouring pieces: their border is put where both lines fit best; those that
+       one line fits are merged, those whose lines meet at their ends have a corner there.
 
     The generator of the numbers that are drawn starts again with each scan: the same scan has the
     same features, whatever comes before it.

@@ -24,7 +24,7 @@ class RegionGrowing(NearMethod):
     2. *Seed*: `s_num` consecutive points, each near the line fitted to them, and near the point
        where its own beam meets that line.
     3. *Grow* the seed both ways, point by point by the same two tests, fitting again each time.
-    4. *Overlaps* of neighbouring regions: each point goes to the nearer line. Neighbours that one
+    4. *Overlaps* of neighbouring regions: parted where both lines fit best. Neighbours that one
        line fits are merged, those whose lines meet at their ends have a corner there.
     """
 

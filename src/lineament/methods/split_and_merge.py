@@ -26,8 +26,8 @@ class SplitAndMerge(PieceMethod):
        line fitted to it, on one side and by more than their tolerances. One alone is an outlier.
        It is split at the point farthest from the chord of its ends, as what is farthest from the
        fitted line may be an end: that of an L is. Then both sides in turn.
-    3. *Merge* neighbours whose joint fit costs no more in χ² than chance allows, let each point at
-       a border go to the nearer line, and put corners where lines meet.
+    3. *Merge* neighbours whose joint fit costs no more in χ² than chance allows, put
+       borders where both lines fit best, and corners where lines meet.
 
     The tolerance of a point at range ρ is ``threshold + noise_factor σ_r``.
     """

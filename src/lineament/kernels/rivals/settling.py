@@ -21,8 +21,9 @@ _SAME = 36.0
 _MARGIN = 20
 #: Points without a piece over which neighbours are still merged or joined.
 _BETWEEN = 3
-#: Squares of distances that differ by less are the same [m²]: a vertex lies on both its walls.
-_ROUNDING = 1e-12
+#: Squares of distances that differ by less are the same [m²], or by this share of them: a vertex
+#: lies on both its walls.
+_ROUNDING, _ALIKE = 1e-12, 1e-9
 #: Sine of the least angle at which lines meet in a corner (2.9°): below, the noise decides where.
 _LEAST_SINE = 0.05
 
@@ -37,9 +38,8 @@ def settle(
 ):
     """Merge, cut apart and join the pieces of a scan.
 
-    Neighbours in a cluster are merged if one line fits both; else each point about their border
-    goes to the nearer line, so far as the beams' order allows; and where their lines meet within
-    `reach`, there is a corner.
+    Neighbours in a cluster are merged if one line fits both; else their border is put where both
+    lines fit best; and where these meet within `reach`, there is a corner.
 
     From points, and the ends of pieces in beam order, which may overlap. The response of a corner
     is the sine of the angle at which the lines meet.
@@ -99,7 +99,7 @@ def divide_overlaps(
     floats: Floats2,
     ints: Ints2,
 ):
-    """Give each point of two overlapping neighbours to the nearer line (Gao et al. 2018)."""
+    """Part two overlapping neighbours (Gao et al. 2018: each point goes to the nearer line)."""
     work = at.extended(floats, ints)
     fill_moments(work)
     for k in range(1, work.counts[at.PIECES]):
@@ -140,14 +140,14 @@ def _merge(work, noise, epsilon):
 
 @helper
 def _cut(work, k):
-    """Move the border of a piece and the one before it to where least squares to both lines are.
+    """Move the border of a piece and the one before it to where the squares off both are least.
 
-    Both keep three points if they can; points between them that had no piece get one. Each keeps
-    two: where they have no more, they go on sharing one. The later may begin before the earlier
-    does, where that has just been cut itself.
+    Both lines are fitted anew for each border: those that a wrong border gave would keep it. Both
+    keep three points if they can; points between them that had no piece get one. Each keeps two:
+    where they have no more, they go on sharing one. The later may begin before the earlier does,
+    where that has just been cut itself.
     """
     first, last = work.pieces[at.FIRST], work.pieces[at.LAST]
-    x, y = work.points[at.X], work.points[at.Y]
     a, b, c, d = first[k - 1], last[k - 1], first[k], last[k]
     near, far = max(min(b, c - 1), a + 1), min(max(b, c - 1), d - 2)
     low, high = max(near - _MARGIN, a + 2), min(far + _MARGIN, d - 3)
@@ -155,14 +155,12 @@ def _cut(work, k):
         if max(c, near + 1) < d:
             last[k - 1], first[k] = near, max(c, near + 1)
         return
-    n1x, n1y, d1, _ = stretch_line(work, a, near)
-    n2x, n2y, d2, _ = stretch_line(work, far + 1, d)
-    total, least, border = 0.0, 0.0, low
-    for i in range(low + 1, high + 1):
-        e1, e2 = n1x * x[i] + n1y * y[i] - d1, n2x * x[i] + n2y * y[i] - d2
-        total += e1 * e1 - e2 * e2
-        if total < least - _ROUNDING:
-            least, border = total, i
+    least, border = math.inf, low
+    for i in range(low, high + 1):
+        _, _, _, before = stretch_line(work, a, i)
+        _, _, _, after = stretch_line(work, i + 1, d)
+        if before + after < (1.0 - _ALIKE) * least - _ROUNDING:
+            least, border = before + after, i
     last[k - 1], first[k] = border, border + 1
 
 
