@@ -142,12 +142,13 @@ class Drive(InTurn):
             return motion, False
         tried = self._tried(features, prior, way, turn)
 
-        def scores(poses: Array, count: int, wide: float) -> Array:
+        def scores(poses: Array, count: int, wide: float, apart: float = math.inf) -> Array:
             """Judge poses by so many of the beams, against that share of the prior."""
             few = some(beams, count)
-            odds = evidence_of(poses, few, self._index, wide, _MILD)[:, 0]
             share = len(few) / max(len(beams), 1)
-            return np.asarray(odds - 0.5 * share * squares_off(poses, prior, spread))
+            known = -0.5 * share * squares_off(poses, prior, spread)
+            found = evidence_of(poses, few, self._index, wide, _MILD, before=known, apart=apart)
+            return np.asarray(found[:, 0])
 
         for count, most in _SIFTED:
             tried = tried[distinct(tried, scores(tried, count, _WIDE), _APART, most)]
@@ -156,7 +157,8 @@ class Drive(InTurn):
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        fine_scores = scores(poses, _BEAMS, _TIGHT)
+        # The motion that was matched is preferred by a little.
+        fine_scores = scores(poses, _BEAMS, _TIGHT, apart=0.5)
         fine_scores[-1] += 0.5
         x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
