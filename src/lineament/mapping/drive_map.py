@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
 from ..features import Features
+from ..kernels.mapping.beams import count_passes
 from ..motion.association import associate
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
@@ -255,12 +256,6 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
 
 def _passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
     """Whether beams pass through each wall, away from its ends, and end far behind."""
-    ux, uy, ranges = beams[:, 2:5].T[:, :, None]
-    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
-    length = np.maximum(np.hypot(qx - px, qy - py), 1e-9)
-    # How far the start and the end lie to the left of each beam, and its end behind the wall.
-    start, end = ux * py - uy * px, ux * qy - uy * qx
-    behind = (ranges * (end - start) + qx * py - qy * px) / length
-    margin = np.minimum(0.1 / length, 0.2) * (end - start)
-    passes = (start < -margin) & (end > margin) & (behind > 0.3)
-    return np.asarray(passes.sum(axis=0) >= 3)
+    ends, passes = np.concatenate((walls["start"], walls["end"]), axis=1), np.empty(len(walls), int)
+    count_passes(beams, ends, (0.1, 0.2, 0.3), passes)
+    return passes >= 3

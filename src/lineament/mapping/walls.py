@@ -110,7 +110,9 @@ def rows_of(walls: Records) -> Array:
 
 def unit(angles: Array) -> Array:
     """Return unit vectors (..., 2) of these directions."""
-    return np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    vectors = np.empty((*np.shape(angles), 2))
+    vectors[..., 0], vectors[..., 1] = np.cos(angles), np.sin(angles)
+    return vectors
 
 
 def summed(values: Array, at: Numbers, count: int) -> Array:

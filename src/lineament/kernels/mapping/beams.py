@@ -170,3 +170,27 @@ def judge(
                 total += weight * short
         best = max(best, total)
         found[h, 0], found[h, 1], found[h, 2], found[h, 3] = total, hits, shorts, passes
+
+
+@kernel
+def count_passes(
+    beams: Floats2, walls: Floats2, settings: tuple[float, float, float], passes: Ints1
+):
+    """Count the beams that pass through each wall, away from its ends, and end far behind.
+
+    `walls` have both ends in a row. `settings`: how far from an end, by length and by share; how
+    far behind [m].
+    """
+    edge, share, far = settings
+    for w in range(len(walls)):
+        px, py, qx, qy = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        length = max(math.hypot(qx - px, qy - py), 1e-9)
+        margin, count = min(edge / length, share), 0
+        for b in range(len(beams)):
+            ux, uy, r = beams[b, 2], beams[b, 3], beams[b, 4]
+            # How far the start and the end lie to the left of the beam, its end behind the wall.
+            start, end = ux * py - uy * px, ux * qy - uy * qx
+            out = margin * (end - start)
+            if start < -out and end > out and r * (end - start) + qx * py - qy * px > far * length:
+                count += 1
+        passes[w] = count
