@@ -198,7 +198,8 @@ def _inverse_of(matrix: Any) -> Callable[[Array], Array]:
     lower = dpotri(dpotrf(matrix.toarray(), lower=1)[0], lower=1)[0]
     inverse = lower + lower.T
     np.fill_diagonal(inverse, lower.diagonal())
-    return lambda right: inverse @ right
+    # It is its own transpose, of whose rows none is copied.
+    return lambda right: (right.T @ inverse).T
 
 
 def _solver(matrix: Any) -> Callable[[Array], Array]:

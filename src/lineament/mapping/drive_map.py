@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
 from ..features import Features
+from ..kernels.mapping.beams import count_passes
 from ..motion.association import associate
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
@@ -142,12 +143,13 @@ class Drive(InTurn):
             return motion, False
         tried = self._tried(features, prior, way, turn)
 
-        def scores(poses: Array, count: int, wide: float) -> Array:
+        def scores(poses: Array, count: int, wide: float, apart: float = math.inf) -> Array:
             """Judge poses by so many of the beams, against that share of the prior."""
             few = some(beams, count)
-            odds = evidence_of(poses, few, self._index, wide, _MILD)[:, 0]
             share = len(few) / max(len(beams), 1)
-            return np.asarray(odds - 0.5 * share * squares_off(poses, prior, spread))
+            known = -0.5 * share * squares_off(poses, prior, spread)
+            found = evidence_of(poses, few, self._index, wide, _MILD, before=known, apart=apart)
+            return np.asarray(found[:, 0])
 
         for count, most in _SIFTED:
             tried = tried[distinct(tried, scores(tried, count, _WIDE), _APART, most)]
@@ -156,7 +158,8 @@ class Drive(InTurn):
         query = Query(walls, np.zeros((2 * len(walls), 2 * len(walls))), beams)
         fine = refined(refined(poses, query, self._index, COARSE)[0], query, self._index, FINE)[0]
         poses = np.concatenate((fine, poses))
-        fine_scores = scores(poses, _BEAMS, _TIGHT)
+        # The motion that was matched is preferred by a little.
+        fine_scores = scores(poses, _BEAMS, _TIGHT, apart=0.5)
         fine_scores[-1] += 0.5
         x, y, theta = poses[fine_scores.argmax()].tolist()
         best = Motion(x, y, theta, _NEAR)
@@ -253,12 +256,6 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
 
 def _passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
     """Whether beams pass through each wall, away from its ends, and end far behind."""
-    ux, uy, ranges = beams[:, 2:5].T[:, :, None]
-    (px, py), (qx, qy) = walls["start"].T, walls["end"].T
-    length = np.maximum(np.hypot(qx - px, qy - py), 1e-9)
-    # How far the start and the end lie to the left of each beam, and its end behind the wall.
-    start, end = ux * py - uy * px, ux * qy - uy * qx
-    behind = (ranges * (end - start) + qx * py - qy * px) / length
-    margin = np.minimum(0.1 / length, 0.2) * (end - start)
-    passes = (start < -margin) & (end > margin) & (behind > 0.3)
-    return np.asarray(passes.sum(axis=0) >= 3)
+    ends, passes = np.concatenate((walls["start"], walls["end"]), axis=1), np.empty(len(walls), int)
+    count_passes(beams, ends, (0.1, 0.2, 0.3), passes)
+    return passes >= 3

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..kernels.mapping.beams import judge
 from ..scan import Array
@@ -46,17 +47,29 @@ class Evidence:
 
 
 def evidence_of(
-    poses: Array, beams: Array, index: Index, spread: float, through: float = _THROUGH
+    poses: Array,
+    beams: Array,
+    index: Index,
+    spread: float,
+    through: float = _THROUGH,
+    *,
+    before: ArrayLike = 0.0,
+    best: float = -math.inf,
+    apart: float = math.inf,
 ) -> Array:
     """Judge poses (n, 3) by beams: log-likelihood ratios and the shares of the beams, (n, 4).
 
     `spread` is a deviation [m] that is added to those of beams and walls; `through`, what a beam
-    says that passes through a wall [nats].
+    says that passes through a wall [nats]; `before`, what is known of each pose already. The ratio
+    is -inf where it cannot come as near to the `best`, of those and those before it, as `apart`.
     """
     found = np.zeros((len(poses), 4))
+    found[:, 0] = before
     if not len(beams):
         return found
-    settings = (_EXPLAINED + 0.5, _SHORT, through, spread**2, MARGIN + spread, SHY + spread)
+    found[:, 0] *= TOGETHER
+    of_beams = (_EXPLAINED + 0.5, _SHORT, through, spread**2, MARGIN + spread, SHY + spread)
+    settings = (*of_beams, best * TOGETHER, apart * TOGETHER)
     judge(np.ascontiguousarray(poses), beams, *index, settings, found)
     found[:, 0] /= TOGETHER
     found[:, 1:] /= max(beams[:, 6].sum(), 1e-12)

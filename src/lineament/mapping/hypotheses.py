@@ -1,14 +1,16 @@
 """Where a local map may lie on a plan: corners of both that are alike, and votes for poses."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LineamentError
+from ..kernels.mapping.corners import CORNER_COLUMNS, meet
 from ..kernels.mapping.votes import vote
 from ..scan import Array
-from .walls import Numbers, lengths_of, unit
+from .walls import Numbers, lengths_of, rows_of, unit
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
 #: there, below π; `solid` is 1 where that is inside a wall, 0 where it is free, -1 if not known.
@@ -30,6 +32,8 @@ REACH, LEAST_SINE = 0.35, 0.35
 ARM = 0.08
 #: Points along walls by which they are found, and pairs of walls that are looked at, at most.
 _MOST_POINTS, _MOST_PAIRS = 4_000_000, 5_000_000
+#: Of so few walls, to look at all pairs is quicker.
+_FEW = 150
 #: Corners whose openings differ by more are not the same [rad].
 ALIKE = math.radians(12)
 #: Ends of walls vote if the wall is so long [m], by this weight; turns count from this vote on.
@@ -41,45 +45,28 @@ BOX, TURN = 0.6, math.radians(12)
 def meetings(walls: NDArray[np.void]) -> NDArray[np.void]:
     """Return where two walls end together, or one ends on the other: records of `MEETING`."""
     pairs = beside(walls)
-    u = unit(walls["angle"])
-    sine = _cross(u[pairs[:, 0]], u[pairs[:, 1]])
-    crossing = np.abs(sine) > LEAST_SINE
-    pairs, sine = pairs[crossing], sine[crossing]
-    between = walls["start"][pairs[:, 1]] - walls["start"][pairs[:, 0]]
-    along = np.column_stack([_cross(between, u[k]) for k in pairs.T[::-1]]) / sine[:, None]
-    length = lengths_of(walls)[pairs]
-    near = (np.minimum(np.abs(along), np.abs(length - along)) <= REACH).any(axis=1)
-    near &= ((along >= -REACH) & (along <= length + REACH)).all(axis=1)
-    found = [np.zeros(0, MEETING)]
-    for ways in np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
-        # An arm leads from the vertex along the wall: to its end, or back to its start.
-        arm = np.where(ways > 0, length - along, along)
-        k = np.flatnonzero(near & (arm >= np.minimum(ARM, 0.5 * length)).all(axis=1))
-        corners, of = np.zeros(len(k), MEETING), pairs[k]
-        leads = np.broadcast_to(ways, of.shape)
-        # Arms in counter-clockwise order, less than half a turn apart.
-        swap = (ways.prod() * sine[k] < 0)[:, None]
-        of, leads = np.where(swap, of[:, ::-1], of), np.where(swap, leads[:, ::-1], leads)
-        va, vb = (leads[:, [side]] * u[of[:, side]] for side in (0, 1))
-        middle = va + vb
-        corners["position"] = walls["start"][pairs[k, 0]] + along[k, :1] * u[pairs[k, 0]]
-        corners["bisector"] = np.arctan2(middle[:, 1], middle[:, 0])
-        corners["opening"] = np.arctan2(_cross(va, vb), (va * vb).sum(axis=1))
-        corners["covariance"] = _spread(walls[of], corners["position"])
-        # What is seen lies to the left of a wall: between the arms if a leads on and b leads back.
-        one_sided = (walls["side"][of] == 1).all(axis=1)
-        corners["walls"], corners["solid"] = of, np.where(one_sided, leads[:, 0] < 0, -1)
-        found.append(corners[~one_sided | (leads[:, 0] != leads[:, 1])])
-    return np.concatenate(found)
+    found = np.empty((4 * len(pairs), CORNER_COLUMNS))
+    count = meet(rows_of(walls), pairs, (REACH, LEAST_SINE, ARM), found)
+    rows, corners = found[:count], np.zeros(count, MEETING)
+    corners["position"], corners["covariance"] = (
+        rows[:, :2],
+        rows[:, (2, 3, 3, 4)].reshape(-1, 2, 2),
+    )
+    corners["bisector"], corners["opening"] = rows[:, 5:7].T
+    corners["solid"], corners["walls"] = rows[:, 7], rows[:, 8:]
+    return corners
 
 
 def beside(walls: NDArray[np.void]) -> Numbers:
     """Return pairs of walls of which one, a little longer, may pass by an end of the other.
 
-    Rows are sorted, with the lower number first. Points along the walls are listed by cells, and
-    each end looks into the nine cells around it: the cost is that of the pairs.
+    Rows are sorted, with the lower number first; of few walls they are all. Points along the walls
+    are listed by cells, and each end looks into the nine cells around it: the cost is that of the
+    pairs.
     """
     u, lengths, n = unit(walls["angle"]), lengths_of(walls), len(walls)
+    if n <= _FEW:
+        return np.column_stack(np.triu_indices(n, 1))
     total = float(lengths.sum()) + 2 * REACH * n
     step = max(2 * REACH, total / _MOST_POINTS)
     counts = np.ceil((lengths + 2 * REACH) / step).astype(np.int64)
@@ -111,29 +98,29 @@ def beside(walls: NDArray[np.void]) -> Numbers:
     return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
 
 
-def _spread(walls: NDArray[np.void], at: Array) -> Array:
-    """Covariances of places (n, 2) where two lines meet, from those of both, (n, 2)."""
-    u = unit(walls["angle"])
-    lever = np.ones(u.shape)
-    lever[:, :, 1] = ((at[:, None] - walls["centroid"]) * u).sum(axis=2)
-    variances = np.einsum("nwi,nwij,nwj->nw", lever, walls["covariance"], lever)
-    inverse = np.linalg.inv(np.stack((-u[:, :, 1], u[:, :, 0]), axis=-1))
-    return np.asarray((inverse * variances[:, None]) @ inverse.transpose(0, 2, 1))
-
-
 def directions(local: NDArray[np.void], walls: NDArray[np.void]) -> Array:
     """Votes of the walls for each turn of the local map, by degrees, shape (360,), at most 1."""
-    spectra = []
-    for table in (local, walls):
-        lengths = np.minimum(lengths_of(table), 10.0)
-        degrees = np.rint(np.degrees(table["angle"])).astype(np.int64) % 360
-        histogram = np.bincount(degrees, lengths, minlength=360)
-        both = table["side"] == 0
-        histogram += np.bincount((degrees[both] + 180) % 360, lengths[both], minlength=360)
-        spectra.append(np.fft.rfft(histogram))
-    smooth = np.roll(np.bincount(np.arange(7), [1, 2, 3, 4, 3, 2, 1], 360), -3)
-    turned = np.fft.irfft(spectra[0].conj() * spectra[1] * np.fft.rfft(smooth), 360)
+    return agreement(spectrum(local), spectrum(walls))
+
+
+def spectrum(walls: NDArray[np.void]) -> NDArray[np.complex128]:
+    """Fourier transform of the lengths of walls by the degrees of their directions."""
+    lengths = np.minimum(lengths_of(walls), 10.0)
+    degrees = np.rint(np.degrees(walls["angle"])).astype(np.int64) % 360
+    both = walls["side"] == 0
+    histogram = np.bincount(degrees, lengths, minlength=360)
+    histogram += np.bincount((degrees[both] + 180) % 360, lengths[both], minlength=360)
+    return np.asarray(np.fft.rfft(histogram))
+
+
+def agreement(local: NDArray[np.complex128], walls: NDArray[np.complex128]) -> Array:
+    """Votes for each turn by spectra of walls, as of `directions`."""
+    turned = np.fft.irfft(local.conj() * walls * _SMOOTH, 360)
     return np.asarray(np.maximum(turned / turned.max(initial=1e-12), 0.0))
+
+
+#: Walls that are a few degrees off each other agree in part.
+_SMOOTH = np.fft.rfft(np.roll(np.bincount(np.arange(7), [1, 2, 3, 4, 3, 2, 1], 360), -3))
 
 
 def anchors(walls: NDArray[np.void], corners: NDArray[np.void]) -> Array:
@@ -152,37 +139,58 @@ def anchors(walls: NDArray[np.void], corners: NDArray[np.void]) -> Array:
     return np.concatenate(tables)
 
 
-def hypotheses(local: Array, plan: Array, by_turn: Array, most: int) -> Array:
+def image_of(anchors: Array) -> Array:
+    """Return the anchors of the mirror image: where walls started they end."""
+    image = anchors * (1, -1, -1, 1, 1)
+    ends = anchors[:, 3] > 1.5
+    image[ends, 2] += math.pi
+    image[ends, 3] = 5.0 - anchors[ends, 3]
+    return image
+
+
+class Listed(NamedTuple):
+    """Anchors by kind, degree and place; their directions as vectors; where each degree begins.
+
+    Those beside each other are, so that their votes are, too.
+    """
+
+    anchors: Array
+    units: Array
+    begins: Numbers
+
+
+def listed(anchors: Array) -> Listed:
+    """List the anchors of a plan."""
+    rows = anchors.copy()
+    rows[:, 2] %= 2 * math.pi
+    degrees = np.minimum(np.degrees(rows[:, 2]).astype(np.int64), 359)
+    keys = 360 * (rows[:, 3].astype(np.int64) + 1) + degrees
+    order = np.lexsort((rows[:, 1], rows[:, 0], keys))
+    begins = np.searchsorted(keys[order], np.arange(5 * 360 + 1))
+    return Listed(rows[order], unit(rows[order, 2]), begins)
+
+
+def hypotheses(local: Array, plan: Listed, by_turn: Array, most: int) -> Array:
     """Return the poses of the local map for which most votes are, shape (n, 3), the best first.
 
     An anchor of the local map that is like one of the plan votes for the pose that puts it there,
     by how well the walls agree with the turn. Boxes in which votes are counted overlap by half.
     """
-    n_turns = round(2 * math.pi / TURN)
+    n_turns, places = round(2 * math.pi / TURN), plan.anchors[:, :2]
     reach = np.hypot(*local[:, :2].T).max(initial=0.0) + BOX
-    low, high = plan[:, :2].min(axis=0) - reach, plan[:, :2].max(axis=0) + reach
-    columns, rows = np.ceil((high - low) / BOX).astype(int) + 1
-    settings = (*low.tolist(), BOX, int(rows), ALIKE, LEAST_TURN, OF_ENDS)
+    low, high = places.min(axis=0) - reach, places.max(axis=0) + reach
+    columns, rows = (np.ceil((high - low) / BOX).astype(int) + 1).tolist()
+    settings = (*low.tolist(), BOX, rows, ALIKE, LEAST_TURN, OF_ENDS)
     # Only turns that walls agree with have boxes.
     degrees = np.flatnonzero(by_turn >= LEAST_TURN)[:, None] + np.array([-0.5, 0.5])
-    slots = np.full((2, n_turns), -1)
+    used = np.zeros((2, n_turns), np.int64)
     for k in range(2):
-        used = np.unique(np.floor(degrees / 360 * n_turns + 0.5 * k).astype(np.int64) % n_turns)
-        slots[k, used] = np.arange(len(used))
-    n_slots = int(slots.max(initial=-1)) + 1
-    boxes = np.zeros((2, columns * rows * n_slots, 4))
-    voters = np.zeros(boxes.shape[:2], np.int32)
-    touched = np.empty(boxes.shape[:2], np.int64)
-    counts = np.zeros(2, np.int64)
-    turns = by_turn, slots, n_slots
-    vote(local, plan, unit(plan[:, 2]), turns, settings, boxes, voters, touched, counts)
-    found = np.concatenate([boxes[k, touched[k, :count]] for k, count in enumerate(counts)])
-    if len(found) > most:
-        least = np.partition(found[:, 0], -most)[-most]
-        found = found[found[:, 0] >= least]
-    return np.asarray(found[np.argsort(-found[:, 0], kind="stable")[:most], 1:])
-
-
-def _cross(a: Array, b: Array) -> Array:
-    product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return product
+        used[k, np.floor(degrees / 360 * n_turns + 0.5 * k).astype(np.int64) % n_turns] = 1
+    boxes = np.zeros((columns * rows, 4))
+    found = np.empty((4, min(int(used.sum()) * len(boxes), 2 * len(local) * len(places))))
+    scratch, touched = (boxes, np.zeros(len(boxes), np.int64)), np.empty(len(boxes), np.int64)
+    count = vote(local, plan, (by_turn, used), settings, scratch, touched, found)
+    votes, best = found[0, :count], np.arange(count)
+    if count > most:
+        best = np.flatnonzero(votes >= np.partition(votes, -most)[-most])
+    return found[1:, best[np.argsort(-votes[best], kind="stable")[:most]]].T

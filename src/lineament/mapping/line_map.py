@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from .._copies import ReadOnly, locked
 from ..errors import LineamentError
 from ..features import ARC, CORNER, Features, make_records
-from ..kernels.mapping.layout import WALL_COLUMNS, list_walls
+from ..kernels.mapping.layout import list_walls
 from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .drawings import read_drawing
-from .hypotheses import anchors, meetings
+from .hypotheses import Listed, anchors, listed, meetings, spectrum
 from .plans import plan_error, read_table
 from .sights import columns_shown, walls_shown
-from .walls import COLUMN, lengths_of, segments_of, shared, walls_of
+from .walls import COLUMN, lengths_of, rows_of, segments_of, shared, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -140,9 +140,14 @@ class LineMap(ReadOnly):
         return locked(meetings(self.walls))
 
     @cached_property
-    def anchors(self) -> Array:
+    def anchors(self) -> Listed:
         """What votes for poses: corners and ends of walls, see `hypotheses.anchors`."""
-        return anchors(self.walls, self.corners)
+        return listed(anchors(self.walls, self.corners))
+
+    @cached_property
+    def spectrum(self) -> NDArray[np.complex128]:
+        """The directions of the walls, see `hypotheses.spectrum`."""
+        return spectrum(self.walls)
 
     @cached_property
     def index(self) -> Index:
@@ -293,27 +298,19 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     turns = np.linspace(0, 2 * math.pi, _SIDES + 1)
     ring = np.stack((np.cos(turns), np.sin(turns)), axis=1)[::-1]  # seen from outside: its left
     rings = columns["center"][:, None] + columns["radius"][:, None, None] * ring
-    sides = np.stack((rings[:, :-1], rings[:, 1:]), axis=2).reshape(-1, 2, 2)
-    ends = np.concatenate((np.stack((walls["start"], walls["end"]), axis=1), sides))
-    along, n = ends[:, 1] - ends[:, 0], len(walls)
-    table = np.zeros((len(ends), WALL_COLUMNS))
-    table[:, 4] = np.linalg.norm(along, axis=1)
-    table[:, :2], table[:, 2:4] = ends[:, 0], along / table[:, 4:5]
-    table[:n, 5], table[n:, 5] = walls["side"], 1
-    # The covariance is moved along the wall to the middle between its ends.
-    lever = ((ends[:n].mean(axis=1) - walls["centroid"]) * table[:n, 2:4]).sum(axis=1)
-    (v00, v01), (_, v11) = walls["covariance"].transpose(1, 2, 0)
-    table[:n, 6] = v00 + 2 * lever * v01 + lever**2 * v11
-    table[:n, 7], table[:n, 8] = v01 + lever * v11, v11
+    sides = walls_of(np.stack((rings[:, :-1], rings[:, 1:]), axis=2).reshape(-1, 2, 2), side=1)
+    every = np.concatenate((walls, sides))
+    table, ends = rows_of(every), np.stack((every["start"], every["end"]), axis=1)
     table[:, 6] += sigma**2
+    along = ends[:, 1] - ends[:, 0]
     low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0
     boxes = float(np.prod(abs(along) + 2 * (_AROUND + _CELL), axis=1).sum())
     area = float(np.prod(high - low))
     cell = max(_CELL, math.sqrt(area / _MOST_CELLS), math.sqrt(boxes / _MOST_LISTED))
     counts = np.ceil((high - low) / cell)
-    grid, begins = np.array([*low, cell, *counts]), np.zeros(int(np.prod(counts)) + 1, np.int64)
-    list_walls(table, grid, _AROUND, begins[:-1], np.empty(0, np.int64))
-    begins = np.concatenate(([0], np.cumsum(begins[:-1])))
+    grid, begins = np.array([*low, cell, *counts]), np.zeros(2 * int(np.prod(counts)) + 1, np.int64)
+    list_walls(table, grid, _AROUND, begins[1:], np.empty(0, np.int64))
+    begins = np.cumsum(begins)
     members = np.empty(begins[-1], np.int64)
     list_walls(table, grid, _AROUND, begins[:-1].copy(), members)
     return Index(table, grid, begins, members)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,13 @@ from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
 from ..features import Features
-from ..kernels.mapping.layout import BEAM_COLUMNS
+from ..kernels.mapping.layout import BEAM_COLUMNS, LOCAL_COLUMNS
 from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
 from .adjust import adjust
-from .hypotheses import meetings
+from .hypotheses import anchors, meetings
 from .walls import SHORTEST, unit, wrapped
 
 #: A scan is kept after so much way, or so much turn [m, rad].
@@ -31,7 +32,7 @@ FASTEST = 0.5
 _SQUARE, MOST_BEAMS = 0.25, 160
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Query:
     """What is looked for: walls and beams in one frame, the sensor's now.
 
@@ -48,13 +49,16 @@ class Query:
     covariance: Array
     beams: Array
 
-    @property
+    @cached_property
     def table(self) -> Array:
         """The walls as the kernels take them, shape (n, LOCAL_COLUMNS)."""
         walls = self.walls
-        reach = [np.linalg.norm(walls[end] - walls["centroid"], axis=1) for end in ("start", "end")]
-        spread = walls["covariance"].reshape(-1, 4)[:, (0, 1, 3)]
-        return np.column_stack((walls["centroid"], walls["angle"], *reach, spread))
+        table = np.empty((len(walls), LOCAL_COLUMNS))
+        table[:, :2], table[:, 2:4] = walls["centroid"], unit(walls["angle"])
+        for column, end in ((4, "start"), (5, "end")):
+            table[:, column] = np.linalg.norm(walls[end] - walls["centroid"], axis=1)
+        table[:, 6:] = walls["covariance"].reshape(-1, 4)[:, (0, 1, 3)]
+        return table
 
     def mirrored(self) -> "Query":
         """Return its mirror image, which is as rich but belongs nowhere on a plan."""
@@ -70,6 +74,11 @@ class Query:
     def corners(self) -> NDArray[np.void]:
         """Where walls end together, records of `hypotheses.MEETING`."""
         return meetings(self.walls)
+
+    @cached_property
+    def anchors(self) -> Array:
+        """What votes: these, and ends of walls, see `hypotheses.anchors`."""
+        return anchors(self.walls, self.corners)
 
 
 class LocalMap(InTurn):
@@ -197,7 +206,12 @@ def query_of_scan(features: Features, scan: LaserScan | None = None) -> Query:
 
 def some(rows: NDArray[Any], count: int) -> NDArray[Any]:
     """Return so many of the rows, evenly spread, or all if there are no more."""
-    return np.asarray(rows[np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.intp)])
+    return np.asarray(rows[_spread_out(len(rows), count)])
+
+
+@lru_cache
+def _spread_out(n: int, count: int) -> NDArray[np.intp]:
+    return np.linspace(0, n - 1, min(count, n)).astype(np.intp)
 
 
 def thinned(beams: Array) -> Array:

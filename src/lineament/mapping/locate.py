@@ -11,7 +11,7 @@ from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from .evidence import Evidence, evidence_of
-from .hypotheses import BOX, TURN, anchors, directions, hypotheses
+from .hypotheses import BOX, TURN, agreement, hypotheses, image_of, spectrum
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan, some
 from .refine import COARSE, FINE, WEAK, adjusted, refined
@@ -137,22 +137,26 @@ def locate(
         query = query.query()
     elif isinstance(query, Features):
         query = query_of_scan(query, scan)
-    tried = _tried(query, plan) if guess is None else _near(guess, covariance, query, plan)
+    if guess is None:
+        tried = _tried(query.anchors, query, plan)
+    else:
+        tried = _near(guess, covariance, query, plan)
     poses, found = _searched(tried, query, plan)
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
     room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
     odds, where = found[0, 0], _judged(poses, found, query, plan, room)
-    if where.verdict == LOCATED and guess is None:
-        # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
-        image = query.mirrored()
-        _, feigned = _searched(_tried(image, plan), image, plan)
-        control = feigned[:, 0].max(initial=-math.inf)
-        if control > odds + SURE or where.evidence.contradicted > LESS_CONTRADICTED:
-            where = replace(where, verdict=LOST)
-        elif control > odds - NOT_MIRRORED:
-            where = replace(where, verdict=AMBIGUOUS)
-    return where
+    if where.verdict != LOCATED or guess is not None:
+        return where
+    if where.evidence.contradicted > LESS_CONTRADICTED:
+        return replace(where, verdict=LOST)
+    # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
+    image = query.mirrored()
+    _, feigned = _searched(_tried(image_of(query.anchors), image, plan), image, plan, 0.0)
+    control = feigned[:, 0].max(initial=-math.inf)
+    if control > odds + SURE:
+        return replace(where, verdict=LOST)
+    return replace(where, verdict=AMBIGUOUS) if control > odds - NOT_MIRRORED else where
 
 
 #: Covariance of a pose of which nothing is known, and of a guess for which none is given.
@@ -161,10 +165,10 @@ _GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 
 
-def _tried(query: Query, plan: LineMap) -> Array:
-    """Poses of a local map for which its corners and ends of walls vote."""
-    local = anchors(query.walls, query.corners)
-    return hypotheses(local, plan.anchors, directions(query.walls, plan.walls), TRIED)
+def _tried(anchors: Array, query: Query, plan: LineMap) -> Array:
+    """Poses of a local map for which its anchors vote: corners and ends of walls."""
+    by_turn = agreement(spectrum(query.walls), plan.spectrum)
+    return hypotheses(anchors, plan.anchors, by_turn, TRIED)
 
 
 def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap) -> Array:
@@ -175,7 +179,7 @@ def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap
     if np.prod(counts.astype(float)) <= TRIED:
         steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
-    tried = _tried(query, plan)
+    tried = _tried(query.anchors, query, plan)
     return np.vstack((guess, tried[squares_off(tried, guess, spread) < 16.0]))
 
 
@@ -186,8 +190,13 @@ def squares_off(poses: Array, guess: Pose, covariance: Array) -> Array:
     return np.asarray(np.einsum("ni,ij,nj->n", off, np.linalg.inv(covariance), off))
 
 
-def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
-    """Try poses by few beams, refine the best, and judge them by all; the best come first."""
+def _searched(
+    tried: Array, query: Query, plan: LineMap, apart: float = SURE
+) -> tuple[Array, Array]:
+    """Try poses by few beams, refine the best, and judge them by all; the best come first.
+
+    What is less likely than the best by more than `apart` [nats] need not be judged by all.
+    """
     if not len(tried):
         return tried, np.zeros((0, 4))
     for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
@@ -196,7 +205,7 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     # What is near enough may be moved away by a wrong pair of walls that is looked for far off.
     starts = np.concatenate((tried, refined(tried, query, plan.index, COARSE)[0]))
     poses, _, _ = refined(starts, query, plan.index, FINE)
-    found = evidence_of(poses, query.beams, plan.index, _TIGHT)
+    found = evidence_of(poses, query.beams, plan.index, _TIGHT, apart=apart)
     # Poses some way off along both axes of the local map may look alike.
     best = poses[found[:, 0].argmax()]
     main = np.angle((lengths_of(query.walls) * np.exp(4j * query.walls["angle"])).sum()) / 4
@@ -204,7 +213,9 @@ def _searched(tried: Array, query: Query, plan: LineMap) -> tuple[Array, Array]:
     axes = unit(best[2] + main + np.array((0.0, math.pi / 2)))
     slid[:, :2] += np.kron(axes.T, _SLIDES).T
     slid, _, _ = refined(slid, query, plan.index, FINE)
-    found = np.concatenate((found, evidence_of(slid, query.beams, plan.index, _TIGHT)))
+    best_odds = found[:, 0].max()
+    of_slid = evidence_of(slid, query.beams, plan.index, _TIGHT, best=best_odds, apart=apart)
+    found = np.concatenate((found, of_slid))
     poses = np.concatenate((poses, slid))
     kept = distinct(poses, found[:, 0], _SAME, JUDGED)
     return poses[kept], found[kept]

@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from ..features import SEGMENT
+from ..kernels.mapping.lines import SUMS, fit_lines
 from ..motion.association import chi_square
 from ..scan import Array
 from .walls import (
@@ -20,7 +21,6 @@ from .walls import (
     covariance_at,
     lengths_of,
     shared,
-    summed,
     unit,
     wrapped,
 )
@@ -99,19 +99,11 @@ def lines_of(sights: Records, poses: Array, count: int) -> Records:
 
     From the mean of its sights on, by robust least squares.
     """
-    (places, angles), w, lines = placed(sights, poses), sights["wall"], np.zeros(count, WALL)
-    sure, firm = (1.0 / sights["covariance"][:, k, k, None] for k in range(2))
-    lines["angle"] = np.arctan2(*summed(firm * unit(angles), w, count).T[::-1])
-    total = np.maximum(summed(sure, w, count), 1e-12)
-    lines["centroid"] = summed(sure * places, w, count) / total
-    information = np.linalg.inv(sights["covariance"])
-    for _ in range(2):
-        off, _, of_wall = errors(sights, poses, lines)
-        weighted = of_wall.transpose(0, 2, 1) @ robust(off, information)
-        own = summed(weighted @ of_wall, w, count)
-        lines["covariance"] = np.linalg.inv(own + 1e-6 * np.eye(2))
-        step = lines["covariance"] @ summed(weighted @ off[:, :, None], w, count)
-        move(lines, -step[:, :, 0])
+    lines, words = np.zeros(count, WALL), np.ascontiguousarray(sights).view(np.float64)
+    rows = words.reshape(len(sights), SIGHT.itemsize // 8)
+    of_lines, most = lines.view(np.float64).reshape(count, WALL.itemsize // 8), _KERNEL**2
+    poses = np.ascontiguousarray(poses, np.float64)
+    fit_lines(rows, rows.view(np.int64), poses, most, of_lines, np.zeros((count, SUMS)))
     return lines
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import SEGMENT
+from ..kernels.mapping.layout import WALL_COLUMNS
 from ..scan import Array, Pose
 
 #: A straight wall. Its covariance is that of (offset along the left normal at the centroid, angle)
@@ -92,9 +93,26 @@ def lengths_of(walls: Records) -> Array:
     return np.asarray(np.linalg.norm(walls["end"] - walls["start"], axis=1))
 
 
+def rows_of(walls: Records) -> Array:
+    """Return walls as the kernels take them, shape (n, WALL_COLUMNS)."""
+    rows = np.empty((len(walls), WALL_COLUMNS))
+    along = walls["end"] - walls["start"]
+    rows[:, :2], rows[:, 4] = walls["start"], np.hypot(along[:, 0], along[:, 1])
+    rows[:, 2:4], rows[:, 5] = along / rows[:, 4:5], walls["side"]
+    # The covariance is moved along the wall to the middle between its ends.
+    arm = 0.5 * (walls["start"] + walls["end"]) - walls["centroid"]
+    lever, spread = (arm * rows[:, 2:4]).sum(axis=1), walls["covariance"]
+    rows[:, 8] = spread[:, 1, 1]
+    rows[:, 7] = spread[:, 0, 1] + lever * rows[:, 8]
+    rows[:, 6] = spread[:, 0, 0] + lever * (2 * spread[:, 0, 1] + lever * rows[:, 8])
+    return rows
+
+
 def unit(angles: Array) -> Array:
     """Return unit vectors (..., 2) of these directions."""
-    return np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    vectors = np.empty((*np.shape(angles), 2))
+    vectors[..., 0], vectors[..., 1] = np.cos(angles), np.sin(angles)
+    return vectors
 
 
 def summed(values: Array, at: Numbers, count: int) -> Array:

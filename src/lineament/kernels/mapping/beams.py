@@ -10,6 +10,10 @@ from .layout import cell_of
 GATE = 9.0
 #: Beyond such a one, behind a wall, it has passed through it.
 THROUGH = 16.0
+#: Beams are looked at in so many laps: those beside each other say the same.
+_LAPS = 8
+#: By so much of a cell, places along a beam are rounded, and far less.
+_ROUNDED = 1e-6
 
 
 @helper
@@ -41,8 +45,9 @@ def _misfit(walls, near, x, y, direction, pose, margin, spread):
             continue
         off = ux * ry - uy * rx
         total = spread + _variance(walls[k], along, direction, pose)
-        if off * off < GATE * total:
-            least = min(least, off * off / total + math.log(total / spread))
+        square = off * off / total
+        if square < GATE and square < least:
+            least = min(least, square + math.log(total / spread))
     return least
 
 
@@ -71,34 +76,28 @@ def _stops(walls, near, origin, end, direction, pose, shy, spread):
 
 @helper
 def _passes(walls, grid, begins, members, origin, end, direction, pose, shy, spread):
-    """Whether a beam passes through a wall: the cells along it are looked at in turn."""
-    ox, oy = origin
-    ex, ey = end
-    low_x, low_y, cell = grid[0], grid[1], grid[2]
-    columns, rows = int(grid[3]), int(grid[4])
-    i, j = math.floor((ox - low_x) / cell), math.floor((oy - low_y) / cell)
-    i_end, j_end = math.floor((ex - low_x) / cell), math.floor((ey - low_y) / cell)
-    dx, dy = ex - ox, ey - oy
-    step_i, step_j = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
-    per_i = abs(cell / dx) if dx != 0.0 else math.inf
-    per_j = abs(cell / dy) if dy != 0.0 else math.inf
-    next_i, next_j = math.inf, math.inf
-    if dx != 0.0:
-        next_i = (low_x + (i + (dx > 0.0)) * cell - ox) / dx
-    if dy != 0.0:
-        next_j = (low_y + (j + (dy > 0.0)) * cell - oy) / dy
-    for _ in range(abs(i_end - i) + abs(j_end - j) + 1):
-        if 0 <= i < columns and 0 <= j < rows:
-            at = i * rows + j
-            near = members[begins[at] : begins[at + 1]]
-            if _stops(walls, near, origin, end, direction, pose, shy, spread):
-                return True
-        if next_i < next_j:
-            i += step_i
-            next_i += per_i
-        else:
-            j += step_j
-            next_j += per_j
+    """Whether a beam passes through a wall that crosses one of the cells along it.
+
+    In each column of cells, those are beside each other, and their walls follow each other.
+    """
+    cell, columns, rows = grid[2], int(grid[3]), int(grid[4])
+    x, y = (origin[0] - grid[0]) / cell, (origin[1] - grid[1]) / cell
+    x_end, y_end = (end[0] - grid[0]) / cell, (end[1] - grid[1]) / cell
+    low, high = min(x, x_end), max(x, x_end)
+    slope = (y_end - y) / (x_end - x) if high > low else 0.0
+    least, most = max(math.floor(low), 0), min(math.floor(high), columns - 1)
+    for i in range(int(least), int(most) + 1):
+        one, other = y, y_end
+        if high > low:
+            one, other = y + (max(low, i) - x) * slope, y + (min(high, i + 1.0) - x) * slope
+        first = max(math.floor(min(one, other) - _ROUNDED), 0)
+        last = min(math.floor(max(one, other) + _ROUNDED), rows - 1)
+        if first > last:
+            continue
+        at = rows * (columns + i)
+        near = members[begins[at + int(first)] : begins[at + int(last) + 1]]
+        if _stops(walls, near, origin, end, direction, pose, shy, spread):
+            return True
     return False
 
 
@@ -110,22 +109,37 @@ def judge(
     grid: Floats1,
     begins: Ints1,
     members: Ints1,
-    settings: tuple[float, float, float, float, float, float],
+    settings: tuple[float, float, float, float, float, float, float, float],
     found: Floats2,
 ):
     """Sum up the evidence of beams for poses.
 
-    Rows of `found` become the log-likelihood ratio, and the weights of the beams that are
-    explained, short, and passing through a wall.
+    Rows of `found`, of which the first column is what is known before, become the log-likelihood
+    ratio, and the weights of the beams that are explained, short, and passing through a wall. It is
+    -inf for poses that cannot come as near to the best one so far as `apart` any more.
 
     `settings`: log-likelihood ratio of a beam explained, short, and passing through; variance that
-    is added to all; how far past a wall's end it explains, and how near to it a beam may pass [m].
+    is added to all; how far past a wall's end it explains, and how near to it a beam may pass [m];
+    the best one before; `apart`.
     """
-    explained, short, through, spread, margin, shy = settings
+    explained, short, through, spread, margin, shy, best, apart = settings
+    most, count = max(explained, short, through), len(beams)
+    weights = 0.0
+    for b in range(count):
+        weights += beams[b, 6]
     for h in range(len(poses)):
         x, y, c, s = poses[h, 0], poses[h, 1], math.cos(poses[h, 2]), math.sin(poses[h, 2])
-        total = hits = shorts = passes = 0.0
-        for b in range(len(beams)):
+        cc, cs, ss = c * c, c * s, s * s
+        total, rest, hits, shorts, passes = found[h, 0], weights, 0.0, 0.0, 0.0
+        lap, b = -1, count
+        for _ in range(count):
+            if total + most * rest < best - apart:
+                total = -math.inf
+                break
+            b += _LAPS
+            if b >= count:
+                lap += 1
+                b = lap
             ox = x + c * beams[b, 0] - s * beams[b, 1]
             oy = y + s * beams[b, 0] + c * beams[b, 1]
             dx, dy = c * beams[b, 2] - s * beams[b, 3], s * beams[b, 2] + c * beams[b, 3]
@@ -133,22 +147,50 @@ def judge(
             ex, ey = ox + r * dx, oy + r * dy
             # The covariance of the end, turned with the pose.
             xx, xy, yy = beams[b, 7], beams[b, 8], beams[b, 9]
-            half, twice, mean = 0.5 * (xx - yy), 2.0 * c * s, 0.5 * (xx + yy)
-            even = (c * c - s * s) * half - twice * xy
-            pose = (mean + even, twice * half + (c * c - s * s) * xy, mean - even)
+            pose = (
+                cc * xx - 2.0 * cs * xy + ss * yy,
+                cs * (xx - yy) + (cc - ss) * xy,
+                ss * xx + 2.0 * cs * xy + cc * yy,
+            )
             direction, end = (dx, dy, variance), (ex, ey)
-            deviation = math.inf
-            at = cell_of(grid, ex, ey)
-            if at >= 0:
-                near = members[begins[at] : begins[at + 1]]
-                deviation = _misfit(walls, near, ex, ey, direction, pose, margin, spread)
+            rest -= weight
             if _passes(walls, grid, begins, members, (ox, oy), end, direction, pose, shy, spread):
                 passes += weight
                 total += weight * through
-            elif deviation < math.inf:
+                continue
+            deviation, at = math.inf, cell_of(grid, ex, ey)
+            if at >= 0:
+                near = members[begins[at] : begins[at + 1]]
+                deviation = _misfit(walls, near, ex, ey, direction, pose, margin, spread)
+            if deviation < math.inf:
                 hits += weight
                 total += weight * max(explained - 0.5 * deviation, short)
             else:
                 shorts += weight
                 total += weight * short
+        best = max(best, total)
         found[h, 0], found[h, 1], found[h, 2], found[h, 3] = total, hits, shorts, passes
+
+
+@kernel
+def count_passes(
+    beams: Floats2, walls: Floats2, settings: tuple[float, float, float], passes: Ints1
+):
+    """Count the beams that pass through each wall, away from its ends, and end far behind.
+
+    `walls` have both ends in a row. `settings`: how far from an end, by length and by share; how
+    far behind [m].
+    """
+    edge, share, far = settings
+    for w in range(len(walls)):
+        px, py, qx, qy = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        length = max(math.hypot(qx - px, qy - py), 1e-9)
+        margin, count = min(edge / length, share), 0
+        for b in range(len(beams)):
+            ux, uy, r = beams[b, 2], beams[b, 3], beams[b, 4]
+            # How far the start and the end lie to the left of the beam, its end behind the wall.
+            start, end = ux * py - uy * px, ux * qy - uy * qx
+            out = margin * (end - start)
+            if start < -out and end > out and r * (end - start) + qx * py - qy * px > far * length:
+                count += 1
+        passes[w] = count

@@ -6,13 +6,16 @@ from .. import helper, kernel
 from ..arrays import Floats1, Floats2, Floats3, Ints1, Ints2
 from .layout import cell_of
 
+#: Once a round moves a pose, and what is known of it, by less, the next does not move it [m, rad].
+_STILL = 1e-7
+
 
 @helper
 def _pair(local, walls, near, place, turned, pose_spread, rough, best, best_d2):
     """Find the wall that fits a local wall best: its number and squared deviation."""
     x, y = place
     ux, uy = turned
-    back, on = local[3], local[4]
+    back, on = local[4], local[5]
     for k in near:
         vx, vy, length = walls[k, 2], walls[k, 3], walls[k, 4]
         sine, cosine = vx * uy - vy * ux, vx * ux + vy * uy
@@ -31,12 +34,14 @@ def _pair(local, walls, near, place, turned, pose_spread, rough, best, best_d2):
         shared = min(last, length) - max(first, 0.0)
         if shared < 0.5 * min(last - first, length):
             continue
-        off, turn = vx * ry - vy * rx, math.atan2(sine, cosine)
-        # The deviation of the offset is judged where both are seen.
-        a = along - 0.5 * length
+        # The deviation of the offset is judged where both are seen; with the turn, it is no less.
+        off, a = vx * ry - vy * rx, along - 0.5 * length
         v00, v01, v11 = _joint(local, walls[k], a, same, rough)
         v00 += pose_spread[0]
+        if off * off >= best_d2 * v00:
+            continue
         v11 += pose_spread[1]
+        turn = math.atan2(sine, cosine)
         det = v00 * v11 - v01 * v01
         d2 = (v11 * off * off - 2.0 * v01 * off * turn + v00 * turn * turn) / det
         if d2 < best_d2:
@@ -47,10 +52,10 @@ def _pair(local, walls, near, place, turned, pose_spread, rough, best, best_d2):
 @helper
 def _joint(local, wall, a, same, rough):
     """Covariance of offset and angle between a local wall and a wall, `a` from its middle."""
-    v00 = local[5] + wall[6] + 2.0 * a * wall[7] + a * a * wall[8] + rough * rough
-    v01 = same * local[6] + wall[7] + a * wall[8]
-    turn = rough / max(local[3] + local[4], 0.1)
-    v11 = local[7] + wall[8] + 4.0 * turn * turn
+    v00 = local[6] + wall[6] + 2.0 * a * wall[7] + a * a * wall[8] + rough * rough
+    v01 = same * local[7] + wall[7] + a * wall[8]
+    turn = rough / max(local[4] + local[5], 0.1)
+    v11 = local[8] + wall[8] + 4.0 * turn * turn
     return v00, v01, v11
 
 
@@ -81,26 +86,18 @@ def refine(
             for i in range(len(local)):
                 wall = local[i]
                 lx, ly = c * wall[0] - s * wall[1], s * wall[0] + c * wall[1]
-                px, py, angle = x + lx, y + ly, theta + wall[2]
-                ux, uy = math.cos(angle), math.sin(angle)
-                best, best_d2 = -1, gate
+                ux, uy = c * wall[2] - s * wall[3], s * wall[2] + c * wall[3]
+                px, py, best, best_d2, before = x + lx, y + ly, -1, gate, -1
                 spread = (way * way + turn * turn * (lx * lx + ly * ly), turn * turn)
                 for quarter in range(-1, 2):
-                    t = 0.5 * quarter * (wall[4] if quarter > 0 else wall[3])
+                    t = 0.5 * quarter * (wall[5] if quarter > 0 else wall[4])
                     at = cell_of(grid, px + t * ux, py + t * uy)
-                    if at >= 0:
-                        near = members[begins[at] : begins[at + 1]]
-                        best, best_d2 = _pair(
-                            wall,
-                            walls,
-                            near,
-                            (px, py),
-                            (ux, uy),
-                            spread,
-                            rough,
-                            best,
-                            best_d2,
-                        )
+                    if at < 0 or at == before:
+                        continue
+                    before, near = at, members[begins[at] : begins[at + 1]]
+                    best, best_d2 = _pair(
+                        wall, walls, near, (px, py), (ux, uy), spread, rough, best, best_d2
+                    )
                 pairs[h, i] = best
                 if best < 0:
                     continue
@@ -136,8 +133,19 @@ def refine(
             m0, m1, m2 = b * d - hyt * hyt, hxt * hyt - hxy * d, hxy * hyt - b * hxt
             det = a * m0 + hxy * m1 + hxt * m2
             m4, m5, m8 = a * d - hxt * hxt, hxy * hxt - a * hyt, a * b - hxy * hxy
-            poses[h, 0] -= (m0 * gx + m1 * gy + m2 * gt) / det
-            poses[h, 1] -= (m1 * gx + m4 * gy + m5 * gt) / det
-            poses[h, 2] -= (m2 * gx + m5 * gy + m8 * gt) / det
+            steps = (
+                (m0 * gx + m1 * gy + m2 * gt) / det,
+                (m1 * gx + m4 * gy + m5 * gt) / det,
+                (m2 * gx + m5 * gy + m8 * gt) / det,
+            )
+            poses[h, 0] -= steps[0]
+            poses[h, 1] -= steps[1]
+            poses[h, 2] -= steps[2]
+            before_way, before_turn = way, turn
             way = min(way, 0.01 + math.sqrt(max(m0, m4) / det))
             turn = min(turn, 0.002 + math.sqrt(m8 / det))
+            change = max(before_way - way, before_turn - turn)
+            for step in steps:
+                change = max(change, abs(step))
+            if change < _STILL:
+                break
