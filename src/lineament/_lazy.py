@@ -1,5 +1,6 @@
 """Public names that are imported when they are first used: ``import lineament`` stays quick."""
 
+import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -21,7 +22,9 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         if not homes[name]:
             return import_module(f".{name}", package)
-        return getattr(import_module(f".{homes[name]}", package), name)
+        value = getattr(import_module(f".{homes[name]}", package), name)
+        setattr(sys.modules[package], name, value)  # To look for it takes as long as a scan.
+        return value
 
     return get
 

@@ -18,7 +18,7 @@ from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 from .scan.fields import numbers
 from .scan.given import FIELDS, no_scan, scan_of
-from .scan.units import FAR, warn_of_units
+from .scan.units import FAR, FEW, warn_of_units
 
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
 
@@ -101,14 +101,14 @@ class Extractor:
         block = self._blocks.take(scan) or self._new_block(scan, 1)
         block.load(scan.ranges)
         (self._run or self._first_run)(block)
-        tables, clusters = block.raw(), block.clusters.tobytes()
-        noise = block.noises[0].copy()
+        found, largest, equal = block.found(), 0.0, 0.0
+        if scan.range_max > FAR:
+            ((largest, equal),) = block.find_farthest().tolist()
         self._blocks.append(block)
-        features = Features.as_written(tables, clusters, noise, self._noise, scan)
-        is_empty = not (tables[SEGMENTS] or tables[BREAKPOINTS])
-        if is_empty or scan.range_max > FAR:
-            warn_of_units(scan.ranges, scan, is_empty)
-        return features
+        is_empty = not (found[SEGMENTS] or found[BREAKPOINTS])
+        if is_empty or equal > FEW or largest > FAR:
+            warn_of_units(scan.ranges, scan, is_empty, largest, equal)
+        return Features.as_written(found, self._noise, scan)
 
     def batch(
         self,
@@ -182,8 +182,8 @@ class Extractor:
         for k, name in enumerate(TABLES):
             np.cumsum(found.counts[:, k], out=offsets[name][1:])
         is_empty = found.counts.sum(axis=1) == 0
-        doubtful = range(m) if frame.range_max > FAR else np.flatnonzero(is_empty)
-        any(warn_of_units(rows[i], frame, is_empty[i]) for i in doubtful)
+        doubtful = np.flatnonzero(is_empty | (found.farthest > (FAR, FEW)).any(axis=1))
+        any(warn_of_units(rows[i], frame, is_empty[i], *found.farthest[i]) for i in doubtful)
         return FeatureBatch(
             **found.records,
             clusters=found.clusters,

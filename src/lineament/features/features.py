@@ -133,7 +133,7 @@ class Features(Tabled, LazyFields, ReadOnly, Pictured):
         >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).counts()
         {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
         """
-        return {name: len(self[name]) for name in TABLES}
+        return {name: len(self.raw(name)) // dtype.itemsize for name, dtype in TABLES.items()}
 
     def transform(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,15 +60,14 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     >>> features_table([]).num_rows
     0
     """
-    parts = {
-        name: (
-            _joined((getattr(f, name) for f in scans), dtype),
-            np.array([len(getattr(f, name)) for f in scans], dtype=np.int64),
-        )
-        for name, dtype in TABLES.items()
-    }
-    labels = _joined((f.clusters for f in scans), np.dtype(np.int32))
-    beams = np.array([len(f.clusters) for f in scans], dtype=np.int64)
+    parts = {}
+    for name, dtype in TABLES.items():
+        raw = [f.raw(name) for f in scans]
+        # Joined as bytes: numpy joins records field by field, 10 × slower.
+        parts[name] = np.frombuffer(b"".join(raw), dtype), _lengths(raw, dtype)
+    raw = [f.raw("clusters") for f in scans]
+    beams = _lengths(raw, np.dtype(np.int32))
+    labels = np.frombuffer(b"".join(raw), np.int32)
     stamps = np.array([f.stamp for f in scans], dtype=np.float64), [f.stamp_ns for f in scans]
     frames = list(dict.fromkeys(f.frame_id for f in scans))
     return _table(parts, labels, beams, stamps, first_scan, frames)
@@ -83,9 +82,9 @@ def batch_table(batch: FeatureBatch, first_scan: int = 0) -> pa.Table:
     return _table(parts, batch.clusters.ravel(), np.full(m, n), stamps, first_scan, frames)
 
 
-def _joined(arrays: Iterable[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Join arrays by way of bytes: 10 × quicker than np.concatenate of many small records."""
-    return np.frombuffer(b"".join([np.asarray(a, dtype=dtype).tobytes() for a in arrays]), dtype)
+def _lengths(raw: list[bytes], dtype: np.dtype[Any]) -> NDArray[np.int64]:
+    """Return how many records there are in each of some bytes."""
+    return np.array([*map(len, raw)], np.int64) // dtype.itemsize
 
 
 def _table(

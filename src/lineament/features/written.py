@@ -12,8 +12,12 @@ from numpy.typing import NDArray
 from ..scan import LaserScan, NoiseLike, RangeNoise
 from .records import TABLES
 
-#: The number of each table in the order in which they are written, and its type.
-_TABLES = {name: (k, dtype) for k, (name, dtype) in enumerate(TABLES.items())}
+#: The number of each part of what is written, and its type.
+_PARTS = {name: (k, dtype) for k, (name, dtype) in enumerate(TABLES.items())}
+_PARTS |= {
+    "clusters": (len(TABLES), np.dtype(np.int32)),
+    "noise": (len(TABLES) + 1, np.dtype("f8")),
+}
 
 
 class LazyFields:
@@ -25,22 +29,15 @@ class LazyFields:
 
     __slots__ = ("_written",)
 
-    #: Tables and clusters as bytes, and the row of the noise.
-    _written: tuple[list[bytes], bytes, NDArray[np.float64]]
+    #: Tables, clusters and the row of the noise, as bytes.
+    _written: list[bytes]
 
     @classmethod
-    def as_written(
-        cls,
-        tables: list[bytes],
-        clusters: bytes,
-        row: NDArray[np.float64],
-        noise: RangeNoise | None,
-        scan: LaserScan,
-    ) -> Self:
-        """Take the bytes of the tables in their order, and the noise, given or as its row."""
+    def as_written(cls, written: list[bytes], noise: RangeNoise | None, scan: LaserScan) -> Self:
+        """Take what is written, and the noise where it is given."""
         features: Any = cls.__new__(cls)
-        features._written = tables, clusters, row
-        features.scan, features.stamp, features.frame_id = scan, scan.stamp, scan.frame_id
+        features._written, features.scan = written, scan
+        features.stamp, features.frame_id = scan.stamp, scan.frame_id
         if noise is not None:
             features.noise = noise
         return cast("Self", features)
@@ -48,17 +45,23 @@ class LazyFields:
     if not TYPE_CHECKING:  # To which any name would then be a field.
 
         def __getattr__(self, name: str) -> Any:
-            if name in _TABLES:
-                k, dtype = _TABLES[name]
-                value = np.frombuffer(self._written[0][k], dtype)
-            elif name == "clusters":
-                value = np.frombuffer(self._written[1], np.int32)
-            elif name == "noise":
-                value = noise_of(self._written[2])
-            else:
+            if name not in _PARTS:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            k, dtype = _PARTS[name]
+            value = np.frombuffer(self._written[k], dtype)
+            if name == "noise":
+                value = noise_of(value)
             setattr(self, name, value)
             return value
+
+    def raw(self, name: str) -> bytes:
+        """Return the bytes of a table, or of the clusters, of which no array need be made."""
+        k, dtype = _PARTS[name]
+        try:
+            made = object.__getattribute__(self, name)
+        except AttributeError:
+            return self._written[k]
+        return np.asarray(made, dtype).tobytes()
 
     def __getstate__(self) -> tuple[None, dict[str, Any]]:
         """Return all fields, made."""

@@ -15,6 +15,10 @@ from ..scan import LaserScan
 from .base import Head, Log, Topic
 from .lines import numbered_lines
 
+#: Of so short words there are few, as of ranges in centimetres: so many are kept. Every so manieth
+#: word of a list shows whether it has such.
+_SHORT, _MOST, _EVERY = 5, 1 << 14, 16
+
 #: Makes a scan of a line of some kind; None where the line holds what later scans need.
 Parser = Callable[[str, bytes], LaserScan | None]
 
@@ -189,12 +193,28 @@ def _plain_float(word: bytes) -> float:
     return float(word)
 
 
+class _Values(dict[bytes, float]):
+    """Numbers of short words: a log has the same ones over and over, to be parsed once."""
+
+    def __missing__(self, word: bytes) -> float:
+        if len(self) >= _MOST:
+            self.clear()
+        value = self[word] = float(word)
+        return value
+
+
+_VALUES = _Values()
+
+
 def numbers(
     what: str, words: list[bytes], number: Callable[[bytes], float] = _plain_float
 ) -> NDArray[np.float64]:
     """Return words as numbers; ValueError names the first that is not one."""
+    known = number is float and max(map(len, words[::_EVERY]), default=0) <= _SHORT
     try:
-        return np.fromiter(map(number, words), np.float64, len(words))
+        return np.fromiter(
+            map(_VALUES.__getitem__ if known else number, words), np.float64, len(words)
+        )
     except ValueError:
         for i, word in enumerate(words):
             scalar(f"{what} {i + 1} of {len(words)}", word, number)

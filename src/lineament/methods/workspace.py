@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from ..features import TABLES
 from ..features.records import words
+from ..kernels import bind
 from ..kernels import layout as at
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure
 from ..kernels.noise import estimate_noise
 from ..kernels.rivals.pdbs import part_by_distance
+from ..kernels.units import find_farthest
 from ..scan import LaserScan
+from ..scan.units import CODES, FAR
 
 Array = NDArray[np.float64]
 
-#: The type of each table, and an empty one.
-_TABLES = [(dtype, np.frombuffer(b"", dtype)) for dtype in TABLES.values()]
 #: Values in a block of a batch: its arrays stay in the cache, and a kernel has so much to do that
 #: threads hardly ever wait for each other.
 _BLOCK_VALUES = 32768
@@ -49,8 +50,8 @@ class Block:
         n = len(frame)
         self.frame, self.capacity, self.beams = frame, capacity, n
         self.row = 0
-        #: How many scans it has, where kernels read it.
-        self.extent = np.zeros(1, np.int64)
+        #: How many scans it has, and the same where kernels read it.
+        self.rows, self.extent = 0, np.zeros(1, np.int64)
         self.bearings = np.stack((np.cos(frame.angles), np.sin(frame.angles)))
         self.step, self.circular = frame.angle_increment, frame.is_full_circle
         self.range_min, self.range_max = frame.range_min, frame.range_max
@@ -58,6 +59,13 @@ class Block:
         self.noise, self.own = noise, own
         self.noises = np.empty((capacity, 5))
         self.ranges = np.empty((capacity, n))
+        #: Of each scan the largest range below the limit, and how many equal it, where that is far.
+        self.farthest = np.zeros((capacity, 2))
+        limit = min(self.range_max, CODES)
+        self._find_farthest: Callable[[], Any] | None = None
+        if limit > FAR:
+            farthest = bind(find_farthest, self.ranges, self.extent, limit, self.farthest)
+            self._find_farthest = farthest
         self.floats, self.ints = at.workspace(n)
         self.work = at.named(self.floats, self.ints)
         self.counts = self.work.counts
@@ -73,11 +81,6 @@ class Block:
         #: What runs all kernels over it, of a method that has one for them; its arrays stay.
         self.call: Callable[[], Any] | None = None
 
-    @property
-    def rows(self) -> int:
-        """How many scans it has."""
-        return int(self.extent[0])
-
     def fits(self, scan: LaserScan) -> bool:
         """Whether a scan has the bearings and range limits that the block was made for."""
         frame = self.frame
@@ -85,7 +88,7 @@ class Block:
             return False
         if scan.is_regular and frame.is_regular:
             return (
-                len(scan) == self.beams
+                len(scan.ranges) == self.beams
                 and scan.angle_min == frame.angle_min
                 and scan.angle_increment == frame.angle_increment
             )
@@ -93,7 +96,7 @@ class Block:
 
     def load(self, ranges: Array) -> None:
         """Take in the ranges of some scans, shape (m, n), or of one, shape (n,)."""
-        self.extent[0] = rows = 1 if ranges.ndim == 1 else len(ranges)
+        self.rows = self.extent[0] = rows = 1 if ranges.ndim == 1 else len(ranges)
         self.ranges[:rows] = ranges
 
     def take(self, row: int) -> None:
@@ -147,11 +150,21 @@ class Block:
             for (table, size), count in zip(self._bytes, counts, strict=True)
         ]
 
+    def found(self) -> list[bytes]:
+        """Copy what the last run found in one scan: the tables, its clusters and its noise."""
+        return [*self.raw(), self.clusters.tobytes(), self.noises.tobytes()]
+
+    def find_farthest(self) -> Array:
+        """Return, of each scan, the largest range and how many equal it; 0 where none is far."""
+        if self._find_farthest is not None:
+            self._find_farthest()
+        return self.farthest[: self.rows]
+
     def written(self) -> list[NDArray[np.void]]:
         """Copy the records that the last run wrote, in the order of the tables."""
         return [
-            np.frombuffer(raw, dtype) if raw else none
-            for raw, (dtype, none) in zip(self.raw(), _TABLES, strict=True)
+            np.frombuffer(raw, dtype)
+            for raw, dtype in zip(self.raw(), TABLES.values(), strict=True)
         ]
 
 
@@ -187,6 +200,7 @@ class Batch(NamedTuple):
     counts: NDArray[np.int64]
     clusters: NDArray[np.int32]
     noises: Array
+    farthest: Array
     records: dict[str, NDArray[np.void]]
 
 
@@ -199,7 +213,7 @@ def run_batch(rows: Array, blocks: Sequence[Block], run: Callable[[Block], None]
     """Run a method over rows of ranges, shape (m, n), with a thread for each block."""
     m, n = rows.shape
     counts, clusters = np.empty((m, len(TABLES)), np.int64), np.empty((m, n), np.int32)
-    batch = Batch(counts, clusters, np.empty((m, 5)), {})
+    batch = Batch(counts, clusters, np.empty((m, 5)), np.empty((m, 2)), {})
 
     def run_share(k: int) -> list[list[bytes]]:
         """Run over some of the rows; arrays go to the batch at once, records are returned."""
@@ -211,6 +225,7 @@ def run_batch(rows: Array, blocks: Sequence[Block], run: Callable[[Block], None]
             run(block)
             count = block.rows
             batch.clusters[part], batch.noises[part] = block.clusters[:count], block.noises[:count]
+            batch.farthest[part] = block.find_farthest()
             batch.counts[part] = np.diff(block.offsets[: count + 1], axis=0)
             written.append(block.raw())
         return written

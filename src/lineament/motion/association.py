@@ -3,12 +3,13 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..features import Features
-from ..features.records import C_COVARIANCE
+from ..features.records import C_COVARIANCE, CORNER, SEGMENT
 from ..kernels.tracking.association import associate as kernel
 from ..kernels.tracking.association import move
 from ..scan import Array
@@ -19,6 +20,46 @@ Pairs = NDArray[np.intp]
 KINDS = ("segments", "corners", "arcs")
 #: Words of segments, corners and arcs (see `kernels.records`).
 Words = tuple[Array, Array, Array]
+
+
+class Frame(NamedTuple):
+    """The tracked features of a frame, as the kernels take them.
+
+    Attributes
+    ----------
+    words : Words
+        All of them.
+    segments, corners : structured arrays
+        The same memory as records.
+    convex : int8 array
+        Whether each corner is convex.
+    sides : int32 array, shape (n, 2)
+        Indices of the segments of each corner.
+    """
+
+    words: Words
+    segments: NDArray[np.void]
+    corners: NDArray[np.void]
+    convex: NDArray[np.int8]
+    sides: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, words: Words) -> Self:
+        """Complete the words of a frame."""
+        segments, corners = words[0].reshape(-1).view(SEGMENT), words[1].reshape(-1).view(CORNER)
+        sides = np.array(corners["segments"], order="C")
+        return cls(words, segments, corners, corners["convex"].astype(np.int8), sides)
+
+    def moved(self, motion: tuple[float, float, float]) -> Words:
+        """Return the words after a motion, with the misfits in the covariances of the corners."""
+        segments, corners, arcs = (of.copy() for of in self.words)
+        # Walls are off straight lines in both frames, and their corners with them.
+        squares = np.append(self.segments["misfit"] ** 2, 0.0)
+        both = 2.0 * squares[self.sides].sum(axis=1)
+        corners[:, C_COVARIANCE] += both
+        corners[:, C_COVARIANCE + 3] += both
+        move(segments, corners, arcs, *motion)
+        return segments, corners, arcs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,21 +136,29 @@ def associate(
     gates = chi_square(gate, 2), chi_square(gate, 3)
     spread = np.zeros((3, 3)) if covariance is None else matrix_of(covariance)
     x, y, theta = map(float, motion)
-    earlier, moved = words_of(before), words_of(now)
-    # Walls are off straight lines in both frames, and their corners with them.
-    squares = np.append(now.segments["misfit"] ** 2, 0.0)
-    both = 2.0 * squares[now.corners["segments"]].sum(axis=1)
-    moved[1][:, C_COVARIANCE] += both
-    moved[1][:, C_COVARIANCE + 3] += both
-    move(*moved, x, y, theta)
-    sides = before.corners["convex"].astype(np.int8), now.corners["convex"].astype(np.int8)
+    frames = Frame.of(words_of(before)), Frame.of(words_of(now))
+    return Matches(before, now, *paired(*frames, (x, y, theta), spread, gates, float(roughness)))
+
+
+def paired(
+    before: Frame,
+    now: Frame,
+    motion: tuple[float, float, float],
+    spread: Array,
+    gates: tuple[float, float],
+    roughness: float,
+) -> tuple[Pairs, Pairs, Pairs]:
+    """Find the pairs of segments, corners and arcs; gates are squares of 2 and 3 components."""
+    earlier, moved = before.words, now.moved(motion)
     owners = tuple(np.empty(len(table), np.int64) for table in earlier)
     rows = max(map(len, moved))
     columns = max(len(one) + len(other) for one, other in zip(earlier, moved, strict=True))
     floats, ints = np.empty((3, columns + 1)), np.empty((3, columns + 1), np.int64)
     scratch = np.empty((rows, columns)), floats, ints
-    kernel(earlier, moved, sides, spread, (x, y), float(roughness), gates, scratch, owners)
-    return Matches(before, now, *map(_pairs, owners))
+    convex = before.convex, now.convex
+    kernel(earlier, moved, convex, spread, motion[:2], roughness, gates, scratch, owners)
+    segments, corners, arcs = map(_pairs, owners)
+    return segments, corners, arcs
 
 
 def words_of(features: Features) -> Words:
@@ -147,7 +196,7 @@ def chi_square(probability: float, degrees: int) -> float:
 
 def _pairs(owners: NDArray[np.int64]) -> Pairs:
     """List the earlier features that are seen later, and what they are then, shape (m, 2)."""
-    before = np.flatnonzero(owners >= 0)
+    (before,) = (owners >= 0).nonzero()
     pairs = np.empty((len(before), 2), np.intp)
     pairs[:, 0], pairs[:, 1] = before, owners[before]
     return pairs

@@ -11,7 +11,7 @@ from ..kernels.tracking.motion import estimate_motion as kernel
 from ..kernels.tracking.residuals import COLUMNS
 from ..scan import Array, Pose
 from ..scan.poses import Twist, twist_between
-from .association import KINDS, Matches, chi_square, matrix_of, words_of
+from .association import Frame, Matches, Pairs, chi_square, matrix_of, words_of
 
 #: Without a prior, the motion is known this badly [m, m, rad].
 _UNKNOWN = np.diag((10.0, 10.0, math.pi)) ** 2
@@ -119,25 +119,29 @@ def estimate_motion(
     ([0.1, 0.0, 0.05], True)
     """
     spread = _UNKNOWN if covariance is None else matrix_of(covariance)
-    before, now = matches.before, matches.now
     x, y, theta = map(float, prior)
-    pairs = tuple(np.array(getattr(matches, kind), np.int64, order="C") for kind in KINDS)
-    count, later = sum(map(len, pairs)), np.zeros(len(now.segments), np.int64)
+    frames = Frame.of(words_of(matches.before)), Frame.of(words_of(matches.now))
+    pairs = matches.segments, matches.corners, matches.arcs
+    return motion_by(*frames, pairs, (x, y, theta), spread, float(roughness))
+
+
+def motion_by(
+    before: Frame,
+    now: Frame,
+    pairs: tuple[Pairs, Pairs, Pairs],
+    prior: Pose,
+    spread: Array,
+    roughness: float,
+) -> Motion:
+    """Estimate a motion as `estimate_motion` does, by pairs of segments, corners and arcs."""
+    pairs = tuple(np.array(of, np.int64, order="C") for of in pairs)
+    count, later = sum(map(len, pairs)), np.zeros(len(now.words[0]), np.int64)
     matrices, vectors = np.empty((5, 3, 3)), np.empty((3, 3))
     scratch = matrices, vectors, np.empty((count, COLUMNS)), np.empty(count), later
     found = np.empty((3, 3, 3))
-    lost = kernel(
-        words_of(before),
-        words_of(now),
-        np.array(now.corners["segments"], order="C"),
-        pairs,
-        (x, y, theta),
-        spread,
-        float(roughness),
-        (chi_square(_RIGHT, 2), chi_square(0.5, 2)),
-        scratch,
-        found,
-    )
+    quantiles = chi_square(_RIGHT, 2), chi_square(0.5, 2)
+    given = before.words, now.words, now.sides, pairs, prior, spread, roughness, quantiles
+    lost = kernel(*given, scratch, found)
     if lost == NOT_POSITIVE:
         raise ValueError(
             f"covariance of the prior is {spread.tolist()}, expected (3, 3), positive definite"

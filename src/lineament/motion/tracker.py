@@ -2,23 +2,26 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._copies import InTurn, in_turn
-from ..features import TABLES, Features, make_records
+from ..features import TABLES, Features
 from ..kernels.tracking.association import move
 from ..scan import Array, Pose
 from ..scan.poses import Twist, inverse, poses_along, relative
-from .association import KINDS, Matches, associate, chi_square, words_of
-from .estimate import Motion, estimate_motion
+from .association import KINDS, Frame, Pairs, chi_square, paired, words_of
+from .estimate import Motion, motion_by
 from .relocation import is_contradicted, relocated
 
 Numbers = NDArray[np.int64]
+#: Of segments, corners and arcs.
+AllPairs = tuple[Pairs, Pairs, Pairs]
 
+#: No pairs at all.
+_LOST: AllPairs = (np.empty((0, 2), np.intp),) * 3
 #: Deviations of the motion by odometry [m, rad], and their growth with way and turn.
 _ODOMETRY = (0.03, 0.01), (0.1, 0.1)
 #: The same of the motion that goes on as it was, or of none: no way is known to grow with.
@@ -110,8 +113,8 @@ class Tracker(InTurn):
         chi_square(gate, 2)
         self.max_missed, self.gate, self.roughness = max_missed, gate, roughness
         #: Last sight of each track, in the frame of the last scan; those of that scan come first.
-        empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
-        self._seen = Features(**empty, clusters=np.empty(0, np.int32))
+        segments, corners, arcs = (np.empty((0, TABLES[kind].itemsize // 8)) for kind in KINDS)
+        self._seen = Frame.of((segments, corners, arcs))
         self._tracks = {kind: np.empty(0, np.int64) for kind in KINDS}
         self._missed = {kind: np.empty(0, np.int64) for kind in KINDS}
         self._stamp: float | None = None
@@ -164,12 +167,10 @@ class Tracker(InTurn):
             raise TypeError(f"features is of type {kind}, expected Features: what extract returns")
         if odometry is not None and (len(odometry) != 3 or not all(map(math.isfinite, odometry))):
             raise ValueError(f"odometry is {odometry!r}, expected three finite numbers")
-        motion = None
-        if self._stamp is None:
-            matches = associate(self._seen, features)
-        else:
+        motion, pairs, frame = None, _LOST, Frame.of(words_of(features))
+        if self._stamp is not None:
             duration = features.stamp - self._stamp
-            motion, matches = self._moved(features, odometry, duration)
+            motion, pairs = self._moved(frame, odometry, duration)
             twist = motion.twist(duration) if duration > 0 else (math.inf,) * 3
             if all(abs(speed) <= FASTEST for speed in twist):
                 self._twists.append(twist)
@@ -177,7 +178,7 @@ class Tracker(InTurn):
             else:
                 self._twists.clear()
         self._stamp, self._odometry = features.stamp, odometry
-        return self._renew(features, matches, motion)
+        return self._renew(frame, pairs, motion)
 
     @in_turn
     def again(self, features: Features) -> Tracks:
@@ -192,18 +193,18 @@ class Tracker(InTurn):
         return tracks
 
     def _moved(
-        self, features: Features, odometry: Pose | None, duration: float
-    ) -> tuple[Motion, Matches]:
+        self, frame: Frame, odometry: Pose | None, duration: float
+    ) -> tuple[Motion, AllPairs]:
         """Find the tracks again, and the motion by them."""
         prior, deviations = self._expected(odometry, duration)
         fresh = self._seen.segments[self._missed["segments"] == 0]
         expected = [(prior, deviations)]
         if (deviations[[0, 2]] <= _UNIQUE).all():
             spread = np.diag(deviations) ** 2
-            motion, matches = self._follow(features, Motion(*prior, spread), prior, spread)
+            motion, pairs = self._follow(frame, prior, spread, prior, spread)
             is_sure = motion.observable or odometry is None
-            if not (is_sure and is_contradicted(motion.pose, fresh, features.segments)):
-                return motion, matches
+            if not (is_sure and is_contradicted(motion.pose, fresh, frame.segments)):
+                return motion, pairs
             deviations = _ANYWHERE
             expected.insert(0, (prior, deviations))
         (least_way, least_turn), _ = _CONTINUED
@@ -211,32 +212,37 @@ class Tracker(InTurn):
         # It stood, or goes on after a jump of its clock.
         steps = poses_along(self.twist or (0.0, 0.0, 0.0), [0.0, self._step])
         expected += [((x, y, theta), near) for x, y, theta in steps.tolist()]
-        spread, start = np.diag(deviations) ** 2, relocated(fresh, features.segments, expected)
+        spread, start = np.diag(deviations) ** 2, relocated(fresh, frame.segments, expected)
         if start is not None:
-            begun = Motion(*start, np.diag(near) ** 2)
-            motion, matches = self._follow(features, begun, prior, spread)
-            if not is_contradicted(motion.pose, fresh, features.segments):
-                return motion, matches
+            motion, pairs = self._follow(frame, start, np.diag(near) ** 2, prior, spread)
+            if not is_contradicted(motion.pose, fresh, frame.segments):
+                return motion, pairs
         for kind in KINDS:
             self._missed[kind][:] = self.max_missed
-        nothing = np.empty((0, 2), np.intp)
-        lost = Matches(self._seen, features, nothing, nothing, nothing)
-        return Motion(*prior, spread, np.eye(3)), lost
+        return Motion(*prior, spread, np.eye(3)), _LOST
 
     def _follow(
-        self, features: Features, motion: Motion, prior: Pose, spread: Array
-    ) -> tuple[Motion, Matches]:
+        self, frame: Frame, start: Pose, near: Array, prior: Pose, spread: Array
+    ) -> tuple[Motion, AllPairs]:
         """Find the tracks again near a motion, and the motion by them."""
-        matches = None
-        for _ in range(_ROUNDS):
-            gates = {"gate": self.gate, "roughness": self.roughness}
-            found = associate(self._seen, features, motion.pose, motion.covariance, **gates)
-            if matches is not None and found.same_as(matches):
+        # The motion is that of the tracks that were seen in the very last frame.
+        is_fresh = [self._missed[kind] == 0 for kind in KINDS]
+        gates = chi_square(self.gate, 2), chi_square(self.gate, 3)
+        seen, rough = self._seen, float(self.roughness)
+        found = paired(seen, frame, start, near, gates, rough)
+        for left in reversed(range(_ROUNDS)):
+            pairs = found
+            segments, corners, arcs = (
+                of[mask[of[:, 0]]] for of, mask in zip(pairs, is_fresh, strict=True)
+            )
+            fresh = segments, corners, arcs
+            motion = motion_by(seen, frame, fresh, prior, spread, rough)
+            if not left:
                 break
-            matches = found
-            motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
-        assert matches is not None
-        return motion, matches
+            found = paired(seen, frame, motion.pose, motion.covariance, gates, rough)
+            if all(map(np.array_equal, found, pairs)):
+                break
+        return motion, pairs
 
     def _expected(self, odometry: Pose | None, duration: float) -> tuple[Pose, Array]:
         """Motion since the last frame as it is expected, and its deviations."""
@@ -255,19 +261,13 @@ class Tracker(InTurn):
         turn = least_turn + by_turn * abs(pose[2]) + _MAY_GO[1] * pause
         return pose, np.array((way, way, min(turn, math.pi)))
 
-    def _fresh(self, matches: Matches) -> Matches:
-        """Keep the pairs whose track was seen in the very last frame."""
-        pairs = {kind: getattr(matches, kind) for kind in KINDS}
-        fresh = {kind: of[self._missed[kind][of[:, 0]] == 0] for kind, of in pairs.items()}
-        return replace(matches, **fresh)
-
-    def _renew(self, features: Features, matches: Matches, motion: Motion | None) -> Tracks:
+    def _renew(self, frame: Frame, pairs: AllPairs, motion: Motion | None) -> Tracks:
         """Give the features their numbers, and keep them with the tracks that were missed."""
-        numbers, born, ended, rest = {}, [], [], {}
-        for kind in KINDS:
+        numbers, born, ended, rest = {}, [], [], []
+        for kind, of, words in zip(KINDS, pairs, frame.words, strict=True):
             tracks, missed = self._tracks[kind], self._missed[kind] + 1
-            before, now = getattr(matches, kind).T
-            mine = np.full(len(getattr(features, kind)), -1, np.int64)
+            before, now = of.T
+            mine = np.full(len(words), -1, np.int64)
             mine[now] = tracks[before]
             born.append(np.arange(self._next, self._next + len(mine) - len(now)))
             mine[mine < 0] = born[-1]
@@ -278,16 +278,25 @@ class Tracker(InTurn):
                 young = kept & (missed == 1) & (tracks >= self._young)
                 self._young = int(born[-1][0]) if len(born[-1]) else self._next
                 for k in np.flatnonzero(young):
-                    same = features.corners[mine < tracks[k]]
+                    same = frame.corners[mine < tracks[k]]
                     kept[k] = not self._is_double(self._seen.corners[k], same, motion)
             ended.append(tracks[(missed > 0) & ~kept])
-            numbers[kind], rest[kind] = mine, kept
+            numbers[kind] = mine
+            rest.append(kept)
             self._tracks[kind] = np.concatenate((mine, tracks[kept]))
             self._missed[kind] = np.concatenate((np.zeros_like(mine), missed[kept]))
-        self._seen = _together(features, self._seen, rest, motion)
+        self._keep(frame, rest, motion)
         return Tracks(
             **numbers, born=np.concatenate(born), ended=np.concatenate(ended), motion=motion
         )
+
+    def _keep(self, frame: Frame, rest: list[NDArray[np.bool_]], motion: Motion | None) -> None:
+        """Keep the features of a frame, and behind them those of the frame before in `rest`."""
+        missed = [words[kept] for words, kept in zip(self._seen.words, rest, strict=True)]
+        if motion is not None:
+            move(*missed, *inverse(motion.pose))
+        segments, corners, arcs = map(np.concatenate, zip(frame.words, missed, strict=True))
+        self._seen = Frame.of((segments, corners, arcs))
 
     def _is_double(self, before: np.void, corners: NDArray[np.void], motion: Motion | None) -> bool:
         """Whether a corner that was seen once is one of others, which was seen wrongly then."""
@@ -299,22 +308,7 @@ class Tracker(InTurn):
         rough = 2.0 * self.roughness**2 * np.eye(2)
         spread = turn @ corners["covariance"] @ turn.T + before["covariance"] + rough
         known = np.isfinite(spread).all(axis=(1, 2))
-        off, spread = off[known], spread[known]
-        squares = (off[:, None] @ np.linalg.pinv(spread) @ off[:, :, None]).ravel()
-        return bool((squares < chi_square(self.gate, 2)).any())
-
-
-def _together(
-    features: Features, seen: Features, kept: dict[str, NDArray[np.bool_]], motion: Motion | None
-) -> Features:
-    """Features of a frame, and behind them those of the frame before that are kept."""
-    words = dict(zip(KINDS, words_of(seen), strict=True))
-    missed = [words[kind][kept[kind]] for kind in KINDS]
-    if motion is not None:
-        move(*missed, *inverse(motion.pose))
-    # By way of bytes: numpy joins records field by field, several times slower.
-    tables: dict[str, Any] = {
-        kind: np.frombuffer(getattr(features, kind).tobytes() + words.tobytes(), TABLES[kind])
-        for kind, words in zip(KINDS, missed, strict=True)
-    }
-    return replace(features, **tables)
+        (p, q), (xx, xy, yx, yy) = off[known].T, spread[known].reshape(-1, 4).T
+        determinant = xx * yy - xy * yx
+        square = yy * p * p - (xy + yx) * p * q + xx * q * q
+        return bool((square < chi_square(self.gate, 2) * determinant).any())

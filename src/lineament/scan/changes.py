@@ -49,13 +49,13 @@ def part_of(scan: Any, kept: range) -> dict[str, Any]:
     return own
 
 
-def in_reverse(own: dict[str, Any]) -> dict[str, Any]:
+def in_reverse(scan: Any) -> dict[str, Any]:
     """Fields of a scan whose beams run the other way round, but for its bearings."""
-    n, intensities = len(own["ranges"]), own["intensities"]
+    intensities = scan.intensities
     return {
-        "ranges": own["ranges"][::-1],
+        "ranges": scan.ranges[::-1],
         "intensities": None if intensities is None else intensities[::-1],
-        "stamp_beam": n - 1 - own["stamp_beam"],
-        "scan_time": -own["scan_time"],
-        "time_increment": -own["time_increment"],
+        "stamp_beam": len(scan) - 1 - scan.stamp_beam,
+        "scan_time": -scan.scan_time,
+        "time_increment": -scan.time_increment,
     }

@@ -10,15 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 #: Beams that a stamp may be the time of, in the order in which they are taken.
 STAMPS = ("first", "middle", "last")
-_FLOAT64 = np.dtype(np.float64)
+_FLOAT64, _FLOAT32 = np.dtype(np.float64), np.dtype(np.float32)
 _OF_MESSAGE: tuple[str, ...] = ("ranges", "angle_min", "angle_increment", "range_min", "range_max")
 _OF_MESSAGE += ("scan_time", "time_increment")
 #: x, y [m], and heading [rad].
 Pose = tuple[float, float, float]
 #: Beams to points: a gap of more steps is where the scan begins, and a turn has so many at most.
 _WIDE, _MOST_BEAMS = 10.0, 20_000
+#: Bearings that differ by more are different floats, wherever they are [rad].
+FINEST = 1e-9
 #: A scan that goes around from behind has bearings up to three half turns; none has so many [rad].
-_FARTHEST = 4 * math.pi
+FARTHEST = 4 * math.pi
 _DEGREES = ": are they in degrees? (numpy.radians)"
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
@@ -45,14 +47,21 @@ def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
     """Copy `values` into a read-only float64 vector; what is masked or null is NaN."""
     if type(values) is np.ndarray and values.dtype is _FLOAT64:
         copy = values.copy()
+    elif type(values) is np.ndarray and values.dtype is _FLOAT32:  # as messages have them
+        copy = _widened(values)
     else:
         copy = np.array(numbers(name, values))
     if copy.ndim != 1:
         raise ValueError(f"{name} has shape {copy.shape}, expected one dimension")
     if length is not None and len(copy) != length:
         raise ValueError(f"{name} has {len(copy)} values, expected {length}, one for each range")
-    copy.setflags(write=False)
+    copy.setflags(False)
     return copy
+
+
+@np.errstate(invalid="ignore")  # A signalling NaN, as in `numbers`.
+def _widened(values: NDArray[np.float32]) -> Array:
+    return values.astype(np.float64, "C")
 
 
 # A damaged file may hold a signalling NaN: it becomes a NaN like any other, without a warning.
@@ -103,7 +112,7 @@ def regular_bearings(first: object, step: object, n: int) -> tuple[float, float,
     last = first + (n - 1) * step
     if last - first > 2 * math.pi:  # Rare, and the check proper takes longer.
         _check_turn("angle_increment", first, last, step)
-    if not -_FARTHEST <= first <= _FARTHEST:
+    if not -FARTHEST <= first <= FARTHEST:
         raise ValueError(_no_bearing("angle_min", first))
     return first, step, is_clockwise
 
@@ -142,7 +151,7 @@ def irregular_bearings(angles: Array) -> tuple[float, float]:
         return 0.0, 0.0
     step = float(np.median(steps)) if len(steps) else 0.0
     _check_turn("angles", angles[0], angles[-1], step)
-    if not -_FARTHEST <= angles[0] <= _FARTHEST:
+    if not -FARTHEST <= angles[0] <= FARTHEST:
         raise ValueError(_no_bearing("angles[0]", angles[0]))
     return float(angles[0]), step
 
@@ -214,12 +223,12 @@ def beam_at_stamp(beam: str | float, n: int, is_clockwise: bool) -> float:
 def checked_pose(pose: Any) -> Pose:
     """Three finite numbers."""
     try:
-        x, y, theta = (finite("pose", value) for value in pose)
+        x, y, theta = pose
+        return finite("pose", x), finite("pose", y), finite("pose", theta)
     except TypeError:
         raise ValueError(f"pose is {pose!r}, expected (x, y, theta)") from None
     except ValueError:
         raise ValueError(f"pose is {pose!r}, expected three finite numbers") from None
-    return x, y, theta
 
 
 def checked_mounting(laser_pose: Any) -> Pose:

@@ -1,21 +1,19 @@
-"""One sweep of a 2-D laser scanner: its beams, and which of them are valid (equations 1-3)."""
+"""One sweep of a 2-D laser scanner, as it is given."""
 
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from operator import index
 from typing import Any, Self, SupportsIndex, overload
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._copies import ReadOnly, locked
-from .._lazy import Pictured
+from .beams import Beams
 from .changes import in_metres, in_reverse, part_of
 from .fields import (
+    FARTHEST,
+    FINEST,
     NANO,
-    Array,
     Pose,
     beam_at_stamp,
     beams_to,
@@ -24,13 +22,14 @@ from .fields import (
     covariance_of_pose,
     finite,
     message_fields,
-    nanoseconds,
     range_limits,
     vector,
 )
 
+_TURN, _INF = 2 * math.pi, math.inf
 
-class LaserScan(ReadOnly, Pictured):
+
+class LaserScan(Beams):
     """One sweep of a 2-D laser scanner, with the fields of ``sensor_msgs/LaserScan``.
 
     A beam is *valid* when its range is finite, positive, at least `range_min` and below
@@ -83,24 +82,6 @@ class LaserScan(ReadOnly, Pictured):
     [1.96, 0.397]
     """
 
-    ranges: Array
-    angle_min: float
-    angle_increment: float
-    #: True if the bearings are ``angle_min + i * angle_increment``.
-    is_regular: bool
-    range_min: float
-    range_max: float
-    stamp: float
-    #: Index of the beam that was taken at the stamp; it may lie between beams.
-    stamp_beam: float
-    scan_time: float
-    time_increment: float
-    frame_id: str
-    intensities: Array | None
-    pose: Pose | None
-    #: Covariance (3, 3) of the pose [m, m, rad], where it is known; see `with_pose`.
-    pose_covariance: Array | None
-
     def __init__(
         self,
         ranges: ArrayLike,
@@ -119,32 +100,47 @@ class LaserScan(ReadOnly, Pictured):
         scale: float = 1.0,
     ) -> None:
         own = self.__dict__
-        own["ranges"] = vector("ranges", ranges)
-        n = len(own["ranges"])
+        own["ranges"] = copy = vector("ranges", ranges)
+        n, is_clockwise = len(copy), False
         own["is_regular"] = angles is None
-        irregular, first, step, is_clockwise = bearings(angle_min, angle_increment, angles, n)
-        if irregular is not None:
-            own["angles"] = irregular
-        own["angle_min"], own["angle_increment"] = first, step
-        own["range_min"], own["range_max"] = range_limits(range_min, range_max)
-        own["stamp"] = finite("stamp", stamp)
-        own["stamp_beam"] = 0.0
-        own["scan_time"] = finite("scan_time", scan_time)
-        own["time_increment"] = finite("time_increment", time_increment)
-        own["frame_id"] = str(frame_id)
-        own["intensities"] = None if intensities is None else vector("intensities", intensities, n)
-        own["pose"] = None if pose is None else checked_pose(pose)
-        own["pose_covariance"] = None
+        # Nearly all scans are like this; one by one, the checks take longer than the copy.
+        if not (
+            type(angle_min) is type(angle_increment) is type(range_min) is type(range_max) is float
+            and type(stamp) is type(scan_time) is type(time_increment) is float
+            and type(frame_id) is str
+            and angles is None
+            and angle_increment > FINEST
+            and (n - 1) * angle_increment <= _TURN
+            and -FARTHEST <= angle_min <= FARTHEST
+            and 0.0 <= range_min < range_max
+            and range_min < _INF
+            and -_INF < stamp + scan_time + time_increment < _INF
+        ):
+            irregular, angle_min, angle_increment, is_clockwise = bearings(
+                angle_min, angle_increment, angles, n
+            )
+            if irregular is not None:
+                own["angles"] = irregular
+            range_min, range_max = range_limits(range_min, range_max)
+            stamp, scan_time = finite("stamp", stamp), finite("scan_time", scan_time)
+            time_increment = finite("time_increment", time_increment)
+            frame_id = str(frame_id)
+        own["angle_min"], own["angle_increment"] = angle_min, angle_increment
+        own["range_min"], own["range_max"] = range_min, range_max
+        own["stamp"] = stamp
+        own["scan_time"], own["time_increment"] = scan_time, time_increment
+        own["frame_id"] = frame_id
+        if intensities is not None:
+            own["intensities"] = vector("intensities", intensities, n)
+        if pose is not None:
+            own["pose"] = checked_pose(pose)
         if is_clockwise:
-            own.update(in_reverse(own))
-        if scale != 1:
+            own.update(in_reverse(self))
+        if scale != 1.0:
             own["ranges"] = in_metres(own["ranges"], scale, own["range_max"])
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
-
-    def __len__(self) -> int:
-        return len(self.ranges)
 
     @overload
     def __getitem__(self, index: SupportsIndex) -> tuple[float, float]: ...
@@ -172,48 +168,6 @@ class LaserScan(ReadOnly, Pictured):
             other.__dict__.pop(name, None)
         return other
 
-    def __repr__(self) -> str:
-        return (
-            f"LaserScan({len(self)} beams, {int(self.valid.sum())} valid, "
-            f"{math.degrees(self.angle_min):.1f}° + i·{math.degrees(self.angle_increment):.4f}°, "
-            f"stamp={self.stamp:.3f})"
-        )
-
-    @cached_property
-    def stamp_ns(self) -> int:
-        """The stamp in nanoseconds [ns], exactly as a message has it."""
-        return nanoseconds(self.stamp)
-
-    @cached_property
-    def angles(self) -> Array:
-        """Bearing of each beam [rad], shape (n,)."""
-        angles = self.angle_min + self.angle_increment * np.arange(len(self), dtype=np.float64)
-        angles.flags.writeable = False
-        return angles
-
-    @cached_property
-    def valid(self) -> NDArray[np.bool_]:
-        """Whether each beam returned a usable range, shape (n,)."""
-        r = self.ranges
-        valid = (r > 0) & (r >= self.range_min) & (r < self.range_max)
-        valid.flags.writeable = False
-        return valid
-
-    @cached_property
-    def points(self) -> Array:
-        """X = ρ cos θ, y = ρ sin θ (equations 2, 3) [m], shape (n, 2); NaN if invalid."""
-        r = np.where(self.valid, self.ranges, np.nan)
-        return locked(np.column_stack((r * np.cos(self.angles), r * np.sin(self.angles))))
-
-    @property
-    def is_full_circle(self) -> bool:
-        """Whether the last beam neighbours the first: n Δφ ≥ 2π - 1.5 Δφ."""
-        n, step = len(self), self.angle_increment
-        if n < 3:
-            return False
-        span = (n - 1) * step if self.is_regular else float(self.angles[-1] - self.angles[0])
-        return span >= 2 * math.pi - 2.5 * step
-
     def with_pose(self, pose: Pose | None, covariance: ArrayLike | None = None) -> Self:
         """Return the same scan with another pose [m, m, rad]; they share their arrays.
 
@@ -234,7 +188,7 @@ class LaserScan(ReadOnly, Pictured):
 
         Bearings change their sign: what hangs upside down is then in a frame with z upwards.
         """
-        own = in_reverse(vars(self))
+        own = in_reverse(self)
         own["angle_min"] = -float(self.angles[-1]) if len(self) else 0.0
         if not self.is_regular:
             own["angles"] = vector("angles", -self.angles[::-1])

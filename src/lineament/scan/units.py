@@ -8,7 +8,7 @@ from ..errors import warn
 from .fields import Array
 
 if TYPE_CHECKING:
-    from .laser_scan import LaserScan
+    from .beams import Beams
 
 #: Half of the ranges of a scan are never beyond this [m]. The scanners that reach farthest see a
 #: white wall at 80 to 250 m, but most of what is around them is nearer: the median of a scan is 24
@@ -19,19 +19,24 @@ CODES = 1e6
 #: Limits that no scanner has: it is blind up to this range, or beyond this one [m].
 _BLIND, _SHORT = 10.0, 0.1
 #: Scanners have no more codes, and of a ring of sonars no more are equal by chance.
-_FEW = 8
+FEW = 8
 #: No surface is at one range to the last digit over so much [rad]: a wall at 1 m varies by 3 cm.
 _ROUND = 0.5
 
 
-def warn_of_units(ranges: Array, scan: "LaserScan", is_empty: bool) -> bool:
-    """Warn of a `doubt`, or of `no_return`, where there can be one; return whether there is."""
-    message, range_max = "", min(scan.range_max, CODES)
-    largest = float(ranges.max(initial=0.0, where=ranges < range_max))
+def warn_of_units(
+    ranges: Array, scan: "Beams", is_empty: bool, largest: float = 0.0, equal: float = 0.0
+) -> bool:
+    """Warn of a `doubt`, or of `no_return`, where there can be one; return whether there is.
+
+    `largest` is the largest range below the limit, and `equal` how many ranges are just that,
+    where the limit is beyond `FAR`.
+    """
+    message = ""
     if is_empty or largest > FAR:
         message = doubt(ranges, scan.range_min, scan.range_max)
     if not is_empty and not message:
-        message = no_return(ranges, largest, scan.angle_increment)
+        message = no_return(largest, equal, scan.angle_increment)
     if message:
         warn(message)
     return bool(message)
@@ -64,7 +69,7 @@ def doubt(ranges: Array, range_min: float, range_max: float) -> str:
     finite = ranges[(ranges > 0) & (ranges < CODES)]
     if not len(finite):
         other = np.unique(ranges[np.isfinite(ranges) & (ranges != 0)])
-        if len(other) <= _FEW:
+        if len(other) <= FEW:
             return ""
         return f"all ranges are {other[0]:g} to {other[-1]:g}, expected some from 0 to {CODES:g} m"
     least, median, largest = finite.min(), np.median(finite), finite.max()
@@ -88,21 +93,20 @@ def doubt(ranges: Array, range_min: float, range_max: float) -> str:
     return ""
 
 
-def no_return(ranges: Array, largest: float, step: float) -> str:
+def no_return(largest: float, equal: float, step: float) -> str:
     """Return what the largest of ranges stands for, with the way out; "" if it is a distance.
 
-    A scanner to which nothing comes back along a beam may give the farthest that it sees, of which
-    many beams would be a round wall.
+    So many are equal to it. A scanner to which nothing comes back along a beam may give the
+    farthest that it sees, of which many beams would be a round wall.
 
     Examples
     --------
-    >>> no_return(np.append(np.full(90, 30.0), np.linspace(2.0, 3.0, 90)), 30.0, 0.0175)
+    >>> no_return(30.0, 90, 0.0175)
     '90 beams have exactly the largest range, 30 m: do they stand for no return? (range_max=30)'
     """
-    equal = np.count_nonzero(ranges == largest)
-    if equal <= _FEW or equal * step < _ROUND:
+    if equal <= FEW or equal * step < _ROUND:
         return ""
     return (
-        f"{equal} beams have exactly the largest range, {largest:.9g} m: do they stand for no "
+        f"{equal:.0f} beams have exactly the largest range, {largest:.9g} m: do they stand for no "
         f"return? (range_max={largest:.9g})"
     )
