@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
-from lineament import Extractor
+from lineament import Extractor, LaserScan
 from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
@@ -102,6 +102,22 @@ def test_a_wall_seen_through_a_slit_does_not_part_its_corner(extractor):
     (corner,) = of_kind(features, "slit")
     assert corner["segments"].tolist() == [0, 2]
     assert within(corner["position"] - (2.0, 0.0), corner["covariance"])
+
+
+@pytest.mark.parametrize("behind", [2, 7])
+def test_a_slit_is_found_where_a_full_circle_is_opened(behind):
+    """Its largest step is beside the slit, so that the two walls are the last and the first."""
+    angles = full_circle(720)
+    corner = round((math.atan2(1.3, 2.0) + math.pi) / (angles[1] - angles[0]))
+    ranges = room(angles, BOX)
+    ranges[corner - behind // 2 :][:behind] = wall(angles[corner - behind // 2 :][:behind], 9.0, 33.0)
+    for turn in (0, corner, 300):
+        ranges_turned, first = np.roll(ranges, -turn), angles[0] + turn * (angles[1] - angles[0])
+        step = 2 * math.pi / 720
+        features = AWARE(LaserScan(noisy(ranges_turned, 3), first, step))
+        (slit,) = of_kind(features, "slit")
+        assert within(slit["position"] - (2.0, 1.3), slit["covariance"])
+        assert len(of_kind(features, "corner")) == 3
 
 
 def test_the_trace_has_the_spacing_before_each_measurement():

@@ -80,8 +80,8 @@ def extract_rows(
         for table in range(tables.offsets.shape[1]):
             tables.offsets[row + 1, table] = tables.offsets[row, table]
         _write_surfaces(work, tables, scan, surfaces)
-        join_all(work, tables, scan, surfaces, closed)
-        _write_clusters(work, tables, scan, surfaces, closed)
+        join_all(work, tables, scan, surfaces)
+        _write_clusters(work, tables, scan, surfaces)
         for part in range(5):
             noises[row, part] = 0.0 if estimated else given[part]
         if estimated:
@@ -128,7 +128,7 @@ def _write_surfaces(work, tables, scan, surfaces):
 
 
 @inlined
-def _write_clusters(work, tables, scan, surfaces, closed):
+def _write_clusters(work, tables, scan, surfaces):
     """Step 5: write the clusters, which cluster a segment is in, and what is between them."""
     beams, spans, clusters = work.beams, work.spans, tables.clusters[scan.row]
     ints, following = tables.segments.view(np.int32), tables.offsets[scan.row + 1]
@@ -139,6 +139,6 @@ def _write_clusters(work, tables, scan, surfaces, closed):
             ints[spans[at.SEGMENT, k], to.S_CLUSTER] = clusters[first]
     following[to.BREAKPOINTS] = write_breaks(
         work.points, beams[at.BEAM], beams[at.CLUSTER_FIRST], beams[at.CLUSTER_LAST],
-        found if not closed or beams[at.BROKEN, 0] or found > 1 else 0, scan.circular,
+        found if beams[at.BROKEN, beams[at.CLUSTER_FIRST, 0]] else 0, scan.circular,
         scan.missing, scan.beams, tables.breakpoints, following[to.BREAKPOINTS],
     )  # fmt: skip

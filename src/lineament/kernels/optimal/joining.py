@@ -23,12 +23,12 @@ def around(i, n):
 
 
 @inlined
-def join_all(work, tables, scan, surfaces, closed):
+def join_all(work, tables, scan, surfaces):
     """Write the corners where surfaces meet, and the edges where they end."""
     spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
     for k in range(surfaces):
         m = around(k + 1, surfaces)
-        if m > k or (closed and m < k):
+        if m > k or (scan.circular and m < k):
             _join(work, tables, scan, k, m)
     # Through a slit, a surface behind may show between two lines.
     for k in range(surfaces):
@@ -37,7 +37,7 @@ def join_all(work, tables, scan, surfaces, closed):
         if both_end and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
             i, j = spans[at.LAST, k], spans[at.FIRST, m]
             dx, dy = x[i] - x[j], y[i] - y[j]
-            if (m > k or (closed and m != k)) and dx * dx + dy * dy <= 4.0 * REACH * REACH:
+            if (m > k or (scan.circular and m < k)) and dx * dx + dy * dy <= 4.0 * REACH * REACH:
                 _cross(work, tables, scan, k, m)
     for k in range(surfaces):
         for way in (-1, 1):
