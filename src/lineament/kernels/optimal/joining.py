@@ -9,9 +9,12 @@ from ...features import records as to
 from ..writing import grade_corner, write_edge, write_end, write_opening, write_place
 from . import layout as at
 from .arcs import is_on
-from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
+from .constants import BEND, LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU
 from .costs import joint_cost
 from .merging import gap, surface_variance
+
+#: Of two lines that have no corner.
+_NONE = -1
 
 
 @helper
@@ -25,20 +28,24 @@ def around(i, n):
 @inlined
 def join_all(work, tables, scan, surfaces):
     """Write the corners where surfaces meet, and the edges where they end."""
-    spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
+    spans = work.spans
     for k in range(surfaces):
-        m = around(k + 1, surfaces)
+        m, spans[at.CORNER, k] = around(k + 1, surfaces), _NONE
         if m > k or (scan.circular and m < k):
-            _join(work, tables, scan, k, m)
-    # Through a slit, a surface behind may show between two lines.
-    for k in range(surfaces):
-        m = around(around(k + 1, surfaces) + 1, surfaces)
-        both_end = spans[at.END, k] == spans[at.START, m] == 0
-        if both_end and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
-            i, j = spans[at.LAST, k], spans[at.FIRST, m]
-            dx, dy = x[i] - x[j], y[i] - y[j]
-            if (m > k or (scan.circular and m < k)) and dx * dx + dy * dy <= 4.0 * REACH * REACH:
-                _cross(work, tables, scan, k, m)
+            _join(work, scan, k, m)
+    # Lines meet over a lesser one that does not join them by two corners. What has no corner then
+    # may have one over whatever shows through a slit.
+    for slits in (False, True):
+        for k in range(surfaces):
+            m = around(k + 1, surfaces)
+            n = around(m + 1, surfaces)
+            lesser = spans[at.COUNT, m] < min(spans[at.COUNT, k], spans[at.COUNT, n])
+            joins = spans[at.CORNER, k] == spans[at.CORNER, m] == to.SHARP
+            free = not (spans[at.END, k] or spans[at.START, n])
+            if free and (n > k or (scan.circular and n < k)) and (slits or (lesser and not joins)):
+                _add_corner(work, tables, scan.row, k, n, _corner_over(work, scan, k, n))
+        for k in range(surfaces):
+            _add_corner(work, tables, scan.row, k, around(k + 1, surfaces), spans[at.CORNER, k])
     for k in range(surfaces):
         for way in (-1, 1):
             if spans[at.KIND, k] == at.LINE and not spans[at.END if way > 0 else at.START, k]:
@@ -46,7 +53,7 @@ def join_all(work, tables, scan, surfaces):
 
 
 @inlined
-def _join(work, tables, scan, k, m):
+def _join(work, scan, k, m):
     """Join surface k to the next one, m, where they meet, or break the cluster between them."""
     points, beam, broken = work.points, work.beams[at.BEAM], work.beams[at.BROKEN]
     kinds, pieces = work.spans[at.KIND], work.pieces
@@ -57,7 +64,7 @@ def _join(work, tables, scan, k, m):
     elif joined and kinds[m] == at.ARC:
         joined = is_on(points, pieces[m], i, work.noise, TAU)
     elif joined:
-        joined = _cross(work, tables, scan, k, m)
+        joined, work.spans[at.CORNER, k] = _cross(work, scan, k, m)
     largest, step, whole, t = j, -1.0, True, i
     while t != j:
         before, t = t, t + 1 if t + 1 < scan.count else 0
@@ -71,21 +78,51 @@ def _join(work, tables, scan, k, m):
 
 
 @inlined
-def _cross(work, tables, scan, k, m):
-    """Write the corner of two lines, if there is one. Returns whether they are one surface."""
-    spans, i, j = work.spans, work.spans[at.LAST, k], work.spans[at.FIRST, m]
-    joined, meets, x, y = _meet(work, scan, k, m)
-    if x == x:
-        rise = joint_cost(work.sums, spans[at.FIRST, k], i + 1, j, spans[at.LAST, m] + 1)
-        if rise >= scan.evidence:
-            kind = np.int64(to.SHARP if meets else to.SLIT)
-            _add_corner(work, tables, scan.row, k, m, x, y, kind, rise)
-    return joined
+def _corner_over(work, scan, k, m):
+    """Kind of the corner of two lines that have another surface between them."""
+    spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
+    i, j, kind = spans[at.LAST, k], spans[at.FIRST, m], np.int64(_NONE)
+    near = math.hypot(x[i] - x[j], y[i] - y[j]) <= 2.0 * REACH
+    if near and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
+        _, kind = _cross(work, scan, k, m)
+    return kind
+
+
+@inlined
+def _cross(work, scan, k, m):
+    """Whether two lines are one surface, and the kind of their corner.
+
+    One that is hardly a turn stands out of the line through both by no less than a surface may.
+    """
+    p, q, kind = work.pieces[k], work.pieces[m], np.int64(_NONE)
+    joined, meets, crosses = _meet(work, scan, k, m)
+    turn = abs(p[at.UX] * q[at.UY] - p[at.UY] * q[at.UX])
+    lengths = _length(work, k), _length(work, m)
+    height = turn * lengths[0] * lengths[1] / (lengths[0] + lengths[1])
+    bends = p[at.UX] * q[at.UX] + p[at.UY] * q[at.UY] > BEND
+    if crosses and (height > SIGMAS * TAU or not bends) and _response(work, k, m) >= scan.evidence:
+        kind = np.int64(to.SHARP if meets else to.SLIT)
+    return joined, kind
+
+
+@helper
+def _length(work, k):
+    """Distance between the first and the last measurement of a line."""
+    x, y = work.points[at.X], work.points[at.Y]
+    first, last = work.spans[at.FIRST, k], work.spans[at.LAST, k]
+    return math.hypot(x[last] - x[first], y[last] - y[first])
+
+
+@helper
+def _response(work, k, m):
+    """Rise of χ² if two lines were one."""
+    first, last = work.spans[at.FIRST], work.spans[at.LAST]
+    return joint_cost(work.sums, first[k], last[k] + 1, first[m], last[m] + 1)
 
 
 @inlined
 def _meet(work, scan, k, m):
-    """Whether two neighbouring lines are one surface, whether they meet, and where (NaN: nowhere).
+    """Whether two neighbouring lines are one surface, whether they meet, and whether they cross.
 
     They meet where they cross between their facing measurements, or are no farther apart there
     than by chance, if no measurement between went on behind both. If not, a face at right angles to
@@ -110,9 +147,12 @@ def _meet(work, scan, k, m):
         depth = max(depth, q[at.A] * x[i] + q[at.B] * y[i] - 1.0)
     step = gap(points, i, j, p[at.A] - q[at.A], p[at.B] - q[at.B])
     meets = between < LEAST and not hole and step * step <= error * error
-    # Corners lie near the measurements on both sides, or within their spacing and its error.
-    reach_i = max(REACH, math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error_i)
-    reach_j = max(REACH, math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error_j)
+    # Corners lie near the measurements on both sides, no farther than these have seen of their
+    # lines, or within their spacing and its error.
+    reach_i = math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error_i
+    reach_j = math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error_j
+    reach_i = max(min(REACH, _length(work, k)), reach_i)
+    reach_j = max(min(REACH, _length(work, m)), reach_j)
     determinant = p[at.A] * q[at.B] - q[at.A] * p[at.B]
     inverse = 1.0 / determinant if determinant != 0.0 else math.nan
     cx, cy = (q[at.B] - p[at.B]) * inverse, (p[at.A] - q[at.A]) * inverse
@@ -122,25 +162,28 @@ def _meet(work, scan, k, m):
     beyond = (cx - p[at.CX]) * p[at.UX] + (cy - p[at.CY]) * p[at.UY] > 0.0 and (
         (cx - q[at.CX]) * q[at.UX] + (cy - q[at.CY]) * q[at.UY] < 0.0
     )
-    if not (near and beyond):
-        cx, cy = math.nan, math.nan
-    joined = meets and (cx == cx or math.hypot(x[i] - x[j], y[i] - y[j]) <= reach_i + reach_j)
+    crosses = near and beyond
+    joined = meets and (crosses or math.hypot(x[i] - x[j], y[i] - y[j]) <= reach_i + reach_j)
     if not joined and unbroken and not hole:
         square = nearer[at.A] * nearer[at.A] + nearer[at.B] * nearer[at.B]
         bx, by = x[e] + depth * nearer[at.A] / square, y[e] + depth * nearer[at.B] / square
         face = (x[e] * by - y[e] * bx) / (rho[e] * math.hypot(bx, by)) * (1.0 if e == i else -1.0)
         beam = (x[i] * y[j] - y[i] * x[j]) / (rho[i] * rho[j] * (between + 1.0))
         joined = 0.5 * beam <= face <= (between + 3.0) * beam
-    return joined, meets, cx, cy
+    return joined, meets, crosses
 
 
 @inlined
-def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
-    """Write the corner of two lines at (x, y), Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ, if it is known so well.
+def _add_corner(work, tables, scan, k, m, kind):
+    """Write the corner of two lines, Σ = A⁻¹ diag(s₁², s₂²) A⁻ᵀ, if their ends have none yet.
 
     Where they meet, their segments then end there.
     """
     spans, p, q = work.spans, work.pieces[k], work.pieces[m]
+    if kind == _NONE or spans[at.END, k] or spans[at.START, m]:
+        return
+    inverse = 1.0 / (p[at.A] * q[at.B] - q[at.A] * p[at.B])
+    x, y = (q[at.B] - p[at.B]) * inverse, (p[at.A] - q[at.A]) * inverse
     row = tables.offsets[scan + 1, to.CORNERS]
     segments, a, b = tables.segments, spans[at.SEGMENT, k], spans[at.SEGMENT, m]
     sine = p[at.UX] * q[at.UY] - p[at.UY] * q[at.UX]
@@ -150,7 +193,7 @@ def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
     corners, ints = tables.corners, tables.corners.view(np.int32)
     write_place(corners, row, x, y, first, q[at.UX], q[at.UY], second, p[at.UX], p[at.UY])
     write_opening(segments, a, b, corners, ints, row)
-    corners[row, to.C_RESPONSE] = rise
+    corners[row, to.C_RESPONSE] = _response(work, k, m)
     ints[row, to.C_BEAM] = work.beams[at.BEAM, spans[at.FIRST, m]]
     ints[row, to.C_SEGMENTS] = a - tables.offsets[scan, to.SEGMENTS]
     ints[row, to.C_SEGMENTS + 1] = b - tables.offsets[scan, to.SEGMENTS]
@@ -160,6 +203,14 @@ def _add_corner(work, tables, scan, k, m, x, y, kind, rise):
         write_end(segments, b, to.S_START, x, y)
     spans[at.END, k] = spans[at.START, m] = 1
     tables.offsets[scan + 1, to.CORNERS] += 1
+
+
+@helper
+def _length(work, k):
+    """Distance between the ends of a line."""
+    first, last = work.spans[at.FIRST, k], work.spans[at.LAST, k]
+    x, y = work.points[at.X], work.points[at.Y]
+    return math.hypot(x[last] - x[first], y[last] - y[first])
 
 
 @helper

@@ -27,8 +27,8 @@ RADIUS, XX, XY, XR, YY, YR, RR, GAIN = UX, UY, OO, OA, AA, A, B, MISFIT
 PIECES = 11
 #: Of `spans`, by surface: its first and last measurement, how many of those count, what it is, the
 #: number of its segment, and whether there is a corner at its start and its end.
-FIRST, LAST, COUNT, KIND, SEGMENT, START, END = range(7)
-SPANS = 7
+FIRST, LAST, COUNT, KIND, SEGMENT, START, END, CORNER = range(8)
+SPANS = 8
 #: Kinds of surfaces.
 LINE, ARC = 0, 1
 #: Rows of the running sums: w (xx, xy, yy, x, y, 1).
