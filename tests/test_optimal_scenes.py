@@ -110,11 +110,13 @@ def test_a_slit_is_found_where_a_full_circle_is_opened(behind):
     angles = full_circle(720)
     corner = round((math.atan2(1.3, 2.0) + math.pi) / (angles[1] - angles[0]))
     ranges = room(angles, BOX)
-    ranges[corner - behind // 2 :][:behind] = wall(angles[corner - behind // 2 :][:behind], 9.0, 33.0)
+    ranges[corner - behind // 2 :][:behind] = wall(
+        angles[corner - behind // 2 :][:behind], 9.0, 33.0
+    )
+    step = angles[1] - angles[0]
     for turn in (0, corner, 300):
-        ranges_turned, first = np.roll(ranges, -turn), angles[0] + turn * (angles[1] - angles[0])
-        step = 2 * math.pi / 720
-        features = AWARE(LaserScan(noisy(ranges_turned, 3), first, step))
+        ranges_turned = noisy(np.roll(ranges, -turn), 3)
+        features = AWARE(LaserScan(ranges_turned, angles[0] + turn * step, step))
         (slit,) = of_kind(features, "slit")
         assert within(slit["position"] - (2.0, 1.3), slit["covariance"])
         assert len(of_kind(features, "corner")) == 3
