@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
+from lineament.features import TABLES, Features, make_records
 from lineament.motion import Matches, Motion, Tracker, Tracks
 from lineament.scan.poses import inverse
 
@@ -188,14 +189,27 @@ def estimate_motion(matches, prior=(0.0, 0.0, 0.0), covariance=None, *, roughnes
 class NaiveTracker(Tracker):
     """A tracker that looks for pairs three times, and numbers features one by one."""
 
-    def _follow(self, features, motion, prior, spread):
+    def __init__(self, **settings):
+        super().__init__(**settings)
+        tables = {name: make_records(name, []) for name in TABLES}
+        self._seen = Features(**tables, clusters=np.empty(0, np.int32))
+
+    def __call__(self, features, odometry=None):
+        self._features = features
+        return super().__call__(features, odometry)
+
+    def _follow(self, _, start, near, prior, spread):
+        motion = Motion(*start, near)
         for _ in range(3):
             matches = associate(
-                self._seen, features, motion.pose, motion.covariance,
+                self._seen, self._features, motion.pose, motion.covariance,
                 gate=self.gate, roughness=self.roughness,
             )  # fmt: skip
-            motion = estimate_motion(self._fresh(matches), prior, spread, roughness=self.roughness)
-        return motion, matches
+            pairs = {kind: getattr(matches, kind) for kind in KINDS}
+            fresh = {kind: of[self._missed[kind][of[:, 0]] == 0] for kind, of in pairs.items()}
+            matched = replace(matches, **fresh)
+            motion = estimate_motion(matched, prior, spread, roughness=self.roughness)
+        return motion, tuple(pairs.values())
 
     def _doubles(self, k, older, features):
         """Whether a corner that was seen in the last frame alone is one with an older number."""
@@ -214,14 +228,15 @@ class NaiveTracker(Tracker):
                     return True
         return False
 
-    def _renew(self, features, matches, motion):
+    def _renew(self, _, pairs, motion):
+        features = self._features
         if motion is not None:
             self._seen = self._seen.transform(*inverse(motion.pose))
         numbers, born, ended, tables = {}, [], [], {}
-        for kind in KINDS:
+        for kind, of in zip(KINDS, pairs, strict=True):
             seen, mine = getattr(self._seen, kind), {}
             tracks, missed, waiting = self._tracks[kind], self._missed[kind], []
-            found = dict(getattr(matches, kind).tolist())
+            found = dict(of.tolist())
             older = {now: tracks[k] for k, now in found.items()}
             for k in range(len(seen)):
                 if k in found:

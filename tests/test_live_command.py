@@ -272,7 +272,7 @@ scans = 8
         return report
 
     configs: list[LiveConfig] = []
-    monkeypatch.setattr("lineament.live.running.run_live", kept)
+    monkeypatch.setattr("lineament.live.run_live", kept)
     flags = "--echo last -m iepf --set noise_factor=3.0 --localhost --foxglove --rate 2 --noise 0.1"
     flags += " --dock 2 -1.5 --limit scans=7"
     assert run(["live", "--config", str(tmp_path / "robot.toml"), *flags.split()]) == 0

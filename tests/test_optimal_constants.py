@@ -43,7 +43,7 @@ def nearer(beams, by):
 
 
 def panels(step):
-    ranges, angles = flat(15, ONE / 2)
+    ranges, angles = flat(15, ONE / 4)
     return ranges + step * (angles > 0), angles
 
 

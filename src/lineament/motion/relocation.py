@@ -80,7 +80,7 @@ def is_contradicted(motion: Pose, before: NDArray[np.void], now: NDArray[np.void
     """Whether by this motion hardly any of the walls of a frame are where they were before."""
     if min(len(before), len(now)) < _ENOUGH:
         return False
-    share, _ = _found_again(_walls(before), _walls(now), np.array([motion]))
+    share, _ = _found_again(_walls(before), _walls(now), np.array([motion], np.float64))
     return bool(share[0] < _CONTRADICTED)
 
 
