@@ -13,7 +13,9 @@ from ..scan import LaserScan, NoiseLike, RangeNoise
 from .records import TABLES
 
 #: The number of each part of what is written, and its type.
-_PARTS = {name: (k, dtype) for k, (name, dtype) in enumerate(TABLES.items())}
+_PARTS: dict[str, tuple[int, np.dtype[Any]]] = {
+    name: (k, dtype) for k, (name, dtype) in enumerate(TABLES.items())
+}
 _PARTS |= {
     "clusters": (len(TABLES), np.dtype(np.int32)),
     "noise": (len(TABLES) + 1, np.dtype("f8")),

@@ -134,7 +134,8 @@ def motion_by(
     roughness: float,
 ) -> Motion:
     """Estimate a motion as `estimate_motion` does, by pairs of segments, corners and arcs."""
-    pairs = tuple(np.array(of, np.int64, order="C") for of in pairs)
+    segments, corners, arcs = (np.array(of, np.int64, order="C") for of in pairs)
+    pairs = segments, corners, arcs
     count, later = sum(map(len, pairs)), np.zeros(len(now.words[0]), np.int64)
     matrices, vectors = np.empty((5, 3, 3)), np.empty((3, 3))
     scratch = matrices, vectors, np.empty((count, COLUMNS)), np.empty(count), later

@@ -55,7 +55,7 @@ def vector(name: str, values: ArrayLike, length: int | None = None) -> Array:
         raise ValueError(f"{name} has shape {copy.shape}, expected one dimension")
     if length is not None and len(copy) != length:
         raise ValueError(f"{name} has {len(copy)} values, expected {length}, one for each range")
-    copy.setflags(False)
+    copy.setflags(write=False)
     return copy
 
 
