@@ -161,6 +161,7 @@ def assert_ends(edge, segments):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:all ranges are")
 @every_extractor
 @pytest.mark.parametrize("source", ["hostile", "random", *SENSORS])
 def test_features_are_sound(extractor, source):
@@ -188,6 +189,7 @@ def test_features_of_recorded_scans_are_sound(data_dir):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:all ranges are")
 @every_extractor
 def test_features_of_thousands_of_scans_are_sound(extractor):
     rng = np.random.default_rng(1)
