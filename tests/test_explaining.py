@@ -137,8 +137,8 @@ def test_lengths_below_a_metre_are_in_millimetres(distance, words):
 @pytest.mark.parametrize(
     ("seed", "beam", "method", "words"),
     [
-        (6, 170, "optimal", "yet it was not cut, and the two lines turn by"),
-        (6, 130, "optimal", "°: one wall that bends"),
+        (6, 70, "optimal", "yet it was not cut, and the two lines turn by"),
+        (6, 90, "optimal", "°: one wall that bends"),
         (2, 70, "iepf", "asked; cut there first, then merged again"),
         (2, 65, "iepf", "asked; a border, but the lines on its sides do not meet there"),
     ],

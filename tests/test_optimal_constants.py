@@ -43,7 +43,7 @@ def nearer(beams, by):
 
 
 def panels(step):
-    ranges, angles = flat(15, ONE / 4)
+    ranges, angles = flat(15, ONE / 2)
     return ranges + step * (angles > 0), angles
 
 
@@ -83,9 +83,8 @@ def count(table):
 
 #: By constant: what it decides, two scenes on either side of it, and what is found in them.
 CASES = {
-    # Walls 5 cm apart are one that bends, 7 cm apart two.
-    "TAU": (count("segments"), (panels(0.05), 1), (panels(0.07), 2)),
-    "STEP": (count("segments"), (panels(0.05), 1), (panels(0.07), 2)),
+    # Walls 7.5 cm apart are one that bends, 10.5 cm apart two.
+    "TAU": (count("segments"), (panels(0.075), 1), (panels(0.105), 2)),
     # A last measurement is on its wall where it is off by 7 cm, on none where by 8 cm.
     "CLUTTER": (
         lambda found: found.segments["last_beam"][0],

@@ -19,9 +19,6 @@ SIGMAS = 3.0
 STEEPEST = 14.3
 #: Cosine of the turn below which two lines may be one wall that bends (20°).
 BEND = math.cos(math.radians(20.0))
-#: Deviations of a measurement by which a wall that bends may step: of two lines the ends are better
-#: known than a measurement.
-STEP = 2.0
 #: Evidence, in units of that for a surface, against what buildings seldom have: a corner as
 #: shallow as that, or a round wall that goes on as a straight one.
 RARE = 8.0

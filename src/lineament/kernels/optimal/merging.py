@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import helper, inlined
 from . import layout as at
-from .constants import BEND, RARE, STEP, TAU
+from .constants import BEND, RARE, SIGMAS, TAU
 from .costs import joint_cost, solve
 
 
@@ -49,7 +49,7 @@ def merge_lines(work, lines, evidence):
 def _rise(work, k):
     """Rise of χ² if a line and the one before become one; inf where these are no wall that bends.
 
-    A wall that bends turns by little and does not step at the border.
+    They then turn by little, and are no farther apart at their border than by chance.
     """
     spans, sums, points = work.spans, work.sums, work.points
     start, border, end = spans[at.FIRST, k - 1], spans[at.FIRST, k], spans[at.LAST, k] + 1
@@ -60,7 +60,7 @@ def _rise(work, k):
     if not a * c + b * d > BEND * math.sqrt((a * a + b * b) * (c * c + d * d)):
         return math.inf
     step = gap(points, border - 1, border, a - c, b - d)
-    if step * step > STEP * STEP * surface_variance(points, border, work.noise):
+    if step * step > SIGMAS * SIGMAS * surface_variance(points, border, work.noise):
         return math.inf
     return joint_cost(sums, start, border, border, end)
 
