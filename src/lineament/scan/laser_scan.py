@@ -6,6 +6,7 @@ import math
 from operator import index
 from typing import Any, Self, SupportsIndex, overload
 
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from .beams import Beams
@@ -25,6 +26,7 @@ from .fields import (
     range_limits,
     vector,
 )
+from .units import warn_of_whole_numbers
 
 _TURN, _INF = 2 * math.pi, math.inf
 
@@ -138,6 +140,8 @@ class LaserScan(Beams):
             own.update(in_reverse(self))
         if scale != 1.0:
             own["ranges"] = in_metres(own["ranges"], scale, own["range_max"])
+        elif type(ranges) is not ndarray or ranges.dtype.kind != "f":
+            warn_of_whole_numbers(ranges)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
