@@ -59,6 +59,10 @@ def test_arcs_of_one_thing_are_within_10_cm(other, is_one):
         (line((0, 0), (4, 0), sigma=(0.03, 0.0205)), False),
         (line((0, 0), (4, 0), sigma=(0.04, 0.0145)), True),
         (line((0, 0), (4, 0), sigma=(0.04, 0.0155)), False),
+        (line((0, 0), (1, 0), sigma=(0.03, 0.079)), True),
+        (line((0, 0), (1, 0), sigma=(0.03, 0.081)), False),
+        (line((0, 0), (9, 0), sigma=(0.03, 0.0088)), True),
+        (line((0, 0), (9, 0), sigma=(0.03, 0.009)), False),
     ],
 )
 def test_segments_that_a_plan_takes(segment, is_kept):
