@@ -11,7 +11,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from approved import assert_approved, figure_lines
-from handmade import arc, breakpoint_at, edge, features
+from handmade import arc, breakpoint_at, corner, edge, features, segment
 from matplotlib import pyplot
 from worlds import BOX, full_circle, room
 
@@ -486,6 +486,16 @@ def test_plot_of_features_without_a_scan_takes_one(scan):
     assert "no return" in over.get_legend_handles_labels()[1]
     with pytest.raises(ValueError, match="scan has 10 beams, expected the 360"):
         row.plot(scan=scan[:10])
+
+
+@pytest.mark.parametrize(("walls", "is_flat"), [(3, False), (4, True)])
+def test_features_alone_are_drawn_with_the_sensor(walls, is_flat):
+    """Their ends, corners and the sensor: where these are fewer than nine, no plan is flat."""
+    along = [segment((k, 0), (k + 1, 0), 0, 9) for k in range(walls)]
+    ax = features(0, segments=along, corners=[corner(walls, 0)] * (walls == 3)).plot()
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    assert (left, right) == pytest.approx((-0.04 * walls, 1.04 * walls))
+    assert (low, high) == pytest.approx((-walls / 4, walls / 4) if not is_flat else (-0.02, 0.02))
 
 
 # The command

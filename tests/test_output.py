@@ -182,6 +182,21 @@ def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
     assert target.exists()
 
 
+def test_scans_do_not_wait_where_a_format_does_not_say_so(tmp_path):
+    class Counting(Writer):
+        def _open(self, temporary, files):
+            files.enter_context(temporary.open("w"))
+
+        def _write(self, found, first_scan):
+            came.append((len(found), first_scan))
+
+    came = []
+    with Counting(tmp_path / "a.txt") as writer:
+        for k in range(3):
+            writer.write(FOUND)
+            assert came == [(1, i) for i in range(k + 1)]
+
+
 def test_endings(tmp_path):
     for name, expected in (("A.ROS2.MCAP", "Ros2Writer"), ("A.Mcap", "FoxgloveWriter")):
         assert type(open_writer(tmp_path / name)).__name__ == expected
@@ -372,11 +387,15 @@ def test_recording_is_whole_and_has_everything(tmp_path):
 def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     path, scan = tmp_path / "a.rrd", LaserScan([2.0] * 6, 0.0, 0.1)
-    full = namedtuple("usage", "total used free")(1, 1, 0)
+    usage = namedtuple("usage", "total used free")
     with open_writer(path) as writer:
         writer.write(FOUND, scan)
     path.unlink()
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(1 << 40, 0, 1 << 25))
+    with open_writer(path) as writer:
+        writer.write(FOUND, scan)  # 32 MB are enough
+    path.unlink()
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(1 << 40, 0, (1 << 25) - 1))
     with pytest.raises(LineamentError, match=r"a\.rrd: cannot be written: less than 32") as caught:
         open_writer(path).__enter__()
     assert "\n" not in str(caught.value)

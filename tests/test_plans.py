@@ -157,6 +157,19 @@ def test_plans_are_bounded(monkeypatch):
     np.testing.assert_allclose(plan._corners.seen(299), [(0, 0)])
 
 
+def test_what_is_forgotten_was_seen_least_and_not_last(monkeypatch):
+    """Walls and corners that are seen again and again, but only behind many others."""
+    monkeypatch.setattr("lineament.output.floor_plan.MOST", 40)
+    plan = FloorPlan()
+    for y in range(1, 60):
+        again = y > 30
+        walls = [line((0, y), (1, y)), *[line((0, 0), (5, 0))] * again]
+        plan.add(features(segments=walls, corners=[corner(0, y), *[corner(9, 0)] * again]))
+    (wall,) = plan.walls(2)
+    assert wall["views"] == 29
+    np.testing.assert_allclose(plan._corners.seen(29), [(9, 0)])
+
+
 def test_averages_join_what_is_near_and_edges_stay_apart_from_corners():
     means = Averages(2, 0.1)
     means.add(np.array([(0, 0), (1, 0), (np.nan, 0), (1e300, 0)]))
