@@ -83,3 +83,22 @@ def test_what_is_drawn_is_finite_and_nearer_than_the_farthest():
         ([], []),
     ):
         np.testing.assert_array_equal(is_drawn(np.array(values, float)), expected)
+
+
+def test_the_legend_of_a_panel_stands_below_its_left_corner_in_as_few_rows_as_hold_it():
+    figure = canvas.new_figure(6, 4)
+    figure.set_layout_engine("none")
+    cases = ((0, 5, 0), (1, 5, 1), (6, 3, 2), (6, 9, 3), (6, 10, 6), (7, 3, 2), (2, 0.1, 1))
+    for count, width, columns in cases:
+        axes = figure.add_axes((0.25, 0.25, 0.5, 0.5))
+        for k in range(count):
+            axes.plot([], [], label=f"{k}: letters")  # of 1.4 inches
+        canvas.add_own_legend(axes, width)
+        legend = axes.get_legend()
+        assert (legend is not None) == (count > 0)
+        if count:
+            figure.draw_without_rendering()
+            anchor = figure.dpi_scale_trans.inverted().transform(legend.get_bbox_to_anchor().p0)
+            np.testing.assert_allclose(anchor, (0.25 * 6, 0.25 * 4 - 0.45))
+            assert (legend.borderaxespad, legend.get_frame_on()) == (0, False)
+            assert legend._ncols == columns
