@@ -5,7 +5,9 @@ import io
 import matplotlib.image
 import numpy as np
 import pytest
+from handmade import corner, features
 
+from lineament import LaserScan
 from lineament.output import canvas, figures
 from lineament.output.markers import FARTHEST, is_drawn
 
@@ -102,3 +104,17 @@ def test_the_legend_of_a_panel_stands_below_its_left_corner_in_as_few_rows_as_ho
             np.testing.assert_allclose(anchor, (0.25 * 6, 0.25 * 4 - 0.45))
             assert (legend.borderaxespad, legend.get_frame_on()) == (0, False)
             assert legend._ncols == columns
+
+
+@pytest.mark.parametrize(
+    ("sigma", "reach"), [(1e-5, 0.05), (0.01, 0.36), (0.05, 1.8), (1.0, 2.0), (np.nan, 0.5)]
+)
+def test_surroundings_of_a_corner_are_so_large_that_its_ellipse_is_seen(sigma, reach):
+    found = features(100, corners=[corner(1, 2)])
+    found.corners["covariance"] = np.diag((sigma**2, 0.0))
+    figure = figures.corner_figure(LaserScan([3.0] * 100, 0.0, 0.01), found, 0)
+    (axes,) = figure.axes
+    limits = np.transpose((axes.get_xlim(), axes.get_ylim()))
+    np.testing.assert_allclose(limits.mean(axis=0), (1, 2))
+    # One side is longer, where that fills the place of the panel.
+    assert np.ptp(limits, axis=0).min() == pytest.approx(2 * reach * (1 + 2 * MARGIN))
