@@ -109,12 +109,15 @@ def test_the_legend_of_a_panel_stands_below_its_left_corner_in_as_few_rows_as_ho
 @pytest.mark.parametrize(
     ("sigma", "reach"), [(1e-5, 0.05), (0.01, 0.36), (0.05, 1.8), (1.0, 2.0), (np.nan, 0.5)]
 )
-def test_surroundings_of_a_corner_are_so_large_that_its_ellipse_is_seen(sigma, reach):
-    found = features(100, corners=[corner(1, 2)])
+def test_surroundings_of_a_corner_are_so_large_that_its_ellipse_is_seen(sigma, reach, monkeypatch):
+    found, shown, draw = features(100, corners=[corner(1, 2)]), [], canvas.style_plane
+
+    def style_plane(*given):
+        shown.append(given[-1])
+        draw(*given)
+
+    monkeypatch.setattr(canvas, "style_plane", style_plane)
     found.corners["covariance"] = np.diag((sigma**2, 0.0))
-    figure = figures.corner_figure(LaserScan([3.0] * 100, 0.0, 0.01), found, 0)
-    (axes,) = figure.axes
-    limits = np.transpose((axes.get_xlim(), axes.get_ylim()))
-    np.testing.assert_allclose(limits.mean(axis=0), (1, 2))
-    # One side is longer, where that fills the place of the panel.
-    assert np.ptp(limits, axis=0).min() == pytest.approx(2 * reach * (1 + 2 * MARGIN))
+    figures.corner_figure(LaserScan([3.0] * 100, 0.0, 0.01), found, 0)
+    (points,) = shown
+    np.testing.assert_allclose(points, [(1 - reach, 2 - reach), (1 + reach, 2 + reach)])
