@@ -425,6 +425,29 @@ def test_hostile_scans_have_pictures(ranges):
     assert ln.plot(scan).get_xlim()[0] < ln.plot(scan).get_xlim()[1]
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_what_is_not_finite_by_half_is_left_out_of_a_picture(bad):
+    """A feature of each kind of which one number alone is not known; the whole ones are drawn."""
+    rings = [breakpoint_at(0, 1), breakpoint_at(1, 2)]
+    found = features(
+        9,
+        segments=[segment((1, 0), (1, 1), 0, 3), segment((bad, 0), (1, 1), 0, 3)],
+        corners=[corner(1, 1), corner(1, bad)],
+        edges=[edge(1, 0), edge(bad, 1)],
+        arcs=[arc(2, 1, 0.25, 0, 3), arc(2, 1, bad, 0, 3), arc(2, bad, 0.25, 0, 3)],
+        breakpoints=rings,
+    )
+    found.breakpoints["position"] = [(1, 0), (1, bad)]
+    whole = replace(found, **{name: found[name][:1] for name in TABLES})
+    scan = ln.LaserScan([1.0] * 9, 0.0, 0.1)
+    drawn = notebook.svg(scan, found)
+    assert "nan" not in drawn
+    assert "inf" not in drawn
+    marks, legend = drawn.split("<text ")
+    assert marks == notebook.svg(scan, whole).split("<text ")[0]
+    assert legend.count("tspan") == 10
+
+
 def test_scan_and_log_in_a_notebook(scan, log):
     posed = scan.with_pose((1.0, 2.0, 0.0))
     text = "".join(ET.fromstring(posed._repr_html_()).itertext())
