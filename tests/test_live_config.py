@@ -137,6 +137,7 @@ TIMES_AND_SIZES = {
     "participant": {"LAST_DOMAIN": 232},
     "pipeline": {"_LATEST": 2147483647_999999999, "_MOST_PUBLISHERS": 8, "_OLDEST": 0.5,
                  "_LONGEST": 1.0, "_MANY": 20},
+    "raw_dds": {"_DATA": 2},
     "received": {"_MOST_PUBLISHERS": 64},
     "replay": {"_LEAP": 10.0, "_STEP": 0.1, "_PUNCTUAL": 0.01, "_MOST": 64},
     "ros1": {"_PATIENCE": 3.0, "_LEAP": 10000},
@@ -162,9 +163,16 @@ def test_numbers_are_taken_up_to_their_bounds(name):
 
 @pytest.mark.parametrize("name", TIMES_AND_SIZES)
 def test_how_long_is_waited_and_how_much_is_kept(name):
-    extra = {"dds": "cyclonedds", "participant": "cyclonedds", "foxglove": "foxglove"}
+    extra = {
+        "dds": "cyclonedds",
+        "raw_dds": "cyclonedds",
+        "participant": "cyclonedds",
+        "foxglove": "foxglove",
+    }
     if name in extra:
         pytest.importorskip(extra[name])
     module = importlib.import_module(f"lineament.live.{name}")
     kept = {key: getattr(module, key) for key in TIMES_AND_SIZES[name]}
     assert kept == TIMES_AND_SIZES[name]
+    if name == "raw_dds":  # what Cyclone DDS is told of a type: a byte long at least, no key
+        assert list(module._ONE_BYTE) == [0x0101 << 16, 0, 0]
