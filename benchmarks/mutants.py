@@ -48,8 +48,8 @@ AREAS: dict[str, tuple[str, str]] = {
     "logs": ("logs rosmsg", "*log* ros* source* info saving limits bulk* pdbs"),
     "output": (
         "output",
-        "output plans* figures notebook writers_mcap ros_messages feature_points world tables "
-        "experiment_pictures experiment_definitions live_foxglove",
+        "output output_* plans* figures notebook writers_mcap ros_messages feature_points world "
+        "tables experiment_pictures experiment_definitions live_foxglove",
     ),
     "mapping": ("mapping", "mapping* locating* relocation"),
     "motion": (

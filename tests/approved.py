@@ -70,7 +70,7 @@ def _color(color):
 def figure_lines(figure):
     """Describe all that is drawn in a figure, but what the sizes of letters decide.
 
-    In a figure that is settled these are the limits of panels and the places of labels.
+    In a figure that is settled these are the limits of plans and the places of labels.
     """
     is_settled = "Constrained" not in type(figure.get_layout_engine()).__name__
     yield f"figure {_row(figure.get_size_inches())} {_color(figure.get_facecolor())}"
@@ -93,8 +93,8 @@ def _panel(axes, is_settled):
         limits, ticks = getattr(axes, f"get_{name}lim")(), axis.get_ticklabels()
         look = [f"{t.get_size():g} {_color(t.get_color())}" for t in ticks[:1]]
         look += [f"{g.get_lw():g} {_color(g.get_color())}" for g in axis.get_gridlines()[:1]]
-        if not is_settled:
-            look += [_row(limits), " ".join(t.get_text() for t in ticks)]
+        look += [_row(limits)] * (not is_settled or axes.get_aspect() == "auto")
+        look += [" ".join(t.get_text() for t in ticks)] * (not is_settled)
         label = f"{axis.get_label_text()!r} {axis.label.get_size():g}"
         yield f"{name} {axis.get_scale()} {label} {' '.join(look)}"
     aspect = axes.get_aspect()

@@ -3,15 +3,22 @@
 import importlib
 import math
 import re
+from dataclasses import fields
 
 import pytest
+
+from lineament.methods.lines import PieceMethod
+from lineament.reproduce import EXPERIMENTS, controls, experiment_names
 
 SETTINGS = {
     "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
               "FACE_FROM": 0.1, "FACE_TO": 0.6},
+    "claims": {"FLAT": 0.03},
     "compare": {"_TIMED": 50},
     "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISY": 263, "_NOISE": 3.7,
-                    "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75))},
+                    "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75)),
+                    "_WALLS": [[(0.7, -1.75), (3.0, -1.6), (3.3, 0.2)], ((2.3, 0.5), (1.8, 2.2))],
+                    "_STEPS": [(3.0, -1.6), (3.0, 0.3), (1.9, 0.5), (1.7, 1.6)]},
     "grid": {"HALF_WIDTHS": (2, 8), "RADIUS": 6, "THRESHOLD": 0.66, "GATE": 0.1,
              "RADII": (3, 4, 5, 6, 7, 8, 10, 12, 16), "SCENES_A_FRAME": 2,
              "THRESHOLDS": (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.66, 0.8, 1.0, 1.5),
@@ -32,7 +39,12 @@ SETTINGS = {
     "success": {"PAPER_PARTITION": {"liu": (0.9511, (9.6, 25.3)), "pdbs": (0.8355, (15.8, 36.3))},
                 "PAPER_CORNERS": {"liu": (0.9262, (21.6, 38.2)), "iepf": (0.7251, (29.9, 53.4))},
                 "MORE": 10},
-    "tracking": {"SCANS_A_FRAME": 300, "_WAY": (0.02, 0.1), "_TURN": (0.01, 0.1)},
+    "tracking": {"SCANS_A_FRAME": 300, "_WAY": (0.02, 0.1), "_TURN": (0.01, 0.1),
+                 "_FAR": 10,
+                 "LOGS": {"Intel lab": ("truth/intel_graph.npz", 0.0),
+                          "fr079, second half": ("truth/fr079_graph.npz", 0.5),
+                          "arena, moving": ("truth/jackal_mocap_02171554.npz", 0.0),
+                          "arena, static": ("truth/jackal_static_data.npz", 0.0)}},
     "two_corners": {"DISTANCE": 2.302, "GATE": 0.25, "SCANS_A_FRAME": 20,
                     "_PLACES": ((0.7, 0.9, 0.5), (2.0, 0.6, -0.4), (2.9, 1.3, 0.2),
                                 (1.4, 2.3, -0.6), (2.6, 2.4, 0.1))},
@@ -64,6 +76,33 @@ def test_what_the_paper_leaves_open_is_tried_over_these_values():
     tried = [list(values.values()) for values in module("sensitivity").OPEN.values()]
     assert tried[: len(OPEN)] == OPEN
     assert {"tangent", "product", "relative"} <= {form["response"] for form in tried[len(OPEN)]}
+
+
+@pytest.mark.parametrize(
+    ("control", "own"),
+    [
+        (controls.BlindCut, {"every": (8, 2)}),
+        (
+            controls.OperatorCut,
+            {"support_radius": (7, 1), "threshold": (0.1, 0), "response": ("relative", None)},
+        ),
+    ],
+)
+def test_controls_have_these_defaults_and_least_values(control, own):
+    shared = {field.name for field in fields(PieceMethod)}
+    mine = {field.name: field for field in fields(control) if field.name not in shared}
+    assert mine.keys() == own.keys()
+    for name, (default, least) in own.items():
+        assert mine[name].default == default
+        if least is not None:
+            assert mine[name].metadata["bounds"].low == least
+
+
+def test_an_unknown_experiment_is_told_all_names():
+    papers = [name for names in EXPERIMENTS.values() for name in names]
+    with pytest.raises(ValueError, match="unknown, expected") as caught:
+        experiment_names(["none"])
+    assert str(caught.value).partition(": ")[2].split(", ") == [*EXPERIMENTS, *papers]
 
 
 @pytest.mark.parametrize(

@@ -194,6 +194,13 @@ class TestMethods:
         np.testing.assert_allclose(lines["centroid"][:, 0], [2.0, 4.0])
         np.testing.assert_allclose(np.abs(np.sin(lines["angle"])), 1.0)
 
+    def test_two_beams_are_a_line_and_one_is_none(self):
+        scan, labels = ln.LaserScan([2.0] * 9, 0.0, 0.02), [0, -1, 1, 1, -1, 2, 2, 2, 3]
+        for n in (0, 1, 9):
+            found = contenders.region_lines(scan, features(clusters=labels[:n] + [-1] * (9 - n)))
+            lines = found.segments[["cluster", "first_beam", "last_beam"]].tolist()
+            assert lines == [(1, 2, 3), (2, 5, 7)] * (n == 9)
+
     def test_a_cluster_over_the_seam_is_one_line(self):
         bearings = np.radians(np.arange(0, 360, 2.0))
         ranges = np.full(180, np.nan)

@@ -70,6 +70,10 @@ class TestRepetition:
         assert grid.average_repetition(before, before, 0.06) == 0.25  # One of four is near enough.
         assert grid.average_repetition(before, features(), 0.0) == 0.0
         assert math.isnan(grid.average_repetition(features(), features(), 0.0))
+        # Of two views without a corner in common, whatever their numbers.
+        for n, m in ((1, 0), (0, 1), (1, 1), (2, 2), (1, 3)):
+            views = features(corners=[before.corners[0]] * n), features(corners=[corner(9, 9)] * m)
+            assert grid.average_repetition(*views, 0.0) == 0.0
 
     def test_everything_a_corner_repeats_well_and_is_wrong(self):
         everywhere = grid.repetition(Parameters("tangent", 8, 6, 0.0), range(1))

@@ -1,5 +1,7 @@
+import importlib
 import math
 import re
+from dataclasses import MISSING, fields
 
 import pytest
 
@@ -115,3 +117,62 @@ def test_a_file_is_as_long_as_a_line_of_a_log_at_most(tmp_path):
     path.write_bytes(b"#" * (LIMITS.line + 1))
     with pytest.raises(LineamentError, match=f"it has more than {LIMITS.line} bytes"):
         read_config(path)
+
+
+#: What a robot relies on: what holds where nothing is said, how long is waited, how much is kept.
+DEFAULTS = {
+    "topic": "scan", "namespace": "", "name": "lineament", "type": "LaserScan", "echo": "first",
+    "stamp": "first", "scale": 1.0, "ros": 2, "localhost": False, "reliability": "best-effort",
+    "depth": 10, "method": "optimal", "deskew": "off", "laser_pose": (0.0, 0.0, 0.0),
+    "upside_down": False, "track": False, "layers": "", "keep_going": False, "rate": 1.0,
+    "loop": False, "host": "127.0.0.1",
+}  # fmt: skip
+BOUNDS = {"depth": (1, 1000), "rate": (0, 1e6), "noise": (0, 1000), "scale": (1e-9, 1e9),
+          "domain": (0, 232), "foxglove": (0, 65535), "dock_track": (0, 2147483647)}  # fmt: skip
+TIMES_AND_SIZES = {
+    "counters": {"_MOST": 4096},
+    "dds": {"NANO": 10**9, "PATIENCE": 10**6, "MOST_PUBLISHERS": 1000},
+    "foxglove": {"_BACKLOG": 64},
+    "node": {"_WAIT": 0.1, "_EACH": 1.0, "_PATIENCE": 2.0, "_MOST_FAULTY": 64},
+    "participant": {"LAST_DOMAIN": 232},
+    "pipeline": {"_LATEST": 2147483647_999999999, "_MOST_PUBLISHERS": 8, "_OLDEST": 0.5,
+                 "_LONGEST": 1.0, "_MANY": 20},
+    "raw_dds": {"_DATA": 2},
+    "received": {"_MOST_PUBLISHERS": 64},
+    "replay": {"_LEAP": 10.0, "_STEP": 0.1, "_PUNCTUAL": 0.01, "_MOST": 64},
+    "ros1": {"_PATIENCE": 3.0, "_LEAP": 10000},
+}  # fmt: skip
+
+
+def test_what_holds_where_nothing_is_said():
+    defaults = {f.name: f.default for f in fields(LiveConfig) if f.default is not MISSING}
+    assert {name: value for name, value in defaults.items() if value is not None} == DEFAULTS
+    empty = LiveConfig()
+    assert (empty.parameters, empty.limits) == ({}, {})
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_numbers_are_taken_up_to_their_bounds(name):
+    for bound, beyond in zip(BOUNDS[name], (-math.inf, math.inf), strict=True):
+        is_whole = isinstance(bound, int) and name not in ("rate", "noise")
+        off = bound + int(math.copysign(1, beyond)) if is_whole else math.nextafter(bound, beyond)
+        assert getattr(LiveConfig(log="a.npz", **{name: bound}), name) == bound
+        with pytest.raises(ValueError, match=f"{name} is "):
+            LiveConfig(log="a.npz", **{name: off})
+
+
+@pytest.mark.parametrize("name", TIMES_AND_SIZES)
+def test_how_long_is_waited_and_how_much_is_kept(name):
+    extra = {
+        "dds": "cyclonedds",
+        "raw_dds": "cyclonedds",
+        "participant": "cyclonedds",
+        "foxglove": "foxglove",
+    }
+    if name in extra:
+        pytest.importorskip(extra[name])
+    module = importlib.import_module(f"lineament.live.{name}")
+    kept = {key: getattr(module, key) for key in TIMES_AND_SIZES[name]}
+    assert kept == TIMES_AND_SIZES[name]
+    if name == "raw_dds":  # what Cyclone DDS is told of a type: a byte long at least, no key
+        assert list(module._ONE_BYTE) == [0x0101 << 16, 0, 0]

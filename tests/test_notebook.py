@@ -11,7 +11,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from approved import assert_approved, figure_lines
-from handmade import arc, breakpoint_at, edge, features
+from handmade import arc, breakpoint_at, corner, edge, features, segment
 from matplotlib import pyplot
 from worlds import BOX, full_circle, room
 
@@ -425,6 +425,29 @@ def test_hostile_scans_have_pictures(ranges):
     assert ln.plot(scan).get_xlim()[0] < ln.plot(scan).get_xlim()[1]
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_what_is_not_finite_by_half_is_left_out_of_a_picture(bad):
+    """A feature of each kind of which one number alone is not known; the whole ones are drawn."""
+    rings = [breakpoint_at(0, 1), breakpoint_at(1, 2)]
+    found = features(
+        9,
+        segments=[segment((1, 0), (1, 1), 0, 3), segment((bad, 0), (1, 1), 0, 3)],
+        corners=[corner(1, 1), corner(1, bad)],
+        edges=[edge(1, 0), edge(bad, 1)],
+        arcs=[arc(2, 1, 0.25, 0, 3), arc(2, 1, bad, 0, 3), arc(2, bad, 0.25, 0, 3)],
+        breakpoints=rings,
+    )
+    found.breakpoints["position"] = [(1, 0), (1, bad)]
+    whole = replace(found, **{name: found[name][:1] for name in TABLES})
+    scan = ln.LaserScan([1.0] * 9, 0.0, 0.1)
+    drawn = notebook.svg(scan, found)
+    assert "nan" not in drawn
+    assert "inf" not in drawn
+    marks, legend = drawn.split("<text ")
+    assert marks == notebook.svg(scan, whole).split("<text ")[0]
+    assert legend.count("tspan") == 10
+
+
 def test_scan_and_log_in_a_notebook(scan, log):
     posed = scan.with_pose((1.0, 2.0, 0.0))
     text = "".join(ET.fromstring(posed._repr_html_()).itertext())
@@ -486,6 +509,16 @@ def test_plot_of_features_without_a_scan_takes_one(scan):
     assert "no return" in over.get_legend_handles_labels()[1]
     with pytest.raises(ValueError, match="scan has 10 beams, expected the 360"):
         row.plot(scan=scan[:10])
+
+
+@pytest.mark.parametrize(("walls", "is_flat"), [(3, False), (4, True)])
+def test_features_alone_are_drawn_with_the_sensor(walls, is_flat):
+    """Their ends, corners and the sensor: where these are fewer than nine, no plan is flat."""
+    along = [segment((k, 0), (k + 1, 0), 0, 9) for k in range(walls)]
+    ax = features(0, segments=along, corners=[corner(walls, 0)] * (walls == 3)).plot()
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    assert (left, right) == pytest.approx((-0.04 * walls, 1.04 * walls))
+    assert (low, high) == pytest.approx((-walls / 4, walls / 4) if not is_flat else (-0.02, 0.02))
 
 
 # The command

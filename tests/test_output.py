@@ -182,6 +182,21 @@ def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
     assert target.exists()
 
 
+def test_scans_do_not_wait_where_a_format_does_not_say_so(tmp_path):
+    class Counting(Writer):
+        def _open(self, temporary, files):
+            files.enter_context(temporary.open("w"))
+
+        def _write(self, found, first_scan):
+            came.append((len(found), first_scan))
+
+    came = []
+    with Counting(tmp_path / "a.txt") as writer:
+        for k in range(3):
+            writer.write(FOUND)
+            assert came == [(1, i) for i in range(k + 1)]
+
+
 def test_endings(tmp_path):
     for name, expected in (("A.ROS2.MCAP", "Ros2Writer"), ("A.Mcap", "FoxgloveWriter")):
         assert type(open_writer(tmp_path / name)).__name__ == expected
@@ -372,14 +387,35 @@ def test_recording_is_whole_and_has_everything(tmp_path):
 def test_full_disk_is_reported_before_rerun_meets_it(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     path, scan = tmp_path / "a.rrd", LaserScan([2.0] * 6, 0.0, 0.1)
-    full = namedtuple("usage", "total used free")(1, 1, 0)
+    usage = namedtuple("usage", "total used free")
     with open_writer(path) as writer:
         writer.write(FOUND, scan)
     path.unlink()
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(1 << 40, 0, 1 << 25))
+    with open_writer(path) as writer:
+        writer.write(FOUND, scan)  # 32 MB are enough
+    path.unlink()
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(1 << 40, 0, (1 << 25) - 1))
     with pytest.raises(LineamentError, match=r"a\.rrd: cannot be written: less than 32") as caught:
         open_writer(path).__enter__()
     assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_that_does_not_reach_the_disk_in_time_is_an_error(tmp_path, monkeypatch):
+    rerun = pytest.importorskip("rerun")
+
+    def flush(recording, *, timeout_sec):
+        assert recording is not None
+        raise RuntimeError(f"nothing for {timeout_sec:g} s")
+
+    def write():
+        with open_writer(tmp_path / "a.rrd") as writer:
+            writer.write(FOUND, LaserScan([2.0] * 6, 0.0, 0.1))
+
+    monkeypatch.setattr(rerun.RecordingStream, "flush", flush)
+    with pytest.raises(LineamentError, match=r"a\.rrd: .*rerun says: nothing for 10 s"):
+        write()
     assert not list(tmp_path.iterdir())
 
 
@@ -434,6 +470,36 @@ def test_page_is_one_file_with_its_images(tmp_path):
     assert tags.count("dl") == tags.count("script") == 1
     assert "http" not in text
     assert "prefers-color-scheme: dark" in text
+
+
+def test_pages_are_as_was_approved(tmp_path):
+    """Of every part, with and without what may be left out, and with a table and without."""
+    head = struct.pack(">8s8s2I", b"PNG", b"IHDR", 1001, 499)
+    table = [
+        [page.Cell("a" * 40), page.Cell("3 (2–4) (5)", "number"), page.Cell("holds", "verdict")],
+        [page.Cell("a" * 41), page.Cell("3", "number"), page.Cell("b" * 41, "verdict", "#p")],
+    ]
+    plain = [
+        page.list_part([("scans", "331")]),
+        page.heading_part("p", "A part"),
+        page.contents_part([("p", "A part"), ("q", "Another")]),
+        page.image_part("bare", head),
+        page.image_part("either", head, "q", head),
+        *page.text_parts(["One.", "Two."]),
+    ]
+    tables = [
+        page.table_part("T", ["long", "n", "v"], table, "A note"),
+        page.table_part("U", ["long", "n", "v"], [table[0], table[1][::-1]]),
+    ]
+    lines = []
+    for parts in (plain, [*plain, *tables]):
+        page.write_parts(tmp_path / "a.html", "A < B", parts)
+        before, style, after = re.split("</?style>", (tmp_path / "a.html").read_text("utf-8"))
+        assert style.count("{") == style.count("}") > 10
+        body, *script = after.split("<script>")
+        assert len(script) == (parts is not plain)
+        lines += (before + body).splitlines()
+    assert_approved("page", lines)
 
 
 def test_page_has_a_picture_for_either_light():

@@ -147,14 +147,29 @@ def test_a_short_line_is_of_a_wall_within_three_deviations_of_its_angle(deviatio
 
 def test_plans_are_bounded(monkeypatch):
     monkeypatch.setattr("lineament.output.floor_plan.MOST", 40)
-    plan = FloorPlan()
+    plan, sizes = FloorPlan(), []
     for y in range(1, 300):
         walls = [line((0, 0), (5, 0)), line((0, y), (1, y))]
         plan.add(features(segments=walls, corners=[corner(0, y), corner(0, 0)]))
         assert len(plan._walls) == len(plan._ends) <= 41
         assert len(plan._corners.seen(1)) <= 41
+        sizes.append((len(plan._walls), len(plan._corners.seen(1))))
+    assert np.min(sizes[40:], axis=0).tolist() == [20, 20]  # half of what there may be
     assert plan.walls()[0]["views"] == 299  # those seen least are forgotten
     np.testing.assert_allclose(plan._corners.seen(299), [(0, 0)])
+
+
+def test_what_is_forgotten_was_seen_least_and_not_last(monkeypatch):
+    """Walls and corners that are seen again and again, but only behind many others."""
+    monkeypatch.setattr("lineament.output.floor_plan.MOST", 40)
+    plan = FloorPlan()
+    for y in range(1, 60):
+        again = y > 30
+        walls = [line((0, y), (1, y)), *[line((0, 0), (5, 0))] * again]
+        plan.add(features(segments=walls, corners=[corner(0, y), *[corner(9, 0)] * again]))
+    (wall,) = plan.walls(2)
+    assert wall["views"] == 29
+    np.testing.assert_allclose(plan._corners.seen(29), [(9, 0)])
 
 
 def test_averages_join_what_is_near_and_edges_stay_apart_from_corners():

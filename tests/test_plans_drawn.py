@@ -13,6 +13,7 @@ from lineament import LaserScan
 from lineament.output import open_writer
 from lineament.output.floor_plan import FloorPlan
 from lineament.output.markers import Markers
+from lineament.output.plans import Plan
 from lineament.output.walls import offsets_between
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -59,6 +60,10 @@ def test_arcs_of_one_thing_are_within_10_cm(other, is_one):
         (line((0, 0), (4, 0), sigma=(0.03, 0.0205)), False),
         (line((0, 0), (4, 0), sigma=(0.04, 0.0145)), True),
         (line((0, 0), (4, 0), sigma=(0.04, 0.0155)), False),
+        (line((0, 0), (1, 0), sigma=(0.03, 0.079)), True),
+        (line((0, 0), (1, 0), sigma=(0.03, 0.081)), False),
+        (line((0, 0), (9, 0), sigma=(0.03, 0.0088)), True),
+        (line((0, 0), (9, 0), sigma=(0.03, 0.009)), False),
     ],
 )
 def test_segments_that_a_plan_takes(segment, is_kept):
@@ -129,6 +134,21 @@ def test_arcs_and_ellipses_become_strips():
     assert len(strip) == 49
     assert np.ptp(along) == pytest.approx(0.8)
     np.testing.assert_allclose(markers.points, [(3, 2), (-1, 2), (1, 4), (1, 0)])
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "is_whole"),
+    [
+        *((first, first + 2 * math.pi, True) for first in (0.0, -math.pi, -6.0, 4.0)),
+        *((first, first + 2 * math.pi - 1e-3, False) for first in (0.0, -math.pi, -6.0, 4.0)),
+        (3.0, 4.0, False),
+    ],
+)
+def test_an_arc_of_a_whole_turn_is_a_circle(first, last, is_whole):
+    nothing, row = np.zeros((0, 2)), [1.0, 2.0, 0.5, first, last]
+    ellipses = np.zeros((0, 5))
+    markers = Markers(np.zeros((0, 2, 2)), nothing, nothing, np.array([row]), ellipses)
+    assert Plan(markers, np.zeros(0, np.int64), "").arcs() == [(row, is_whole)]
 
 
 @pytest.mark.parametrize("ending", [".svg", ".dxf"])

@@ -1,10 +1,12 @@
 """MCAP: other readers find in it what was written, in both kinds of messages."""
 
 import math
-from dataclasses import replace
+import re
+from dataclasses import asdict, is_dataclass, replace
 
 import numpy as np
 import pytest
+from approved import assert_approved, numbers_of
 from handmade import arc, corner, edge, features, segment
 from mcap.reader import make_reader
 from protobuf import decode, messages_of
@@ -204,3 +206,28 @@ def test_many_scans_are_in_chunks_with_an_index(tmp_path):
     assert sorted(sequences) == [k // 2 for k in range(400)]
     assert len(summary.chunk_indexes) > 2  # memory does not grow: about 1 MB each
     assert summary.statistics.message_count == 400
+
+
+def plain(value):
+    """Turn messages and arrays into dicts, lists, numbers and texts."""
+    if is_dataclass(value):
+        value = asdict(value)
+    if isinstance(value, dict):  # without constants and names of types
+        return {name: plain(part) for name, part in value.items() if re.match("[a-z]", name)}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if isinstance(value, bytes):
+        return value.hex()
+    return plain(value.tolist()) if isinstance(value, np.ndarray) else value
+
+
+@pytest.mark.parametrize(("ending", "read"), [(".mcap", read_foxglove), (".ros2.mcap", read_ros2)])
+def test_recordings_hold_what_was_approved(tmp_path, ending, read):
+    """A scan of each kind: with a pose and without, regular or not, with what it shows of each."""
+    scan = scan_of(intensities=[1.0, 2.0, 3.0, 4.0, 5.0, 6.5])
+    uneven = scan_of(pose=None, stamp=13.0, angles=[-0.5, -0.4, -0.1, 0.0, 0.2, 0.7])
+    path = write(tmp_path / f"a{ending}", (FOUND, scan), (EMPTY, uneven))
+    lines = []
+    for topic, time, message in read(path):
+        lines += [f"{topic} at {time}", *numbers_of(plain(message))]
+    assert_approved(f"messages{ending}", lines)

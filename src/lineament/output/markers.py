@@ -72,7 +72,7 @@ def markers_of(features: Features, scan: LaserScan | None = None) -> Markers:
     corners, edges = (
         table[is_drawn(table["position"])] for table in (features.corners, features.edges)
     )
-    arcs = arcs[is_drawn(arcs["center"]) & (np.abs(arcs["radius"]) < FARTHEST)]
+    arcs = arcs[is_drawn(arcs["center"]) & is_drawn(arcs["radius"])]
     spans = [(0.0, 2 * math.pi) if scan is None else arc_span(arc, scan) for arc in arcs]
     return Markers(
         segments=lines[is_drawn(lines)],

@@ -1,0 +1,130 @@
+"""What sinks say of the pose on a plan, and how they draw it; signals and scans that are late."""
+
+import signal
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lineament as ln
+from lineament.live import FoxgloveSink, LiveConfig, ReplaySource, RosSink, run_live
+from lineament.live.counters import Counts, Report
+from lineament.live.stopping import stopping
+from lineament.logs import save_npz
+from lineament.mapping import VERDICTS, LineMap
+from lineament.mapping.evidence import Evidence
+from lineament.mapping.following import Whereabouts
+from lineament.output.foxglove import FoxgloveMessages
+from lineament.output.ros_messages import RosMessages
+
+REPORT, TIME = Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2)
+WALLS = [((0.0, 0.0), (4.0, 0.0)), ((4.0, 0.0), (4.0, 3.0))]
+
+
+class Publisher:
+    """A publisher that all listen to, and that keeps the messages."""
+
+    unsent = 0
+
+    def __init__(self):
+        self.sent = []
+
+    def advertise(self, topic, kind):
+        assert topic
+        assert kind
+
+    def listeners(self, topic):
+        return bool(topic)
+
+    def publish(self, message):
+        self.sent.append(message)
+
+
+def recorded(messages, name):
+    """Let a maker of messages keep what it is given for those of one name."""
+    make, given = getattr(messages, name), []
+
+    def keep(*arguments, **named):
+        given.append((*arguments, named))
+        return make(*arguments, **named)
+
+    setattr(messages, name, keep)
+    return given
+
+
+@pytest.fixture
+def plan(tmp_path):
+    LineMap.from_lines(np.array(WALLS)).write(tmp_path / "plan.dxf")
+    return str(tmp_path / "plan.dxf")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "turn", "level"),
+    [(name, 1e-4, level) for name, level in zip(VERDICTS, (0, 2, 1, 2), strict=True)]
+    + [(VERDICTS[2], 1.0, 2), (VERDICTS[0], 2.0, 0)],
+)
+def test_diagnosis_of_a_pose(verdict, turn, level):
+    """0 where it is located, 1 where it is but for a direction, 2 where it is not known."""
+    messages = RosMessages("cdr")
+    given = recorded(messages, "diagnostics")
+    sink = RosSink(Publisher(), messages, LiveConfig())
+    evidence = Evidence(12.34, 0.75, 0.2, 0.05, 100)
+    where = Whereabouts(verdict, (1.0, -2.0, 0.5), np.diag((4e-4, 9e-4, turn)), evidence)
+    sink._where = where
+    sink.diagnose(REPORT, TIME)
+    (*_, of_node), (topic, moment, told) = given
+    assert of_node["level"] == REPORT.level
+    assert (topic, moment) == ("/diagnostics", (*TIME, "", ""))
+    assert (told["name"], told["hardware_id"]) == ("lineament: /scan/pose", "/scan")
+    assert (told["level"], told["summary"]) == (level, verdict)
+    deviation = np.degrees(np.sqrt(turn))
+    assert told["values"] == {
+        "x [m]": "1.000 ± 0.020",
+        "y [m]": "-2.000 ± 0.030",
+        "theta [°]": f"28.65 ± {deviation:.2f}",
+        "explained [%]": "75.0",
+        "contradicted [%]": "5.0",
+        "log odds": "12.3",
+    }
+
+
+def test_foxglove_draws_the_plan_in_grey(plan):
+    messages = FoxgloveMessages()
+    given = recorded(messages, "features")
+    sink = FoxgloveSink(Publisher(), messages, LiveConfig(map=plan))
+    sink.diagnose(REPORT, TIME)
+    ((topic, moment, (layer,), _),) = given
+    assert (topic, moment) == ("/scan/plan", (*TIME, "map", ""))
+    assert (layer.name, layer.color, layer.size) == ("plan", (0.5, 0.5, 0.5, 1.0), 0.02)
+    assert sorted(np.reshape(layer.strips, (-1, 4)).tolist()) == sorted(
+        [*a, *b] for a, b in LineMap.read(plan).ends.tolist()
+    )
+
+
+def log_of(folder, stamps):
+    save_npz(folder / "a.npz", [ln.LaserScan([2.0] * 9, 0.0, 0.1, stamp=t) for t in stamps])
+    return str(folder / "a.npz")
+
+
+def test_a_signal_behind_the_start_ends_a_node_that_runs(tmp_path):
+    """It is noted, and the node comes to its end as always: with a report."""
+    config, reports = LiveConfig(log=log_of(tmp_path, [0.0, 0.1]), rate=1, ros=0, loop=True), []
+
+    def write(line):
+        assert "finds features" in line
+        signal.raise_signal(signal.SIGTERM)
+
+    with stopping() as is_stopped:
+        reports.append(run_live(config, is_stopped, write=write))
+    assert [type(report) for report in reports] == [Report]
+
+
+@pytest.mark.parametrize(("late", "alone"), [(0.0099, True), (0.0101, False)])
+def test_a_scan_is_in_time_for_a_hundredth_of_a_second(tmp_path, monkeypatch, late, alone):
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr("time.sleep", lambda _: None)
+    path = log_of(tmp_path, [0.0, 0.001, 0.002])
+    source = ReplaySource(path, clock=lambda: clock.now)
+    assert len(source.receive(0.0)) == 1
+    clock.now += 0.001 + late
+    assert len(source.receive(0.0)) == (1 if alone else 2)
