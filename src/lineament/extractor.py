@@ -23,8 +23,8 @@ from .scan.units import FAR, FEW, warn_of_units, warn_of_whole_numbers
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
 
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
-#: What kernels are loaded with, so that the first scan need not wait for them.
-WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
+#: What kernels are loaded with, all of them: the first scan need not wait, whatever its limits.
+WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)
 
 
 class Extractor:
