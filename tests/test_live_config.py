@@ -72,6 +72,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"dock_track": -1}, "dock_track is -1, expected 0 to 2147483647"),
         ({"track": 1}, "track is 1, expected true or false"),
         ({"parameters": 3}, "parameters is 3, expected a table"),
+        ({"limits": {"none": 3}}, "limit 'none' is unknown, expected one of "),
     ],
 )
 def test_what_makes_no_sense_is_named(given, message):

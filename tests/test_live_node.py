@@ -493,6 +493,23 @@ def test_moving_scans_are_deskewed(deskew, most):
     assert np.nanmax(np.abs(frame.straight.ranges - scan.ranges)) > 0.005
 
 
+def test_a_scan_is_deskewed_by_the_motion_before_it_or_where_none_is_known_by_its_own():
+    scans = drive(room(), [(-2.0, 0.0), (-1.4, 0.1)], SENSORS["lms361"], speed=1.0, rate=10)
+    pipeline, extract, track = Pipeline(LiveConfig(deskew="scans")), ln.Extractor(), ln.Tracker()
+    for k, scan in enumerate(scans):
+        frame, before = pipeline("one", scan), track.twist
+        straight = ln.deskew(scan, before)
+        track(extract(straight))
+        if before is None:
+            straight = ln.deskew(scan, track.twist)
+            if k > 0:
+                track.again(extract(straight))
+        np.testing.assert_array_equal(frame.straight.ranges, straight.ranges)
+        assert (frame.straight is scan) == (k == 0)
+        assert frame.features.to_dict() == extract(straight).to_dict()
+    assert k >= 4
+
+
 def turning_scan(way, pose, twist, still=False):
     """Return a message of a sweep of 270° in 75 ms in a room; `way` is 1 or -1, its mirror's."""
     n, step = 541, math.radians(0.5)
