@@ -8,7 +8,7 @@ import pytest
 from handmade import corner, features
 
 from lineament import LaserScan
-from lineament.output import canvas, figures
+from lineament.output import canvas, drawing, figures
 from lineament.output.markers import FARTHEST, is_drawn
 
 LEVEL, MARGIN = 0.01, 0.04  # of the extent: the least height of a plan, what is free around it
@@ -121,3 +121,15 @@ def test_surroundings_of_a_corner_are_so_large_that_its_ellipse_is_seen(sigma, r
     figures.corner_figure(LaserScan([3.0] * 100, 0.0, 0.01), found, 0)
     (points,) = shown
     np.testing.assert_allclose(points, [(1 - reach, 2 - reach), (1 + reach, 2 + reach)])
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_errors_are_drawn_over_all_bearings(n):
+    axes = canvas.new_figure(4, 3).subplots()
+    before = axes.get_xlim()
+    drawing.draw_errors(axes, LaserScan([1.0] * n, 0.25, 0.125), np.full(n, 0.02))
+    if n == 1:
+        middle, ends = np.degrees(0.25), axes.get_xlim()
+        assert ends[0] < middle < ends[1] != before[1]
+    else:
+        assert axes.get_xlim() == pytest.approx(np.degrees((0.25, 0.25 + 0.125 * (n - 1))))
