@@ -5,7 +5,8 @@ import io
 import matplotlib.image
 import numpy as np
 import pytest
-from handmade import corner, features
+from approved import assert_approved, numbers_of
+from handmade import corner, features, segment
 
 from lineament import LaserScan
 from lineament.output import canvas, drawing, figures
@@ -133,3 +134,31 @@ def test_errors_are_drawn_over_all_bearings(n):
         assert ends[0] < middle < ends[1] != before[1]
     else:
         assert axes.get_xlim() == pytest.approx(np.degrees((0.25, 0.25 + 0.125 * (n - 1))))
+
+
+def test_what_a_plan_leaves_out_is_as_was_approved():
+    """Ever more beams of a hundred, ever farther out, with and without what was found there."""
+    rows, near = [], np.full(100, 2.0)
+    for number in (1, 4, 5, 6, 9, 10, 11, 30):
+        for far in np.linspace(2.1, 4.5, 13):
+            ranges = near.copy()
+            ranges[10 : 10 + number] = far
+            scan = LaserScan(ranges, -0.75, 0.015)
+            end = scan.points[10] * 1.04
+            for found in ([], [features(100, segments=[segment((1, 0), end, 0, 9)])]):
+                points, outside = drawing.points_to_show(scan, found, 4.2)
+                ends = [*points.min(axis=0), *points.max(axis=0)]
+                rows.append([number, float(far), len(found), outside, *map(float, ends)])
+    assert_approved("figures/shown", numbers_of(rows))
+
+
+def test_shapes_of_plans_are_as_was_approved():
+    """From corridors along y to corridors along x: how large they are drawn, and how high."""
+    rows = []
+    for shape in np.geomspace(1e-3, 1e3, 31):
+        points = np.array([(0, 0), (1, shape)] * 5, float)
+        axes = canvas.new_figure(5, 5).add_subplot()
+        canvas.style_plane(axes, "", "", points)
+        height = canvas.plane_height(points, 4.0)
+        rows.append([float(shape), float(axes.get_aspect()), height, axes.get_ylabel()])
+    assert_approved("figures/shapes", numbers_of(rows))
