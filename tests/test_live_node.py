@@ -222,6 +222,13 @@ def test_publishers_problems_and_reports_second_by_second(clock):
     assert {report.level for report in shown} == {3}
 
 
+def test_reports_have_the_time_of_day(clock, monkeypatch):
+    monkeypatch.setattr(clock, "time_ns", lambda: 1_700_000_000_123_456_789, raising=False)
+    sink = Kept()
+    Node(Given([wall("a")]), Pipeline(LiveConfig()), [sink], write=[].append).run()
+    assert [time for _, time in sink.reports] == [(1_700_000_000, 123_456_789)]
+
+
 def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
     bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")

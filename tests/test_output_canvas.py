@@ -6,7 +6,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from approved import assert_approved, numbers_of
-from handmade import corner, features, segment
+from handmade import corner, features
 
 from lineament import LaserScan
 from lineament.output import canvas, drawing, figures
@@ -137,18 +137,21 @@ def test_errors_are_drawn_over_all_bearings(n):
 
 
 def test_what_a_plan_leaves_out_is_as_was_approved():
-    """Ever more beams of a hundred, ever farther out, with and without what was found there."""
-    rows, near = [], np.full(100, 2.0)
-    for number in (1, 4, 5, 6, 9, 10, 11, 30):
-        for far in np.linspace(2.1, 4.5, 13):
-            ranges = near.copy()
-            ranges[10 : 10 + number] = far
-            scan = LaserScan(ranges, -0.75, 0.015)
-            end = scan.points[10] * 1.04
-            for found in ([], [features(100, segments=[segment((1, 0), end, 0, 9)])]):
-                points, outside = drawing.points_to_show(scan, found, 4.2)
-                ends = [*points.min(axis=0), *points.max(axis=0)]
-                rows.append([number, float(far), len(found), outside, *map(float, ends)])
+    """Ever more beams of a hundred, on one side or on all, ever farther out; and what is found."""
+    rows, circle = [], 2 * np.pi / 100
+    for number in (1, 4, 5, 6, 9, 10, 11, 13, 15, 17):
+        for far in np.linspace(2.1, 4.5, 9):
+            for beams in (10 + np.arange(number), np.arange(number) * (100 // number)):
+                ranges = np.full(100, 2.0)
+                ranges[beams] = far
+                scan = LaserScan(ranges, -np.pi, circle)
+                low, high = scan.points.min(axis=0), scan.points.max(axis=0)
+                marks = [high + beyond * (high - low).max() for beyond in (0.04, 0.06, 0.1)]
+                for mark in ([], *([corner(*mark)] for mark in marks)):
+                    found = [features(100, corners=mark)]
+                    points, outside = drawing.points_to_show(scan, found, 4.2)
+                    ends = [*points.min(axis=0), *points.max(axis=0)]
+                    rows.append([number, float(far), outside, *map(float, ends)])
     assert_approved("figures/shown", numbers_of(rows))
 
 
