@@ -229,6 +229,14 @@ def test_reports_have_the_time_of_day(clock, monkeypatch):
     assert [time for _, time in sink.reports] == [(1_700_000_000, 123_456_789)]
 
 
+def test_latency_counts_from_when_a_scan_came(clock):
+    clock.now, sink = 7.0, Kept()
+    came = [Received("a", sweep, 4.5), Received("b", sweep, 6.5)]
+    Node(Given(came), Pipeline(LiveConfig()), [sink], write=[].append).run()
+    ((report, _),) = sink.reports
+    assert report.latency == pytest.approx((1.5, 0.5 + 0.99 * 2.0))
+
+
 def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
     bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
