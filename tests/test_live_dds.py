@@ -29,7 +29,7 @@ pytest.importorskip("cyclonedds", reason="no cyclonedds for this Python")
 from dds_peer import KINDS, Peer
 
 from lineament.errors import LineamentError
-from lineament.live import LiveConfig
+from lineament.live import LiveConfig, raw_dds
 from lineament.live.dds import DdsPublisher, DdsSource
 from lineament.live.participant import _HASHES, Participant, type_hash
 from lineament.output.scene import Message
@@ -88,6 +88,24 @@ def test_a_message_is_waited_for(participant, peer):
     connected(peer, source, "/scan", "LaserScan")
     (came,) = waited_for(source.receive, lambda: peer.write("/scan", scan_message(7)))
     assert came.read().stamp == 7.500000001
+
+
+def test_the_memory_of_each_message_is_given_back(participant, peer, monkeypatch):
+    release, given = raw_dds._release, []
+
+    def counting(message):
+        given.append(message)
+        release(message)
+
+    monkeypatch.setattr(raw_dds, "_release", counting)
+    source = source_of(participant)
+    connected(peer, source, "/scan", "LaserScan")
+    for k in range(3):
+        before = len(given)
+        peer.write("/scan", scan_message(k))
+        assert len(received(source)) == 1
+        assert len(given) == before + 1
+        assert given[-1]
 
 
 def test_odometry_comes_before_the_scan(participant, peer):
