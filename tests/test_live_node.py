@@ -460,6 +460,16 @@ def test_scans_that_cannot_be_deskewed_are_a_line(deskew, times, scans, why):
     assert lines == ([] if why is None else [f"scans are not deskewed: {why}"])
 
 
+def test_twenty_scans_in_a_row_without_a_motion_are_a_line():
+    pipeline = Pipeline(LiveConfig(deskew="/odom"))
+    known = {0, 20}
+    for k in range(41):
+        if k in known:
+            pipeline.hear(moving(1.0, 0.0, 0.0, stamp=float(k)))
+        pipeline("one", sweep(float(k), time_increment=1e-4))
+        assert len(list(pipeline.problems())) == (k >= 40)
+
+
 def test_poses_give_the_motion_between_scans():
     pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
     poses = [
@@ -475,6 +485,23 @@ def test_poses_give_the_motion_between_scans():
     ]
     for stamp, pose, moves in poses:
         assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
+
+
+@pytest.mark.parametrize(
+    ("deskew", "scan_time", "sweep_time"),
+    [("off", 0.05, 0.05), ("off", -0.05, 0.05), ("off", 0.0, math.inf), ("/odom", 0.05, 0.0)],
+)
+def test_odometry_knows_how_long_a_sweep_took_that_is_not_deskewed(deskew, scan_time, sweep_time):
+    pipeline, swept = Pipeline(LiveConfig(deskew=deskew, dock=(5.0, 2.0))), []
+    kept = pipeline._publisher("one")
+    odometer = kept.odometer
+    kept.odometer = lambda tracks, stamp, sweep: (
+        swept.append(sweep) or odometer(tracks, stamp, sweep)
+    )
+    pipeline.hear(moving(1.0, 0.0, 0.0))
+    frame = pipeline("one", sweep(scan_time=scan_time))
+    assert (frame.straight is frame.scan) == (deskew == "off")
+    assert swept == [sweep_time]
 
 
 def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
