@@ -1,4 +1,5 @@
 import importlib
+import inspect
 import math
 import re
 from dataclasses import MISSING, fields
@@ -72,6 +73,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"dock_track": -1}, "dock_track is -1, expected 0 to 2147483647"),
         ({"track": 1}, "track is 1, expected true or false"),
         ({"parameters": 3}, "parameters is 3, expected a table"),
+        ({"limits": {"none": 3}}, "limit 'none' is unknown, expected one of "),
     ],
 )
 def test_what_makes_no_sense_is_named(given, message):
@@ -176,3 +178,22 @@ def test_how_long_is_waited_and_how_much_is_kept(name):
     assert kept == TIMES_AND_SIZES[name]
     if name == "raw_dds":  # what Cyclone DDS is told of a type: a byte long at least, no key
         assert list(module._ONE_BYTE) == [0x0101 << 16, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("of", "given"),
+    [("dds.DdsSource", {"depth": 64}), ("dds.DdsPublisher", {"depth": 1}),
+     ("foxglove.FoxgloveServer", {"port": 8765}), ("replay.ReplaySource", {"rate": 1.0}),
+     ("ros1.Ros1Publisher", {"depth": 10}), ("received.Inbox.put", {"missing": 0}),
+     ("counters.Counters.report", {"lost": 0, "unsent": 0})],
+)  # fmt: skip
+def test_numbers_that_need_not_be_given(of, given):
+    name, *path = of.split(".")
+    if name in ("dds", "foxglove"):
+        pytest.importorskip("cyclonedds" if name == "dds" else "foxglove")
+    made = importlib.import_module(f"lineament.live.{name}")
+    for part in path:
+        made = getattr(made, part)
+    defaults = {p.name: p.default for p in inspect.signature(made).parameters.values()}
+    numbers = {key: value for key, value in defaults.items() if type(value) in (int, float)}
+    assert numbers == given

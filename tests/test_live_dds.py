@@ -26,15 +26,17 @@ from ros_bags import store
 
 pytest.importorskip("cyclonedds", reason="no cyclonedds for this Python")
 
+from cyclonedds.core import Policy
 from dds_peer import KINDS, Peer
 
 from lineament.errors import LineamentError
-from lineament.live import LiveConfig
+from lineament.live import LiveConfig, dds, raw_dds
 from lineament.live.dds import DdsPublisher, DdsSource
 from lineament.live.participant import _HASHES, Participant, type_hash
 from lineament.output.scene import Message
 
 SCAN = "sensor_msgs/msg/LaserScan"
+RELIABLE = Policy.Reliability.Reliable(10**10), Policy.History.KeepLast(4)
 
 
 @pytest.fixture
@@ -88,6 +90,24 @@ def test_a_message_is_waited_for(participant, peer):
     connected(peer, source, "/scan", "LaserScan")
     (came,) = waited_for(source.receive, lambda: peer.write("/scan", scan_message(7)))
     assert came.read().stamp == 7.500000001
+
+
+def test_the_memory_of_each_message_is_given_back(participant, peer, monkeypatch):
+    release, given = raw_dds._release, []
+
+    def counting(message):
+        given.append(message)
+        release(message)
+
+    monkeypatch.setattr(raw_dds, "_release", counting)
+    source = source_of(participant)
+    connected(peer, source, "/scan", "LaserScan")
+    for k in range(3):
+        before = len(given)
+        peer.write("/scan", scan_message(k))
+        assert len(received(source)) == 1
+        assert len(given) == before + 1
+        assert given[-1]
 
 
 def test_odometry_comes_before_the_scan(participant, peer):
@@ -216,6 +236,19 @@ def test_a_message_serialised_by_others_is_read_by_others(participant, remote):
     assert publisher.unsent == 0
     with pytest.raises(ValueError, match="message begins with '07070707', expected CDR"):
         publisher.publish(Message("/made", kind, b"\7\7\7\7"))
+
+
+def test_messages_of_any_length_are_filled_to_a_word(participant):
+    topic, qos = participant.topic("/made", SCAN), dds._qos(SCAN, *RELIABLE)
+    writer = raw_dds.RawWriter(participant.entity, topic, qos)
+    assert writer.listeners == 0
+    reader = raw_dds.RawReader(participant.entity, topic, qos, 4)
+    eventually(lambda: writer.listeners == 1)
+    for n in range(1, 9):
+        data = b"\0\1\0\0" + bytes(range(1, n + 1))
+        assert writer.write_raw(data)
+        ((came, _),) = eventually(reader.take_raw)
+        assert came[4:] == data[4:] + bytes(-n % 4)
 
 
 @pytest.mark.slow

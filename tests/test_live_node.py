@@ -222,6 +222,21 @@ def test_publishers_problems_and_reports_second_by_second(clock):
     assert {report.level for report in shown} == {3}
 
 
+def test_reports_have_the_time_of_day(clock, monkeypatch):
+    monkeypatch.setattr(clock, "time_ns", lambda: 1_700_000_000_123_456_789, raising=False)
+    sink = Kept()
+    Node(Given([wall("a")]), Pipeline(LiveConfig()), [sink], write=[].append).run()
+    assert [time for _, time in sink.reports] == [(1_700_000_000, 123_456_789)]
+
+
+def test_latency_counts_from_when_a_scan_came(clock):
+    clock.now, sink = 7.0, Kept()
+    came = [Received("a", sweep, 4.5), Received("b", sweep, 6.5)]
+    Node(Given(came), Pipeline(LiveConfig()), [sink], write=[].append).run()
+    ((report, _),) = sink.reports
+    assert report.latency == pytest.approx((1.5, 0.5 + 0.99 * 2.0))
+
+
 def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
     bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
@@ -445,6 +460,16 @@ def test_scans_that_cannot_be_deskewed_are_a_line(deskew, times, scans, why):
     assert lines == ([] if why is None else [f"scans are not deskewed: {why}"])
 
 
+def test_twenty_scans_in_a_row_without_a_motion_are_a_line():
+    pipeline = Pipeline(LiveConfig(deskew="/odom"))
+    known = {0, 20}
+    for k in range(41):
+        if k in known:
+            pipeline.hear(moving(1.0, 0.0, 0.0, stamp=float(k)))
+        pipeline("one", sweep(float(k), time_increment=1e-4))
+        assert len(list(pipeline.problems())) == (k >= 40)
+
+
 def test_poses_give_the_motion_between_scans():
     pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
     poses = [
@@ -460,6 +485,23 @@ def test_poses_give_the_motion_between_scans():
     ]
     for stamp, pose, moves in poses:
         assert deskewed(pipeline, sweep(stamp, pose=pose, time_increment=1e-3)) == moves, stamp
+
+
+@pytest.mark.parametrize(
+    ("deskew", "scan_time", "sweep_time"),
+    [("off", 0.05, 0.05), ("off", -0.05, 0.05), ("off", 0.0, math.inf), ("/odom", 0.05, 0.0)],
+)
+def test_odometry_knows_how_long_a_sweep_took_that_is_not_deskewed(deskew, scan_time, sweep_time):
+    pipeline, swept = Pipeline(LiveConfig(deskew=deskew, dock=(5.0, 2.0))), []
+    kept = pipeline._publisher("one")
+    odometer = kept.odometer
+    kept.odometer = lambda tracks, stamp, sweep: (
+        swept.append(sweep) or odometer(tracks, stamp, sweep)
+    )
+    pipeline.hear(moving(1.0, 0.0, 0.0))
+    frame = pipeline("one", sweep(scan_time=scan_time))
+    assert (frame.straight is frame.scan) == (deskew == "off")
+    assert swept == [sweep_time]
 
 
 def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
@@ -491,6 +533,23 @@ def test_moving_scans_are_deskewed(deskew, most):
     expected = ln.deskew(scan, (1.0, 0.0, 0.0))
     np.testing.assert_allclose(frame.straight.ranges, expected.ranges, atol=most)
     assert np.nanmax(np.abs(frame.straight.ranges - scan.ranges)) > 0.005
+
+
+def test_a_scan_is_deskewed_by_the_motion_before_it_or_where_none_is_known_by_its_own():
+    scans = drive(room(), [(-2.0, 0.0), (-1.4, 0.1)], SENSORS["lms361"], speed=1.0, rate=10)
+    pipeline, extract, track = Pipeline(LiveConfig(deskew="scans")), ln.Extractor(), ln.Tracker()
+    for k, scan in enumerate(scans):
+        frame, before = pipeline("one", scan), track.twist
+        straight = ln.deskew(scan, before)
+        track(extract(straight))
+        if before is None:
+            straight = ln.deskew(scan, track.twist)
+            if k > 0:
+                track.again(extract(straight))
+        np.testing.assert_array_equal(frame.straight.ranges, straight.ranges)
+        assert (frame.straight is scan) == (k == 0)
+        assert frame.features.to_dict() == extract(straight).to_dict()
+    assert k >= 4
 
 
 def turning_scan(way, pose, twist, still=False):

@@ -96,6 +96,8 @@ def master(rospy: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[No
 def node(master: None) -> Iterator[Ros1Node]:  # noqa: ARG001
     with closing(Ros1Node("lineament_test")) as node:
         yield node
+        assert not node.ended
+    assert node.ended
 
 
 @pytest.fixture(scope="module")

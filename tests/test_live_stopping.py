@@ -1,6 +1,7 @@
 """Signals: before a node runs the first leaves the block, later they are only noted."""
 
 import signal
+import sys
 
 import pytest
 
@@ -65,3 +66,18 @@ def test_other_errors_are_raised(runs):
 
     with pytest.raises(OSError, match="faulty"):
         fail()
+
+
+def test_what_else_is_raised_in_a_callback_is_told_as_before(monkeypatch):
+    class Callback:
+        def __del__(self):
+            raise ValueError("of a callback")
+
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda of: told.append(str(of.exc_value)))
+    before = sys.unraisablehook
+    with stopping():
+        del (found := [Callback()])[0]
+        assert not found
+        assert told == ["of a callback"]
+    assert sys.unraisablehook is before

@@ -5,10 +5,11 @@ import io
 import matplotlib.image
 import numpy as np
 import pytest
+from approved import assert_approved, numbers_of
 from handmade import corner, features
 
 from lineament import LaserScan
-from lineament.output import canvas, figures
+from lineament.output import canvas, drawing, figures
 from lineament.output.markers import FARTHEST, is_drawn
 
 LEVEL, MARGIN = 0.01, 0.04  # of the extent: the least height of a plan, what is free around it
@@ -121,3 +122,46 @@ def test_surroundings_of_a_corner_are_so_large_that_its_ellipse_is_seen(sigma, r
     figures.corner_figure(LaserScan([3.0] * 100, 0.0, 0.01), found, 0)
     (points,) = shown
     np.testing.assert_allclose(points, [(1 - reach, 2 - reach), (1 + reach, 2 + reach)])
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_errors_are_drawn_over_all_bearings(n):
+    axes = canvas.new_figure(4, 3).subplots()
+    before = axes.get_xlim()
+    drawing.draw_errors(axes, LaserScan([1.0] * n, 0.25, 0.125), np.full(n, 0.02))
+    if n == 1:
+        middle, ends = np.degrees(0.25), axes.get_xlim()
+        assert ends[0] < middle < ends[1] != before[1]
+    else:
+        assert axes.get_xlim() == pytest.approx(np.degrees((0.25, 0.25 + 0.125 * (n - 1))))
+
+
+def test_what_a_plan_leaves_out_is_as_was_approved():
+    """Ever more beams of a hundred, on one side or on all, ever farther out; and what is found."""
+    rows, circle = [], 2 * np.pi / 100
+    for number in (1, 4, 5, 6, 9, 10, 11, 13, 15, 17):
+        for far in np.linspace(2.1, 4.5, 9):
+            for beams in (10 + np.arange(number), np.arange(number) * (100 // number)):
+                ranges = np.full(100, 2.0)
+                ranges[beams] = far
+                scan = LaserScan(ranges, -np.pi, circle)
+                low, high = scan.points.min(axis=0), scan.points.max(axis=0)
+                marks = [high + beyond * (high - low).max() for beyond in (0.04, 0.06, 0.1)]
+                for mark in ([], *([corner(*mark)] for mark in marks)):
+                    found = [features(100, corners=mark)]
+                    points, outside = drawing.points_to_show(scan, found, 4.2)
+                    ends = [*points.min(axis=0), *points.max(axis=0)]
+                    rows.append([number, float(far), outside, *map(float, ends)])
+    assert_approved("figures/shown", numbers_of(rows))
+
+
+def test_shapes_of_plans_are_as_was_approved():
+    """From corridors along y to corridors along x: how large they are drawn, and how high."""
+    rows = []
+    for shape in np.geomspace(1e-3, 1e3, 31):
+        points = np.array([(0, 0), (1, shape)] * 5, float)
+        axes = canvas.new_figure(5, 5).add_subplot()
+        canvas.style_plane(axes, "", "", points)
+        height = canvas.plane_height(points, 4.0)
+        rows.append([float(shape), float(axes.get_aspect()), height, axes.get_ylabel()])
+    assert_approved("figures/shapes", numbers_of(rows))

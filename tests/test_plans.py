@@ -95,6 +95,7 @@ def test_walls(scans, least, walls):
         (((0, 0.09), (4, 0.09)), 1),  # a copy that the poses have moved
         (((4.1, 0.1), (8, 0.1)), 2),  # beside it stands nothing: another wall
         (((2.5, 0.09), (6, 0.09)), 2),  # less than half of it
+        (((2, 0.09), (6, 0.09)), 2),  # half
         (((1.5, 0.09), (5, 0.09)), 1),  # more
         (((0, 0.2), (4, 0.2)), 2),
         (((3.9, 0.01), (9, -0.6)), 2),  # ends on it, turned by 6.8 degrees

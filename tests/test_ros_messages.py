@@ -225,6 +225,10 @@ def test_corners_point_to_where_they_open(make):
         sides[1]["centroid"] = -x, x
         ((*_, yaw),) = yaws_of(make, features(6, sides, [corner(1, 1, segments=(0, 1))]))
         assert math.isfinite(yaw)
+    sides[0]["centroid"] = 1e300, 1e300  # on the other side of one as far away
+    sides[1]["centroid"] = -1e300, -1e300
+    ((*_, yaw),) = yaws_of(make, features(6, sides, [corner(1, 1, segments=(0, 1))]))
+    assert yaw == 0
 
 
 def test_feature_cloud(make):
