@@ -34,8 +34,8 @@ _THIRD = 1.0 / 0.4307**2
 _WHOLE = 1.03
 #: Of overlapping triples, so many count as one.
 _OVERLAP = 1.94
-#: Steps of Newton's method at most, and one of which the square is less than rounding; the least and
-#: the most that a mean square is of what is expected: what is a metre off is clutter.
+#: Steps of Newton's method at most, and one of which the square is less than rounding; the least
+#: and the most that a mean square is of what is expected: what is a metre off is clutter.
 _NEWTON_STEPS, _SMALL_STEP, _LEAST_RATIO, _MOST_RATIO = 8, 1e-8, 1e-30, 1e4
 #: No scanner reports its ranges in coarser steps [m].
 _COARSEST_QUANTUM = 0.15
