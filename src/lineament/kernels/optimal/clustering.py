@@ -125,15 +125,23 @@ def list_clusters(beams, count, clusters):
     while begin < count and not broken[begin]:
         begin += 1
     begin = begin if begin < count else 0
-    start = begin
-    for end in range(begin + 1, begin + count + 1):
-        if end < begin + count and not broken[end - (count if end >= count else 0)]:
+    start, ahead = begin, broken[begin + 1 : count]
+    for k in range(len(ahead) + 1):
+        if k < len(ahead) and not ahead[k]:
             continue
-        if end - start >= _LEAST_CLUSTER:
-            for i in range(start, end):
-                clusters[beam[i - (count if i >= count else 0)]] = found
-            beams[at.CLUSTER_FIRST, found] = start % count
-            beams[at.CLUSTER_LAST, found] = (end - 1) % count
+        # What is before the first break belongs to the last cluster.
+        end, seam = begin + 1 + k, begin if k == len(ahead) else 0
+        if end - start + seam >= _LEAST_CLUSTER:
+            _label(clusters, beam[start:end], found)
+            _label(clusters, beam[:seam], found)
+            beams[at.CLUSTER_FIRST, found] = start
+            beams[at.CLUSTER_LAST, found] = (seam if seam > 0 else end) - 1
             found += 1
         start = end
     return found
+
+
+@helper
+def _label(clusters, beams, number):
+    for i in range(len(beams)):
+        clusters[beams[i]] = number

@@ -180,37 +180,37 @@ def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, fo
     ended, began = blocks[(j - first) // BLOCK], blocks[(j - first + BLOCK - 1) // BLOCK]
     energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
     lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
-    base, now = points[at.BASE], points[at.SCRATCH]
+    base, scratch = points[at.BASE], points[at.SCRATCH]
     last, back = j - LEAST + 1, oldest
     groups = (last - 1 - first) // GROUP + 1
     for row in range(oldest // ROW, (groups - 1) // ROW + 1):
         if row_key[row] + ended >= total:
             continue
-        row_key[row], lower = math.inf, math.inf
-        for q in range(max(row * ROW, oldest), min((row + 1) * ROW, groups)):
-            if key[q] + ended >= total:
-                lower = min(lower, key[q])
+        row_key[row] = math.inf
+        least_group = max(row * ROW, oldest)
+        keys = key[least_group : min((row + 1) * ROW, groups)]
+        for k in range(len(keys)):
+            if keys[k] + ended >= total:
                 continue
+            q = least_group + k
             low = first + q * GROUP
             # Each line is at least as bad as one up to the anchor and one from there on. Of few
             # measurements, the differences of the running sums have lost too many digits.
             rest = cost(sums, anchor[q], j) if j - anchor[q] >= BLOCK else 0.0
             key[q] = lowest[q] - began + (rest if rest < math.inf else 0.0)
             if key[q] + began >= total:
-                lower = min(lower, key[q])
                 continue
             high = min(low + GROUP, last)
-            costs_from(sums, low, high, j, base, now)
-            least, second, best = math.inf, math.inf, low
-            for c in range(low, high):
-                second = min(second, max(least, now[c]))
-                best = c if now[c] < least else best
-                least = min(least, now[c])
+            costs_from(sums, low, high, j, base, scratch)
+            least, best = _least(scratch[low:high])
+            rest, best = least, low + best
             found = best if least < total else found
             total = min(least, total)
             runs, worst = _is_runner(points, j, least)
-            key[q] = (second if runs else least) - began
-            lower = min(lower, key[q])
+            if runs:
+                scratch[best] = math.inf
+                rest, _ = _least(scratch[low:high])
+            key[q] = rest - began
             if low + GROUP <= last:
                 anchor[q], lowest[q] = j, key[q] + began
             if runs:
@@ -226,8 +226,19 @@ def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, fo
                 beams[at.RUNNER, worst], points[at.AHEAD + worst, j] = best, least
                 before = energy[best] + evidence
                 costs_on(sums, best, j + 1, end, before, points[at.AHEAD + worst])
+        lower, _ = _least(keys)
         row_key[row] = min(row_key[row], lower)
     return total, found, back
+
+
+@helper
+def _least(values):
+    """Return the least of some values, and the first that it is."""
+    least, first = math.inf, np.int64(0)
+    for k in range(len(values)):
+        first = k if values[k] < least else first
+        least = min(values[k], least)
+    return least, first
 
 
 @helper
