@@ -9,6 +9,7 @@ file of all of them, and a linker a library that needs nothing but the C library
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -96,12 +97,12 @@ define i64 @{name}(i64 %table) {{
 }}
 """
 
-#: What numba's code refers to besides the C library: the end of memory that arrays own, which none
-#: does here; and the strides of an array of another shape, of which all is contiguous here.
+#: How numba counts who uses the memory that an array owns: none does here.
+_COUNTS = re.compile(r"^ *(tail )?call void @NRT_(in|de)cref\(.*\n", re.MULTILINE)
+
+#: What numba's code refers to besides the C library: the strides of an array of another shape, of
+#: which all is contiguous here.
 SUPPORT = """
-define void @NRT_MemInfo_call_dtor(ptr %owner) {
-  unreachable
-}
 define i32 @numba_attempt_nocopy_reshape(i64 %nd, ptr %dims, ptr %strides, i64 %count,
     ptr %lengths, ptr %out, i64 %item, i32 %by_columns) {
   %some = icmp sgt i64 %count, 0
@@ -134,7 +135,7 @@ def object_of(name: str, inner: str, code: str) -> bytes:
 
     from lineament.kernels.library import REFUSED
 
-    whole = llvm.parse_assembly(code)
+    whole = llvm.parse_assembly(_COUNTS.sub("", code))
     machine = llvm.Target.from_default_triple().create_target_machine(
         cpu=config.CPU_NAME, features=config.CPU_FEATURES, opt=3, reloc="pic", codemodel="default"
     )

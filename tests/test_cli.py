@@ -384,6 +384,7 @@ def test_options_become_what_open_log_takes(capsys):
     show.main([], standalone_mode=False)
     given = ["--topic", "/scan", "--echo", "last", "--ring", "0", "--poses", "/odom"]
     given += ["--scale", "0.001", "--laser-pose", "1", "2", "3"]
+    given += ["--mask", "-1", "0.5", "--mask", "3", "-3"]
     limits = ["--limit", "beams=3", "--limit", "ratio=1_000"]
     show.main([*given, "--keep-going", *limits], standalone_mode=False)
     plain, all_given = map(ast.literal_eval, capsys.readouterr().out.splitlines())
@@ -400,6 +401,7 @@ def test_options_become_what_open_log_takes(capsys):
         "limits": limited,
         "scale": 0.001,
         "laser_pose": (1.0, 2.0, 3.0),
+        "mask": ((-1.0, 0.5), (3.0, -3.0)),
     }
     for option in show.params:
         if option.name == "echo":

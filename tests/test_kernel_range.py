@@ -20,7 +20,11 @@ from lineament.methods import METHODS, get_method, method_names
 from lineament.methods.parameters import MOST_VERTICES
 from lineament.methods.workspace import Block
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    # Such ranges are of no unit; tests/test_units.py has what is warned of.
+    pytest.mark.filterwarnings("ignore::lineament.LineamentWarning"),
+]
 
 NAMES = [*method_names(), "maps"]
 every_name = pytest.mark.parametrize("name", NAMES)

@@ -154,6 +154,7 @@ def test_line_does_not_depend_on_the_directions_voted_for(angles, normal):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:all ranges are")
 @pytest.mark.parametrize("size", [1e-6, 1e9, 1e60, 1e150, 1e200, 1.7e308])
 def test_clusters_of_any_size_stay_within_the_accumulator(size):
     bearings = fan(30)

@@ -97,6 +97,7 @@ def assert_same(name, scan):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:all ranges are")
 @pytest.mark.parametrize("scan", DEGENERATE.values(), ids=DEGENERATE)
 @pytest.mark.parametrize("name", [*FAST, "ransac, bearings", "hough, coarse", "region_growing"])
 def test_degenerate_scans(name, scan):

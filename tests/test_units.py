@@ -135,6 +135,21 @@ def test_ranges_of_no_metres_are_warned_of():
     assert ln.extract(codes, **BEARINGS).segments.size == 0
 
 
+@pytest.mark.parametrize("dtype", [np.uint16, np.int32])
+def test_integers_are_no_metres(dtype):
+    """Not even where they are few enough: a wall at 15 cm is 146 to 264 mm."""
+    near = (58.6 * WALL).astype(dtype)
+    match = r"ranges are whole numbers, 146 to 2\d\d: .* millimetres\? \(scale=0.001;"
+    for given in (near, np.ma.masked_array(near, near == 146)):
+        with pytest.warns(LineamentWarning, match=match):
+            LaserScan(given, **BEARINGS)
+    with pytest.warns(LineamentWarning, match=match):
+        Extractor().batch(near[None], **BEARINGS)
+    for given in (near.astype(float), np.full(201, 3, dtype), np.arange(201, dtype=dtype) % 8):
+        assert len(LaserScan(given, **BEARINGS)) == 201
+    assert len(LaserScan(near, scale=0.001, **BEARINGS)) == 201
+
+
 @pytest.mark.parametrize("largest", [30.0, 81.83, 65.535])
 def test_one_range_of_many_beams_is_no_wall(largest):
     """A wall is not that round: of 50 beams, half a radian; of 49, and below `range_max`, none."""

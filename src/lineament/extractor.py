@@ -18,13 +18,13 @@ from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 from .scan.fields import numbers
 from .scan.given import FIELDS, no_scan, scan_of
-from .scan.units import FAR, FEW, warn_of_units
+from .scan.units import FAR, FEW, warn_of_units, warn_of_whole_numbers
 
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]
 
 _BEARINGS = np.linspace(-1.0, 1.0, 101)
-#: What kernels are loaded with, so that the first scan need not wait for them.
-WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS, range_max=30.0)
+#: What kernels are loaded with, all of them: the first scan need not wait, whatever its limits.
+WALL = LaserScan(2.0 / np.cos(_BEARINGS), angles=_BEARINGS)
 
 
 class Extractor:
@@ -176,6 +176,8 @@ class Extractor:
             rows = rows[:, ::-1]
         if scale != 1:
             rows = scale * rows
+        else:
+            warn_of_whole_numbers(ranges)
         found = run_batch(rows, blocks, self._run or self._first_run)
         self._workers.extend(blocks)
         offsets = np.zeros(m + 1, [(name, np.int64) for name in TABLES])

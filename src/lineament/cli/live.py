@@ -14,6 +14,7 @@ from .mapping import UNITS
 from .options import (
     LASER_POSE,
     LIMITS,
+    MASK,
     METHOD,
     NOISE,
     PATH,
@@ -62,6 +63,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 )
 @LASER_POSE
 @click.option("--upside-down", **_FLAG, help="The laser is turned about its x axis.")
+@MASK
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
@@ -135,7 +137,7 @@ def _configured(
 
     options = {} if path is None else read_config(path)
     limits = given.pop("limits") or {}
-    options.update({name: value for name, value in given.items() if value is not None})
+    options.update({name: value for name, value in given.items() if value not in (None, ())})
     for argument in remappings:  # Those of roslaunch are for rospy, which finds them by itself.
         if options.get("ros") != 1 or ":=" not in argument:
             raise click.UsageError(f"got an unexpected argument {argument!r}")

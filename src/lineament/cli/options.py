@@ -61,6 +61,28 @@ LASER_POSE = click.option(
     metavar="X Y THETA",
     help="Pose of the laser on the robot, that poses are of [m, m, rad].",
 )
+
+
+def _sectors(
+    context: click.Context,  # noqa: ARG001
+    parameter: click.Parameter,  # noqa: ARG001
+    given: tuple[tuple[float, float], ...],
+) -> tuple[tuple[float, float], ...]:
+    from ..scan.changes import checked_mask
+
+    with wrong_usage():
+        return checked_mask(given)
+
+
+MASK = click.option(
+    "--mask",
+    type=float,
+    nargs=2,
+    multiple=True,
+    metavar="FROM TO",
+    callback=_sectors,
+    help="Bearings between which the scanner sees its own robot [rad]; may be given again.",
+)
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
@@ -112,7 +134,8 @@ QUIET = click.option("-q", "--quiet", **_QUIET)
 HUSH = click.option("-q", "--quiet", expose_value=False, **_QUIET)
 
 
-_READING = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale", "laser_pose")
+_OF_SCANS = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale", "laser_pose")
+_READING = (*_OF_SCANS, "mask")
 
 
 def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -130,7 +153,7 @@ def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Cal
                     checked_mounting(given["laser_pose"])
             command(reading={name: given.pop(name) for name in _READING}, **given)
 
-        for option in (LIMITS, KEEP_GOING, SCALE, LASER_POSE, poses, _RING, _ECHO, TOPIC):
+        for option in (LIMITS, KEEP_GOING, SCALE, MASK, LASER_POSE, poses, _RING, _ECHO, TOPIC):
             collecting = option(collecting)
         return collecting
 

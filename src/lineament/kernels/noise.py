@@ -26,16 +26,17 @@ MOST_SIGMA = 0.1
 TYPICAL_SIGMA, SPREAD = 0.012, 4.5
 #: Deviations beyond which errors are no noise.
 _SIGMAS = 3.0
-_BITS_OF_INFINITY = 0x7FF0000000000000
+#: In single precision, of which twice as many are compared at once.
+_BITS_OF_INFINITY, _ONE, _NONE = 0x7F800000, np.float32(1.0), np.float32(0.0)
 #: Square of a deviation of a normal distribution, over that which a third of its squares is below.
 _THIRD = 1.0 / 0.4307**2
 #: What is cut off at three deviations is 3 % of the variance.
 _WHOLE = 1.03
 #: Of overlapping triples, so many count as one.
 _OVERLAP = 1.94
-#: Steps of Newton's method; the least and the most that a mean square is of what is expected: what
-#: is a metre off is clutter.
-_NEWTON_STEPS, _LEAST_RATIO, _MOST_RATIO = 8, 1e-30, 1e4
+#: Steps of Newton's method at most, and one of which the square is less than rounding; the least
+#: and the most that a mean square is of what is expected: what is a metre off is clutter.
+_NEWTON_STEPS, _SMALL_STEP, _LEAST_RATIO, _MOST_RATIO = 8, 1e-8, 1e-30, 1e4
 #: No scanner reports its ranges in coarser steps [m].
 _COARSEST_QUANTUM = 0.15
 #: Of ranges on a lattice, at least so large a share differs from the neighbours'.
@@ -143,8 +144,11 @@ def _peak(ratio, half, centre):
     level = max((weight * math.log(ratio) + centre) / (weight + 1.0), centre - weight)
     pull = half * ratio * math.exp(-level)
     for _ in range(_NEWTON_STEPS):
-        level += (pull - half - inverse * (level - centre)) / (pull + inverse)
+        step = (pull - half - inverse * (level - centre)) / (pull + inverse)
+        level += step
         pull = half * ratio * math.exp(-level)
+        if abs(step) < _SMALL_STEP:
+            break
     off = level - centre
     return -0.5 * inverse * off * off - half * level - pull, pull + inverse
 
@@ -191,48 +195,48 @@ def _fill_triples(points, beam, count, row):
 @sums
 def _least_third(points, count, row, spare, low, high):
     """Variance by triples of squared ranges from `low` to `high`, their mean square, and number."""
-    rho, triple, kept, n = points[at.RHO], points[row], points[spare], 0.0
+    rho, triple, n = points[at.RHO], points[row], 0.0
+    singles, bits = points[spare].view(np.float32), triple.view(np.int64)
     for i in range(count):
         square = rho[i] * rho[i]
-        kept[i] = triple[i] if low <= square < high else math.inf
+        singles[i] = np.float32(triple[i] if low <= square < high else math.inf)
     for i in range(count):
-        n += 1.0 if kept[i] < math.inf else 0.0
+        n += 1.0 if singles[i] < math.inf else 0.0
     if n == 0.0:
         return 0.0, 0.0, 0.0
     # The last of the third: of few, one less would take too much for clutter.
-    third = min((int(n) + 2) // 3, int(n) - 1)
-    limit = _SIGMAS * _SIGMAS * _THIRD * ranked(kept, count, third)
+    single, last = ranked(singles, count, min((int(n) + 2) // 3, int(n) - 1)), np.int64(0)
+    for i in range(count):
+        last = max(last, bits[i] if singles[i] <= single else np.int64(0))
+    limit = _SIGMAS * _SIGMAS * _THIRD * np.int64(last).view(np.float64)
     total, squares, used = 0.0, 0.0, 0.0
     for i in range(count):
-        within = kept[i] <= limit
-        total += kept[i] if within else 0.0
-        squares += rho[i] * rho[i] if within else 0.0
+        square = rho[i] * rho[i]
+        within = (low <= square) & (square < high) & (triple[i] <= limit)
+        total += triple[i] if within else 0.0
+        squares += square if within else 0.0
         used += 1.0 if within else 0.0
     return _WHOLE * total / used, squares / used, used
 
 
-@helper
-def ranked(values, count, rank):
-    """Return the value of a rank, from 0 on, of the first `count`, all of them at least 0.
+@sums
+def ranked(singles, count, rank):
+    """Return what just the least of the first `count` are not above, up to a rank, from 0 on.
 
-    The bits of such numbers have their order, so that bisection ends after 63 rounds at most, and
-    most often after twenty. It has no branches that depend on the values.
+    All are at least 0. The bits of such numbers have their order, so that bisection ends after 32
+    rounds at most, and most often after a dozen. It has no branches that depend on the values.
     """
-    bits = values[:count].view(np.int64)
-    low, high = np.int64(-1), np.int64(_BITS_OF_INFINITY)
+    low, high = np.int32(-1), np.int32(_BITS_OF_INFINITY)
     while high - low > 1:
-        middle = low + (high - low) // 2
-        below = 0
+        middle = np.int32(low + (high - low) // 2)
+        most, below = middle.view(np.float32), np.float32(0.0)
         for i in range(count):
-            below += bits[i] <= middle
+            below += _ONE if singles[i] <= most else _NONE
         if below > rank:
             high = middle
             if below == rank + 1:
                 break
         else:
             low = middle
-    largest = np.int64(0)
-    for i in range(count):
-        largest = max(largest, bits[i] if bits[i] <= high else np.int64(0))
-    found = np.int64(largest)
-    return found.view(np.float64)
+    found = np.int32(high)
+    return found.view(np.float32)

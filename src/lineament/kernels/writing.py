@@ -42,7 +42,7 @@ def write_end(segments, k, end, x, y):
     row = segments[k]
     row[end], row[end + 1] = x, y
     dx, dy = row[at.S_END] - row[at.S_START], row[at.S_END + 1] - row[at.S_START + 1]
-    row[at.S_LENGTH] = math.hypot(dx, dy)
+    row[at.S_LENGTH] = math.sqrt(dx * dx + dy * dy)
 
 
 @helper

@@ -14,6 +14,7 @@ from typing import Any
 from ..errors import LineamentError
 from ..limits import LIMITS, Limits
 from ..scan import Pose
+from ..scan.changes import Mask, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
 
 _CHOICES: dict[str, tuple[object, ...]] = {
@@ -41,6 +42,7 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "int": (int, "a whole number"),
     "float": ((int, float), "a number"),
     "Pose": ((tuple, list), "three numbers"),
+    "Mask": ((tuple, list), "pairs of bearings"),
     "Point": ((tuple, list), "two numbers"),
     "Mapping[str, Any]": (Mapping, "a table"),
 }
@@ -93,6 +95,8 @@ class LiveConfig:
         Pose of the scanner in the frame of the odometry's twist [m, m, rad].
     upside_down : bool
         Whether the scanner hangs upside down: then its frame is turned about its x axis.
+    mask : sequence of (from, to)
+        Sectors of bearings that see the robot itself [rad], see `LaserScan.masked`.
     track : bool
         Whether features are recognised from scan to scan. Then, and where `deskew` is ``scans``,
         the motion by them is known too: ``TOPIC/odometry``.
@@ -157,6 +161,7 @@ class LiveConfig:
     deskew: str = "off"
     laser_pose: Pose = (0.0, 0.0, 0.0)
     upside_down: bool = False
+    mask: Mask = ()
     track: bool = False
     dock: Point | None = None
     dock_track: int | None = None
@@ -190,6 +195,7 @@ class LiveConfig:
             ):
                 raise ValueError(f"{name} is {values}, expected {many} finite numbers")
         checked_mounting(self.laser_pose)
+        object.__setattr__(self, "mask", checked_mask(self.mask))
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
         if self.log is None and self.deskew == "poses":

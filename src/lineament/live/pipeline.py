@@ -117,6 +117,8 @@ class Pipeline(InTurn):
             scan = scan.stamped(self._config.stamp)
         if self._config.scale != 1:
             scan = scan.scaled(self._config.scale)
+        if self._config.mask:
+            scan = scan.masked(self._config.mask)
         twist, kept.last = self._twist(kept, scan), scan
         self._note(scan, twist)
         straight = deskew(scan, twist)

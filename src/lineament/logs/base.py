@@ -15,7 +15,7 @@ from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
 from ..scan import LaserScan, Pose
-from ..scan.changes import check_scale
+from ..scan.changes import Mask, check_scale, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
 from ..scan.poses import carried, compose
 from ..scan.units import why_invalid
@@ -41,6 +41,7 @@ class ReadOptions:
     stamp: str = "first"
     scale: float = 1.0
     laser_pose: Pose | None = None
+    mask: Mask = ()
 
     def __post_init__(self) -> None:
         if self.echo not in ECHOES:
@@ -52,6 +53,7 @@ class ReadOptions:
         check_scale(self.scale)
         if self.laser_pose is not None:
             object.__setattr__(self, "laser_pose", checked_mounting(self.laser_pose))
+        object.__setattr__(self, "mask", checked_mask(self.mask))
         topic = self.pose_topic
         if topic is not None and not (isinstance(topic, str) and topic):
             raise ValueError(f"pose_topic is {topic!r}, expected the name of a topic")
@@ -218,6 +220,8 @@ class Log(Pictured, ABC):
             if covariance is not None:
                 covariance = carried(covariance, scan.pose, pose)
             scan = scan.with_pose(pose, covariance)
+        if options.mask:
+            scan = scan.masked(options.mask)
         return scan if options.scale == 1 else scan.scaled(options.scale)
 
     def measured(self) -> Iterator[tuple[str, LaserScan]]:

@@ -10,8 +10,10 @@ import numpy as np
 
 from ..errors import one_line
 from ..scan import LaserScan, Pose
+from ..scan.changes import Mask
 from ..scan.units import FAR
 from .base import Log, Topic
+from .own import OwnParts
 
 #: How many frames, topics and kinds of messages are listed.
 _FRAMES, _TOPICS, _LISTED = 16, 32, 20
@@ -49,6 +51,7 @@ class TopicInfo:
     poses: float  # Share of scans with a pose.
     travelled: float  # Length of the way from pose to pose [m].
     frame_ids: tuple[str, ...]  # In order of appearance, the first 16.
+    own: Mask = ()  # Sectors that see the robot itself [rad].
 
     def rows(self) -> list[tuple[str, str]]:
         """Names and values for a person to read, angles in degrees."""
@@ -72,7 +75,16 @@ class TopicInfo:
             ("ranges", ranges),
             ("poses", f"{100 * self.poses:.0f} % of scans{way}" if self.poses else "none"),
             ("frames", (", ".join(self.frame_ids) or "not named") + several),
+            *([("robot", self._own_parts())] if self.own else []),
         ]
+
+    def _own_parts(self) -> str:
+        """Bearings under which the scanner sees what moves with it, and how to leave them out."""
+        shown = ", ".join(
+            f"{math.degrees(low):.0f}° to {math.degrees(high):.0f}°" for low, high in self.own
+        )
+        masks = " ".join(f"--mask {low:g} {high:g}" for low, high in self.own)
+        return f"its own parts are seen from {shown}: {masks} leaves them out"
 
     def _time(self) -> str:
         if self.start is None or self.duration is None:
@@ -213,6 +225,7 @@ class _Counter:
         self.histogram = np.zeros(round(1000 * _LONGEST) + 1, dtype=np.int64)
         self.travelled, self.pose = 0.0, first.pose
         self.frames: dict[str, None] = {}
+        self.own = OwnParts(first)
 
     def add(self, scan: LaserScan) -> None:
         self.scans += 1
@@ -223,6 +236,7 @@ class _Counter:
         self.with_intensities += scan.intensities is not None
         if scan.frame_id and len(self.frames) < _FRAMES:
             self.frames[scan.frame_id] = None
+        self.own.add(scan)
         self._add_stamp(scan.stamp)
         self._add_pose(scan.pose)
         self.limits = min(self.limits[0], scan.range_min), max(self.limits[1], scan.range_max)
@@ -282,4 +296,5 @@ class _Counter:
             poses=self.with_pose / self.scans,
             travelled=self.travelled,
             frame_ids=tuple(self.frames),
+            own=self.own.sectors(),
         )

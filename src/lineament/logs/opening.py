@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import LogError
 from ..limits import Limits
+from ..scan.changes import Mask
 from . import sources
 from .base import Head, Log, ReadOptions
 
@@ -60,6 +61,7 @@ def open_log(
     stamp: str = "first",
     scale: float = 1.0,
     laser_pose: tuple[float, float, float] | None = None,
+    mask: Mask = (),
 ) -> Log:
     """Open a log of laser scans; its format is found by what it holds, then by its ending.
 
@@ -93,6 +95,8 @@ def open_log(
         Pose of the scanner on what the poses of the log are of [m, m, rad]. By default, poses of a
         ROS log are moved by ``/tf_static``, with a `LineamentWarning` where it does not say where
         the scanner is; poses of other logs are those of the scanner.
+    mask : sequence of (from, to)
+        Sectors of bearings [rad] that see the robot itself, see `LaserScan.masked`.
 
     Returns
     -------
@@ -102,8 +106,8 @@ def open_log(
     Raises
     ------
     ValueError
-        If `echo`, `ring`, `pose_topic`, `stamp`, `scale`, `laser_pose` or a limit is not a
-        value that it can have.
+        If `echo`, `ring`, `pose_topic`, `stamp`, `scale`, `laser_pose`, `mask` or a limit is
+        not a value that it can have.
     LogError
         If the file cannot be read, has no format that is known, holds no scans, has no such topic,
         or is beyond a limit. While the log is iterated: if a scan in it is faulty, unless
@@ -119,7 +123,7 @@ def open_log(
     ('carmen', 1, [7.5])
     """
     most = Limits.of(limits)
-    options = ReadOptions(echo, ring, pose_topic, most, stamp, scale, laser_pose)
+    options = ReadOptions(echo, ring, pose_topic, most, stamp, scale, laser_pose, mask)
     source = _located(path, options.limits)
     head = sources.read_head(source)
     reader = _recognised(head)

@@ -4,9 +4,12 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .fields import Array, finite, irregular_bearings
+from .fields import DEGREES, FINEST, Array, finite, irregular_bearings
 
+#: Sectors of bearings [rad], each counter-clockwise from its first one to its second.
+Mask = tuple[tuple[float, float], ...]
 #: No limit of a scanner is farther [m].
 _LONGEST = 1000.0
 
@@ -30,6 +33,31 @@ def in_metres(ranges: Array, scale: object, range_max: float = 0.0) -> Array:
         made = factor * ranges
     made.setflags(write=False)
     return made
+
+
+def checked_mask(mask: Any) -> Mask:
+    """Check sectors of bearings [rad], each of less than a turn."""
+    try:
+        sectors = tuple((finite("mask", low), finite("mask", high)) for low, high in mask)
+    except TypeError:
+        raise ValueError(f"mask is {mask!r}, expected pairs of bearings [rad]") from None
+    except ValueError as error:
+        raise ValueError(f"mask is {mask!r}, expected pairs of bearings [rad]: {error}") from None
+    for low, high in sectors:
+        if max(abs(low), abs(high)) > 2 * math.pi:
+            raise ValueError(f"mask has {low:g} to {high:g} rad, more than a turn{DEGREES}")
+        if low == high:
+            raise ValueError(f"mask has {low:g} to {high:g} rad, expected two bearings")
+    return sectors
+
+
+def in_mask(bearings: Array, mask: Mask) -> NDArray[np.bool_]:
+    """Whether each bearing is in a sector."""
+    turn, inside = 2 * math.pi, np.zeros(len(bearings), bool)
+    for low, high in mask:
+        # A bearing that is the end of a sector may differ from it by rounding.
+        inside |= (bearings - low + FINEST) % turn <= (high - low) % turn + 2 * FINEST
+    return inside
 
 
 def part_of(scan: Any, kept: range) -> dict[str, Any]:

@@ -21,7 +21,8 @@ _WIDE, _MOST_BEAMS = 10.0, 20_000
 FINEST = 1e-9
 #: A scan that goes around from behind has bearings up to three half turns; none has so many [rad].
 FARTHEST = 4 * math.pi
-_DEGREES = ": are they in degrees? (numpy.radians)"
+#: What is likely where bearings are too large.
+DEGREES = ": are they in degrees? (numpy.radians)"
 #: Nanoseconds of a second.
 NANO = 1_000_000_000
 
@@ -161,12 +162,12 @@ def _check_turn(name: str, first: float, last: float, step: float) -> None:
     if last - first > 2 * math.pi + min(1.5 * step, 0.1):
         raise ValueError(
             f"{name}: beams from {first:.6g} to {last:.6g} rad go more than once around"
-            f"{_DEGREES if last - first > 4 * math.pi else ''}"
+            f"{DEGREES if last - first > 4 * math.pi else ''}"
         )
 
 
 def _no_bearing(name: str, value: float) -> str:
-    return f"{name} is {value:.6g} rad, more than two turns from the x axis{_DEGREES}"
+    return f"{name} is {value:.6g} rad, more than two turns from the x axis{DEGREES}"
 
 
 def beams_to(points: ArrayLike) -> tuple[Array, Array]:
@@ -238,7 +239,7 @@ def checked_mounting(laser_pose: Any) -> Pose:
     except ValueError as error:
         raise ValueError(f"laser_{error}") from None
     if abs(pose[2]) > 2 * math.pi:
-        raise ValueError(f"laser_pose has theta = {pose[2]:g} rad, more than a turn{_DEGREES}")
+        raise ValueError(f"laser_pose has theta = {pose[2]:g} rad, more than a turn{DEGREES}")
     return pose
 
 

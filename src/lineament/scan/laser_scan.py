@@ -6,10 +6,11 @@ import math
 from operator import index
 from typing import Any, Self, SupportsIndex, overload
 
+from numpy import nan, ndarray, where
 from numpy.typing import ArrayLike
 
 from .beams import Beams
-from .changes import in_metres, in_reverse, part_of
+from .changes import Mask, checked_mask, in_mask, in_metres, in_reverse, part_of
 from .fields import (
     FARTHEST,
     FINEST,
@@ -25,6 +26,7 @@ from .fields import (
     range_limits,
     vector,
 )
+from .units import warn_of_whole_numbers
 
 _TURN, _INF = 2 * math.pi, math.inf
 
@@ -138,6 +140,8 @@ class LaserScan(Beams):
             own.update(in_reverse(self))
         if scale != 1.0:
             own["ranges"] = in_metres(own["ranges"], scale, own["range_max"])
+        elif type(ranges) is not ndarray or ranges.dtype.kind != "f":
+            warn_of_whole_numbers(ranges)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
@@ -207,6 +211,28 @@ class LaserScan(Beams):
         ranges = in_metres(self.ranges, scale)
         low, high = range_limits(self.range_min * scale, self.range_max * scale)
         return self._changed(ranges=ranges, range_min=low, range_max=high)
+
+    def masked(self, mask: Mask) -> Self:
+        """Return the same scan without the ranges of some sectors, which are NaN.
+
+        Parameters
+        ----------
+        mask : sequence of (from, to)
+            Bearings [rad]: a sector goes counter-clockwise from the first to the second, both
+            included, such as that in which the scanner sees its own robot.
+
+        Raises
+        ------
+        ValueError
+            If a sector is no pair of bearings.
+
+        Examples
+        --------
+        >>> LaserScan([1.0, 2.0, 3.0], -0.1, 0.1).masked([(0.1, -0.1)]).ranges.tolist()
+        [nan, 2.0, nan]
+        """
+        ranges = where(in_mask(self.angles, checked_mask(mask)), nan, self.ranges)
+        return self._changed(ranges=vector("ranges", ranges))
 
     def stamped(self, beam: str | float, ns: int | None = None) -> Self:
         """Return the same scan with a stamp that is the time of another beam.

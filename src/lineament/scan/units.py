@@ -42,6 +42,21 @@ def warn_of_units(
     return bool(message)
 
 
+def warn_of_whole_numbers(ranges: object) -> None:
+    """Warn of an array of integers: in metres, ranges have fractions.
+
+    A scanner that is near a wall has ranges in millimetres that could be metres by their size.
+    """
+    dtype = getattr(ranges, "dtype", None)
+    if isinstance(dtype, np.dtype) and dtype.kind in "iu":
+        different = np.unique(np.asarray(ranges))
+        if len(different) > FEW:
+            warn(
+                f"ranges are whole numbers, {different[0]} to {different[-1]}: are they in "
+                "millimetres? (scale=0.001; or ranges.astype(float), if they are in metres)"
+            )
+
+
 def why_invalid(ranges: Array, range_min: float, range_max: float) -> str:
     """Return what is wrong with ranges of which none is valid; "" if no beam returned anything."""
     finite = ranges[(ranges > 0) & (ranges < CODES)]

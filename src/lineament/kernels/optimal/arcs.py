@@ -87,7 +87,8 @@ def _looks_round(points, first, last, noise):
         dx, dy = x[i] - mx - ux, y[i] - my - uy
         if not abs(math.sqrt(dx * dx + dy * dy) - r) <= near:
             return False
-    return math.hypot(ax - bx, ay - by) >= 0.5 * ARC_TURN * r
+    dx, dy, least = ax - bx, ay - by, 0.5 * ARC_TURN * r
+    return dx * dx + dy * dy >= least * least
 
 
 @helper
@@ -150,7 +151,8 @@ def _follow(points, broken, arc, i, stop, way, noise):
 @helper
 def is_on(points, arc, i, noise, scale):
     """Whether a measurement is as near to an arc as by chance, at a scale of its surface [m]."""
-    off = math.hypot(points[at.X, i] - arc[at.CX], points[at.Y, i] - arc[at.CY]) - arc[at.RADIUS]
+    dx, dy = points[at.X, i] - arc[at.CX], points[at.Y, i] - arc[at.CY]
+    off = math.sqrt(dx * dx + dy * dy) - arc[at.RADIUS]
     variance = noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i] + scale * scale
     return off * off <= SIGMAS * SIGMAS * variance
 

@@ -1,7 +1,5 @@
 """Step 2: which measurements are usable, and between which a surface breaks."""
 
-import math
-
 import numpy as np
 
 from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
@@ -22,12 +20,11 @@ def list_points(work, ranges, start, limits, bearings):
     count = 0
     for first, end in ((start, len(ranges)), (0, start)):
         for i in range(first, end):
-            beam[count] = i
-            count += usable(ranges[i], range_min, range_max)
-    for i in range(count):
-        b = beam[i]
-        r = ranges[b]
-        rho[i], x[i], y[i] = r, r * cosines[b], r * sines[b]
+            # What is not usable is written over by the next, or behind the last.
+            is_usable = usable(ranges[i], range_min, range_max)
+            r = ranges[i] if is_usable else 0.0
+            beam[count], rho[count], x[count], y[count] = i, r, r * cosines[i], r * sines[i]
+            count += is_usable
     return count
 
 
@@ -35,8 +32,10 @@ def list_points(work, ranges, start, limits, bearings):
 def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
     """Whether the range steps by more than that of a surface met at the steepest incidence."""
     near, far = min(rho0, rho1), max(rho0, rho1)
-    slope = STEEPEST * abs(x0 * y1 - y0 * x1) / far
-    return far - near > slope + 2.0 * SIGMAS * math.sqrt(noise[0] + noise[1] * far * far)
+    # Times the farther range, so that nothing is divided, and no root is taken.
+    square, beyond = far * far, far * (far - near) - STEEPEST * abs(x0 * y1 - y0 * x1)
+    allowed = 4.0 * SIGMAS * SIGMAS * square * (noise[0] + noise[1] * square)
+    return (beyond > 0.0) & (beyond * beyond > allowed)
 
 
 @inlined
@@ -71,10 +70,16 @@ def cluster(work, count, n, circular, most_missing):
     first, last, kept, spikes = np.int64(0), count - 1, 0, work.beams[at.SPIKE]
     if count > 0:
         broken[0] = not circular or _is_broken(work, last, first, n, most_missing)
+    # Hardly any measurement is one.
+    pairs, broken1 = broken[0] & broken[last] if circular and count > 0 else 0, broken[1:count]
+    for i in range(len(broken1)):
+        pairs += broken[i] & broken1[i]
+    if pairs == 0:
+        return count
     for i in range(count):
-        before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+        after = i + 1 if i < last else 0
         spikes[i] = broken[i] and broken[after] and (circular or 0 < i < last)
-        if spikes[i] and _is_broken(work, before, after, n, most_missing):
+        if spikes[i] and _is_broken(work, i - 1 if i > 0 else last, after, n, most_missing):
             spikes[i] = 0
     for i in range(count):
         before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
@@ -116,19 +121,27 @@ def list_clusters(beams, count, clusters):
     beam, broken = beams[at.BEAM], beams[at.BROKEN]
     for i in range(len(clusters)):
         clusters[i] = -1
-    begin, found, size = 0, 0, 0
+    begin, found = 0, 0
     while begin < count and not broken[begin]:
         begin += 1
     begin = begin if begin < count else 0
-    for t in range(begin, begin + count):
-        size += 1
-        if t + 1 < begin + count and not broken[t + 1 - (count if t + 1 >= count else 0)]:
+    start, ahead = begin, broken[begin + 1 : count]
+    for k in range(len(ahead) + 1):
+        if k < len(ahead) and not ahead[k]:
             continue
-        if size >= _LEAST_CLUSTER:
-            for back in range(t + 1 - size, t + 1):
-                clusters[beam[back - (count if back >= count else 0)]] = found
-            beams[at.CLUSTER_FIRST, found] = (t + 1 - size) % count
-            beams[at.CLUSTER_LAST, found] = t % count
+        # What is before the first break belongs to the last cluster.
+        end, seam = begin + 1 + k, begin if k == len(ahead) else 0
+        if end - start + seam >= _LEAST_CLUSTER:
+            _label(clusters, beam[start:end], found)
+            _label(clusters, beam[:seam], found)
+            beams[at.CLUSTER_FIRST, found] = start
+            beams[at.CLUSTER_LAST, found] = (seam if seam > 0 else end) - 1
             found += 1
-        size = 0
+        start = end
     return found
+
+
+@helper
+def _label(clusters, beams, number):
+    for i in range(len(beams)):
+        clusters[beams[i]] = number

@@ -149,7 +149,7 @@ def _scatter_of_means(work, surfaces):
         else:
             long += end - first
             a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.SCRATCH]
-            _second_differences(points[:, first:end], a, b, work.noise, error, squares[used:])
+            _second_differences(points, first, end, a, b, work.noise, error, squares[used:])
             used += end - first + 1 - 3 * _TOGETHER
     if long <= short:
         return 1.0
@@ -174,12 +174,13 @@ def _mean_within(squares, count, limit):
 
 
 @sums
-def _second_differences(points, a, b, noise, error, squares):
+def _second_differences(points, first, end, a, b, noise, error, squares):
     """Square the second differences of means of four errors, in units of those of white noise."""
-    x, y, rho, constant, growth = points[at.X], points[at.Y], points[at.RHO], noise[0], noise[1]
+    x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
+    constant, growth = noise[0], noise[1]
     for i in range(len(x)):
-        variance = constant + growth * rho[i] * rho[i]
-        error[i] = (rho[i] - rho[i] / (a * x[i] + b * y[i])) / math.sqrt(variance)
+        across, deviation = a * x[i] + b * y[i], math.sqrt(constant + growth * rho[i] * rho[i])
+        error[i] = rho[i] * (across - 1.0) / (across * deviation)
     # In place: the sum of four from each one on.
     error1, error2, error3 = error[1:], error[2:], error[3:]
     for i in range(len(x) + 1 - _TOGETHER):

@@ -206,14 +206,6 @@ def _add_corner(work, tables, scan, k, m, kind):
 
 
 @helper
-def _length(work, k):
-    """Distance between the ends of a line."""
-    first, last = work.spans[at.FIRST, k], work.spans[at.LAST, k]
-    x, y = work.points[at.X], work.points[at.Y]
-    return math.hypot(x[last] - x[first], y[last] - y[first])
-
-
-@helper
 def _variance_at(piece, x, y):
     """Variance of the offset of a line at a point: that at its centroid, with the lever arm."""
     t = (x - piece[at.CX]) * piece[at.UX] + (y - piece[at.CY]) * piece[at.UY]

@@ -29,10 +29,14 @@ def partition(work, count, evidence):
     """
     origin, first, last = work.beams[at.ORIGIN], work.spans[at.FIRST], work.spans[at.LAST]
     work.points[at.ENERGY, 0], begin = 0.0, np.int64(0)
-    for i in range(1, count + 1):
-        if i == count or work.beams[at.BROKEN, i]:
-            _part_stretch(work, begin, i, evidence)
-            begin = i
+    while begin < count:
+        broken, end = work.beams[at.BROKEN, begin + 1 : count], count
+        for i in range(len(broken)):
+            if broken[i]:
+                end = begin + 1 + i
+                break
+        _part_stretch(work, begin, end, evidence)
+        begin = end
     lines, i = 0, count
     while i > 0:
         if origin[i] >= 0:
@@ -110,22 +114,26 @@ def _part_block(points, beams, sums, first, low, high, oldest, bound, evidence):
         costs_on(sums, runner[r], low, high, energy[runner[r]] + evidence, ahead[r])
     q, key, lowest, anchor = (low - first - LEAST) // GROUP, math.inf, math.inf, first
     total = energy[low - 1]
-    for j in range(low, high):
-        i, leader, least = j - LEAST, 0, math.inf
-        anchor = i
-        for r in range(RUNNERS):
-            leader = r if ahead[r, j] < least else leader
-            least = min(ahead[r, j], least)
+    # Slices, as numba need not look for negative indices where a loop begins at 0.
+    begins, bases, blocks = energy[low - LEAST :], base[low - LEAST :], blocks[q * GROUP // BLOCK :]
+    one, two, three = ahead[0, low:high], ahead[1, low:high], ahead[2, low:high]
+    energies, origins = energy[low:high], origin[low:high]
+    for k in range(len(one)):
+        leader, least = 0, one[k]
+        leader = 1 if two[k] < least else leader
+        least = min(two[k], least)
+        leader = 2 if three[k] < least else leader
+        least = min(three[k], least)
         found = runner[leader] if least < total + price else np.int64(-1)
         total = min(least, total + price)
-        own, ended = energy[i] + evidence, blocks[(j - first) // BLOCK]
-        base[i] = own if i > first else math.inf
-        key = min(key, base[i] - blocks[(i - first + BLOCK - 1) // BLOCK])
-        lowest = min(lowest, own)
+        own, ended = begins[k] + evidence, blocks[(k + LEAST) // BLOCK]
+        bases[k] = own if low + k > first + LEAST else math.inf
+        key = min(key, bases[k] - blocks[(k + BLOCK - 1) // BLOCK])
+        lowest, anchor = min(lowest, own), low + k - LEAST
         if min(bound, key) + ended < total:
             _set_group(points, beams, q, key, lowest, anchor)
             total, found, oldest = _open_groups(
-                points, beams, sums, first, j, high, oldest, evidence, total, found
+                points, beams, sums, first, low + k, high, oldest, evidence, total, found
             )
             # What is so far above can never be the least again.
             while oldest < q and points[at.KEY, oldest] + ended > total + most:
@@ -134,7 +142,7 @@ def _part_block(points, beams, sums, first, low, high, oldest, bound, evidence):
             anchor = beams[at.ANCHOR, q]
             for row in range(oldest // ROW, q // ROW + 1):
                 bound = min(bound, points[at.ROW_KEY, row])
-        energy[j], origin[j] = total, found
+        energies[k], origins[k] = total, found
     _set_group(points, beams, q, key, lowest, anchor)
     return oldest, min(bound, key)
 
@@ -172,37 +180,37 @@ def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, fo
     ended, began = blocks[(j - first) // BLOCK], blocks[(j - first + BLOCK - 1) // BLOCK]
     energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
     lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
-    base, now = points[at.BASE], points[at.SCRATCH]
+    base, scratch = points[at.BASE], points[at.SCRATCH]
     last, back = j - LEAST + 1, oldest
     groups = (last - 1 - first) // GROUP + 1
     for row in range(oldest // ROW, (groups - 1) // ROW + 1):
         if row_key[row] + ended >= total:
             continue
-        row_key[row], lower = math.inf, math.inf
-        for q in range(max(row * ROW, oldest), min((row + 1) * ROW, groups)):
-            if key[q] + ended >= total:
-                lower = min(lower, key[q])
+        row_key[row] = math.inf
+        least_group = max(row * ROW, oldest)
+        keys = key[least_group : min((row + 1) * ROW, groups)]
+        for k in range(len(keys)):
+            if keys[k] + ended >= total:
                 continue
+            q = least_group + k
             low = first + q * GROUP
             # Each line is at least as bad as one up to the anchor and one from there on. Of few
             # measurements, the differences of the running sums have lost too many digits.
             rest = cost(sums, anchor[q], j) if j - anchor[q] >= BLOCK else 0.0
             key[q] = lowest[q] - began + (rest if rest < math.inf else 0.0)
             if key[q] + began >= total:
-                lower = min(lower, key[q])
                 continue
             high = min(low + GROUP, last)
-            costs_from(sums, low, high, j, base, now)
-            least, second, best = math.inf, math.inf, low
-            for c in range(low, high):
-                second = min(second, max(least, now[c]))
-                best = c if now[c] < least else best
-                least = min(least, now[c])
+            costs_from(sums, low, high, j, base, scratch)
+            least, best = _least(scratch[low:high])
+            rest, best = least, low + best
             found = best if least < total else found
             total = min(least, total)
             runs, worst = _is_runner(points, j, least)
-            key[q] = (second if runs else least) - began
-            lower = min(lower, key[q])
+            if runs:
+                scratch[best] = math.inf
+                rest, _ = _least(scratch[low:high])
+            key[q] = rest - began
             if low + GROUP <= last:
                 anchor[q], lowest[q] = j, key[q] + began
             if runs:
@@ -218,8 +226,19 @@ def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, fo
                 beams[at.RUNNER, worst], points[at.AHEAD + worst, j] = best, least
                 before = energy[best] + evidence
                 costs_on(sums, best, j + 1, end, before, points[at.AHEAD + worst])
+        lower, _ = _least(keys)
         row_key[row] = min(row_key[row], lower)
     return total, found, back
+
+
+@helper
+def _least(values):
+    """Return the least of some values, and the first that it is."""
+    least, first = math.inf, np.int64(0)
+    for k in range(len(values)):
+        first = k if values[k] < least else first
+        least = min(values[k], least)
+    return least, first
 
 
 @helper
