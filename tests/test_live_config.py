@@ -126,9 +126,8 @@ DEFAULTS = {
     "topic": "scan", "namespace": "", "name": "lineament", "type": "LaserScan", "echo": "first",
     "stamp": "first", "scale": 1.0, "ros": 2, "localhost": False, "reliability": "best-effort",
     "depth": 10, "method": "optimal", "deskew": "off", "laser_pose": (0.0, 0.0, 0.0),
-    "upside_down": False,
-    "mask": (), "track": False, "layers": "", "keep_going": False, "rate": 1.0,
-    "loop": False, "host": "127.0.0.1",
+    "upside_down": False, "mask": (), "track": False, "layers": "", "keep_going": False,
+    "rate": 1.0, "loop": False, "host": "127.0.0.1",
 }  # fmt: skip
 BOUNDS = {"depth": (1, 1000), "rate": (0, 1e6), "noise": (0, 1000), "scale": (1e-9, 1e9),
           "domain": (0, 232), "foxglove": (0, 65535), "dock_track": (0, 2147483647)}  # fmt: skip

@@ -168,8 +168,8 @@ def test_a_flood_of_one_publisher_leaves_the_scan_of_another(node, scanner, peer
     assert came == [("/other", 1), ("/scanner", 47), ("/scanner", 48), ("/scanner", 49)]
 
 
-def raw_scan(number: int, ranges: tuple[float, ...] = (1.0, 2.0)) -> bytes:
-    head = struct.pack("<IIII5s7f", number, 5, 0, 5, b"laser", 0, 1, 1, 0, 0, 0.1, 30)
+def raw_scan(number: int, ranges: tuple[float, ...] = (1.0, 2.0), *, seconds: int = 5) -> bytes:
+    head = struct.pack("<IIII5s7f", number, seconds, 0, 5, b"laser", 0, 1, 1, 0, 0, 0.1, 30)
     return head + struct.pack(f"<I{len(ranges)}fI", len(ranges), *ranges, 0)
 
 
@@ -178,7 +178,8 @@ def test_gaps_in_the_numbers_are_lost_scans(node, scanner, topic):
     connected(scanner, source, topic, SCAN, True)
     # Three are missing; then another begins to count; then none is numbered.
     numbers = [7, 8, 12, 1, 2_000_000_000, 0, 0]
-    scanner.write(topic, *map(raw_scan, numbers))
+    scans = [raw_scan(number, seconds=k) for k, number in enumerate(numbers)]
+    scanner.write(topic, *scans)
     received(source, len(numbers))
     assert source.lost == 3
 
