@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from worlds import ring_sensor
 
 import lineament as ln
-from lineament.motion.deskew import beam_times
+from lineament.motion.deskew import _bearing, beam_times
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room
 from lineament.simulation.placing import clearance
@@ -125,3 +125,13 @@ def test_any_scan_stays_a_scan(ranges, twist, increment):
 def test_a_twist_must_be_finite():
     with pytest.raises(ValueError, match=r"twist is .*, expected three finite"):
         ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, time_increment=0.1), (NAN, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("beam", "expected"),
+    [(0.0, 0.0), (0.5, 0.05), (1.5, 0.25), (2.0, 0.4), (-1.0, -0.2), (3.0, 0.6)],
+)
+def test_bearings_between_irregular_beams(beam, expected):
+    """Outside, beams go on by the median step from the first bearing."""
+    scan = ln.LaserScan([1.0, 1.0, 1.0], angles=[0.0, 0.1, 0.4])
+    assert _bearing(scan, beam) == pytest.approx(expected)

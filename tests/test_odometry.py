@@ -120,3 +120,17 @@ def test_the_skew_of_a_sweep_adds_up_and_is_in_the_covariance(sweep):
     assert off > 4 * deviation
     assert honestly == pytest.approx(math.hypot(deviation, lost), rel=0.2)
     assert travel.pose == known.pose
+
+
+def test_what_is_not_deskewed_adds_up():
+    """Half a circle takes half of the time from scan to scan: each motion is off by its share."""
+    odometer, pose = Odometer(), (0.0, 0.0, 0.0)
+    odometer(tracks(None), 5.0)
+    spread, skew = np.zeros((3, 3)), np.zeros(3)
+    for k, motion in enumerate(MOTIONS[:3], 1):
+        travel = odometer(tracks(Motion(*motion, SPREAD)), 5.0 + k, sweep=0.5)
+        of_pose, of_motion = compose_jacobians(pose, motion)
+        spread = of_pose @ spread @ of_pose.T + of_motion @ SPREAD @ of_motion.T
+        skew = of_pose @ skew + of_motion @ (np.array(motion) * motion[2] * 0.5 / (2 * math.pi))
+        pose = compose(pose, motion)
+        np.testing.assert_allclose(travel.covariance, spread + np.outer(skew, skew), rtol=1e-9)

@@ -315,3 +315,29 @@ def test_scans_give_their_own_twist_for_deskewing():
         twists.append(tracker.twist)
     assert twists[0] is None
     assert np.abs(np.array(twists[6:-1]) - (0.8, 0.0, 0.0)).max() < 0.06
+
+
+def test_a_corner_where_it_was_is_double_without_a_motion():
+    """A motion that is not known is none: nothing turns."""
+    corners = features(corners=[corner(3.0, 1.0)]).corners
+    tracker = Tracker()
+    assert tracker._is_double(corners[0], corners, None)
+
+
+def farthest_that_is_the_same(kind, make):
+    """Distance up to which a feature is taken for the one of before, by bisection [m]."""
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        pairs = associate(features(**{kind: [make(3.0)]}), features(**{kind: [make(3.0 + middle)]}))
+        low, high = (middle, high) if len(getattr(pairs, kind)) else (low, middle)
+    return low
+
+
+def test_gates_have_the_degrees_of_freedom_of_what_they_judge():
+    """Two of a corner, three of an arc, which has a radius besides."""
+    gate = Tracker().gate
+    of_corner = farthest_that_is_the_same("corners", lambda x: corner(x, 1.0))
+    of_arc = farthest_that_is_the_same("arcs", lambda x: arc(x, 1.0, 0.2, 10, 20))
+    expected = math.sqrt(chi_square(gate, 3) / chi_square(gate, 2))
+    assert of_arc / of_corner == pytest.approx(expected, rel=1e-3)
