@@ -43,8 +43,7 @@ def scans_by_name() -> dict[str, tuple[dict[str, float], Any]]:
 
     found = {}
     world, way = building()
-    names = [name for name in SENSORS if name in KNOWN]
-    for name in names:
+    for name in SENSORS:
         found[name] = list(islice(drive(world, way, KNOWN[name], rate=0.4, seed=11), SCANS))
     for log in LOGS:
         if (DATA / log).exists():
@@ -68,12 +67,11 @@ def serve(path: Path) -> None:
         if key not in blocks:
             fields, rows = sets[name]
             extractor = ln.Extractor(method)
-            blocks[key] = (
-                extractor,
-                extractor._new_block(ln.LaserScan(rows[0], **fields), len(rows)),
-            )
-            blocks[key][1].load(rows)
-            extractor.method.run(blocks[key][1])
+            first = ln.LaserScan(rows[0], **fields)
+            block = extractor._new_block(first, len(rows))
+            block.load(rows)
+            extractor.method.run(block)
+            blocks[key] = extractor, block
         extractor, block = blocks[key]
         times = []
         for _ in range(REPETITIONS):

@@ -41,12 +41,12 @@ def test_the_mast_of_a_robot_that_moves_is_suggested_and_left_out(tmp_path, caps
     (topic,) = summarize(open_log(log)).topics
     step, first = scans[0].angle_increment, float(scans[0].angles[MAST[0]])
     expected = first - step, first + len(MAST) * step
-    np.testing.assert_allclose(topic.own, [expected], atol=6e-4)
+    np.testing.assert_allclose(topic.own, [expected], atol=6e-5)
 
     assert run(["info", str(log)]) == 0
     shown = capsys.readouterr().out
     suggested = "--mask " + " ".join(f"{value:g}" for value in topic.own[0])
-    assert f"{suggested} leaves them out" in shown
+    assert f"leave it out by {suggested}" in shown
     command = ["extract", str(log), "-o", str(tmp_path / "f.csv"), *suggested.split()]
     assert run(command) == 0
     for masked, scan in zip(open_log(log, mask=topic.own), scans, strict=True):
@@ -105,7 +105,8 @@ def test_sectors_go_counter_clockwise(mask, expected):
     ("mask", "message"),
     [
         ([(-90, 30)], "mask has -90 to 30 rad, more than a turn: are they in degrees"),
-        ([(1.0, 1.0)], "mask has 1 to 1 rad, expected two bearings"),
+        ([(1.0, 1.0)], "mask has 1 to 1 rad, expected two bearings, less than a turn apart"),
+        ([(0.0, 2 * math.pi)], "mask has 0 to 6.28319 rad, expected two bearings"),
         ([0.3, 0.5], r"mask is \[0.3, 0.5\], expected pairs of bearings"),
         ([(0.3, math.nan)], "expected pairs of bearings .* expected a finite number"),
         ("ab", "expected pairs of bearings"),

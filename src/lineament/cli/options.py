@@ -81,7 +81,8 @@ MASK = click.option(
     multiple=True,
     metavar="FROM TO",
     callback=_sectors,
-    help="Bearings between which the scanner sees its own robot [rad]; may be given again.",
+    help="Leave out the beams from one bearing counter-clockwise to another [rad], such as those "
+    "that see the robot itself; may be given again.",
 )
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
@@ -134,8 +135,9 @@ QUIET = click.option("-q", "--quiet", **_QUIET)
 HUSH = click.option("-q", "--quiet", expose_value=False, **_QUIET)
 
 
-_OF_SCANS = ("topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale", "laser_pose")
-_READING = (*_OF_SCANS, "mask")
+_READING = (
+    "topic", "keep_going", "echo", "ring", "pose_topic", "limits", "scale", "mask", "laser_pose"
+)  # fmt: skip
 
 
 def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -27,7 +27,7 @@ TYPICAL_SIGMA, SPREAD = 0.012, 4.5
 #: Deviations beyond which errors are no noise.
 _SIGMAS = 3.0
 #: In single precision, of which twice as many are compared at once.
-_BITS_OF_INFINITY, _ONE, _NONE = 0x7F800000, np.float32(1.0), np.float32(0.0)
+_BITS_OF_INFINITY, _ONE, _ZERO = 0x7F800000, np.float32(1.0), np.float32(0.0)
 #: Square of a deviation of a normal distribution, over that which a third of its squares is below.
 _THIRD = 1.0 / 0.4307**2
 #: What is cut off at three deviations is 3 % of the variance.
@@ -221,17 +221,18 @@ def _least_third(points, count, row, spare, low, high):
 
 @sums
 def ranked(singles, count, rank):
-    """Return what just the least of the first `count` are not above, up to a rank, from 0 on.
+    """Return a bound of the first `count` values: those up to a rank, from 0 on, are not above it.
 
-    All are at least 0. The bits of such numbers have their order, so that bisection ends after 32
-    rounds at most, and most often after a dozen. It has no branches that depend on the values.
+    Of the others only those are not above it that equal one of these. All are at least 0: the bits
+    of such numbers have their order, so that bisection ends after 32 rounds at most, and most often
+    after a dozen. It has no branches that depend on the values.
     """
     low, high = np.int32(-1), np.int32(_BITS_OF_INFINITY)
     while high - low > 1:
         middle = np.int32(low + (high - low) // 2)
         most, below = middle.view(np.float32), np.float32(0.0)
         for i in range(count):
-            below += _ONE if singles[i] <= most else _NONE
+            below += _ONE if singles[i] <= most else _ZERO
         if below > rank:
             high = middle
             if below == rank + 1:

@@ -79,12 +79,12 @@ class TopicInfo:
         ]
 
     def _own_parts(self) -> str:
-        """Bearings under which the scanner sees what moves with it, and how to leave them out."""
+        """Bearings at which the scanner sees the robot itself, and how to leave them out."""
         shown = ", ".join(
             f"{math.degrees(low):.0f}° to {math.degrees(high):.0f}°" for low, high in self.own
         )
         masks = " ".join(f"--mask {low:g} {high:g}" for low, high in self.own)
-        return f"its own parts are seen from {shown}: {masks} leaves them out"
+        return f"the scanner sees the robot itself from {shown}: leave it out by {masks}"
 
     def _time(self) -> str:
         if self.start is None or self.duration is None:

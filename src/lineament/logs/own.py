@@ -1,4 +1,4 @@
-"""What a scanner sees of the robot that carries it: it stays while all else moves."""
+"""What a scanner sees of the robot itself: it stays in place while all else moves."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,4 +72,4 @@ class OwnParts:
             if len(part) >= _BEAMS:
                 step = self.first.angle_increment
                 found.append((float(angles[part[0]]) - step, float(angles[part[-1]]) + step))
-        return tuple((round(low, 3), round(high, 3)) for low, high in found)
+        return tuple((round(low, 4), round(high, 4)) for low, high in found)

@@ -46,8 +46,10 @@ def checked_mask(mask: Any) -> Mask:
     for low, high in sectors:
         if max(abs(low), abs(high)) > 2 * math.pi:
             raise ValueError(f"mask has {low:g} to {high:g} rad, more than a turn{DEGREES}")
-        if low == high:
-            raise ValueError(f"mask has {low:g} to {high:g} rad, expected two bearings")
+        if abs(math.remainder(high - low, 2 * math.pi)) < FINEST:
+            raise ValueError(
+                f"mask has {low:g} to {high:g} rad, expected two bearings, less than a turn apart"
+            )
     return sectors
 
 

@@ -43,25 +43,23 @@ def warn_of_units(
 
 
 def warn_of_whole_numbers(ranges: object) -> None:
-    """Warn of an array of integers: in metres, ranges have fractions.
+    """Warn of integers, of which some differ: in metres, ranges have fractions.
 
-    A scanner that is near a wall has ranges in millimetres that could be metres by their size.
+    Near a wall, ranges in millimetres could be metres by their size.
     """
-    dtype = getattr(ranges, "dtype", None)
-    if isinstance(dtype, np.dtype) and dtype.kind in "iu":
-        different = np.unique(np.asarray(ranges))
-        if len(different) > FEW:
-            warn(
-                f"ranges are whole numbers, {different[0]} to {different[-1]}: are they in "
-                "millimetres? (scale=0.001; or ranges.astype(float), if they are in metres)"
-            )
+    given = np.asarray(ranges)
+    if given.dtype.kind in "iu" and len(np.unique(given)) > FEW:
+        warn(
+            "ranges are whole numbers: are they in millimetres? "
+            "(scale=0.001; or as floats, if they are in metres)"
+        )
 
 
 def why_invalid(ranges: Array, range_min: float, range_max: float) -> str:
     """Return what is wrong with ranges of which none is valid; "" if no beam returned anything."""
     finite = ranges[(ranges > 0) & (ranges < CODES)]
     if not len(finite):
-        return ""
+        return doubt(ranges, range_min, range_max)
     limits = f"{range_min:g} to {range_max:g} m"
     return doubt(ranges, range_min, range_max) or (
         f"they are {finite.min():g} to {finite.max():g} m, outside of the limits of {limits}; "
@@ -86,7 +84,9 @@ def doubt(ranges: Array, range_min: float, range_max: float) -> str:
         other = np.unique(ranges[np.isfinite(ranges) & (ranges != 0)])
         if len(other) <= FEW:
             return ""
-        return f"all ranges are {other[0]:g} to {other[-1]:g}, expected some from 0 to {CODES:g} m"
+        return (
+            f"all ranges are negative or beyond {CODES:g} m, expected metres: is their type right?"
+        )
     least, median, largest = finite.min(), np.median(finite), finite.max()
     valid = finite[(finite >= range_min) & (finite < range_max)]
     if len(valid):
@@ -117,11 +117,11 @@ def no_return(largest: float, equal: float, step: float) -> str:
     Examples
     --------
     >>> no_return(30.0, 90, 0.0175)
-    '90 beams have exactly the largest range, 30 m: do they stand for no return? (range_max=30)'
+    'many beams have exactly the largest range, 30 m: do they stand for no return? (range_max=30)'
     """
     if equal <= FEW or equal * step < _ROUND:
         return ""
     return (
-        f"{equal:.0f} beams have exactly the largest range, {largest:.9g} m: do they stand for no "
+        f"many beams have exactly the largest range, {largest:.9g} m: do they stand for no "
         f"return? (range_max={largest:.9g})"
     )

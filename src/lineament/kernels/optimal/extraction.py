@@ -137,8 +137,10 @@ def _write_clusters(work, tables, scan, surfaces):
         if spans[at.KIND, k] == at.LINE:
             first = beams[at.BEAM, spans[at.FIRST, k]]
             ints[spans[at.SEGMENT, k], to.S_CLUSTER] = clusters[first]
+    # A circle without a break has nothing between clusters.
+    parts = found if found > 0 and beams[at.BROKEN, beams[at.CLUSTER_FIRST, 0]] else 0
     following[to.BREAKPOINTS] = write_breaks(
         work.points, beams[at.BEAM], beams[at.CLUSTER_FIRST], beams[at.CLUSTER_LAST],
-        found if beams[at.BROKEN, beams[at.CLUSTER_FIRST, 0]] else 0, scan.circular,
-        scan.missing, scan.beams, tables.breakpoints, following[to.BREAKPOINTS],
+        parts, scan.circular, scan.missing, scan.beams, tables.breakpoints,
+        following[to.BREAKPOINTS],
     )  # fmt: skip

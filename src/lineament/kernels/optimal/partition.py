@@ -17,7 +17,8 @@ from .constants import CLUTTER, LEAST
 from .costs import cost, costs_from, costs_on
 
 #: Measurements of the blocks that bound χ² from below, candidates of a group, groups of a row, and
-#: candidates that run along. They change the time, not the result.
+#: candidates that run along. They change the time, not the result: a group is whole blocks, and
+#: `_part_block` names the three runners.
 BLOCK, GROUP, ROW, RUNNERS = 8, 16, 16, 3
 
 
