@@ -175,6 +175,28 @@ def masked_anew(used: Extractor, scans: list[LaserScan]) -> Any:
 
 
 @form
+def sector(used: Extractor, scans: list[LaserScan]) -> Any:
+    """Beams of a sector are as if they were NaN, one after the other, in a scan and in a log."""
+    scan, turn, chance = scans[0], 2 * math.pi, Random(scans[0].ranges.tobytes())
+    low, high = chance.uniform(-4.0, 4.0), chance.uniform(-4.0, 4.0)
+    ranges = scan.ranges.copy()
+    for k, bearing in enumerate(scan.angles.tolist()):
+        past, end = (math.fmod(one - low + 4 * turn, turn) for one in (bearing, high))
+        if past <= end:
+            ranges[k] = math.nan
+    expected = words_of(used(fields_of(scan, ranges)))
+    assert words_of(used(scan.masked([(low, high)]))) == expected
+    if not len(scan):
+        return used(scan)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.npz"
+        save_npz(path, [scan])
+        (read,) = open_log(path, mask=[(low, high)])
+    assert words_of(used(read)) == expected
+    return used(scan)
+
+
+@form
 def list_of_numbers(used: Extractor, scans: list[LaserScan]) -> Any:
     ranges = [None if math.isnan(r) else r for r in scans[0].ranges.tolist()]
     return used(fields_of(scans[0], ranges))

@@ -10,7 +10,7 @@ from handmade import features, segment
 import lineament as ln
 from lineament.live import LiveConfig, Pipeline
 from lineament.motion import Tracker
-from lineament.motion.relocation import is_contradicted, relocated
+from lineament.motion.relocation import _surprise, is_contradicted, relocated
 from lineament.scan.poses import compose, inverse, poses_along, relative
 from lineament.simulation import SENSORS, World, scene
 
@@ -172,6 +172,23 @@ def test_two_walls_of_which_one_is_turned_to_either_side_give_the_turn_between()
     expected = [WIDE, ((1.6, -0.6, 1.1), np.full(3, 0.4))]
     found = relocated(before, seen_after(motion, later), expected)
     np.testing.assert_allclose(found, motion, atol=3e-3)
+
+
+@pytest.mark.parametrize(("turn", "is_known"), [(0.34, True), (0.27, False)])
+def test_walls_cross_at_more_than_17_degrees(turn, is_known):
+    walls = [wall((0.0, 0.0), 4.0), wall((3.0, 1.0), 3.0, turn), wall((9.0, 6.0), 2.0)]
+    before = features(segments=walls).segments
+    found = relocated(before, seen_after((1.0, -0.5, 0.4), before), [WIDE])
+    assert (found is not None) == is_known
+
+
+def test_the_density_of_what_is_expected_by_hand():
+    """Deviations of .5, .5 and .1: -2 log is χ² + 2 log .025; beyond four deviations nothing is."""
+    deviations = np.array((0.5, 0.5, 0.1))
+    motions = np.array([(1.0, 2.0, 3.1), (1.5, 1.0, -3.0), (3.1, 2.0, 3.1), (1.0, 2.0, 3.45)])
+    square = 1.0 + 4.0 + ((2 * math.pi - 6.1) / 0.1) ** 2
+    expected = [0.0, square, math.inf, 3.5**2] + 2 * np.log(0.025)
+    np.testing.assert_allclose(_surprise(motions, (1.0, 2.0, 3.1), deviations), expected)
 
 
 def test_a_room_that_is_the_same_from_both_ends():

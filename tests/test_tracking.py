@@ -341,3 +341,9 @@ def test_gates_have_the_degrees_of_freedom_of_what_they_judge():
     of_arc = farthest_that_is_the_same("arcs", lambda x: arc(x, 1.0, 0.2, 10, 20))
     expected = math.sqrt(chi_square(gate, 3) / chi_square(gate, 2))
     assert of_arc / of_corner == pytest.approx(expected, rel=1e-3)
+
+
+def test_what_the_documents_say_of_a_tracker_nobody_set():
+    """Five frames, 99 % of the right pairs, walls that are straight to a centimetre."""
+    tracker = Tracker()
+    assert (tracker.max_missed, tracker.gate, tracker.roughness) == (5, 0.99, 0.01)
