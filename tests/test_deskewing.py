@@ -127,6 +127,16 @@ def test_a_twist_must_be_finite():
         ln.deskew(ln.LaserScan([1.0], 0.0, 0.1, time_increment=0.1), (NAN, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("twist", [(-1e6, 0.0, 0.0), (0.0, 1e6, 0.0), (0.0, 0.0, 1e6)])
+def test_a_sweep_that_leads_farther_than_any_world_is_refused(twist):
+    """The last of three beams is a second after the stamp."""
+    scan = ln.LaserScan([1.0] * 3, 0.0, 0.1, time_increment=0.5)
+    for much in (1.01, 1e200):
+        with pytest.raises(ValueError, match="leads out of any world"):
+            ln.deskew(scan, tuple(much * np.array(twist)))
+    assert len(ln.deskew(scan, tuple(0.99 * np.array(twist)))) == 3
+
+
 @pytest.mark.parametrize(
     ("beam", "expected"),
     [(0.0, 0.0), (0.5, 0.05), (1.5, 0.25), (2.0, 0.4), (-1.0, -0.2), (3.0, 0.6)],
