@@ -9,18 +9,24 @@ PYTEST = pytest -n auto --dist worksteal
 
 .PHONY: demo test test-all slow boundscheck kernels library docs lint house types tests coverage wheel bench pictures mutants results lines browser ros1 clean
 
-demo: .venv/ready
-	$(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
+# Where no library fits, numba compiles the two largest kernels side by side.
+demo: .venv/base
+	@$(BIN)/lineament warmup --quiet -m liu:paper & $(BIN)/lineament demo $(if $(LOG),"$(LOG)") -o demo
 
 test: lint types tests
 
 test-all: bench-check wheel slow coverage boundscheck kernels docs
 
-.venv/ready: requirements.lock pyproject.toml
+# What a demo needs; and what the checks need besides.
+.venv/base: requirements-base.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lineament needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; name one by make PYTHON=...")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements-base.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv/ready: requirements.lock .venv/base
+	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements.lock
 	@touch $@
 
 lint: .venv/ready

@@ -4,9 +4,12 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from lineament import LineamentError
 from lineament.errors import EXTRAS, needed_by
@@ -19,7 +22,8 @@ MODULES = {"foxglove-sdk": "foxglove", "rerun-sdk": "rerun"}
 
 
 def packages(requirements):
-    names = [re.match(r"[\w-]+", requirement)[0] for requirement in requirements]
+    plain = [one for one in requirements if isinstance(one, str)]
+    names = [re.match(r"[\w-]+", requirement)[0] for requirement in plain]
     return {MODULES.get(name, name) for name in names}
 
 
@@ -28,8 +32,28 @@ def test_errors_know_the_extras_of_the_project_and_checks_install_them_all():
     of_size = sorted(extras, key=lambda name: len(extras[name]), reverse=True)
     smallest = {package: name for name in of_size for package in packages(extras[name])}
     assert smallest == EXTRAS
-    assert set(EXTRAS) <= packages(PROJECT["dependency-groups"]["dev"])
+    assert set(EXTRAS) <= packages(sum(PROJECT["dependency-groups"].values(), []))
     assert not set(EXTRAS) & packages(PROJECT["project"]["dependencies"])
+
+
+def pins(name):
+    """Each package of a file of versions, with all that it says of it."""
+    text = (Path(__file__).parents[1] / name).read_text(encoding="utf-8")
+    return re.findall(r"^([\w-]+)(==.*\n(?:    .*\n)+)", text, re.MULTILINE)
+
+
+def test_a_demo_needs_the_versions_that_the_checks_have():
+    base, every = pins("requirements-base.lock"), pins("requirements.lock")
+    assert set(base) < set(every)
+    asked = PROJECT["project"]["dependencies"] + PROJECT["dependency-groups"]["base"]
+    asked = {re.match(r"[\w-]+", requirement)[0] for requirement in asked}
+    needed, there = set(), {name for name, _ in every}
+    while asked:
+        needed |= asked
+        lines = [line for name in asked for line in metadata.requires(name) or ()]
+        names = {canonicalize_name(Requirement(line).name) for line in lines if "extra" not in line}
+        asked = (names & there) - needed
+    assert {name for name, _ in base} == needed
 
 
 @pytest.mark.parametrize("package", EXTRAS)
