@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tomllib
 from importlib import metadata
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -32,7 +33,7 @@ def test_errors_know_the_extras_of_the_project_and_checks_install_them_all():
     of_size = sorted(extras, key=lambda name: len(extras[name]), reverse=True)
     smallest = {package: name for name in of_size for package in packages(extras[name])}
     assert smallest == EXTRAS
-    assert set(EXTRAS) <= packages(sum(PROJECT["dependency-groups"].values(), []))
+    assert set(EXTRAS) <= packages(chain(*PROJECT["dependency-groups"].values()))
     assert not set(EXTRAS) & packages(PROJECT["project"]["dependencies"])
 
 

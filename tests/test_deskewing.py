@@ -50,6 +50,7 @@ def test_a_turn_by_hand():
     np.testing.assert_array_equal(still.ranges, scan.ranges)
     assert (still.stamp, still.frame_id, still.pose) == (7.0, "laser", (1, 2, 3))
     assert (still.range_max, still.scan_time, still.time_increment) == (9.0, 0.0, 0.0)
+    assert (still.stamp_beam, ln.deskew(scan.stamped("last"), (0, 0, 0.5)).stamp_beam) == (0, 0)
     assert still.intensities.tolist() == [5, 6, 7]
     assert ln.deskew(still, (0.0, 0.0, 0.5)) is still
     # More than half a turn, at 2 rad/s with a beam each second: the bearings go on.

@@ -34,6 +34,12 @@ def test_the_mirror_image_lies_on_the_mirrored_plan_as_the_view_does_on_the_plan
     signs = np.array((1, -1, -1))
     np.testing.assert_allclose(there.covariance, here.covariance * np.outer(signs, signs))
     np.testing.assert_allclose(query.mirrored().mirrored().beams, query.beams)
+    # An offset and an angle to the left are to the right of the image.
+    query.walls["covariance"] = [[4.0, 1.0], [1.0, 2.0]]
+    mirrored = query.mirrored().walls["covariance"]
+    np.testing.assert_array_equal(
+        mirrored, np.broadcast_to([[4.0, -1.0], [-1.0, 2.0]], mirrored.shape)
+    )
 
 
 def test_beams_end_at_the_same_places_in_another_frame():

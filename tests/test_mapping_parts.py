@@ -132,6 +132,24 @@ def test_odometry_says_how_a_drive_goes_on():
     pose, spread = placed._expected(0.2, (5.0, 1.3, math.pi / 2 - 0.2))
     np.testing.assert_allclose(pose, (0.5, 0.1, -0.2))
     np.testing.assert_allclose(spread, np.diag((0.06, 0.06, 0.04)) ** 2)
+    # Odometry that begins with this scan says nothing of the motion from the last one.
+    placed._last = 0.1, None, (0.2, 0.1, 0.0)
+    begun, without = (placed._expected(0.2, given) for given in ((5.0, 1.3, 0.0), None))
+    for one, other in zip(begun, without, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_sights_keep_of_a_segment_its_misfit_and_noise_as_squares():
+    """Points of a wall scatter by 10 mm, of which a bow is 6: 64 mm² are noise, of 25 points."""
+    segments = features(segments=[segment((0.0, 1.0), (3.0, 1.0), 0, 24)]).segments.copy()
+    segments["rms"], segments["misfit"], segments["n_points"] = 0.010, 0.006, 25
+    (sight,) = sights_of([(segments, np.array([7]))])
+    assert (sight["frame"], sight["wall"]) == (0, 7)
+    assert sight["misfit"] == pytest.approx(36e-6)
+    assert sight["noise"] == pytest.approx(64e-6 / math.sqrt(25 * math.pi))
+    # More misfit than scatter is rounding.
+    segments["misfit"] = 0.011
+    assert sights_of([(segments, np.array([7]))])["noise"].tolist() == [0.0]
 
 
 def test_parts_of_a_wall_are_known_where_they_are():

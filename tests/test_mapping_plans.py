@@ -144,6 +144,18 @@ def test_dxf_in_any_unit_with_blocks_and_polylines(tmp_path, unit):
     np.testing.assert_allclose(plan.columns["center"], [[2, 1]])
 
 
+def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
+    """Of two walls one is in a block whose place has one number that is none."""
+    drawing = ezdxf.new("R2010", units=6)
+    drawing.modelspace().add_line((0, 0), (4, 0))
+    drawing.blocks.new("wall").add_line((0, 0), (0, 3))
+    drawing.modelspace().add_blockref("wall", (math.nan, 1.0))
+    drawing.saveas(tmp_path / "plan.dxf")
+    plan = LineMap.read(tmp_path / "plan.dxf")
+    assert plan.ends.tolist() == [[[0, 0], [4, 0]]]
+    assert plan.left_out == 1
+
+
 def test_dxf_layers_are_chosen_by_name(tmp_path):
     path = draw(tmp_path / "plan.dxf")
     doors = LineMap.read(path, layers=["door*"])

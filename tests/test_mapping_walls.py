@@ -10,7 +10,7 @@ from lineament.errors import LineamentError
 from lineament.features import ARC
 from lineament.mapping import LineMap
 from lineament.mapping.drive_map import _passed
-from lineament.mapping.hypotheses import anchors, meetings
+from lineament.mapping.hypotheses import anchors, beside, meetings
 from lineament.mapping.sights import (
     SIGHT,
     columns_shown,
@@ -223,6 +223,31 @@ def test_all_walls_near_a_place_are_listed():
         listed = members[begins[at] : begins[at + 1]]
         assert {*np.flatnonzero(away < 0.3)} <= {*listed}
         assert away[listed].max(initial=0) < 2.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walls_of_which_one_may_pass_by_an_end_of_the_other_are_pairs(seed):
+    """Of 200 walls; one passes where an end is within 35 cm of its line, or of 35 cm beyond."""
+    rng = np.random.default_rng(seed)
+    starts, turns = rng.uniform(-15, 15, (200, 2)), rng.uniform(-math.pi, math.pi, 200)
+    lengths = rng.choice((0.3, 1.0, 6.0, 20.0), 200)
+    ahead = np.column_stack((np.cos(turns), np.sin(turns)))
+    ends = starts + lengths[:, None] * ahead
+    walls = walls_of(np.stack((starts, ends), axis=1))
+    pairs = beside(walls)
+    assert (np.diff(pairs @ (200, 1)) > 0).all()
+    assert (pairs[:, 0] < pairs[:, 1]).all()
+    listed, needed = {*map(tuple, pairs.tolist())}, set()
+    for point in (starts, ends):
+        for k in range(200):
+            arm = point[k] - starts
+            along = np.clip((arm * ahead).sum(axis=1), -0.35, lengths + 0.35)
+            away = np.linalg.norm(arm - along[:, None] * ahead, axis=1)
+            near = np.flatnonzero(away <= 0.35).tolist()
+            needed |= {(min(k, i), max(k, i)) for i in near if i != k}
+    assert len(needed) > 100
+    assert needed <= listed
+    assert len(listed) < 6 * len(needed)
 
 
 def test_a_plan_is_no_larger_than_buildings_are():

@@ -15,7 +15,7 @@ from lineament.scan.poses import compose, relative, twist_between
 from lineament.simulation import SENSORS, drive, room
 
 SPREAD = np.array([[4.0, 1.0, -0.5], [1.0, 2.0, 0.3], [-0.5, 0.3, 1.0]]) * 1e-4
-MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5)]
+MOTIONS = [(0.3, -0.1, 0.2), (0.2, 0.1, 0.0), (0.5, 0.4, -3.0), (0.0, 0.0, 1e-5), (3, 0.5, 1.6e-4)]
 
 
 def derivative(function, at, step=1e-6):
