@@ -57,6 +57,13 @@ def test_it_looks_to_where_the_walls_open(turn, opening, flips):
     assert math.remainder(theta - turn, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("sides", [(0, -1), (-1, 0), (-1, -1)])
+def test_a_corner_of_fewer_than_two_segments_has_no_pose(sides):
+    walls = [segment((1.0, 2.0), (3.0, 2.0), 0, 9), segment((1.0, 2.0), (1.0, 4.0), 9, 18)]
+    assert corner_pose(features(50, walls, [corner(1, 2, segments=(0, 1))]), 0) is not None
+    assert corner_pose(features(50, walls, [corner(1, 2, segments=sides)]), 0) is None
+
+
 @pytest.mark.slow
 def test_covariance_by_small_errors_of_the_walls():
     """Each wall is moved by its own errors: the pose follows as its covariance says."""
