@@ -78,6 +78,46 @@ def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
         assert found.tolist() == [0, 0, 0]
 
 
+@pytest.mark.parametrize("middle", [0.0, math.pi, math.pi / 2])
+def test_parts_of_a_wall_are_one_whatever_its_direction(middle):
+    """Two parts of 2 m in one line, 10 cm from each other, whose directions differ by 20 mrad."""
+    segments = np.zeros(2, SEGMENT)
+    for k, (along, turn) in enumerate([(-1.05, -0.01), (1.05, 0.01)]):
+        u, own = (np.array((math.cos(a), math.sin(a))) for a in (middle, middle + turn))
+        segments["centroid"][k] = along * u
+        segments["start"][k], segments["end"][k] = along * u - own, along * u + own
+        segments["angle"][k] = math.remainder(middle + turn, 2 * math.pi)
+    segments["length"], segments["covariance"] = 2.0, np.diag((0.01, 0.02)) ** 2
+    sights = sights_of([(segments, np.arange(2))])
+    lines = lines_of(sights, np.zeros((1, 3)), 2)
+    assert merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"].tolist() == [0, 0]
+
+
+def test_a_wall_along_another_is_hidden_by_it_up_to_10_degrees():
+    for degrees, left in ((9.5, 1), (10.5, 2)):
+        half = 0.5 * np.array((math.cos(math.radians(degrees)), math.sin(math.radians(degrees))))
+        ends = np.array([[(-5, 0), (5, 0)], [-half, half]], float)
+        walls = walls_of(ends)
+        walls["views"] = 9, 3
+        assert len(single(walls)) == left
+
+
+def test_turns_and_places_that_are_tried():
+    """Five places each way, by a deviation of 10 to 30 cm; seven turns, by half of one."""
+    placed, extract = Drive(), Extractor()
+    for scan in scans_on([0.0]):
+        placed.add(scan, found := extract(scan))
+    for way, turn, step, angle in (
+        (0.02, 0.02, 0.1, 0.05), (0.2, 0.16, 0.2, 0.08), (9.0, 3.0, 0.3, 0.1)
+    ):  # fmt: skip
+        tried = placed._tried(found, (1.0, 2.0, 0.5), way, turn)
+        for column, middle in ((0, 1.0), (1, 2.0)):
+            expected = middle + step * np.arange(-2, 3)
+            np.testing.assert_allclose(np.unique(tried[:, column].round(9)), expected)
+        turns = np.unique(tried[:, 2].round(9))
+        assert {*(0.5 + angle * np.arange(-3, 4)).round(9)} <= {*turns}
+
+
 def test_poses_near_the_expected_one_are_tried():
     """Wherever within two deviations the pose is, one is tried within reach of refinement."""
     placed, extract = Drive(), Extractor()
@@ -147,6 +187,10 @@ def test_sights_keep_of_a_segment_its_misfit_and_noise_as_squares():
     assert (sight["frame"], sight["wall"]) == (0, 7)
     assert sight["misfit"] == pytest.approx(36e-6)
     assert sight["noise"] == pytest.approx(64e-6 / math.sqrt(25 * math.pi))
+    np.testing.assert_allclose(sight["covariance"], segments["covariance"][0])
+    # Surfaces that are 2 cm off, each time elsewhere, are so over 3 m.
+    rough = sights_of([(segments, np.array([7]))], 0.02)["covariance"] - sight["covariance"]
+    np.testing.assert_allclose(rough[0], np.diag((4e-4, 4 * 4e-4 / 9)))
     # More misfit than scatter is rounding.
     segments["misfit"] = 0.011
     assert sights_of([(segments, np.array([7]))])["noise"].tolist() == [0.0]

@@ -144,6 +144,15 @@ def test_dxf_in_any_unit_with_blocks_and_polylines(tmp_path, unit):
     np.testing.assert_allclose(plan.columns["center"], [[2, 1]])
 
 
+def test_an_arc_however_small_has_two_chords_for_a_quarter(tmp_path):
+    for radius, chords in ((1e-3, 2), (1.0, 6)):
+        drawing = ezdxf.new("R2010", units=6)
+        drawing.modelspace().add_line((0, 5), (4, 5))
+        drawing.modelspace().add_arc((0, 0), radius, 0, 90)
+        drawing.saveas(tmp_path / "plan.dxf")
+        assert len(LineMap.read(tmp_path / "plan.dxf").walls) == 1 + chords
+
+
 def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
     """Of two walls one is in a block whose place has one number that is none."""
     drawing = ezdxf.new("R2010", units=6)
