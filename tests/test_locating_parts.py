@@ -201,6 +201,11 @@ def test_what_beams_say_of_a_pose():
         assert odds == pytest.approx(says / 3)
         np.testing.assert_allclose(shares, np.array((hits, short, behind)) / 30)
     assert not evidence_of(np.zeros((2, 3)), beams[:0], plan.index, 0.02).any()
+    # What is known of a pose before adds to what beams say.
+    poses, known = np.zeros((3, 3)), np.array((-2.0, 0.0, 5.0))
+    alone, both = (evidence_of(poses, beams, plan.index, 0.02, before=k) for k in (0.0, known))
+    np.testing.assert_allclose(both[:, 0], alone[:, 0] + known)
+    np.testing.assert_array_equal(both[:, 1:], alone[:, 1:])
 
 
 def follower(covariance, verdict="located"):

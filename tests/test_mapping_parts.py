@@ -1,6 +1,7 @@
 """Parts of maps of drives by hand-worked cases: walls and lines, what is expected, loops."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ from small_room import scans_on
 
 from lineament import Extractor, Tracker
 from lineament.features import SEGMENT
-from lineament.mapping import LocalMap
+from lineament.mapping import LocalMap, making
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
-from lineament.mapping.making import single
+from lineament.mapping.making import found_on, single
 from lineament.mapping.sights import SIGHT, lines_of, merged, sights_of, walls_along
 from lineament.mapping.walls import walls_of
 from lineament.scan.poses import compose
@@ -61,6 +62,19 @@ def test_the_likeliest_turns_are_those_near_the_expected_one(turned):
     wide = _likely_turns(around, seen, turned + math.pi / 4, 9.0)
     off = np.remainder(wide - turned - math.pi / 4 + math.pi, 2 * math.pi) - math.pi
     assert sorted(np.round(off[:2] / (math.pi / 4)).tolist()) == [-1, 1]
+
+
+def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
+    """Of five places two are wrong alike in direction, but not in where they are."""
+    poses = np.column_stack((3.0 * np.arange(6), np.zeros((6, 2))))
+    survey = Survey([None] * 6, poses, None, None)
+    seen = [(9.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.1, 2.0, 0.0), (-7.0, 4.0, 0.0), (1.0, 2.1, 1.0)]
+    queries = [(k, compose(move, survey.pose(k))) for k, move in enumerate(seen)]
+    monkeypatch.setattr(Survey, "queries", lambda *_: queries)
+    monkeypatch.setattr(making, "locate", lambda pose, _: SimpleNamespace(pose=pose))
+    assert found_on(None, survey, 0) in (seen[1], seen[2])
+    assert found_on(None, survey, 3) in (seen[3], seen[4])
+    assert found_on(None, survey, 5) is None
 
 
 def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
@@ -238,6 +252,12 @@ def test_where_a_way_was_passed_before():
     poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
     survey = Survey([Frame() for _ in poses], poses, None, None)
     assert survey._passed(160, 3.5) == [60, 100]
+    # Four key frames beyond reach between two that are within part no stretches; five do.
+    for apart, stretches in ((4, [0]), (5, [0, 8])):
+        near, far = np.zeros((3, 3)), np.tile((90.0, 0.0, 0.0), (apart, 1))
+        poses = np.concatenate((near, far, np.add(near, (0.1, 0, 0)), [(500.0, 0, 0)], near[:1]))
+        survey = Survey([Frame() for _ in poses], poses, None, None)
+        assert survey._passed(len(poses) - 1, 2.0) == stretches
     # Where it was lost, what was seen before is far.
     frames = [Frame(k == 10) for k in range(20)]
     survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)

@@ -165,6 +165,28 @@ def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
     assert plan.left_out == 1
 
 
+@pytest.mark.parametrize("what", ["knots", "weights"])
+def test_a_spline_of_numbers_that_are_none_is_left_out(tmp_path, what):
+    for value, more in ((1.0, 1), (math.nan, 0)):
+        drawing = ezdxf.new("R2010", units=6)
+        drawing.modelspace().add_line((0, 0), (4, 0))
+        spline = drawing.modelspace().add_spline()
+        points = [(0, 1, 0), (1, 2, 0), (2, 1, 0), (3, 2, 0)]
+        spline.set_open_rational(points, [1, 1, 1, value if what == "weights" else 1])
+        if what == "knots":
+            spline.knots = [*list(spline.knots)[:-1], value]
+        drawing.saveas(tmp_path / "plan.dxf")
+        assert (len(LineMap.read(tmp_path / "plan.dxf").walls) > 1) == bool(more)
+
+
+def test_walls_whose_covariance_has_one_number_that_is_none_are_left_out():
+    walls = LineMap.from_lines([[0, 0, 4, 0], [0, 0, 0, 3]]).walls.copy()
+    walls["covariance"][1, 0, 1] = math.nan
+    plan = LineMap(walls)
+    assert plan.ends.tolist() == [[[0, 0], [4, 0]]]
+    assert plan.left_out == 1
+
+
 def test_dxf_layers_are_chosen_by_name(tmp_path):
     path = draw(tmp_path / "plan.dxf")
     doors = LineMap.read(path, layers=["door*"])
