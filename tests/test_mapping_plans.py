@@ -5,12 +5,14 @@ import math
 import ezdxf
 import numpy as np
 import pytest
+from ezdxf.units import METER_FACTOR
 
 import lineament as ln
 from lineament.cli import run
 from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
 from lineament.mapping import LineMap, locate
+from lineament.mapping.drawings import UNITS
 from lineament.simulation import SENSORS, drive, office, room
 
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
@@ -142,6 +144,13 @@ def test_dxf_in_any_unit_with_blocks_and_polylines(tmp_path, unit):
     assert (plan.walls["side"] == 0).all()
     np.testing.assert_allclose(plan.columns["radius"], [0.2])
     np.testing.assert_allclose(plan.columns["center"], [[2, 1]])
+
+
+def test_units_of_a_dxf_are_those_of_the_format():
+    known = {number: per for number, per in enumerate(METER_FACTOR) if per is not None}
+    assert len(known.keys() & UNITS.keys()) >= 10
+    for number in known.keys() & UNITS.keys():
+        assert UNITS[number] == pytest.approx(1.0 / known[number], rel=1e-4)
 
 
 def test_an_arc_however_small_has_two_chords_for_a_quarter(tmp_path):
