@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-#: Blocks of 16 measurements bound less than blocks of 8, so that more groups are opened.
+#: Of groups of half the size more are opened.
 SLOWER = """
 import sys
 import work
 from lineament.kernels.optimal import partition
-partition.BLOCK = 16
+partition.GROUP = 16
 work.STORED = {("optimal", "noisy"): work.STORED["optimal", "noisy"]}
 sys.exit(work.main())
 """

@@ -28,8 +28,11 @@ TYPICAL_SIGMA, SPREAD = 0.012, 4.5
 _SIGMAS = 3.0
 #: In single precision, of which twice as many are compared at once.
 _BITS_OF_INFINITY, _ONE, _ZERO = 0x7F800000, np.float32(1.0), np.float32(0.0)
+_INFINITY, _HALF_OCTAVE = np.float32(math.inf), 2**22
 #: Square of a deviation of a normal distribution, over that which a third of its squares is below.
 _THIRD = 1.0 / 0.4307**2
+#: What a third is below of what scanners have, as the bits of a number in single precision.
+_TYPICAL = int(np.float32(TYPICAL_SIGMA * TYPICAL_SIGMA / _THIRD).view(np.int32))
 #: What is cut off at three deviations is 3 % of the variance.
 _WHOLE = 1.03
 #: Of overlapping triples, so many count as one.
@@ -95,8 +98,9 @@ def fit_noise(points, beam, count, row, spare):
     """
     least, most = LEAST_SIGMA * LEAST_SIGMA, MOST_SIGMA * MOST_SIGMA
     middle = _fill_triples(points, beam, count, row)
-    near, near_square, near_count = _least_third(points, count, row, spare, 0.0, middle)
-    far, far_square, far_count = _least_third(points, count, row, spare, middle, math.inf)
+    near, near_square, near_count, far, far_square, far_count = _least_thirds(
+        points, count, row, spare, middle
+    )
     used = near_count + far_count
     square = (near * near_count + far * far_count) / max(used, 1.0)
     prior = TYPICAL_SIGMA * TYPICAL_SIGMA
@@ -193,44 +197,72 @@ def _fill_triples(points, beam, count, row):
 
 
 @sums
-def _least_third(points, count, row, spare, low, high):
-    """Variance by triples of squared ranges from `low` to `high`, their mean square, and number."""
-    rho, triple, n = points[at.RHO], points[row], 0.0
-    singles, bits = points[spare].view(np.float32), triple.view(np.int64)
+def _least_thirds(points, count, row, spare, middle):
+    """Variance by triples, their mean square, and number, of the nearer and the farther half.
+
+    That is of squared ranges below `middle`, and from there on.
+    """
+    rho, triple = points[at.RHO], points[row]
+    near, far = points[spare].view(np.float32)[:count], points[spare].view(np.float32)[count:]
+    for i in range(count):
+        single, is_near = np.float32(triple[i]), rho[i] * rho[i] < middle
+        near[i] = single if is_near else _INFINITY
+        far[i] = _INFINITY if is_near else single
+    near_limit, guess = _limit_of_third(near, count, np.int64(_TYPICAL))
+    far_limit, _ = _limit_of_third(far, count, guess)
+    near_total, near_squares, near_used = 0.0, 0.0, 0.0
+    far_total, far_squares, far_used = 0.0, 0.0, 0.0
     for i in range(count):
         square = rho[i] * rho[i]
-        singles[i] = np.float32(triple[i] if low <= square < high else math.inf)
-    for i in range(count):
-        n += 1.0 if singles[i] < math.inf else 0.0
-    if n == 0.0:
-        return 0.0, 0.0, 0.0
-    # The last of the third: of few, one less would take too much for clutter.
-    single, last = ranked(singles, count, min((int(n) + 2) // 3, int(n) - 1)), np.int64(0)
-    for i in range(count):
-        last = max(last, bits[i] if singles[i] <= single else np.int64(0))
-    limit = _SIGMAS * _SIGMAS * _THIRD * np.int64(last).view(np.float64)
-    total, squares, used = 0.0, 0.0, 0.0
-    for i in range(count):
-        square = rho[i] * rho[i]
-        within = (low <= square) & (square < high) & (triple[i] <= limit)
-        total += triple[i] if within else 0.0
-        squares += square if within else 0.0
-        used += 1.0 if within else 0.0
-    return _WHOLE * total / used, squares / used, used
+        within = (square < middle) & (triple[i] <= near_limit)
+        near_total += triple[i] if within else 0.0
+        near_squares += square if within else 0.0
+        near_used += 1.0 if within else 0.0
+        within = (square >= middle) & (triple[i] <= far_limit)
+        far_total += triple[i] if within else 0.0
+        far_squares += square if within else 0.0
+        far_used += 1.0 if within else 0.0
+    near_mean, near_square = near_total / max(near_used, 1.0), near_squares / max(near_used, 1.0)
+    far_mean, far_square = far_total / max(far_used, 1.0), far_squares / max(far_used, 1.0)
+    near_mean, far_mean = _WHOLE * near_mean, _WHOLE * far_mean
+    return near_mean, near_square, near_used, far_mean, far_square, far_used
 
 
 @sums
-def ranked(singles, count, rank):
-    """Return a bound of the first `count` values: those up to a rank, from 0 on, are not above it.
+def _limit_of_third(singles, count, guess):
+    """Return what triples are below that count, by the third that is least off, and its bound.
+
+    Infinite ones are none; -1 where all are.
+    """
+    n = _ZERO
+    for i in range(count):
+        n += _ONE if singles[i] < _INFINITY else _ZERO
+    if n == 0.0:
+        return -1.0, guess
+    # The last of the third: of few, one less would take too much for clutter.
+    bound = ranked(singles, count, min((int(n) + 2) // 3, int(n) - 1), guess)
+    most, bits, last = np.int32(bound), singles.view(np.int32), np.int32(0)
+    for i in range(count):
+        last = max(last, bits[i] if bits[i] <= most else np.int32(0))
+    return _SIGMAS * _SIGMAS * _THIRD * np.int32(last).view(np.float32), bound
+
+
+@sums
+def ranked(singles, count, rank, guess):
+    """Bits of a bound of the first `count` values: those up to a rank, from 0 on, are not above it.
 
     Of the others only those are not above it that equal one of these. All are at least 0: the bits
-    of such numbers have their order, so that bisection ends after 32 rounds at most, and most often
-    after a dozen. It has no branches that depend on the values.
+    of such numbers have their order, so that bisection ends after 32 rounds and few more, and most
+    often after a dozen. It begins at a guess, and goes four times as far from there each time. It
+    has no branches that depend on the values.
     """
-    low, high = np.int32(-1), np.int32(_BITS_OF_INFINITY)
+    low, high, reach = np.int64(-1), np.int64(_BITS_OF_INFINITY), np.int64(_HALF_OCTAVE)
     while high - low > 1:
-        middle = np.int32(low + (high - low) // 2)
-        most, below = middle.view(np.float32), np.float32(0.0)
+        # Inside the bounds: from the guess, no farther than it reaches.
+        middle = low + (high - low) // 2
+        middle = max(min(middle, max(guess, low + 1) + reach), min(guess, high - 1) - reach)
+        reach = min(4 * reach, np.int64(_BITS_OF_INFINITY))
+        most, below = np.int32(middle).view(np.float32), _ZERO
         for i in range(count):
             below += _ONE if singles[i] <= most else _ZERO
         if below > rank:
@@ -239,5 +271,4 @@ def ranked(singles, count, rank):
                 break
         else:
             low = middle
-    found = np.int32(high)
-    return found.view(np.float32)
+    return high

@@ -167,7 +167,7 @@ def fit_arc(points, first, last, noise, steps, piece):
     """
     end = last + 1
     x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
-    n, mx, my = len(x), 0.0, 0.0
+    n, mx, my, constant, growth = len(x), 0.0, 0.0, noise[0], noise[1]
     for i in range(n):
         mx, my = mx + x[i], my + y[i]
     mx, my = mx / n, my / n
@@ -187,14 +187,16 @@ def fit_arc(points, first, last, noise, steps, piece):
         if not 0.0 < r <= ARC_RADIUS:
             return math.inf
         hxx, hxy, hxr, hyy, hyr, hrr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        gx, gy, gr, chi_square, squares = 0.0, 0.0, 0.0, 0.0, 0.0
+        gx, gy, gr, chi_square, squares, bends = 0.0, 0.0, 0.0, 0.0, 0.0, 0.5 / r
         for i in range(n):
             dx, dy = x[i] - cx, y[i] - cy
             d = math.sqrt(dx * dx + dy * dy)
-            nx, ny, e = dx / d, dy / d, d - r
-            cosine = (nx * x[i] + ny * y[i]) / rho[i]
-            variance = noise[0] + noise[1] * rho[i] * rho[i]
-            w = 1.0 / (variance * (cosine * cosine + 0.5 * math.sqrt(variance) / r))
+            inverse, square, e = 1.0 / d, rho[i] * rho[i], d - r
+            nx, ny = dx * inverse, dy * inverse
+            # With cos ψ times the range, so that fewer numbers are divided.
+            across, variance = nx * x[i] + ny * y[i], constant + growth * square
+            bend = bends * math.sqrt(variance)
+            w = square / (variance * (across * across + bend * square))
             squares, chi_square = squares + e * e, chi_square + w * e * e
             hxx, hxy, hxr = hxx + w * nx * nx, hxy + w * nx * ny, hxr + w * nx
             hyy, hyr, hrr = hyy + w * ny * ny, hyr + w * ny, hrr + w

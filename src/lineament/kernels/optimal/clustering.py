@@ -59,6 +59,29 @@ def _mark_breaks(points, beams, count, noise, n, most_missing):
 
 
 @inlined
+def _mark_spikes(work, count, n, circular, most_missing):
+    """Mark the measurements that are broken from neighbours which hold together, and count them."""
+    broken, spikes = work.beams[at.BROKEN], work.beams[at.SPIKE]
+    last, pairs = count - 1, np.int64(0)
+    # Hardly any measurement is one.
+    broken1 = broken[1:count]
+    for i in range(len(broken1)):
+        spikes[i] = broken[i] & broken1[i]
+        pairs += spikes[i]
+    if circular and count > 0:
+        spikes[last] = broken[last] & broken[0]
+        pairs += spikes[last]
+    elif count > 1:
+        pairs, spikes[0], spikes[last] = pairs - spikes[0], 0, 0
+    for i in range(count if pairs > 0 else 0):
+        if spikes[i]:
+            before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+            if _is_broken(work, before, after, n, most_missing):
+                spikes[i], pairs = 0, pairs - 1
+    return pairs
+
+
+@inlined
 def cluster(work, count, n, circular, most_missing):
     """Mark where a surface breaks, and drop the spikes. Returns how many measurements are left.
 
@@ -70,17 +93,8 @@ def cluster(work, count, n, circular, most_missing):
     first, last, kept, spikes = np.int64(0), count - 1, 0, work.beams[at.SPIKE]
     if count > 0:
         broken[0] = not circular or _is_broken(work, last, first, n, most_missing)
-    # Hardly any measurement is one.
-    pairs, broken1 = broken[0] & broken[last] if circular and count > 0 else 0, broken[1:count]
-    for i in range(len(broken1)):
-        pairs += broken[i] & broken1[i]
-    if pairs == 0:
+    if _mark_spikes(work, count, n, circular, most_missing) == 0:
         return count
-    for i in range(count):
-        after = i + 1 if i < last else 0
-        spikes[i] = broken[i] and broken[after] and (circular or 0 < i < last)
-        if spikes[i] and _is_broken(work, i - 1 if i > 0 else last, after, n, most_missing):
-            spikes[i] = 0
     for i in range(count):
         before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
         if spikes[i] and not spikes[before] and not spikes[after]:

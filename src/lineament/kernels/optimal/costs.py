@@ -2,9 +2,16 @@
 
 import math
 
+import numpy as np
+
 from .. import contracted, helper
 from . import layout as at
 from .constants import TAU
+
+#: Candidates that are evaluated at once, a power of two.
+GROUP = 32
+#: Of whole numbers.
+_LARGEST = 2**63 - 1
 
 
 @contracted
@@ -77,16 +84,23 @@ def costs_on(sums, i, low, high, energy, out):
 
 
 @contracted
-def costs_from(sums, low, high, j, energy, out):
-    """Write the energy, with that before it, of a line to measurement j from each of low … high."""
+def least_from(sums, low, high, j, energy):
+    """Least energy, with that before it, of a line to measurement j from one of low … high - 1.
+
+    There are up to `GROUP`; also returns from which. Positive numbers have the order of their bits:
+    with its place in the last five, the least whole number says both. Nothing is written, so that
+    no arrays are compared for overlap, and four lines are evaluated at once.
+    """
     q0, q1, q2, q3, q4, q5 = sums[0, j], sums[1, j], sums[2, j], sums[3, j], sums[4, j], sums[5, j]
     xx, xy, yy = sums[0, low:high], sums[1, low:high], sums[2, low:high]
-    x, y, s = sums[3, low:high], sums[4, low:high], sums[5, low:high]
-    energy, out = energy[low:high], out[low:high]
-    for k in range(len(out)):
-        out[k] = energy[k] + chi_square(
+    x, y, s, energy = sums[3, low:high], sums[4, low:high], sums[5, low:high], energy[low:high]
+    least = np.int64(_LARGEST)
+    for k in range(len(energy)):
+        value = energy[k] + chi_square(
             q0 - xx[k], q1 - xy[k], q2 - yy[k], q3 - x[k], q4 - y[k], q5 - s[k]
         )
+        least = min(least, (np.float64(value).view(np.int64) & -GROUP) | k)
+    return np.int64(least & -GROUP).view(np.float64), low + (least & (GROUP - 1))
 
 
 @helper

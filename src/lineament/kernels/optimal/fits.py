@@ -105,10 +105,11 @@ def fit_line(points, first, end, a, b, noise, piece):
     total, sx, sy, sxx, sxy, syy, used = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         across, square = nx * x[i] + ny * y[i], rho[i] * rho[i]
-        off, share = across - distance, max(across * across / square, 1e-6)
-        variance = (constant + growth * square) * share + bearing * square * (1.0 - share)
-        counts = off * off <= SIGMAS * SIGMAS * (variance + TAU * TAU * share)
-        w, dx, dy = 1.0 / variance if counts else 0.0, x[i] - x0, y[i] - y0
+        # The variance and its scale times ρ², so that one number is divided.
+        off, near = across - distance, max(across * across, 1e-6 * square)
+        spread = (constant + growth * square) * near + bearing * square * (square - near)
+        counts = off * off * square <= SIGMAS * SIGMAS * (spread + TAU * TAU * near)
+        w, dx, dy = square / spread if counts else 0.0, x[i] - x0, y[i] - y0
         total, sx, sy = total + w, sx + w * dx, sy + w * dy
         sxx, sxy, syy = sxx + w * dx * dx, sxy + w * dx * dy, syy + w * dy * dy
         used += 1.0 if counts else 0.0

@@ -18,6 +18,12 @@ _NONE = -1
 
 
 @helper
+def _distance(dx, dy):
+    """Length of a vector: lengths here need not the care of `math.hypot`, a call."""
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@helper
 def around(i, n):
     """Return the number from 0 to n - 1 of what is at most once around more, or less."""
     if i < 0:
@@ -82,7 +88,7 @@ def _corner_over(work, scan, k, m):
     """Kind of the corner of two lines that have another surface between them."""
     spans, x, y = work.spans, work.points[at.X], work.points[at.Y]
     i, j, kind = spans[at.LAST, k], spans[at.FIRST, m], np.int64(_NONE)
-    near = math.hypot(x[i] - x[j], y[i] - y[j]) <= 2.0 * REACH
+    near = _distance(x[i] - x[j], y[i] - y[j]) <= 2.0 * REACH
     if near and spans[at.KIND, k] == spans[at.KIND, m] == at.LINE:
         _, kind = _cross(work, scan, k, m)
     return kind
@@ -110,7 +116,7 @@ def _length(work, k):
     """Distance between the first and the last measurement of a line."""
     x, y = work.points[at.X], work.points[at.Y]
     first, last = work.spans[at.FIRST, k], work.spans[at.LAST, k]
-    return math.hypot(x[last] - x[first], y[last] - y[first])
+    return _distance(x[last] - x[first], y[last] - y[first])
 
 
 @helper
@@ -149,25 +155,25 @@ def _meet(work, scan, k, m):
     meets = between < LEAST and not hole and step * step <= error * error
     # Corners lie near the measurements on both sides, no farther than these have seen of their
     # lines, or within their spacing and its error.
-    reach_i = math.hypot(x[i] - x[i - 1], y[i] - y[i - 1]) + error_i
-    reach_j = math.hypot(x[j + 1] - x[j], y[j + 1] - y[j]) + error_j
+    reach_i = _distance(x[i] - x[i - 1], y[i] - y[i - 1]) + error_i
+    reach_j = _distance(x[j + 1] - x[j], y[j + 1] - y[j]) + error_j
     reach_i = max(min(REACH, _length(work, k)), reach_i)
     reach_j = max(min(REACH, _length(work, m)), reach_j)
     determinant = p[at.A] * q[at.B] - q[at.A] * p[at.B]
     inverse = 1.0 / determinant if determinant != 0.0 else math.nan
     cx, cy = (q[at.B] - p[at.B]) * inverse, (p[at.A] - q[at.A]) * inverse
-    near = math.hypot(cx - x[i], cy - y[i]) <= reach_i and (
-        math.hypot(cx - x[j], cy - y[j]) <= reach_j
+    near = _distance(cx - x[i], cy - y[i]) <= reach_i and (
+        _distance(cx - x[j], cy - y[j]) <= reach_j
     )
     beyond = (cx - p[at.CX]) * p[at.UX] + (cy - p[at.CY]) * p[at.UY] > 0.0 and (
         (cx - q[at.CX]) * q[at.UX] + (cy - q[at.CY]) * q[at.UY] < 0.0
     )
     crosses = near and beyond
-    joined = meets and (crosses or math.hypot(x[i] - x[j], y[i] - y[j]) <= reach_i + reach_j)
+    joined = meets and (crosses or _distance(x[i] - x[j], y[i] - y[j]) <= reach_i + reach_j)
     if not joined and unbroken and not hole:
         square = nearer[at.A] * nearer[at.A] + nearer[at.B] * nearer[at.B]
         bx, by = x[e] + depth * nearer[at.A] / square, y[e] + depth * nearer[at.B] / square
-        face = (x[e] * by - y[e] * bx) / (rho[e] * math.hypot(bx, by)) * (1.0 if e == i else -1.0)
+        face = (x[e] * by - y[e] * bx) / (rho[e] * _distance(bx, by)) * (1.0 if e == i else -1.0)
         beam = (x[i] * y[j] - y[i] * x[j]) / (rho[i] * rho[j] * (between + 1.0))
         joined = 0.5 * beam <= face <= (between + 3.0) * beam
     return joined, meets, crosses

@@ -5,20 +5,18 @@ from typing import Any, NamedTuple
 from ..arrays import Floats1, Floats2, Ints2
 
 #: Of `points`, by measurement in beam order (on a full circle from any beam on): place and range
-#: [m]; least energy of the measurements before; by group, the least energy with a line from one of
-#: its candidates to the anchor; that before a line from a candidate, inf while it runs along; by
-#: block, χ² of the blocks before; two rows of scratch, by measurement or by group; one by row of
-#: groups; and from `AHEAD` on, for each of the three candidates that run along, the energies with
-#: a line from it to the next measurements.
-X, Y, RHO, ENERGY, LOWEST, BASE, BLOCKS, KEY, SCRATCH, ROW_KEY, AHEAD = range(11)
-POINTS = 13
+#: [m]; least energy of the measurements before; that before a line from a candidate, inf while it
+#: runs along; by group of candidates, a bound of the energy with a line from any of them to the
+#: ends behind the block at hand, and to those of the block; two rows of scratch; and from `AHEAD`
+#: on, for both candidates that run along, the energies with a line to the next measurements.
+X, Y, RHO, ENERGY, BASE, BOUND, NOW, KEY, SCRATCH, AHEAD = range(10)
+POINTS = 11
 #: Of `beams`, by measurement: its beam; whether a break is before it; the measurement at which the
 #: line that ends before it begins, or -1; first and last measurement of each cluster.
 BEAM, BROKEN, ORIGIN, CLUSTER_FIRST, CLUSTER_LAST = range(5)
 BEAMS = 5
-#: The candidates that run along; the anchor of each group of candidates; before, whether a
-#: measurement is a spike.
-RUNNER, ANCHOR, SPIKE = CLUSTER_FIRST, CLUSTER_LAST, CLUSTER_FIRST
+#: The candidates that run along; before, whether a measurement is a spike.
+RUNNER, SPIKE = CLUSTER_FIRST, CLUSTER_FIRST
 #: Of a row of `pieces`, by surface: the line a x + b y = 1 [1/m]; its centroid [m] and direction;
 #: the covariance of its offset there and its angle; root mean square and misfit [m]. Of an arc:
 #: centre, radius [m], six covariances, root mean square [m], and by how much lines are worse.

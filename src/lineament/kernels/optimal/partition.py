@@ -3,8 +3,8 @@
 The energy of a partition is, over its lines, their least χ² at the scale of the surface and the
 `evidence` that each costs, and a price for each measurement on no line. Jackson et al., *An
 algorithm for optimal partitioning of data on an interval*, IEEE Signal Processing Letters 2005,
-find its minimum by a recurrence; most of its terms need not be evaluated here, by a bound that is
-kept lazily. ``docs/optimal.md`` has the derivation.
+find its minimum by a recurrence; most of its terms need not be evaluated here, by what they were
+when they were evaluated before. ``docs/optimal.md`` has the derivation.
 """
 
 import math
@@ -14,12 +14,13 @@ import numpy as np
 from .. import contracted, helper, inlined
 from . import layout as at
 from .constants import CLUTTER, LEAST
-from .costs import cost, costs_from, costs_on
+from .costs import GROUP, costs_on, least_from
 
-#: Measurements of the blocks that bound χ² from below, candidates of a group, groups of a row, and
-#: candidates that run along. They change the time, not the result: a group is whole blocks, and
-#: `_part_block` names the three runners.
-BLOCK, GROUP, ROW, RUNNERS = 8, 16, 16, 3
+#: Candidates that run along. As many as in a `GROUP`, they change the time, not the result;
+#: `_part_block` names both.
+RUNNERS = 2
+#: As a whole number.
+_BITS_OF_INFINITY = 0x7FF0000000000000
 
 
 @inlined
@@ -54,10 +55,10 @@ def partition(work, count, evidence):
 def _part_stretch(work, first, last, evidence):
     """Part the measurements first … last - 1, knowing the least energy of those before.
 
-    Candidates for the beginning of the last line come in groups, and groups in rows. A group has a
-    key: with the blocks that end by now it is a lower bound of the energy with a line from any of
-    them on. Groups below the least energy found so far are opened. The few candidates that were
-    least run along: they are always evaluated, and do not count for their group.
+    Candidates for the beginning of the last line come in groups. A group has a lower bound of the
+    energy with a line from any of them on; groups whose bound is below the least energy found so
+    far are opened. The few candidates that were least run along: they are always evaluated, and do
+    not count for their group.
     """
     points, beams, sums = work.points, work.beams, work.sums
     energy, origin, begin = points[at.ENERGY], beams[at.ORIGIN], first + LEAST
@@ -66,19 +67,15 @@ def _part_stretch(work, first, last, evidence):
     low = _follow_line(energy, origin, sums, first, last, evidence)
     if low > last:
         return
-    _bound_blocks(points[at.BLOCKS], sums, first, last)
     for r in range(RUNNERS):
         beams[at.RUNNER, r] = first
-    points[at.BASE, first], oldest, bound = math.inf, np.int64(0), math.inf
+    oldest = np.int64(0)
     for start in range(begin, last + 1, GROUP):
         end = min(start + GROUP, last + 1)
         if start < low:
-            key = _add_group(points, beams, first, start, end, evidence)
-            bound = min(bound, key)
+            _add_group(points, first, start, end, evidence)
         else:
-            oldest, bound = _part_block(
-                points, beams, sums, first, start, end, oldest, bound, evidence
-            )
+            oldest = _part_block(points, beams, sums, first, start, end, oldest, evidence)
 
 
 @contracted
@@ -100,146 +97,122 @@ def _follow_line(energy, origin, sums, first, last, evidence):
 
 
 @contracted
-def _part_block(points, beams, sums, first, low, high, oldest, bound, evidence):
-    """Find the least energies of the ends low … high, whose candidates are the last group.
+def _part_block(points, beams, sums, first, low, high, oldest, evidence):
+    """Find the least energies of the ends low … high - 1, whose candidates are the last group.
 
-    `bound` is the least key of the groups before. Returns the first group that may still be
-    opened, and the least key.
+    Returns the first group that may still be opened.
     """
-    energy, base, blocks, ahead = (
-        points[at.ENERGY], points[at.BASE], points[at.BLOCKS], points[at.AHEAD :]
+    energy, base, ahead, now = (
+        points[at.ENERGY], points[at.BASE], points[at.AHEAD :], points[at.NOW]
     )  # fmt: skip
     origin, runner, price = beams[at.ORIGIN], beams[at.RUNNER], CLUTTER * evidence
     most = max(1.0, (LEAST - 1) * CLUTTER) * evidence
     for r in range(RUNNERS):
         costs_on(sums, runner[r], low, high, energy[runner[r]] + evidence, ahead[r])
-    q, key, lowest, anchor = (low - first - LEAST) // GROUP, math.inf, math.inf, first
-    total = energy[low - 1]
+    q, lowest, total = (low - first - LEAST) // GROUP, math.inf, energy[low - 1]
+    oldest, bound = _raise_bounds(points, sums, low, high, oldest, q, total + most)
     # Slices, as numba need not look for negative indices where a loop begins at 0.
-    begins, bases, blocks = energy[low - LEAST :], base[low - LEAST :], blocks[q * GROUP // BLOCK :]
-    one, two, three = ahead[0, low:high], ahead[1, low:high], ahead[2, low:high]
+    begins, bases = energy[low - LEAST :], base[low - LEAST :]
+    one, two = ahead[0, low:high], ahead[1, low:high]
     energies, origins = energy[low:high], origin[low:high]
     for k in range(len(one)):
-        leader, least = 0, one[k]
-        leader = 1 if two[k] < least else leader
-        least = min(two[k], least)
-        leader = 2 if three[k] < least else leader
-        least = min(three[k], least)
+        leader, least = 1 if two[k] < one[k] else 0, min(two[k], one[k])
         found = runner[leader] if least < total + price else np.int64(-1)
         total = min(least, total + price)
-        own, ended = begins[k] + evidence, blocks[(k + LEAST) // BLOCK]
-        bases[k] = own if low + k > first + LEAST else math.inf
-        key = min(key, bases[k] - blocks[(k + BLOCK - 1) // BLOCK])
-        lowest, anchor = min(lowest, own), low + k - LEAST
-        if min(bound, key) + ended < total:
-            _set_group(points, beams, q, key, lowest, anchor)
-            total, found, oldest = _open_groups(
-                points, beams, sums, first, low + k, high, oldest, evidence, total, found
+        bases[k] = begins[k] + evidence if low + k > first + LEAST else math.inf
+        lowest = min(lowest, bases[k])
+        if min(bound, lowest) < total:
+            now[q] = lowest
+            total, found, oldest, bound = _open_groups(
+                points, beams, sums, first, low + k, high, oldest, q, evidence, total, found
             )
-            # What is so far above can never be the least again.
-            while oldest < q and points[at.KEY, oldest] + ended > total + most:
-                oldest += 1
-            key, lowest, bound = points[at.KEY, q], points[at.LOWEST, q], math.inf
-            anchor = beams[at.ANCHOR, q]
-            for row in range(oldest // ROW, q // ROW + 1):
-                bound = min(bound, points[at.ROW_KEY, row])
+            lowest = now[q]
         energies[k], origins[k] = total, found
-    _set_group(points, beams, q, key, lowest, anchor)
-    return oldest, min(bound, key)
+    points[at.BOUND, q] = lowest
+    return oldest
 
 
 @helper
-def _add_group(points, beams, first, low, high, evidence):
-    """Make a group of the candidates for ends from low … high, and return its key."""
-    energy, base, blocks = points[at.ENERGY], points[at.BASE], points[at.BLOCKS]
-    q, key, lowest = (low - first - LEAST) // GROUP, math.inf, math.inf
+def _add_group(points, first, low, high, evidence):
+    """Make a group of the candidates for ends from low … high."""
+    energy, base, lowest = points[at.ENERGY], points[at.BASE], math.inf
     for i in range(low - LEAST, high - LEAST):
         base[i] = energy[i] + evidence if i > first else math.inf
-        key = min(key, base[i] - blocks[(i - first + BLOCK - 1) // BLOCK])
-        lowest = min(lowest, energy[i] + evidence)
-    _set_group(points, beams, q, key, lowest, high - 1 - LEAST)
-    return key
-
-
-@helper
-def _set_group(points, beams, q, key, lowest, anchor):
-    """Write the key of the last group, the least energy before its lines, and its anchor."""
-    points[at.KEY, q], points[at.LOWEST, q], beams[at.ANCHOR, q] = key, lowest, anchor
-    others = points[at.ROW_KEY, q // ROW] if q % ROW else math.inf
-    points[at.ROW_KEY, q // ROW] = min(others, key)
+        lowest = min(lowest, base[i])
+    points[at.BOUND, (low - first - LEAST) // GROUP] = lowest
 
 
 @contracted
-def _open_groups(points, beams, sums, first, j, end, oldest, evidence, total, found):
-    """Open the groups whose key is less than the least energy before measurement j.
+def _raise_bounds(points, sums, low, high, oldest, groups, most):
+    """Take the bounds for the ends low … high - 1, and raise them for those behind.
+
+    A line that goes on over measurements gets worse by as much as their own line is bad. So a
+    group whose bound is not below what the runners have over that, at any of these ends, is shut.
+    Returns the first group whose bound is not above `most`, so far that it can never be the least
+    again, and the least bound.
+    """
+    while oldest < groups and points[at.BOUND, oldest] > most:
+        oldest += 1
+    one, two = points[at.AHEAD, low:high], points[at.AHEAD + 1, low:high]
+    own, largest = points[at.SCRATCH, low:high], np.int64(0)
+    costs_on(sums, low - 1, low, high, 0.0, points[at.SCRATCH])
+    for k in range(len(own)):
+        own[k] = own[k] if own[k] < math.inf else 0.0
+    for k in range(len(own)):
+        largest = max(largest, np.float64(min(one[k], two[k]) - own[k]).view(np.int64))
+    limit, rise = np.int64(largest).view(np.float64), own[len(own) - 1]
+    now, bound = points[at.NOW, oldest:groups], points[at.BOUND, oldest:groups]
+    for k in range(len(now)):
+        now[k] = bound[k] if bound[k] < limit else math.inf
+        bound[k] += rise
+    return oldest, _least(now)
+
+
+@contracted
+def _open_groups(points, beams, sums, first, j, end, oldest, newest, evidence, total, found):
+    """Open the groups whose bound is less than the least energy before measurement j.
 
     The least candidate of a group that is now less than a runner takes its place, and the runner
-    goes back to its own group. Returns the least energy, the candidate that it is of, and the first
-    group that may still be opened.
+    goes back to its own group. Returns the least energy, the candidate that it is of, the first
+    group that may still be opened, and the least bound.
     """
-    blocks = points[at.BLOCKS]
-    ended, began = blocks[(j - first) // BLOCK], blocks[(j - first + BLOCK - 1) // BLOCK]
-    energy, key, row_key = points[at.ENERGY], points[at.KEY], points[at.ROW_KEY]
-    lowest, anchor = points[at.LOWEST], beams[at.ANCHOR]
-    base, scratch = points[at.BASE], points[at.SCRATCH]
-    last, back = j - LEAST + 1, oldest
-    groups = (last - 1 - first) // GROUP + 1
-    for row in range(oldest // ROW, (groups - 1) // ROW + 1):
-        if row_key[row] + ended >= total:
+    energy, base, now, bound = (
+        points[at.ENERGY], points[at.BASE], points[at.NOW], points[at.BOUND]
+    )  # fmt: skip
+    bounds, eldest = now[oldest : newest + 1], oldest
+    for k in range(len(bounds)):
+        if bounds[k] >= total:
             continue
-        row_key[row] = math.inf
-        least_group = max(row * ROW, oldest)
-        keys = key[least_group : min((row + 1) * ROW, groups)]
-        for k in range(len(keys)):
-            if keys[k] + ended >= total:
-                continue
-            q = least_group + k
-            low = first + q * GROUP
-            # Each line is at least as bad as one up to the anchor and one from there on. Of few
-            # measurements, the differences of the running sums have lost too many digits.
-            rest = cost(sums, anchor[q], j) if j - anchor[q] >= BLOCK else 0.0
-            key[q] = lowest[q] - began + (rest if rest < math.inf else 0.0)
-            if key[q] + began >= total:
-                continue
-            high = min(low + GROUP, last)
-            costs_from(sums, low, high, j, base, scratch)
-            least, best = _least(scratch[low:high])
-            rest, best = least, low + best
-            found = best if least < total else found
-            total = min(least, total)
-            runs, worst = _is_runner(points, j, least)
-            if runs:
-                scratch[best] = math.inf
-                rest, _ = _least(scratch[low:high])
-            key[q] = rest - began
-            if low + GROUP <= last:
-                anchor[q], lowest[q] = j, key[q] + began
-            if runs:
-                out = beams[at.RUNNER, worst]
-                group = (out - first) // GROUP
-                base[out], base[best] = energy[out] + evidence, math.inf
-                key[group] = min(key[group], points[at.AHEAD + worst, j] - began)
-                row_key[group // ROW] = min(row_key[group // ROW], key[group])
-                rest = cost(sums, out, anchor[group])
-                rest = energy[out] + evidence + (rest if rest < math.inf else 0.0)
-                lowest[group] = min(lowest[group], rest)
-                back = min(back, group)
-                beams[at.RUNNER, worst], points[at.AHEAD + worst, j] = best, least
-                before = energy[best] + evidence
-                costs_on(sums, best, j + 1, end, before, points[at.AHEAD + worst])
-        lower, _ = _least(keys)
-        row_key[row] = min(row_key[row], lower)
-    return total, found, back
+        q = eldest + k
+        low = first + q * GROUP
+        high = min(low + GROUP, j - LEAST + 1)
+        least, best = least_from(sums, low, high, j, base)
+        rest = least
+        found = best if least < total else found
+        total = min(least, total)
+        runs, worst = _is_runner(points, j, least)
+        if runs:
+            base[best] = math.inf
+            rest, _ = least_from(sums, low, high, j, base)
+        now[q] = bound[q] = rest
+        if runs:
+            out, back = beams[at.RUNNER, worst], points[at.AHEAD + worst, j]
+            group = (out - first) // GROUP
+            base[out], oldest = energy[out] + evidence, min(oldest, group)
+            now[group], bound[group] = min(now[group], back), min(bound[group], back)
+            beams[at.RUNNER, worst], points[at.AHEAD + worst, j] = best, least
+            before = energy[best] + evidence
+            costs_on(sums, best, j + 1, end, before, points[at.AHEAD + worst])
+    return total, found, oldest, _least(now[oldest : newest + 1])
 
 
 @helper
 def _least(values):
-    """Return the least of some values, and the first that it is."""
-    least, first = math.inf, np.int64(0)
-    for k in range(len(values)):
-        first = k if values[k] < least else first
-        least = min(values[k], least)
-    return least, first
+    """Return the least of some positive values: their bits have their order."""
+    bits, least = values.view(np.int64), np.int64(_BITS_OF_INFINITY)
+    for k in range(len(bits)):
+        least = min(least, bits[k])
+    return np.int64(least).view(np.float64)
 
 
 @helper
@@ -249,18 +222,3 @@ def _is_runner(points, j, least):
     for r in range(1, RUNNERS):
         worst = r if points[at.AHEAD + r, j] > points[at.AHEAD + worst, j] else worst
     return least < points[at.AHEAD + worst, j], worst
-
-
-@helper
-def _bound_blocks(blocks, sums, first, last):
-    """Sum the χ² of the blocks before each block of measurements.
-
-    A line over some blocks costs at least as much as each has with a line for itself.
-    """
-    total, b = 0.0, 0
-    for low in range(first, last + 1, BLOCK):
-        blocks[b], own = total, 0.0
-        if low + BLOCK <= last:
-            own = cost(sums, low, low + BLOCK)
-        total, b = total + (own if own < math.inf else 0.0), b + 1
-    blocks[b] = total
