@@ -1,11 +1,14 @@
 """Many recorded scans on one sheet, and the stages of each: to be looked at.
 
-Run: python benchmarks/contact_sheet.py [-m METHOD] -o FOLDER, with LINEAMENT_DATA.
+Run: python benchmarks/contact_sheet.py [-m METHOD] [--new SEED] -o FOLDER, with LINEAMENT_DATA.
+By `--new` two scans by chance of each of fifteen recordings, six a sheet, in place of those that
+are always drawn.
 """
 
 import argparse
 import os
 from pathlib import Path
+from random import Random
 
 from lineament import Extractor, open_log
 from lineament.output.canvas import figure_bytes
@@ -39,16 +42,32 @@ SHEET = (
     ("text/tinyslam_exp1.dat.gz", 380),
     ("text/lidar01.csv", 0),
 )
+#: Recordings that `--new` leaves out: few scans, or the same data as another.
+FEW = ("jackal_mocap.bag", "scans_2025", "lidar01", "urg_v1_2", "two_publishers", "stationary")
+
+
+def new_scans(seed: int) -> list[tuple[str, int]]:
+    """Return two scans of each recording, by chance."""
+    logs = {file: None for file, _ in SHEET if not any(part in file for part in FEW)}
+    logs |= dict.fromkeys(("truth/obstdet_front_scan.npz", "truth/jackal_mocap_02171554.npz"))
+    chance, there = Random(seed), [file for file in logs if (DATA / file).exists()]
+    lengths = [len(open_log(DATA / file, keep_going=True)) for file in there]
+    return [
+        (file, k)
+        for file, n in zip(there, lengths, strict=True)
+        for k in sorted(chance.sample(range(n), 2))
+    ]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("-m", "--method", default="optimal")
+    parser.add_argument("--new", type=int, metavar="SEED")
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     extract, scans = Extractor(given.method), []
-    for file, number in SHEET:
+    for file, number in SHEET if given.new is None else new_scans(given.new):
         if not (DATA / file).exists():
             continue
         scan = open_log(DATA / file, keep_going=True).scan(number)
@@ -56,10 +75,13 @@ def main() -> None:
         scans.append((title, scan, extract(scan)))
         figure = trace_figure(extract.trace(scan), title=f"{title} · {given.method}")
         (given.output / f"trace_{len(scans):02}.png").write_bytes(figure_bytes(figure, dpi=75))
+    for k in range(0, len(scans) if given.new is not None else 0, 6):
+        sheet = scans_figure(scans[k : k + 6], title="")
+        (given.output / f"new_{k // 6}.png").write_bytes(figure_bytes(sheet, dpi=110))
     for name, dark in (("light", False), ("dark", True)):
         sheet = scans_figure(scans, title=f"What {given.method} finds", dark=dark)
         (given.output / f"scans_{name}.png").write_bytes(figure_bytes(sheet, dpi=75))
-    print(f"{len(scans)} scans, {len(scans) + 2} pictures in {given.output}")
+    print(f"{len(scans)} scans, drawn in {given.output}")
 
 
 if __name__ == "__main__":

@@ -1,17 +1,19 @@
 """Parts of locating by hand-worked cases: local maps, votes, evidence, what is followed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from handmade import features
 from small_room import RING, plan_of, query_at, scans_on
 
-from lineament import Extractor, Tracker
+from lineament import Extractor, LaserScan, RangeNoise, Tracker
 from lineament.mapping import LineMap, LocalMap, Query, locate
 from lineament.mapping.evidence import Evidence, evidence_of
 from lineament.mapping.following import Follower
 from lineament.mapping.hypotheses import anchors, directions, hypotheses
-from lineament.mapping.local_map import moved_beams, thinned
+from lineament.mapping.local_map import beams_of, moved_beams, thinned
 from lineament.mapping.locate import Location, _searched
 from lineament.mapping.refine import adjusted
 from lineament.mapping.walls import walls_of
@@ -61,6 +63,20 @@ def test_beams_end_at_the_same_places_in_another_frame():
     steps = [(ends(np.add(pose, 1e-6 * step))[0] - here) / 1e-6 for step in root.T]
     spread = np.einsum("kni,knj->nij", steps, steps)
     np.testing.assert_allclose(moved[:, 7:], spread.reshape(-1, 4)[:, (0, 1, 3)], rtol=1e-4)
+
+
+def test_beams_know_their_noise_or_are_known_to_2_cm():
+    ranges = [1.0, 2.0, math.nan, 10.0]
+    scan = LaserScan(ranges, 0.0, 0.5)
+    for noise, sigmas in (
+        (None, (0.02, 0.02, 0.02)),
+        (RangeNoise(0.03, proportional=0.02), np.hypot(0.03, (0.02, 0.04, 0.2))),
+    ):
+        found = replace(features(), noise=noise)
+        beams = beams_of(found, scan)
+        np.testing.assert_allclose(np.arctan2(beams[:, 3], beams[:, 2]), (0.0, 0.5, 1.5))
+        np.testing.assert_allclose(beams[:, 4], (1.0, 2.0, 10.0))
+        np.testing.assert_allclose(beams[:, 5], np.square(sigmas))
 
 
 def test_one_beam_is_kept_of_those_that_end_in_a_square_and_no_more_than_160():
@@ -185,6 +201,11 @@ def test_what_beams_say_of_a_pose():
         assert odds == pytest.approx(says / 3)
         np.testing.assert_allclose(shares, np.array((hits, short, behind)) / 30)
     assert not evidence_of(np.zeros((2, 3)), beams[:0], plan.index, 0.02).any()
+    # What is known of a pose before adds to what beams say.
+    poses, known = np.zeros((3, 3)), np.array((-2.0, 0.0, 5.0))
+    alone, both = (evidence_of(poses, beams, plan.index, 0.02, before=k) for k in (0.0, known))
+    np.testing.assert_allclose(both[:, 0], alone[:, 0] + known)
+    np.testing.assert_array_equal(both[:, 1:], alone[:, 1:])
 
 
 def follower(covariance, verdict="located"):

@@ -1,6 +1,7 @@
 """Parts of maps of drives by hand-worked cases: walls and lines, what is expected, loops."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ from small_room import scans_on
 
 from lineament import Extractor, Tracker
 from lineament.features import SEGMENT
-from lineament.mapping import LocalMap
+from lineament.mapping import LocalMap, making
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
-from lineament.mapping.making import single
+from lineament.mapping.making import found_on, single
 from lineament.mapping.sights import SIGHT, lines_of, merged, sights_of, walls_along
 from lineament.mapping.walls import walls_of
 from lineament.scan.poses import compose
@@ -63,6 +64,19 @@ def test_the_likeliest_turns_are_those_near_the_expected_one(turned):
     assert sorted(np.round(off[:2] / (math.pi / 4)).tolist()) == [-1, 1]
 
 
+def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
+    """Of five places two are wrong alike in direction, but not in where they are."""
+    poses = np.column_stack((3.0 * np.arange(6), np.zeros((6, 2))))
+    survey = Survey([None] * 6, poses, None, None)
+    seen = [(9.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.1, 2.0, 0.0), (-7.0, 4.0, 0.0), (1.0, 2.1, 1.0)]
+    queries = [(k, compose(move, survey.pose(k))) for k, move in enumerate(seen)]
+    monkeypatch.setattr(Survey, "queries", lambda *_: queries)
+    monkeypatch.setattr(making, "locate", lambda pose, _: SimpleNamespace(pose=pose))
+    assert found_on(None, survey, 0) in (seen[1], seen[2])
+    assert found_on(None, survey, 3) in (seen[3], seen[4])
+    assert found_on(None, survey, 5) is None
+
+
 def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
     """A wall of 4 m between two of 1 m, which do not touch each other."""
     ends = np.array([(-3.1, 0, -2.1, 0), (-2, 0, 2, 0), (2.1, 0, 3.1, 0)]).reshape(-1, 2, 2)
@@ -76,6 +90,46 @@ def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
         lines = lines_of(sights, np.zeros((1, 3)), 3)
         found = merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"]
         assert found.tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("middle", [0.0, math.pi, math.pi / 2])
+def test_parts_of_a_wall_are_one_whatever_its_direction(middle):
+    """Two parts of 2 m in one line, 10 cm from each other, whose directions differ by 20 mrad."""
+    segments = np.zeros(2, SEGMENT)
+    for k, (along, turn) in enumerate([(-1.05, -0.01), (1.05, 0.01)]):
+        u, own = (np.array((math.cos(a), math.sin(a))) for a in (middle, middle + turn))
+        segments["centroid"][k] = along * u
+        segments["start"][k], segments["end"][k] = along * u - own, along * u + own
+        segments["angle"][k] = math.remainder(middle + turn, 2 * math.pi)
+    segments["length"], segments["covariance"] = 2.0, np.diag((0.01, 0.02)) ** 2
+    sights = sights_of([(segments, np.arange(2))])
+    lines = lines_of(sights, np.zeros((1, 3)), 2)
+    assert merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"].tolist() == [0, 0]
+
+
+def test_a_wall_along_another_is_hidden_by_it_up_to_10_degrees():
+    for degrees, left in ((9.5, 1), (10.5, 2)):
+        half = 0.5 * np.array((math.cos(math.radians(degrees)), math.sin(math.radians(degrees))))
+        ends = np.array([[(-5, 0), (5, 0)], [-half, half]], float)
+        walls = walls_of(ends)
+        walls["views"] = 9, 3
+        assert len(single(walls)) == left
+
+
+def test_turns_and_places_that_are_tried():
+    """Five places each way, by a deviation of 10 to 30 cm; seven turns, by half of one."""
+    placed, extract = Drive(), Extractor()
+    for scan in scans_on([0.0]):
+        placed.add(scan, found := extract(scan))
+    for way, turn, step, angle in (
+        (0.02, 0.02, 0.1, 0.05), (0.2, 0.16, 0.2, 0.08), (9.0, 3.0, 0.3, 0.1)
+    ):  # fmt: skip
+        tried = placed._tried(found, (1.0, 2.0, 0.5), way, turn)
+        for column, middle in ((0, 1.0), (1, 2.0)):
+            expected = middle + step * np.arange(-2, 3)
+            np.testing.assert_allclose(np.unique(tried[:, column].round(9)), expected)
+        turns = np.unique(tried[:, 2].round(9))
+        assert {*(0.5 + angle * np.arange(-3, 4)).round(9)} <= {*turns}
 
 
 def test_poses_near_the_expected_one_are_tried():
@@ -147,6 +201,10 @@ def test_sights_keep_of_a_segment_its_misfit_and_noise_as_squares():
     assert (sight["frame"], sight["wall"]) == (0, 7)
     assert sight["misfit"] == pytest.approx(36e-6)
     assert sight["noise"] == pytest.approx(64e-6 / math.sqrt(25 * math.pi))
+    np.testing.assert_allclose(sight["covariance"], segments["covariance"][0])
+    # Surfaces that are 2 cm off, each time elsewhere, are so over 3 m.
+    rough = sights_of([(segments, np.array([7]))], 0.02)["covariance"] - sight["covariance"]
+    np.testing.assert_allclose(rough[0], np.diag((4e-4, 4 * 4e-4 / 9)))
     # More misfit than scatter is rounding.
     segments["misfit"] = 0.011
     assert sights_of([(segments, np.array([7]))])["noise"].tolist() == [0.0]
@@ -194,6 +252,12 @@ def test_where_a_way_was_passed_before():
     poses = np.concatenate([np.add(across, (0, k, 0)) for k in (3, 0.5, 1, 9)] + [across[20:21]])
     survey = Survey([Frame() for _ in poses], poses, None, None)
     assert survey._passed(160, 3.5) == [60, 100]
+    # Four key frames beyond reach between two that are within part no stretches; five do.
+    for apart, stretches in ((4, [0]), (5, [0, 8])):
+        near, far = np.zeros((3, 3)), np.tile((90.0, 0.0, 0.0), (apart, 1))
+        poses = np.concatenate((near, far, np.add(near, (0.1, 0, 0)), [(500.0, 0, 0)], near[:1]))
+        survey = Survey([Frame() for _ in poses], poses, None, None)
+        assert survey._passed(len(poses) - 1, 2.0) == stretches
     # Where it was lost, what was seen before is far.
     frames = [Frame(k == 10) for k in range(20)]
     survey = Survey(frames, np.column_stack((np.arange(20) * 0.5, np.zeros((20, 2)))), None, None)

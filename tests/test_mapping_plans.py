@@ -5,12 +5,14 @@ import math
 import ezdxf
 import numpy as np
 import pytest
+from ezdxf.units import METER_FACTOR
 
 import lineament as ln
 from lineament.cli import run
 from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
 from lineament.mapping import LineMap, locate
+from lineament.mapping.drawings import UNITS
 from lineament.simulation import SENSORS, drive, office, room
 
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
@@ -144,6 +146,22 @@ def test_dxf_in_any_unit_with_blocks_and_polylines(tmp_path, unit):
     np.testing.assert_allclose(plan.columns["center"], [[2, 1]])
 
 
+def test_units_of_a_dxf_are_those_of_the_format():
+    known = {number: per for number, per in enumerate(METER_FACTOR) if per is not None}
+    assert len(known.keys() & UNITS.keys()) >= 10
+    for number in known.keys() & UNITS.keys():
+        assert UNITS[number] == pytest.approx(1.0 / known[number], rel=1e-4)
+
+
+def test_an_arc_however_small_has_two_chords_for_a_quarter(tmp_path):
+    for radius, chords in ((1e-3, 2), (1.0, 6)):
+        drawing = ezdxf.new("R2010", units=6)
+        drawing.modelspace().add_line((0, 5), (4, 5))
+        drawing.modelspace().add_arc((0, 0), radius, 0, 90)
+        drawing.saveas(tmp_path / "plan.dxf")
+        assert len(LineMap.read(tmp_path / "plan.dxf").walls) == 1 + chords
+
+
 def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
     """Of two walls one is in a block whose place has one number that is none."""
     drawing = ezdxf.new("R2010", units=6)
@@ -152,6 +170,28 @@ def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
     drawing.modelspace().add_blockref("wall", (math.nan, 1.0))
     drawing.saveas(tmp_path / "plan.dxf")
     plan = LineMap.read(tmp_path / "plan.dxf")
+    assert plan.ends.tolist() == [[[0, 0], [4, 0]]]
+    assert plan.left_out == 1
+
+
+@pytest.mark.parametrize("what", ["knots", "weights"])
+def test_a_spline_of_numbers_that_are_none_is_left_out(tmp_path, what):
+    for value, more in ((1.0, 1), (math.nan, 0)):
+        drawing = ezdxf.new("R2010", units=6)
+        drawing.modelspace().add_line((0, 0), (4, 0))
+        spline = drawing.modelspace().add_spline()
+        points = [(0, 1, 0), (1, 2, 0), (2, 1, 0), (3, 2, 0)]
+        spline.set_open_rational(points, [1, 1, 1, value if what == "weights" else 1])
+        if what == "knots":
+            spline.knots = [*list(spline.knots)[:-1], value]
+        drawing.saveas(tmp_path / "plan.dxf")
+        assert (len(LineMap.read(tmp_path / "plan.dxf").walls) > 1) == bool(more)
+
+
+def test_walls_whose_covariance_has_one_number_that_is_none_are_left_out():
+    walls = LineMap.from_lines([[0, 0, 4, 0], [0, 0, 0, 3]]).walls.copy()
+    walls["covariance"][1, 0, 1] = math.nan
+    plan = LineMap(walls)
     assert plan.ends.tolist() == [[[0, 0], [4, 0]]]
     assert plan.left_out == 1
 

@@ -213,6 +213,9 @@ def test_all_walls_near_a_place_are_listed():
     assert (outward > 0).all()
     np.testing.assert_allclose(table[n:, 6], 1e-4)
     low, cell, (wide, high) = grid[:2], grid[2], grid[3:].astype(int)
+    # Each cell has two lists: of the walls near it, and of those that cross it.
+    assert len(begins) == 2 * wide * high + 1
+    assert begins[-1] == len(members)
     for place in np.random.default_rng(0).uniform((-3.5, -2.5), (4.5, 3.5), (200, 2)):
         i, j = np.floor((place - low) / cell).astype(int)
         assert 0 <= i < wide

@@ -7,7 +7,8 @@ import numpy as np
 from . import as_covariance, helper
 from ..features import records as at
 
-#: Spread of a corner at which half are found again from another place, and how fast that falls.
+#: Spread of a corner at which half are found again from another place, and how fast that falls;
+#: fitted by ``benchmarks/quality.py``.
 _SPREAD, _FALL = 0.78, 2.4
 #: The same of an edge at a jump, by its prominence, and how fast that rises.
 _PROMINENCE, _RISE = 130.0, 0.38
