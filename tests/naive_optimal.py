@@ -202,20 +202,22 @@ def border_covariances(xy, rho, noise, border, segments, evidence):
         z = max(rise, 0) / deviation
         return math.exp(-1.6 * z - 0.07 * z**3)
 
-    others = []
+    others, first = [], np.arange(n) < border
     for way in (-1, 1):
         step, odds = 1, 1.0
         while odds > 1e-6 and 4 <= border + way * step <= n - 4:
             i = border + way * step
-            moved = (np.arange(n) < i) != (np.arange(n) < border)
-            odds = odds_of(energy(i) - energy(border), moved * (xy @ (lines[0] - lines[1])))
             pair = surface_line(xy[:i], rho[:i], noise), surface_line(xy[i:], rho[i:], noise)
+            # By how much each measurement's line is another one, with both refitted.
+            apart = np.where(np.arange(n) < i, xy @ pair[0], xy @ pair[1])
+            apart -= np.where(first, xy @ lines[0], xy @ lines[1])
+            odds = odds_of(energy(i) - energy(border), apart)
             others.append((odds, pair))
             step *= 4
     angles = [math.atan2(line[0], -line[1]) for line in lines]
     if abs(math.remainder(angles[1] - angles[0], 2 * math.pi)) < math.radians(20):
         joint = surface_line(xy, rho, noise)
-        apart = np.where(np.arange(n) < border, xy @ (lines[0] - joint), xy @ (lines[1] - joint))
+        apart = xy @ joint - np.where(first, xy @ lines[0], xy @ lines[1])
         rise = chi_square(xy, rho, noise) - energy(border) - 8 * evidence
         others.append((odds_of(rise, apart), (joint, joint)))
     total, found = 1 + sum(odds for odds, _ in others), []
