@@ -182,36 +182,57 @@ def surface_line(xy, rho, noise):
     return np.linalg.lstsq(weight[:, None] * xy, weight, rcond=None)[0]
 
 
-def border_deviation(xy, rho, noise, border):
-    """Root mean square of by how many measurements a border between two lines is off.
+def border_covariances(xy, rho, noise, border, segments, evidence):
+    """What comes to the covariances of two segments as the border between them may be elsewhere.
 
-    It lies one elsewhere with the odds exp -Δχ²/2, at the scale of the noise.
+    Farther off by 1, 4, 16 ... measurements, as long as that is not out of the question; or
+    nowhere, if they turn by less than 20°, where they become one line at a rise of 8 β.
     """
+    n, before, after = len(rho), slice(0, border), slice(border, len(rho))
+    lines = [surface_line(xy[own], rho[own], noise) for own in (before, after)]
+    variance = noise[0] + noise[1] * rho[border - 1] * rho[border]
+    share = variance / (variance + SURFACE**2)
 
-    def odds(i):
-        own = chi_square(xy[:i], rho[:i], noise) + chi_square(xy[i:], rho[i:], noise)
-        variance = variance_of(rho[border], noise)
-        return math.exp(-own / 2 * (variance + SURFACE**2) / variance)
+    def energy(i):
+        return chi_square(xy[:i], rho[:i], noise) + chi_square(xy[i:], rho[i:], noise)
 
-    elsewhere = odds(border - 1) + odds(border + 1)
-    return math.sqrt(elsewhere / (odds(border) + elsewhere))
+    def odds_of(rise, differences):
+        weight = 1 / (variance_of(rho, noise) + SURFACE**2)
+        deviation = 2 * math.sqrt(share * sum(weight * (rho * differences) ** 2))
+        z = max(rise, 0) / deviation
+        return math.exp(-1.6 * z - 0.07 * z**3)
+
+    others, first = [], np.arange(n) < border
+    for way in (-1, 1):
+        step, odds = 1, 1.0
+        while odds > 1e-6 and 4 <= border + way * step <= n - 4:
+            i = border + way * step
+            pair = surface_line(xy[:i], rho[:i], noise), surface_line(xy[i:], rho[i:], noise)
+            # By how much each measurement's line is another one, with both refitted.
+            apart = np.where(np.arange(n) < i, xy @ pair[0], xy @ pair[1])
+            apart -= np.where(first, xy @ lines[0], xy @ lines[1])
+            odds = odds_of(energy(i) - energy(border), apart)
+            others.append((odds, pair))
+            step *= 4
+    angles = [math.atan2(line[0], -line[1]) for line in lines]
+    if abs(math.remainder(angles[1] - angles[0], 2 * math.pi)) < math.radians(20):
+        joint = surface_line(xy, rho, noise)
+        apart = xy @ joint - np.where(first, xy @ lines[0], xy @ lines[1])
+        rise = chi_square(xy, rho, noise) - energy(border) - 8 * evidence
+        others.append((odds_of(rise, apart), (joint, joint)))
+    total, found = 1 + sum(odds for odds, _ in others), []
+    for k, segment in enumerate(segments):
+        own = at_centroid(lines[k], segment)
+        changes = [(odds, at_centroid(pair[k], segment) - own) for odds, pair in others]
+        found.append(sum(odds * np.outer(change, change) for odds, change in changes) / total)
+    return found
 
 
-def border_covariance(xy, rho, noise, segment, without, more, off):
-    """What comes to a segment's covariance as its border is `off` by so many measurements.
-
-    By the lines of `without` and of `more` measurements than it has, by one at that border.
-    """
+def at_centroid(line, segment):
+    """Offset and angle of a line a x + b y = 1 off a segment, at its centroid."""
     along = np.array([math.cos(segment["angle"]), math.sin(segment["angle"])])
-    places = []
-    for own in (without, more):
-        line = surface_line(xy[own], rho[own], noise)
-        across = line @ (-along[1], along[0])
-        places.append(
-            ((1 - line @ segment["centroid"]) / across, -math.atan(line @ along / across))
-        )
-    change = np.subtract(*places) * off / 2
-    return np.outer(change, change)
+    across = line @ (-along[1], along[0])
+    return np.array([(1 - line @ segment["centroid"]) / across, -math.atan(line @ along / across)])
 
 
 def fitted_line(xy, rho, noise):

@@ -267,20 +267,19 @@ def test_response_is_the_rise_of_chi_square(opening):
     assert corner["response"] > EVIDENCE
 
 
-def test_a_border_makes_both_of_its_lines_less_certain():
+@pytest.mark.parametrize(("opening", "far"), [(120, 3.0), (150, 3.0), (170, 3.0), (175, 6.0)])
+def test_a_border_makes_both_of_its_lines_less_certain(opening, far):
     angles, noise = fan(20), (NOISE.sigma**2, 0.0)
-    ranges = vertex(angles, 3.0, 120, convex=True)
+    ranges = vertex(angles, far, opening, convex=True)
     scan = scan_of(ranges + 0.01 * np.random.default_rng(1).normal(size=len(angles)), angles)
     first, second = Extractor("optimal", noise=NOISE)(scan).segments
     border, n = second["first_beam"], len(angles)
-    off = naive.border_deviation(scan.points, scan.ranges, noise, border)
-    for line, own, without, more in (
-        (first, slice(0, border), slice(0, border - 1), slice(0, border + 1)),
-        (second, slice(border, n), slice(border - 1, n), slice(border + 1, n)),
+    xy, rho = scan.points, scan.ranges
+    of_border = naive.border_covariances(xy, rho, noise, border, (first, second), EVIDENCE)
+    for line, own, softened in zip(
+        (first, second), (slice(0, border), slice(border, n)), of_border, strict=True
     ):
-        xy, rho = scan.points, scan.ranges
         fit = np.diag(naive.fitted_line(xy[own], rho[own], noise)[2])
-        softened = naive.border_covariance(xy, rho, noise, line, without, more, off)
         expected = second_order(fit + softened, line["centroid"], line["angle"])
         np.testing.assert_allclose(line["covariance"], expected, rtol=1e-6, atol=1e-12)
         assert abs(line["covariance"][0, 1]) > 1e-10

@@ -76,7 +76,7 @@ def extract_rows(
             start = beams[at.BEAM, spans[at.FIRST, clearest]] if clearest > 0 else start
         scan = at.Scan(row, n, count, circular, evidence, missing)
         lines = merge_lines(work, lines, evidence)
-        surfaces = measure(work, find_arcs(work, scan, lines), estimated)
+        surfaces = measure(work, find_arcs(work, scan, lines), estimated, evidence)
         for table in range(tables.offsets.shape[1]):
             tables.offsets[row + 1, table] = tables.offsets[row, table]
         _write_surfaces(work, tables, scan, surfaces)

@@ -6,8 +6,9 @@ from .. import helper, inlined, sums
 from ..line_fit import direction_along_beams, second_order
 from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
+from .borders import soften_borders
 from .constants import LEAST, SIGMAS, TAU
-from .costs import cost, solve
+from .costs import solve
 from .merging import surface_variance
 
 #: Measurements whose errors are averaged to see whether neighbours are off alike.
@@ -17,7 +18,7 @@ _OVERLAP = 3.4
 
 
 @inlined
-def measure(work, surfaces, estimated):
+def measure(work, surfaces, estimated, evidence):
     """Fit the lines, with their covariances. Returns how many surfaces are left.
 
     A line whose centroid is not between its ends, or that is shorter than the spacing of its
@@ -48,7 +49,7 @@ def measure(work, surfaces, estimated):
             if spans[at.KIND, k] == at.LINE:
                 pieces[k, at.OO] *= scale
                 pieces[k, at.AA] *= scale
-    _soften_borders(work, kept)
+    soften_borders(work, kept, evidence)
     for k in range(kept):
         _to_second_order(spans, pieces[k], k)
     return kept
@@ -190,55 +191,3 @@ def _second_differences(points, first, end, a, b, noise, error, squares):
     for i in range(len(x) + 1 - 3 * _TOGETHER):
         difference = error[i] - 2.0 * second[i] + third[i]
         squares[i] = difference * difference / (6.0 * _TOGETHER)
-
-
-@inlined
-def _soften_borders(work, surfaces):
-    """Add to the covariances what comes of borders that could as well lie elsewhere.
-
-    With a border that is off by a measurement, both of its lines turn.
-    """
-    spans, pieces, sums = work.spans, work.pieces, work.sums
-    for k in range(1, surfaces):
-        start, border, end = spans[at.FIRST, k - 1], spans[at.FIRST, k], spans[at.LAST, k] + 1
-        if spans[at.KIND, k - 1] != at.LINE or spans[at.KIND, k] != at.LINE:
-            continue
-        if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
-            continue
-        rho = work.points[at.RHO]
-        variance = work.noise[0] + work.noise[1] * rho[border - 1] * rho[border]
-        off = _border_deviation(sums, start, border, end, 1.0 + TAU * TAU / variance)
-        low, high = border - 1, border + 1
-        _add_change(pieces[k - 1], solve(sums, start, low), solve(sums, start, high), 0.5 * off)
-        _add_change(pieces[k], solve(sums, low, end), solve(sums, high, end), 0.5 * off)
-
-
-@helper
-def _border_deviation(sums, start, border, end, scale):
-    """Return by how many measurements a border is off, a root mean square.
-
-    It lies elsewhere with the odds exp -Δχ²/2, at the scale of the noise; by one at most, and not
-    where too few are left for a line.
-    """
-    least, odds = cost(sums, start, border) + cost(sums, border, end), 0.0
-    for i in (border - 1, border + 1):
-        if i - start >= LEAST and end - i >= LEAST:
-            rise = scale * (cost(sums, start, i) + cost(sums, i, end) - least)
-            odds += math.exp(-0.5 * rise) if rise > 0.0 else 1.0
-    return math.sqrt(odds / (1.0 + odds))
-
-
-@helper
-def _add_change(piece, line, other, share):
-    """Add a share of the change from one line to another as a deviation of a piece."""
-    ux, uy, cx, cy = piece[at.UX], piece[at.UY], piece[at.CX], piece[at.CY]
-    along, across = line[0] * ux + line[1] * uy, line[1] * ux - line[0] * uy
-    along_too, across_too = other[0] * ux + other[1] * uy, other[1] * ux - other[0] * uy
-    if across * across_too == 0.0:
-        return
-    offset = (1.0 - line[0] * cx - line[1] * cy) / across
-    offset = share * (offset - (1.0 - other[0] * cx - other[1] * cy) / across_too)
-    angle = share * (math.atan(along_too / across_too) - math.atan(along / across))
-    piece[at.OO] += offset * offset
-    piece[at.OA] += offset * angle
-    piece[at.AA] += angle * angle

@@ -29,7 +29,7 @@ def merge_lines(work, lines, evidence):
     """
     first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.KEY]
     for k in range(1, lines):
-        rises[k] = _rise(work, k)
+        rises[k] = rise_if_one(work, k)
     while lines > 1:
         k = 1
         for m in range(2, lines):
@@ -41,12 +41,12 @@ def merge_lines(work, lines, evidence):
         for m in range(k, lines):
             first[m], last[m], rises[m] = first[m + 1], last[m + 1], rises[m + 1]
         for m in range(max(k - 1, 1), min(k + 1, lines)):
-            rises[m] = _rise(work, m)
+            rises[m] = rise_if_one(work, m)
     return lines
 
 
 @inlined
-def _rise(work, k):
+def rise_if_one(work, k):
     """Rise of χ² if a line and the one before become one; inf where these are no wall that bends.
 
     They then turn by little, and are no farther apart at their border than by chance.
