@@ -118,3 +118,24 @@ assert run(["map", log, "-o", "a.svg", "-q"]) == 1
     ]
     assert not (tmp_path / "a.dxf").exists()
     assert (tmp_path / "demo" / "index.html").exists()
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_tables_do_not_import_pandas_where_it_is_installed(tmp_path, ending):
+    """It takes longer than all else."""
+    pytest.importorskip("pandas")
+    code = f"""
+import sys, lineament as ln
+from lineament.cli import main
+from lineament.logs import save_npz
+save_npz({str(tmp_path / "log.npz")!r}, [ln.LaserScan([2.0] * 9, -0.04, 0.01)])
+sys.argv = ["lineament", "extract", {str(tmp_path / "log.npz")!r}, "-o",
+            {str(tmp_path / f"table.{ending}")!r}]
+try:
+    main()
+except SystemExit as end:
+    assert not end.code, end.code
+assert "pandas" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
+    assert (tmp_path / f"table.{ending}").exists()

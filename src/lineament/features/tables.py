@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..scan.fields import nanoseconds
+from .arrow import array_of, texts
 from .records import COLUMNS, FIELDS, SHARED_COLUMNS, TABLES, TEXTS, Field, numbers, text_codes
 
 if TYPE_CHECKING:
@@ -20,9 +21,9 @@ if TYPE_CHECKING:
     from .features import Features
 
 #: Values of the column `kind`, in the order in which the rows of a scan come.
-_ROWS = (*(table[:-1] for table in TABLES), "cluster")
+_ROWS = texts([*(table[:-1] for table in TABLES), "cluster"])
 #: Values of the columns of text.
-_TEXTS = {f.columns: TEXTS[f.table] for f in FIELDS if f.form[0] == "U"}
+_TEXTS = {f.columns: texts(TEXTS[f.table]) for f in FIELDS if f.form[0] == "U"}
 
 Columns = dict[str, NDArray[Any]]
 
@@ -118,13 +119,14 @@ def _table(
     scan = np.repeat(np.arange(len(counts)), counts.sum(axis=1))
 
     # What 64 bits do not hold is no time.
-    exact = pa.array([ns if abs(ns) < 2**63 else None for ns in stamps[1]], pa.int64())
+    too_large = np.array([abs(ns) >= 2**63 for ns in stamps[1]], np.bool_)
+    exact = np.array([0 if abs(ns) >= 2**63 else ns for ns in stamps[1]], np.int64)
     arrays = {
-        "kind": pa.DictionaryArray.from_arrays(kind, _ROWS),
-        "scan": pa.array(scan + first_scan),
-        "stamp": pa.array(stamps[0][scan]),
-        "stamp_ns": exact.take(pa.array(scan)),
-        "index": pa.array(index),
+        "kind": pa.DictionaryArray.from_arrays(array_of(kind), _ROWS),
+        "scan": array_of(scan + first_scan),
+        "stamp": array_of(stamps[0][scan]),
+        "stamp_ns": array_of(exact[scan], too_large[scan]),
+        "index": array_of(index),
     }
     for field in SCHEMA:
         if field.name not in arrays:
@@ -143,7 +145,7 @@ def _scatter(
     is_null = np.array([field.name not in of_kind for of_kind in columns])
     for k in np.flatnonzero(~is_null):
         values[rows[k]] = columns[k][field.name]
-    array = pa.array(values, mask=is_null[kind])
+    array = array_of(values, is_null[kind])
     return pa.DictionaryArray.from_arrays(array, _TEXTS[field.name]) if is_text else array
 
 

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from ..features.arrow import array_of, numbers_of, texts
 from ..features.tables import SCHEMA, features_table
 from ..files import strict_json
 from .writer import Found, Writer
@@ -41,14 +42,13 @@ class _RowWriter(Writer):
 
     def _table(self, found: list[Found], first_scan: int) -> pa.Table:
         table = features_table([one.features for one in found], first_scan)
-        scan = table["scan"].to_numpy() - first_scan
+        scan = numbers_of(table["scan"]) - first_scan
         poses = np.array([one.pose or (np.nan,) * 3 for one in found]).reshape(-1, 3)[scan]
-        for field, column in zip(POSE, poses.T, strict=True):
-            table = table.append_column(field, pa.array(column, mask=np.isnan(column)))
+        for field, values in zip(POSE, poses.T, strict=True):
+            table = table.append_column(field, array_of(values, np.isnan(values)))
         if self.topics:
             of_scan = np.array([self.topics.index(one.topic) for one in found], dtype=np.int32)
-            codes = of_scan[scan]
-            topics = pa.DictionaryArray.from_arrays(codes, pa.array(self.topics, pa.string()))
+            topics = pa.DictionaryArray.from_arrays(array_of(of_scan[scan]), texts(self.topics))
             table = table.append_column(TOPIC, topics)
         return table.replace_schema_metadata(SCHEMA.metadata)
 

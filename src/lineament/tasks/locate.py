@@ -220,21 +220,23 @@ def _write_table(
     import pyarrow.csv
     import pyarrow.parquet as pq
 
+    from ..features.arrow import array_of, texts
+
     places = [where for _, where in found]
     known = np.array([where.is_known for where in places])
     columns: dict[str, Any] = {
-        "scan": np.arange(len(found)),
-        "stamp": [stamp for stamp, _ in found],
-        "verdict": [where.verdict for where in places],
+        "scan": array_of(np.arange(len(found))),
+        "stamp": array_of([stamp for stamp, _ in found]),
+        "verdict": texts([where.verdict for where in places]),
     }
     poses = np.array([where.pose for where in places])
     for name, values in zip(("x", "y", "theta"), poses.T, strict=True):
-        columns[name] = pa.array(values, mask=~known)
+        columns[name] = array_of(values, ~known)
     upper = np.array([where.covariance[np.triu_indices(3)] for where in places])
     for name, values in zip(_SPREAD, upper.T, strict=True):
-        columns[f"cov_{name}"] = pa.array(values, mask=~known)
+        columns[f"cov_{name}"] = array_of(values, ~known)
     for name in ("explained", "short", "contradicted", "log_odds"):
-        columns[name] = [getattr(where.evidence, name) for where in places]
+        columns[name] = array_of([getattr(where.evidence, name) for where in places])
     table = pa.table(columns)
     with naming_errors(path), written_beside(path) as temporary:
         if is_csv:
