@@ -212,9 +212,10 @@ def test_units_and_a_plan_of_no_size(files, capsys):
     assert complaints(capsys.readouterr().err) == []
     assert run([*given, "mm"]) == 3
     said = capsys.readouterr()
-    (warning,) = complaints(said.err)
-    assert "log.npz: never located: " in warning
-    assert warning.endswith("plan.dxf: shows where the scans were if it is drawn in m: --units m")
+    small, never = complaints(said.err)
+    assert small.endswith("m: is it drawn in other units? (units=, --units)")
+    assert "log.npz: never located: " in never
+    assert never.endswith("plan.dxf: shows where the scans were if it is drawn in m: --units m")
     assert said.out.count("never located") == 1
 
 

@@ -409,7 +409,7 @@ def test_a_plan_of_no_size_is_a_warning(files, capsys):
     assert run(["locate", "log.npz", "--map", "wide.dxf", "-o", "a.csv", "-q"]) == 0
     (said,) = complaints(capsys.readouterr().err)
     assert "wide.dxf: is 603 m x " in said
-    assert said.endswith("is it drawn in other units? (--units)")
+    assert said.endswith("is it drawn in other units? (units=, --units)")
 
 
 def test_what_is_no_plan_says_how_to_make_one(files, capsys):

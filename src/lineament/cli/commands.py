@@ -5,7 +5,6 @@ from typing import Any
 
 import click
 
-from ..errors import warn
 from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
@@ -133,11 +132,8 @@ def view(
     drawn = None
     if plan is not None:
         from ..mapping import LineMap
-        from ..tasks.locate import plan_warning
 
         drawn = LineMap.read(plan, **drawing, limits=reading["limits"])
-        if warning := plan_warning(drawn, plan):
-            warn(warning)
     session = Session(logs, extractors, drawn, **reading)
     serve(session, host, port, browser=not no_browser, write=click.echo)
 

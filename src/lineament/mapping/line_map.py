@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._copies import ReadOnly, locked
-from ..errors import LineamentError
+from ..errors import LineamentError, warn
 from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import list_walls
 from ..limits import Limits
@@ -19,7 +19,7 @@ from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .drawings import read_drawing
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
-from .plans import plan_error, read_table
+from .plans import doubts, plan_error, read_table
 from .sights import columns_shown, walls_shown
 from .walls import COLUMN, lengths_of, rows_of, segments_of, shared, walls_of
 
@@ -230,6 +230,8 @@ class LineMap(ReadOnly):
     ) -> Self:
         """Read a plan: DXF, or a table of features in the frame of the world (Parquet).
 
+        A plan as large as no building, or of which parts are left out, is a `LineamentWarning`.
+
         Parameters
         ----------
         path : path-like
@@ -269,6 +271,8 @@ class LineMap(ReadOnly):
         except LineamentError as error:
             problem = str(error).removeprefix(f"{path}: ")
             raise plan_error(path)(problem) from None
+        if doubt := doubts(plan.size, plan.left_out):
+            warn(str(plan_error(path)(doubt)))
         return plan
 
     def to_features(self) -> Features:

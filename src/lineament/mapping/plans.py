@@ -26,6 +26,8 @@ _FIELDS = {
 _ENTRIES = ("00", "01", "11", "02", "12", "22")
 #: No deviation of a wall is larger [m]; a covariance that is singular is widened by this share.
 _VAGUE, _RIDGE = 1e3, 1e-9
+#: Buildings are so large, along the longer side [m].
+_BUILDINGS = 3.0, 500.0
 
 
 def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
@@ -35,6 +37,22 @@ def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
         return LineamentError(one_line(f"{path}: {shortened(problem)}"))
 
     return make
+
+
+def is_a_building(size: float) -> bool:
+    """Whether a plan so long [m] can be that of a building."""
+    return _BUILDINGS[0] <= size <= _BUILDINGS[1]
+
+
+def doubts(extent: tuple[float, float], left_out: int) -> str:
+    """Return what may be wrong with a plan: it is of no building, or parts are left out; or ""."""
+    (wide, deep), said = extent, []
+    if left_out:
+        said.append(f"{left_out} walls or columns have impossible numbers, left out")
+    if not is_a_building(max(extent)):
+        size = f"{wide:.4g} m x {deep:.4g} m"
+        said.append(f"is {size}: is it drawn in other units? (units=, --units)")
+    return "; ".join(said)
 
 
 def check_file(path: str | os.PathLike[str], limits: Limits) -> None:

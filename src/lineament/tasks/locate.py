@@ -10,24 +10,24 @@ from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from ..errors import LineamentError, LogError, NothingFoundError, one_line
+from ..errors import LineamentError, LineamentWarning, LogError, NothingFoundError, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
 from ..mapping.drawings import NAMES as UNITS
 from ..mapping.following import Whereabouts, follow
+from ..mapping.plans import is_a_building
 from ..progress import Track, untracked
 from ..scan import LaserScan
 from .mapping import tum_written
 
 #: Formats of the poses.
 ENDINGS = (".tum", ".csv", ".parquet")
-#: A plan smaller or larger than this is hardly a building [m].
-_SMALL, _LARGE = 3.0, 500.0
 #: Where a smaller share of the scans is located, the plan may be in other units: so many are tried.
 _HARDLY, _TRIED = 0.1, 300
 _SPREAD = ("xx", "xy", "xtheta", "yy", "ytheta", "thetatheta")
@@ -39,7 +39,7 @@ class Located:
 
     Number of scans, and of those with each verdict; time until the first was located [s], NaN if
     none was; how often the sensor was lost after that; wall time [s]. `warning` is a line about why
-    hardly a scan is located, or about the size of the plan; or "".
+    hardly a scan is located, or "".
     """
 
     log: str
@@ -157,7 +157,7 @@ def locate_log(
     else:
         _write_table(output, found, is_csv=ending == ".csv")
     stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
-    seconds, warning = time.perf_counter() - started, plan_warning(drawn, plan)
+    seconds, warning = time.perf_counter() - started, ""
     if sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf":
         others = {
             name: partial(LineMap.read, plan, layers, units=name, limits=reading.get("limits"))
@@ -180,20 +180,6 @@ def locate_log(
     )
 
 
-def plan_warning(plan: LineMap, name: object) -> str:
-    """Return a line about a plan of a size that no building has, or of which parts are left out."""
-    (wide, deep), said = plan.size, []
-    if plan.left_out:
-        said.append(f"{plan.left_out} walls or columns have impossible numbers, left out")
-    if not _is_a_building(plan):
-        said.append(f"is {wide:.4g} m x {deep:.4g} m: is it drawn in other units? (--units)")
-    return one_line(f"{name}: {'; '.join(said)}") if said else ""
-
-
-def _is_a_building(plan: LineMap) -> bool:
-    return _SMALL <= max(plan.size) <= _LARGE
-
-
 def _units_that_fit(
     plans: Mapping[str, Callable[[], LineMap]],
     drawn: LineMap,
@@ -205,10 +191,11 @@ def _units_that_fit(
     """
     best, most = "", _HARDLY
     for name, read in plans.items():
-        with suppress(LineamentError):  # Larger than any building, say.
+        with suppress(LineamentError), catch_warnings():  # Larger than any building, say.
+            simplefilter("ignore", LineamentWarning)
             other = read()
             is_same = math.isclose(max(other.size), max(drawn.size))
-            if not is_same and _is_a_building(other) and (share := located(other)) > most:
+            if not is_same and is_a_building(max(other.size)) and (share := located(other)) > most:
                 best, most = name, share
     return best
 
