@@ -321,7 +321,8 @@ def test_a_corner_where_it_was_is_double_without_a_motion():
     """A motion that is not known is none: nothing turns."""
     corners = features(corners=[corner(3.0, 1.0)]).corners
     tracker = Tracker()
-    assert tracker._is_double(corners[0], corners, None)
+    assert tracker._doubles(corners, corners, np.ones((1, 1), bool), None).tolist() == [True]
+    assert tracker._doubles(corners, corners, np.zeros((1, 1), bool), None).tolist() == [False]
 
 
 def farthest_that_is_the_same(kind, make):
