@@ -35,6 +35,8 @@ class Frame(NamedTuple):
         Whether each corner is convex.
     sides : int32 array, shape (n, 2)
         Indices of the segments of each corner.
+    misfits : float64 array, shape (n,)
+        Variance that those of its segments give to each corner, in two frames.
     """
 
     words: Words
@@ -42,22 +44,23 @@ class Frame(NamedTuple):
     corners: NDArray[np.void]
     convex: NDArray[np.int8]
     sides: NDArray[np.int32]
+    misfits: Array
 
     @classmethod
     def of(cls, words: Words) -> Self:
         """Complete the words of a frame."""
         segments, corners = words[0].reshape(-1).view(SEGMENT), words[1].reshape(-1).view(CORNER)
         sides = np.array(corners["segments"], order="C")
-        return cls(words, segments, corners, corners["convex"].astype(np.int8), sides)
+        # Walls are off straight lines in both frames, and their corners with them.
+        squares = np.append(segments["misfit"] ** 2, 0.0)
+        misfits = 2.0 * squares[sides].sum(axis=1)
+        return cls(words, segments, corners, corners["convex"].astype(np.int8), sides, misfits)
 
     def moved(self, motion: tuple[float, float, float]) -> Words:
         """Return the words after a motion, with the misfits in the covariances of the corners."""
         segments, corners, arcs = (of.copy() for of in self.words)
-        # Walls are off straight lines in both frames, and their corners with them.
-        squares = np.append(self.segments["misfit"] ** 2, 0.0)
-        both = 2.0 * squares[self.sides].sum(axis=1)
-        corners[:, C_COVARIANCE] += both
-        corners[:, C_COVARIANCE + 3] += both
+        corners[:, C_COVARIANCE] += self.misfits
+        corners[:, C_COVARIANCE + 3] += self.misfits
         move(segments, corners, arcs, *motion)
         return segments, corners, arcs
 

@@ -7,6 +7,7 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..features.records import S_ANGLE, S_CENTROID, S_END, S_START
 from ..kernels.tracking import walls as at
 from ..kernels.tracking.walls import TURNED, find_again, refine
 from ..scan import Array, Pose
@@ -86,14 +87,17 @@ def is_contradicted(motion: Pose, before: NDArray[np.void], now: NDArray[np.void
 
 def _walls(segments: NDArray[np.void]) -> Array:
     """Return the longest segments of a frame as the kernels take them."""
-    ends = segments["end"] - segments["start"]
-    lengths = np.hypot(ends[:, 0], ends[:, 1])
+    # As words: numpy takes records field by field, several times slower.
+    words = np.ascontiguousarray(segments).view(np.float64)
+    words = words.reshape(len(segments), segments.dtype.itemsize // 8)
+    along = words[:, S_END : S_END + 2] - words[:, S_START : S_START + 2]
+    lengths = np.hypot(along[:, 0], along[:, 1])
     kept = np.argsort(-lengths, kind="stable")[:_MOST]
-    segments, walls = segments[kept], np.empty((len(kept), at.COLUMNS))
-    walls[:, at.LENGTH], walls[:, at.ANGLE] = lengths[kept], segments["angle"]
-    walls[:, at.COS], walls[:, at.SIN] = np.cos(segments["angle"]), np.sin(segments["angle"])
-    for place, name in ((at.START, "start"), (at.END, "end"), (at.CENTROID, "centroid")):
-        walls[:, place : place + 2] = segments[name]
+    words, walls = words[kept], np.empty((len(kept), at.COLUMNS))
+    walls[:, at.LENGTH], walls[:, at.ANGLE] = lengths[kept], words[:, S_ANGLE]
+    walls[:, at.COS], walls[:, at.SIN] = np.cos(words[:, S_ANGLE]), np.sin(words[:, S_ANGLE])
+    for place, word in ((at.START, S_START), (at.END, S_END), (at.CENTROID, S_CENTROID)):
+        walls[:, place : place + 2] = words[:, word : word + 2]
     return walls
 
 

@@ -277,9 +277,11 @@ class Tracker(InTurn):
             if kind == "corners":
                 young = kept & (missed == 1) & (tracks >= self._young)
                 self._young = int(born[-1][0]) if len(born[-1]) else self._next
-                for k in np.flatnonzero(young):
-                    same = frame.corners[mine < tracks[k]]
-                    kept[k] = not self._is_double(self._seen.corners[k], same, motion)
+                (young,) = young.nonzero()
+                if len(young) and len(mine):
+                    older = mine < tracks[young, None]
+                    before = self._seen.corners[young]
+                    kept[young] = ~self._doubles(before, frame.corners, older, motion)
             ended.append(tracks[(missed > 0) & ~kept])
             numbers[kind] = mine
             rest.append(kept)
@@ -298,17 +300,28 @@ class Tracker(InTurn):
         segments, corners, arcs = map(np.concatenate, zip(frame.words, missed, strict=True))
         self._seen = Frame.of((segments, corners, arcs))
 
-    def _is_double(self, before: np.void, corners: NDArray[np.void], motion: Motion | None) -> bool:
-        """Whether a corner that was seen once is one of others, which was seen wrongly then."""
+    def _doubles(
+        self,
+        before: NDArray[np.void],
+        corners: NDArray[np.void],
+        older: NDArray[np.bool_],
+        motion: Motion | None,
+    ) -> NDArray[np.bool_]:
+        """Whether corners that were seen once are one of others, and were seen wrongly then.
+
+        Of each, in a row, `older` has those that it may be.
+        """
         x, y, theta = (0.0, 0.0, 0.0) if motion is None else motion.pose
         c, s = math.cos(theta), math.sin(theta)
         turn = np.array([[c, -s], [s, c]])
-        corners = corners[corners["convex"] == before["convex"]]
-        off = corners["position"] @ turn.T + (x, y) - before["position"]
+        off = corners["position"] @ turn.T + (x, y) - before["position"][:, None]
         rough = 2.0 * self.roughness**2 * np.eye(2)
-        spread = turn @ corners["covariance"] @ turn.T + before["covariance"] + rough
-        known = np.isfinite(spread).all(axis=(1, 2))
+        spread = turn @ corners["covariance"] @ turn.T + before["covariance"][:, None] + rough
+        known = older & (corners["convex"] == before["convex"][:, None])
+        known &= np.isfinite(spread).all(axis=(2, 3))
         (p, q), (xx, xy, yx, yy) = off[known].T, spread[known].reshape(-1, 4).T
         determinant = xx * yy - xy * yx
         square = yy * p * p - (xy + yx) * p * q + xx * q * q
-        return bool((square < chi_square(self.gate, 2) * determinant).any())
+        is_one = known.copy()
+        is_one[known] = square < chi_square(self.gate, 2) * determinant
+        return np.asarray(is_one.any(axis=1))
