@@ -1,6 +1,8 @@
 """Damaged logs of every format against what every reader promises."""
 
 import tempfile
+import zlib
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -12,6 +14,8 @@ from lineament import LaserScan, LogError
 from lineament.logs import find_logs, open_log, summarize
 from lineament.logs.base import Topic
 
+#: Logs that are larger are not damaged further [bytes].
+LARGEST = 1 << 20
 #: Ways to open; what is wrong with the topic of poses must be one clear line too.
 OPTIONS: tuple[dict[str, Any], ...] = (
     {},
@@ -131,5 +135,15 @@ class Readers:
         """Nothing is open."""
 
     def keep(self, made: tuple[Sample, dict[str, Any]]) -> None:
-        """Take an input into the corpus."""
-        self.samples.append(made[0])
+        """Take an input into the corpus, if it is small: else each is longer than the one before."""
+        if sum(map(unpacked, made[0].files.values())) <= LARGEST:
+            self.samples.append(made[0])
+
+
+def unpacked(data: bytes) -> int:
+    """How many bytes there are in those of a gzip, or in others, up to what is too large."""
+    if not data.startswith(b"\x1f\x8b"):
+        return len(data)
+    with suppress(zlib.error):
+        return len(zlib.decompressobj(31).decompress(data, LARGEST + 1))
+    return len(data)
