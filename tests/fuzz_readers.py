@@ -135,7 +135,7 @@ class Readers:
         """Nothing is open."""
 
     def keep(self, made: tuple[Sample, dict[str, Any]]) -> None:
-        """Take an input into the corpus, if it is small: else each is longer than the one before."""
+        """Take an input into the corpus, if it is small: else each is longer than the last."""
         if sum(map(unpacked, made[0].files.values())) <= LARGEST:
             self.samples.append(made[0])
 
