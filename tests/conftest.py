@@ -33,6 +33,15 @@ settings.load_profile("lineament")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of ROS 1 first: rospy's node cannot come back in a process.
+
+    A worker that has done with some of them and takes others from the end of another worker's would
+    need it to.
+    """
+    items.sort(key=lambda item: item.path.stem != "test_live_ros1")
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """Folder of the recordings, which are not part of the project."""
