@@ -1,6 +1,7 @@
 """ROS 1 against a real master and rospy's own nodes; skipped where rospy is not installed."""
 
 import gc
+import logging
 import math
 import os
 import shutil
@@ -67,6 +68,11 @@ def rospy() -> Iterator[None]:
             patch.setattr(sys, "path", [*sys.path, str(DEBIAN)])
         pytest.importorskip("rospy", reason="ROS 1 is not installed: see make ros1")
         yield
+        # Its files of what all loggers say are not for the tests that follow.
+        for handler in logging.getLogger().handlers[:]:
+            if not type(handler).__module__.startswith("_pytest"):
+                logging.getLogger().removeHandler(handler)
+                handler.close()
 
 
 @pytest.fixture(scope="module")
