@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 def array_of(values: ArrayLike, is_null: ArrayLike | None = None) -> pa.Array:
     """Return numbers or booleans as an array of Arrow, null where `is_null`.
 
+    Contiguous numbers are not copied: they must not change later.
+
     Examples
     --------
     >>> array_of([1.5, 2.5, 3.5], [False, True, False]).to_pylist()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._copies import ReadOnly, locked
-from ..errors import LineamentError, warn
+from ..errors import LineamentError, one_line, warn
 from ..features import ARC, CORNER, Features, make_records
 from ..kernels.mapping.layout import list_walls
 from ..limits import Limits
@@ -272,7 +272,7 @@ class LineMap(ReadOnly):
             problem = str(error).removeprefix(f"{path}: ")
             raise plan_error(path)(problem) from None
         if doubt := doubts(plan.size, plan.left_out):
-            warn(str(plan_error(path)(doubt)))
+            warn(one_line(f"{path}: {doubt}"))
         return plan
 
     def to_features(self) -> Features:

@@ -10,11 +10,10 @@ from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from ..errors import LineamentError, LineamentWarning, LogError, NothingFoundError, one_line
+from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
@@ -191,9 +190,9 @@ def _units_that_fit(
     """
     best, most = "", _HARDLY
     for name, read in plans.items():
-        with suppress(LineamentError), catch_warnings():  # Larger than any building, say.
-            simplefilter("ignore", LineamentWarning)
-            other = read()
+        with suppress(LineamentError):  # Larger than any building, say.
+            with heard():  # What is only tried is not warned of.
+                other = read()
             is_same = math.isclose(max(other.size), max(drawn.size))
             if not is_same and is_a_building(max(other.size)) and (share := located(other)) > most:
                 best, most = name, share
