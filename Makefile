@@ -25,8 +25,9 @@ test-all: bench-check wheel slow coverage boundscheck kernels docs
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
-.venv/ready: requirements.lock .venv/base
+.venv/ready: requirements.lock lab/pyproject.toml .venv/base
 	$(BIN)/python -m pip install --quiet --no-compile --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable lab
 	@touch $@
 
 lint: .venv/ready
@@ -135,7 +136,7 @@ results: .venv/ready
 
 # Lines of source and of tests, by folder.
 lines:
-	@for top in src/lineament tests; do git ls-files "$$top/*.py" "$$top/*.js" "$$top/*.css" "$$top/*.html" | xargs wc -l | \
+	@for top in src/lineament lab/src/lineament_lab tests; do git ls-files "$$top/*.py" "$$top/*.js" "$$top/*.css" "$$top/*.html" | xargs wc -l | \
 	awk -v top="$$top" '$$2 != "total" { sub(top "/", "", $$2); n = split($$2, at, "/"); folder = n > 1 ? at[1] "/" : "."; of[folder] += $$1; all += $$1 } \
 	END { for (folder in of) printf "%7d  %s/%s\n", of[folder], top, folder | "sort -rn"; close("sort -rn"); printf "%7d  %s in all\n\n", all, top }'; done
 

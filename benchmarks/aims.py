@@ -14,16 +14,13 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-
-from lineament import Extractor, Features, LaserScan, RangeNoise
-from lineament.evaluation.beams import MIN_BEAMS
-from lineament.evaluation.ple import load_benchmark, run_benchmark
-from lineament.evaluation.scores import Scores, evaluate
-from lineament.methods.optimal import Optimal
-from lineament.reproduce import Setting, Table
-from lineament.reproduce.arena import ARENAS, arena_scores, load_arena
-from lineament.reproduce.findings import cell_text
-from lineament.reproduce.scans import (
+from lineament_lab.evaluation.beams import MIN_BEAMS
+from lineament_lab.evaluation.ple import load_benchmark, run_benchmark
+from lineament_lab.evaluation.scores import Scores, evaluate
+from lineament_lab.reproduce import Setting, Table
+from lineament_lab.reproduce.arena import ARENAS, arena_scores, load_arena
+from lineament_lab.reproduce.findings import cell_text
+from lineament_lab.reproduce.scans import (
     INDOORS,
     batch_of,
     frame_times,
@@ -33,6 +30,9 @@ from lineament.reproduce.scans import (
     simulated_frames,
     time_ratio,
 )
+
+from lineament import Extractor, Features, LaserScan, RangeNoise
+from lineament.methods.optimal import Optimal
 from lineament.simulation import SENSORS, Sensor
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))

@@ -20,10 +20,10 @@ import numba
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from lineament_lab.reproduce.report import machine
 
 import lineament as ln
 from lineament.logs import open_log
-from lineament.reproduce.report import machine
 from lineament.simulation import SENSORS, building, drive
 from lineament.tasks.bulk import Processes, Threads, extract_logs
 from lineament.tasks.extract import extract_log

@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from lineament import Extractor, LaserScan, LogError
-from lineament.evaluation import (
+from lineament_lab.evaluation import (
     FeatureScores,
     FreeSpaceScores,
     NormalisedErrors,
@@ -23,11 +21,10 @@ from lineament.evaluation import (
     ranked_repeats,
     standing_scores,
 )
-from lineament.evaluation.repeatability import with_edges
-from lineament.logs import find_logs
-from lineament.reproduce.arena import ARENAS, load_arena
-from lineament.reproduce.real import LOGS
-from lineament.reproduce.scans import (
+from lineament_lab.evaluation.repeatability import with_edges
+from lineament_lab.reproduce.arena import ARENAS, load_arena
+from lineament_lab.reproduce.real import LOGS
+from lineament_lab.reproduce.scans import (
     STANDING,
     Frame,
     scan_pairs,
@@ -36,6 +33,9 @@ from lineament.reproduce.scans import (
     spread_scans,
     still_pairs,
 )
+
+from lineament import Extractor, LaserScan, LogError
+from lineament.logs import find_logs
 from lineament.simulation import SENSORS
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))

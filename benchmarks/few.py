@@ -12,10 +12,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from lineament_lab.evaluation import NormalisedErrors
 from numpy.typing import NDArray
 
 from lineament import Extractor, FeatureBatch
-from lineament.evaluation import NormalisedErrors
 from lineament.methods import METHODS
 
 Array = NDArray[np.float64]

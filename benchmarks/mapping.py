@@ -16,12 +16,12 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from lineament_lab.evaluation.icp import icp
+from lineament_lab.evaluation.maps import absolute_errors, doubled_walls
+from lineament_lab.evaluation.relations import read_relations
 from matplotlib.collections import LineCollection
 
 from lineament import Extractor
-from lineament.evaluation.icp import icp
-from lineament.evaluation.maps import absolute_errors, doubled_walls
-from lineament.evaluation.relations import read_relations
 from lineament.logs import open_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise

@@ -39,7 +39,7 @@ import pytest
 from mutating import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
-SOURCE = ROOT / "src"
+SOURCES = ROOT / "src", ROOT / "lab" / "src"
 WORK = ROOT / "build" / "mutants"
 #: The parts of each area, and the tests that belong to it: ``tests/test_NAME.py``.
 AREAS: dict[str, tuple[str, str]] = {
@@ -65,6 +65,8 @@ AREAS: dict[str, tuple[str, str]] = {
         "cli ends view* bulk* progress locating* mapping* extractor explaining dependencies limits",
     ),
 }
+#: Areas of the laboratory.
+LAB = "evaluation", "reproduce"
 #: Kernels are compiled unless they change: numba does not see that what they call did.
 UNCOMPILED = ("kernels", "methods")
 #: Tests run for one mutant until they would take so long; a mutant that loops is killed by its
@@ -165,15 +167,17 @@ def forked(target: Callable[..., None], *arguments: Any) -> int | None:
 
 def copied(job: str) -> str:
     """Copy the sources, with their times, for numba to know them by."""
-    shutil.copytree(
-        SOURCE, WORK / job, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
-    )
+    for source in SOURCES:
+        apart = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(source, WORK / job, dirs_exist_ok=True, ignore=apart)
     return job
 
 
 def covering(files: list[Path], compiled: bool) -> Reached:
     """Return what the tests of some files reach."""
-    common = b"".join(file.read_bytes() for file in sorted(SOURCE.rglob("*.py")))
+    common = b"".join(
+        file.read_bytes() for source in SOURCES for file in sorted(source.rglob("*.py"))
+    )
     reached: Reached = {}
     for file in files:
         state = hashlib.sha256(common + file.read_bytes() + bytes([compiled])).hexdigest()[:16]
@@ -190,8 +194,16 @@ def covering(files: list[Path], compiled: bool) -> Reached:
 def files_of(area: str) -> Iterator[Path]:
     """Yield the source files of an area."""
     for part in AREAS[area][0].split():
-        place = SOURCE / "lineament" / part
+        source, package = (
+            (SOURCES[1], "lineament_lab") if area in LAB else (SOURCES[0], "lineament")
+        )
+        place = source / package / part
         yield from sorted(place.rglob("*.py")) if place.is_dir() else [place]
+
+
+def within(file: Path) -> str:
+    """Return the path of a source file within the folder of its package."""
+    return str(file.relative_to(next(s for s in SOURCES if file.is_relative_to(s))))
 
 
 def tests_of(area: str) -> list[Path]:
@@ -205,7 +217,7 @@ def order_of(mutant: Mutant, reached: Reached) -> list[str]:
 
     And those that reach nothing: they look at constants.
     """
-    path = str(mutant.file.relative_to(SOURCE))
+    path = within(mutant.file)
     near = {test: of.get(path, []) for test, (_, of) in reached.items() if path in of or not of}
     by_seconds = sorted(near, key=lambda test: (mutant.line not in near[test], reached[test][0]))
     tests, seconds = [], 0.0
@@ -221,7 +233,7 @@ def order_of(mutant: Mutant, reached: Reached) -> list[str]:
 
 def survives(mutant: Mutant, tests: list[str], job: str, compiled: bool) -> bool:
     """Run the tests on the mutant; whether all pass."""
-    file = WORK / job / mutant.file.relative_to(SOURCE)
+    file = WORK / job / within(mutant.file)
     file.write_text(mutant.text, encoding="utf-8")
     try:
         return forked(run, tests, job, compiled) in (0, 5)
@@ -247,7 +259,7 @@ def run_area(area: str, drawn: list[Mutant], jobs: SimpleQueue[str], threads: in
             print(f"\r{done} of {len(drawn)}", end="", file=sys.stderr, flush=True)
             killed += not left
             if left:
-                place = str(mutant.file.relative_to(SOURCE))
+                place = within(mutant.file)
                 seen = any(mutant.line in of.get(place, ()) for _, of in reached.values())
                 note = "" if seen else "  (no test reaches the line)"
                 print(f"  {place}:{mutant.line}: {mutant.what}{note}", flush=True)

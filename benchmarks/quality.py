@@ -15,12 +15,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from lineament_lab.evaluation.repeatability import RankedRepeats, ranked_repeats, with_edges
+from lineament_lab.reproduce.real import FURTHER_LOGS, LOGS
+from lineament_lab.reproduce.scans import scan_pairs
 
 from lineament import Extractor, Features
-from lineament.evaluation.repeatability import RankedRepeats, ranked_repeats, with_edges
 from lineament.kernels.writing import _FALL, _PROMINENCE, _RISE, _SPREAD
-from lineament.reproduce.real import FURTHER_LOGS, LOGS
-from lineament.reproduce.scans import scan_pairs
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 PAIRS, BINS = 150, np.linspace(0.0, 1.0, 6)

@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from lineament_lab.reproduce.report import machine
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from lineament import LogError
 from lineament.logs import open_log
-from lineament.reproduce.report import machine
 from lineament.rosmsg.scans import laser_scan
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

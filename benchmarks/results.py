@@ -61,7 +61,7 @@ def is_text(node: object) -> bool:
 
 def stamp(seconds: float, frames: int) -> str:
     """Return commit, date, machine, versions and seeds, and the hash of what was measured."""
-    from lineament.reproduce.report import machine
+    from lineament_lab.reproduce.report import machine
 
     git = ["git", "-C", str(ROOT)]
     commit = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
@@ -80,7 +80,7 @@ def stamp(seconds: float, frames: int) -> str:
 
 def markdown(columns: Sequence[str], rows: Rows) -> str:
     """Return a table in Markdown, compact; numbers with three digits."""
-    from lineament.reproduce.findings import cell_text
+    from lineament_lab.reproduce.findings import cell_text
 
     lines = [columns, ["---"] * len(columns), *([cell_text(cell) for cell in row] for row in rows)]
     return "\n".join(f"|{'|'.join(map(str, line))}|" for line in lines)
@@ -95,7 +95,7 @@ class Results:
     """Runs experiments once each, with all seeds, and makes the tables of their numbers."""
 
     def __init__(self, frames: int) -> None:
-        from lineament.reproduce import Setting
+        from lineament_lab.reproduce import Setting
 
         data = DATA if DATA.is_dir() else None
         self.setting = Setting(frames, SEEDS[0], data, seeds=len(SEEDS))
@@ -103,7 +103,7 @@ class Results:
 
     def findings(self, name: str) -> Any:
         """Return what an experiment found: numbers that differ by seed have their range."""
-        from lineament.reproduce import run_experiments
+        from lineament_lab.reproduce import run_experiments
 
         if name not in self.found:
             print(name, file=sys.stderr, flush=True)
@@ -241,7 +241,7 @@ class Results:
 
     def maps(self) -> str:
         """The public benchmark of polylines."""
-        from lineament.evaluation.ple import load_benchmark, run_benchmark
+        from lineament_lab.evaluation.ple import load_benchmark, run_benchmark
 
         methods = "optimal", "iepf", "line_tracking"
         rows: dict[str, list[object]] = {name: [name] for name in methods}
@@ -262,7 +262,7 @@ class Results:
 
     def claims(self) -> str:
         """The paper's figures and tables, what is found here, and the verdict."""
-        from lineament.reproduce.claims import bands, verdicts
+        from lineament_lab.reproduce.claims import bands, verdicts
 
         names = "definitions", "noise", "layers", "repetition", "scenes", "similarity"
         names += "two_corners", "sensitivity", "success"
@@ -288,10 +288,10 @@ class Results:
     def speed(self) -> str:
         """Times of methods in turns in one run, as ratios to that of `liu`."""
         import numpy as np
+        from lineament_lab.reproduce import scans as recorded
 
         from lineament import Extractor
         from lineament.methods import METHODS
-        from lineament.reproduce import scans as recorded
         from lineament.simulation import SENSORS
 
         methods = {name: Extractor(name) for name in METHODS}

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from lineament_lab.reproduce.report import machine
 
 import lineament as ln
-from lineament.reproduce.report import machine
 from lineament.simulation import SENSORS, building, drive
 from lineament.tasks.extract import extract_log
 

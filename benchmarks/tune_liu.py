@@ -9,10 +9,11 @@ import sys
 from itertools import product
 from typing import Any
 
+from lineament_lab.evaluation.counts import Counts
+from lineament_lab.evaluation.kinds import corner_scores
+from lineament_lab.reproduce.scans import batch_of, scene_numbers, simulated_frames
+
 from lineament import Extractor
-from lineament.evaluation.counts import Counts
-from lineament.evaluation.kinds import corner_scores
-from lineament.reproduce.scans import batch_of, scene_numbers, simulated_frames
 from lineament.simulation import SCENES, SENSORS
 
 GATE = 0.1

@@ -159,9 +159,9 @@ def pytest_make_parametrize_id(val):
 def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Compare what an experiment reports, returns and means with what was approved."""
     from approved import NUMBER, assert_approved, figure_lines, numbers_of
+    from lineament_lab.reproduce.claims import CLAIMS, bands
 
     from lineament.output import canvas
-    from lineament.reproduce.claims import CLAIMS, bands
 
     drawn: list[str] = []
     monkeypatch.setattr(canvas, "figure_bytes", lambda f, *_: drawn.extend(figure_lines(f)) or b"")

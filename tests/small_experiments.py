@@ -4,8 +4,7 @@ from itertools import accumulate, count
 from types import SimpleNamespace
 
 import pytest
-
-from lineament.reproduce import (
+from lineament_lab.reproduce import (
     all_methods,
     contenders,
     definitions,
@@ -19,7 +18,8 @@ from lineament.reproduce import (
     success,
     two_corners,
 )
-from lineament.reproduce.grid import Parameters
+from lineament_lab.reproduce.grid import Parameters
+
 from lineament.simulation import SENSORS
 
 PAPER = SENSORS["paper"]

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation.ple import polylines_of
 from worlds import random_scan
 
 import lineament as ln
-from lineament.evaluation.ple import polylines_of
 from lineament.kernels import layout as at
 from lineament.kernels.budget import limit_pieces
 from lineament.methods.workspace import budget_scratch

@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from bulk_logs import corner_log
+from lineament_lab.reproduce import EXPERIMENTS, Setting
 from text_logs import FLASER, flaser, zipped
 
 import lineament as ln
@@ -22,7 +23,6 @@ from lineament.cli.options import reading
 from lineament.logs import save_npz
 from lineament.logs.base import ECHOES, ReadOptions
 from lineament.output import canvas
-from lineament.reproduce import EXPERIMENTS, Setting
 
 
 @pytest.fixture
@@ -473,7 +473,7 @@ def test_reproduce_runs_what_is_asked_for_on_the_recordings_of_the_environment(
         calls.append(asked[:2])
         return output / "index.html"
 
-    monkeypatch.setattr("lineament.reproduce.report.reproduce", report)
+    monkeypatch.setattr("lineament_lab.reproduce.report.reproduce", report)
     monkeypatch.setenv("LINEAMENT_DATA", str(tmp_path))
     given = ["reproduce", "-o", str(tmp_path), "--only", "fig5", "--frames", "1", "--seed", "2"]
     assert run(given) == 0

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lineament_lab.reproduce.compare import compare_log, compare_scan, write_comparison
 
 import lineament as ln
 from lineament import LineamentError, LogError
 from lineament.logs import save_npz
-from lineament.reproduce.compare import compare_log, compare_scan, write_comparison
 from lineament.simulation import SENSORS, room
 
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation import NormalisedErrors
 from worlds import NOISE, STEP, fan, room, scan_of, vertex, wall
 
 from lineament import Extractor
 from lineament.bounds import arc_bound, corner_bound, line_bound
-from lineament.evaluation import NormalisedErrors
 from lineament.simulation import Sensor, World
 
 pytestmark = pytest.mark.slow

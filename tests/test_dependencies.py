@@ -101,7 +101,6 @@ assert run(["demo", log, "-o", "demo", "-q"]) == 0
 assert run(["live", "--from", log, "--ros", "0", "--rate", "0", "-q"]) == 0
 import lineament.view
 assert run(["extract", log, "-o", "a.dxf", "-q"]) == 1
-assert run(["reproduce", "-o", "report", "-q"]) == 1
 assert run(["map", log, "-o", "a.svg", "-q"]) == 1
 """
     # Without compiled kernels numba is there.

@@ -7,11 +7,12 @@ from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 
+import lineament_lab
 import pytest
 import yaml  # which distributed needs
 
 import lineament as ln
-from lineament.cli.commands import COMMANDS
+from lineament.cli import cli
 from lineament.methods import METHODS, stages
 from lineament.methods.liu import Liu
 
@@ -34,7 +35,11 @@ def test_site_has_each_page_and_each_public_package_once():
     for source in documents.values():
         assert (ROOT / source).exists()
     packages = {"commands", "lineament", "lineament.bounds", "lineament.methods.stages"}
-    for found in pkgutil.walk_packages(ln.__path__, "lineament."):
+    found_packages = (
+        *pkgutil.walk_packages(ln.__path__, "lineament."),
+        *pkgutil.walk_packages(lineament_lab.__path__, "lineament_lab."),
+    )
+    for found in found_packages:
         if found.ispkg and not found.name.startswith("lineament.cli"):
             packages |= {found.name} if hasattr(import_module(found.name), "__all__") else set()
     reference = [f"reference/{package}.md" for package in packages]
@@ -67,7 +72,7 @@ def test_methods_commands_and_public_names_are_what_there_is():
         assert f"| `{name}`" in methods
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for command in re.findall(r"^lineament (\w+)", text, re.MULTILINE):
-        assert command in COMMANDS
+        assert command in cli.list_commands(None)
     for name in re.findall(r"\bln\.(\w+)", text):
         assert hasattr(ln, name)
 

@@ -20,8 +20,7 @@ from text_logs import FLASER
 
 import lineament as ln
 from lineament import LogError, files
-from lineament.cli import run
-from lineament.cli.commands import COMMANDS
+from lineament.cli import cli, run
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
 from lineament.logs import open_log
@@ -29,6 +28,8 @@ from lineament.logs.opening import readers
 from lineament.output import ENDINGS, open_writer
 from lineament.tasks.bulk import extract_logs
 from lineament.view import ViewServer
+
+COMMANDS = {name: cli.get_command(None, name) for name in cli.list_commands(None)}
 
 #: Each command at work on little: with the output that it writes, where it writes one.
 RUNS = {
@@ -74,7 +75,7 @@ def work(tmp_path, monkeypatch, npz, benchmark, plan):  # noqa: ARG001, F811
     monkeypatch.delenv("LINEAMENT_DATA")
     monkeypatch.setattr(ViewServer, "serve_forever", lambda _: None)
     monkeypatch.setattr("lineament.tasks.demo._draw", lambda *_: [])
-    monkeypatch.setattr("lineament.reproduce.report.run_experiments", lambda *_: {})
+    monkeypatch.setattr("lineament_lab.reproduce.report.run_experiments", lambda *_: {})
     return tmp_path
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import SIDE, arc, corner, edge, features, segment
+from lineament_lab.evaluation import Counts, arc_scores, corner_scores, segment_scores
 
-from lineament.evaluation import Counts, arc_scores, corner_scores, segment_scores
 from lineament.features import ARC
 
 SMALL = segment((5, 0), (5, 0.1), 70, 74)

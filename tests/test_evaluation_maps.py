@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation.maps import absolute_errors, alignment, doubled_walls
 
-from lineament.evaluation.maps import absolute_errors, alignment, doubled_walls
 from lineament.scan.poses import compose
 
 

@@ -2,26 +2,22 @@
 
 import itertools
 import math
-import sys
 
 import numpy as np
 import pytest
 from handmade import features, segment
-
-from lineament import LaserScan
-from lineament.errors import LineamentError
-from lineament.evaluation import Counts, NormalisedErrors, evaluate, match
-from lineament.evaluation.beams import (
+from lineament_lab.evaluation import Counts, NormalisedErrors, match
+from lineament_lab.evaluation.beams import (
     beam_masks,
     on_small_surfaces,
     overlap_ratios,
     shared_beams,
     with_neighbours,
 )
-from lineament.evaluation.consistency import largest_variance, tolerance
-from lineament.evaluation.icp import icp
-from lineament.evaluation.matching import distances_from_segments
-from lineament.evaluation.ple import score_map
+from lineament_lab.evaluation.consistency import largest_variance, tolerance
+from lineament_lab.evaluation.matching import distances_from_segments
+
+from lineament import LaserScan
 
 SCAN = LaserScan([2.0] * 9, 0.0, 0.01)
 WALL = features(segments=[segment((2, -1), (2, 1), 10, 49)])
@@ -61,22 +57,6 @@ def test_match_refuses():
         match(np.zeros((2, 3)), np.ones((3, 2), bool))
     with pytest.raises(ValueError, match="cost of an allowed pair is nan"):
         match(np.array([[np.nan]]), np.array([[True]]))
-
-
-@pytest.mark.parametrize(
-    ("package", "extra", "compute"),
-    [
-        ("scipy", "mapping", lambda: evaluate(WALL, WALL)),
-        ("scipy", "mapping", lambda: evaluate(features(), features()).summary()),
-        ("scipy", "mapping", lambda: icp(SCAN, SCAN)),
-        ("shapely", "evaluation", lambda: score_map([], SCAN, np.ones((3, 2)))),
-    ],
-)
-def test_without_a_package_one_line_names_the_smallest_extra(package, extra, compute, monkeypatch):
-    for module in [package, *(name for name in sys.modules if name.startswith(f"{package}."))]:
-        monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(LineamentError, match=rf"needs {package}, .* 'lineament\[{extra}\]'$"):
-        compute()
 
 
 def test_counts_by_hand():

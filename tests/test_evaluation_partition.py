@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 from handmade import breakpoint_at, features
-
-from lineament.evaluation import Counts, PartitionScores, partition_scores
+from lineament_lab.evaluation import Counts, PartitionScores, partition_scores
 
 
 def labels(*sizes):

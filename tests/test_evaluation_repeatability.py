@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from handmade import corner, features, segment
+from lineament_lab.evaluation import RankedRepeats, Repeatability, ranked_repeats, repeatability
+from lineament_lab.evaluation.repeatability import in_sight
 
 import lineament as ln
-from lineament.evaluation import RankedRepeats, Repeatability, ranked_repeats, repeatability
-from lineament.evaluation.repeatability import in_sight
 from lineament.simulation import Sensor, World
 
 # A wall x = 3 and a pillar before its upper half, as the first scanner sees it.

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 from handmade import arc, features, segment
-
-from lineament import LaserScan
-from lineament.evaluation import (
+from lineament_lab.evaluation import (
     FreeSpaceScores,
     SimilarityScores,
     free_space_scores,
     similarity_errors,
     similarity_scores,
 )
+
+from lineament import LaserScan
 
 #: Eleven beams, 0.1 rad apart. Samples between 1.5 steps and more have their beams on one side.
 BEARINGS = 0.1 * np.arange(-5, 6)

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 from handmade import features, random_features, shaken, shuffled
+from lineament_lab.evaluation import Counts, Scores, evaluate
 
-from lineament.evaluation import Counts, Scores, evaluate
 from lineament.simulation import SCENES, SENSORS, scene
 from lineament.simulation import truth as truth_of
 
@@ -86,10 +86,10 @@ def test_hostile_features_raise_no_warning_and_figures_are_json():
         assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
-@pytest.mark.parametrize("package", ["evaluation", "simulation"])
+@pytest.mark.parametrize("package", ["lineament_lab.evaluation", "lineament.simulation"])
 def test_import_is_light(package):
     code = (
-        f"import sys, lineament.{package};"
+        f"import sys, {package};"
         "heavy = {'numba', 'scipy', 'pyarrow', 'matplotlib', 'shapely'} & sys.modules.keys();"
         "sys.exit(f'imported: {heavy}' if heavy else 0)"
     )

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 from handmade import corner, features, segment
-
-from lineament.evaluation import standing_scores
+from lineament_lab.evaluation import standing_scores
 
 #: The median of χ² with two degrees of freedom.
 MEDIAN = 2 * math.log(2)

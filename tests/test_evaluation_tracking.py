@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import corner, features, segment
+from lineament_lab.evaluation.icp import icp
+from lineament_lab.evaluation.relations import read_relations
+from lineament_lab.evaluation.tracking import MotionErrors, chained, motion_errors, track_scores
 
 from lineament import LaserScan, LogError, RangeNoise
-from lineament.evaluation.icp import icp
-from lineament.evaluation.relations import read_relations
-from lineament.evaluation.tracking import MotionErrors, chained, motion_errors, track_scores
 from lineament.motion import Tracks
 from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, room
@@ -88,7 +88,7 @@ def test_no_file_of_relations(tmp_path, text):
 
 def test_relations_of_the_corrected_poses_are_those_known(data_dir):
     """350 of Intel are of its scans, and its corrected poses are .0313 ± .0225 m off."""
-    from lineament.reproduce.scans import archived_scans
+    from lineament_lab.reproduce.scans import archived_scans
 
     scans = archived_scans(data_dir / "truth/intel_graph.npz")
     stamps = np.array([scan.stamp for scan in scans])

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.reproduce import definitions
 from panels import angle_of, assert_legible, beside, by_label, drawn, notes, texts_of
-
-from lineament.reproduce import definitions
 
 
 def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():

@@ -5,12 +5,7 @@ import math
 import numpy as np
 import pytest
 from handmade import features
-from panels import angle_of, assert_apart, assert_legible, by_label, drawn, notes, texts_of
-from small_experiments import PAPER
-
-import lineament as ln
-from lineament.output import canvas
-from lineament.reproduce import (
+from lineament_lab.reproduce import (
     arena,
     grid,
     layers,
@@ -20,8 +15,13 @@ from lineament.reproduce import (
     repetition,
     similarity,
 )
-from lineament.reproduce.findings import dot_chart, log_axis
-from lineament.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
+from lineament_lab.reproduce.findings import dot_chart, log_axis
+from lineament_lab.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
+from panels import angle_of, assert_apart, assert_legible, by_label, drawn, notes, texts_of
+from small_experiments import PAPER
+
+import lineament as ln
+from lineament.output import canvas
 from lineament.scan.poses import compose
 from lineament.simulation import World, truth
 

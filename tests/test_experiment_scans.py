@@ -5,13 +5,10 @@ import math
 import numpy as np
 import pytest
 from handmade import corner, features
-
-from lineament import Extractor, LaserScan
-from lineament.evaluation import evaluate
-from lineament.logs import save_npz
-from lineament.reproduce import Setting, arena, scans
-from lineament.reproduce.arena import ARENAS, arena_scores, load_arena
-from lineament.reproduce.scans import (
+from lineament_lab.evaluation import evaluate
+from lineament_lab.reproduce import Setting, arena, scans
+from lineament_lab.reproduce.arena import ARENAS, arena_scores, load_arena
+from lineament_lab.reproduce.scans import (
     batch_of,
     frame_times,
     interleaved_times,
@@ -21,6 +18,9 @@ from lineament.reproduce.scans import (
     still_pairs,
     time_ratio,
 )
+
+from lineament import Extractor, LaserScan
+from lineament.logs import save_npz
 from lineament.simulation import SENSORS, Sensor, World, building, drive, truth
 
 

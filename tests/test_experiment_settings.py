@@ -6,9 +6,9 @@ import re
 from dataclasses import fields
 
 import pytest
+from lineament_lab.reproduce import EXPERIMENTS, controls, experiment_names
 
 from lineament.methods.lines import PieceMethod
-from lineament.reproduce import EXPERIMENTS, controls, experiment_names
 
 SETTINGS = {
     "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
@@ -64,7 +64,7 @@ OPEN = [
 
 
 def module(name):
-    return importlib.import_module(f"lineament.reproduce.{name}")
+    return importlib.import_module(f"lineament_lab.reproduce.{name}")
 
 
 @pytest.mark.parametrize("name", SETTINGS)

@@ -7,16 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import features
-from small_experiments import CHOSEN, PAPER, silent, small  # noqa: F401
-
-import lineament as ln
-from lineament.evaluation import Counts, FeatureScores, Scores, SimilarityScores
-from lineament.evaluation.consistency import NormalisedErrors
-from lineament.logs import save_npz
-from lineament.methods import METHODS
-from lineament.methods.stages import corner_response
-from lineament.output import canvas, drawing
-from lineament.reproduce import (
+from lineament_lab.evaluation import Counts, FeatureScores, Scores, SimilarityScores
+from lineament_lab.evaluation.consistency import NormalisedErrors
+from lineament_lab.reproduce import (
     EXPERIMENTS,
     Setting,
     all_methods,
@@ -33,7 +26,14 @@ from lineament.reproduce import (
     tracking,
     two_corners,
 )
-from lineament.reproduce.seeds import Spread
+from lineament_lab.reproduce.seeds import Spread
+from small_experiments import CHOSEN, PAPER, silent, small  # noqa: F401
+
+import lineament as ln
+from lineament.logs import save_npz
+from lineament.methods import METHODS
+from lineament.methods.stages import corner_response
+from lineament.output import canvas, drawing
 from lineament.simulation import SENSORS, room, truth
 
 

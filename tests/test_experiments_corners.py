@@ -5,11 +5,7 @@ import math
 import numpy as np
 import pytest
 from handmade import corner, features
-from small_experiments import PAPER
-
-import lineament as ln
-from lineament.methods.stages import bilateral_filter
-from lineament.reproduce import (
+from lineament_lab.reproduce import (
     Setting,
     grid,
     repetition,
@@ -17,8 +13,12 @@ from lineament.reproduce import (
     sensitivity,
     two_corners,
 )
-from lineament.reproduce.grid import Parameters
-from lineament.reproduce.two_corners import DISTANCE, POSES, WORLD, A, B
+from lineament_lab.reproduce.grid import Parameters
+from lineament_lab.reproduce.two_corners import DISTANCE, POSES, WORLD, A, B
+from small_experiments import PAPER
+
+import lineament as ln
+from lineament.methods.stages import bilateral_filter
 from lineament.simulation import truth
 
 

@@ -6,12 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from small_experiments import silent, small  # noqa: F401
-
-import lineament as ln
-from lineament import LineamentError
-from lineament.logs import save_npz
-from lineament.reproduce import (
+from lineament_lab.reproduce import (
     Setting,
     contenders,
     museum,
@@ -19,8 +14,13 @@ from lineament.reproduce import (
     scans,
     tracking,
 )
-from lineament.reproduce.report import reproduce
-from lineament.reproduce.two_corners import DISTANCE, WORLD
+from lineament_lab.reproduce.report import reproduce
+from lineament_lab.reproduce.two_corners import DISTANCE, WORLD
+from small_experiments import silent, small  # noqa: F401
+
+import lineament as ln
+from lineament import LineamentError
+from lineament.logs import save_npz
 from lineament.scan.poses import relative
 from lineament.simulation import SENSORS, drive, room
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation import NormalisedErrors
 from worlds import fan, scan_of, wall
 
 import lineament as ln
 from lineament import Extractor, LaserScan, RangeNoise
-from lineament.evaluation import NormalisedErrors
 from lineament.methods.stages import estimate_noise
 
 #: Root of the mean variance of scanners [m], and variance of its logarithm.

@@ -8,6 +8,7 @@ import struct
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from lineament_lab.reproduce.scans import archived_scans
 
 import lineament as ln
 from lineament.cli import run
@@ -20,7 +21,6 @@ from lineament.mapping import LineMap
 from lineament.mapping.following import Follower, combined, follow
 from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
-from lineament.reproduce.scans import archived_scans
 from lineament.simulation import SENSORS, World, room
 from lineament.simulation import drive as drive_scans
 from lineament.simulation.buildings import office

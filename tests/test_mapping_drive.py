@@ -7,11 +7,11 @@ from itertools import accumulate
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from lineament_lab.evaluation.maps import absolute_errors
 
 from lineament import Extractor, LaserScan
 from lineament.cli import cli, run
 from lineament.errors import LineamentError
-from lineament.evaluation.maps import absolute_errors
 from lineament.features import SEGMENT
 from lineament.logs import save_log
 from lineament.mapping import LineMap

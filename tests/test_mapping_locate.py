@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from lineament_lab.reproduce.scans import archived_scans
 
 import lineament as ln
 from lineament.mapping import LineMap, LocalMap, Query, locate
@@ -13,7 +14,6 @@ from lineament.mapping.evidence import evidence_of
 from lineament.mapping.local_map import query_of_scan
 from lineament.mapping.refine import adjusted
 from lineament.motion import compose, relative
-from lineament.reproduce.scans import archived_scans
 from lineament.simulation import SENSORS, World, drive, drive_poses
 from lineament.simulation.buildings import office
 from lineament.simulation.raycast import cast_rays

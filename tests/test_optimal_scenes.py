@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation import segment_scores
 from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor, LaserScan
-from lineament.evaluation import segment_scores
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 UNAWARE, AWARE = Extractor("optimal"), Extractor("optimal", noise=NOISE)

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation.scores import Scores, evaluate
 
 from lineament import Extractor
-from lineament.evaluation.scores import Scores, evaluate
 from lineament.simulation import SENSORS, scene, truth
 
 KINDS = ("room", "corridor", "hall")

@@ -65,8 +65,8 @@ def idle(files, monkeypatch):  # noqa: ARG001  (they are made first)
 
     monkeypatch.setattr(ln.Extractor, "__call__", work)
     monkeypatch.setattr("lineament.simulation.sensor.Sensor.scan", work)
-    monkeypatch.setattr("lineament.reproduce.report.run_experiments", work)
-    monkeypatch.setattr("lineament.evaluation.ple.run_benchmark", work)
+    monkeypatch.setattr("lineament_lab.reproduce.report.run_experiments", work)
+    monkeypatch.setattr("lineament_lab.evaluation.ple.run_benchmark", work)
 
 
 # Every command

@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import corner, features, segment
-
-from lineament import LaserScan
-from lineament.errors import LogError
-from lineament.evaluation.ple import (
+from lineament_lab.evaluation.ple import (
     Benchmark,
     benchmark_iepf,
     cast_map,
@@ -23,6 +20,9 @@ from lineament.evaluation.ple import (
     score_map,
     sparing_map,
 )
+
+from lineament import LaserScan
+from lineament.errors import LogError
 
 #: Scans and budgets where two points are equally far but for the authors' rounding, which took the
 #: later one.

@@ -5,10 +5,10 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 import pytest
+from lineament_lab.evaluation.ple import polylines_of, score_map
 from worlds import BOX, fan, full_circle, random_scan, room, scan_of, vertex
 
 import lineament as ln
-from lineament.evaluation.ple import polylines_of, score_map
 from lineament.kernels import layout as at
 from lineament.kernels.polylines import CLOSED_COST, PLANES, fit_polylines
 

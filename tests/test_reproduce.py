@@ -7,17 +7,10 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
-from selenium.webdriver.common.keys import Keys
-from test_view_page import CHROMIUM, DRIVER, FLAGS
-
-from lineament import LineamentError
-from lineament.evaluation.counts import plain
-from lineament.evaluation.ple import Benchmark, BenchmarkResult
-from lineament.evaluation.ple import benchmark as ple
-from lineament.output.canvas import figure_bytes, new_figure
-from lineament.reproduce import (
+from lineament_lab.evaluation.counts import plain
+from lineament_lab.evaluation.ple import Benchmark, BenchmarkResult
+from lineament_lab.evaluation.ple import benchmark as ple
+from lineament_lab.reproduce import (
     EXPERIMENTS,
     Figure,
     Findings,
@@ -28,10 +21,17 @@ from lineament.reproduce import (
     noise,
     run_experiments,
 )
-from lineament.reproduce.claims import CLAIMS, WORDS, bands, verdicts
-from lineament.reproduce.findings import cell_text, dot_chart, median_of, merged_findings
-from lineament.reproduce.report import benchmark_tables, reproduce, write_report
-from lineament.reproduce.seeds import Spread, merged, merged_text
+from lineament_lab.reproduce.claims import CLAIMS, WORDS, bands, verdicts
+from lineament_lab.reproduce.findings import cell_text, dot_chart, median_of, merged_findings
+from lineament_lab.reproduce.report import benchmark_tables, reproduce, write_report
+from lineament_lab.reproduce.seeds import Spread, merged, merged_text
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.keys import Keys
+from test_view_page import CHROMIUM, DRIVER, FLAGS
+
+from lineament import LineamentError
+from lineament.output.canvas import figure_bytes, new_figure
 
 
 def findings():
@@ -113,7 +113,7 @@ def test_recordings_that_are_missing_are_left_out(tmp_path):
 
 def test_chart_draws_what_is_finite(monkeypatch):
     shown = []
-    monkeypatch.setattr("lineament.reproduce.findings.canvas.figure_bytes", shown.append)
+    monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
     numbers = {"one": {"a": {"f1": 1.0}, "b": {"f1": np.nan, "t": 3}}, "other": {"b": {"f1": 2}}}
     dot_chart(numbers, {"F1 [%]": ("f1", 100), "time": ("t", 1)}, ["time"])
     f1, time = shown[0].axes
@@ -127,7 +127,7 @@ def test_chart_draws_what_is_finite(monkeypatch):
                                               ("errors of some corners.", 2)])  # fmt: skip
 def test_labels_of_a_chart_have_lines_of_22_letters(label, lines, monkeypatch):
     shown = []
-    monkeypatch.setattr("lineament.reproduce.findings.canvas.figure_bytes", shown.append)
+    monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
     dot_chart({"one": {"a": {"f1": 1.0}}}, {label: ("f1", 1)}, [])
     assert len(shown[0].axes[0].get_xlabel().split("\n")) == lines
 

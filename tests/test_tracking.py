@@ -8,11 +8,11 @@ import naive_tracking as naive
 import numpy as np
 import pytest
 from handmade import arc, corner, edge, features, random_features, segment, shaken
+from lineament_lab.reproduce.tracking import LOGS, load_recording, stand_in_odometry
 
 import lineament as ln
 from lineament.motion import Tracker, associate, estimate_motion
 from lineament.motion.association import KINDS, chi_square
-from lineament.reproduce.tracking import LOGS, load_recording, stand_in_odometry
 from lineament.scan.poses import compose, inverse
 from lineament.simulation import SENSORS, drive, room
 

@@ -20,7 +20,6 @@ EXTRAS = {
     "polars": "polars",
     "rerun": "rerun",
     "scipy": "mapping",
-    "shapely": "evaluation",
 }
 
 

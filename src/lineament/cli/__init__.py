@@ -10,6 +10,7 @@ import click
 
 from ..errors import LineamentError, LineamentWarning, NothingFoundError
 from ..progress import compiling_shown
+from .added import Commands
 from .commands import COMMANDS
 from .options import complain
 from .progress import show_compiling
@@ -22,6 +23,7 @@ _UNWRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EFBIG, errno.EDQUOT, 
 
 
 @click.group(
+    cls=Commands,
     commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )

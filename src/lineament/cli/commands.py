@@ -5,7 +5,6 @@ from typing import Any
 
 import click
 
-from .experiments import bench, compare, demo, reproduce, simulate
 from .extract import extract
 from .live import live
 from .mapping import LAYERS, UNITS, locate, map_command
@@ -25,6 +24,7 @@ from .options import (
     reading,
     wrong_usage,
 )
+from .simulating import demo, simulate
 
 
 @click.command()
@@ -163,6 +163,6 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
 
 _ALL = (
     *(extract, info, plot, view, live, locate, map_command, demo),
-    *(methods, warmup, compare, reproduce, bench, simulate),
+    *(methods, warmup, simulate),
 )
 COMMANDS = {command.name: command for command in _ALL if command.name}

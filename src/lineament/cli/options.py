@@ -41,6 +41,7 @@ LOG_PATH = _LogPlace(path_type=Path)
 LOG = click.argument("log", type=LOG_PATH)
 SCAN = click.option("--scan", "index", type=int, default=0, help="Index of the scan, from 0.")
 TOPIC = click.option("--topic", help="Which scans of the log.  [default: the format's own choice]")
+SEED = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 KEEP_GOING = click.option(
     "--keep-going", is_flag=True, help="Skip and count faulty lines and records."
 )

@@ -1,0 +1,256 @@
+"""Figures 11 to 13 and Tables 2 and 3 on a bag of the museum that the paper's scans are from."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice, product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lineament.extractor import Extractor
+from lineament.features import Features
+from lineament.logs import open_log
+from lineament.methods import DEFAULT_METHOD
+from lineament.motion import Tracker
+from lineament.output import canvas
+from lineament.scan import Array, LaserScan
+from lineament.scan.poses import compose
+
+from ..evaluation.similarity import SimilarityScores, similarity_scores
+from .contenders import LIU_PAPER, PDBS_LINES, Extract, fitted_methods
+from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
+from .scans import frame_times
+from .scenes import pictures
+from .similarity import error_strips
+from .two_corners import DISTANCE, distance_found, draw_place
+
+#: The topic of the scans in a bag of the Deutsches Museum, 2-D, by Cartographer.
+TOPIC = "horizontal_laser_2d"
+#: Scans in a row in which corners are followed, for each frame of the setting; their distance in
+#: time at least [s]; and of the corners, at least and at most [m].
+SCANS_A_FRAME, APART, FAR = 40, 0.1, (1.0, 5.0)
+PLACES = 5
+TITLE = "The paper’s museum"
+
+
+class View(NamedTuple):
+    """A scan, what `optimal` finds in it, the way to it [m], and followed corners by number.
+
+    Each has its position [m], and whether it is convex.
+    """
+
+    scan: LaserScan
+    features: Features
+    way: float
+    corners: dict[int, tuple[Array, bool]]
+
+
+def run(setting: Setting, progress: Progress) -> Findings:
+    """Measure all methods on the bag of the setting."""
+    if setting.museum is None:
+        text = (
+            "No bag is given. The paper’s scans are from the Deutsches Museum, recorded for "
+            "Cartographer, whose bags are public but not part of this report: “lineament reproduce "
+            "--museum BAG” runs this part.",
+        )
+        return Findings(TITLE, text)
+    progress("reading")
+    frames, in_row = read(setting.museum, setting.frames)
+    methods = fitted_methods(setting, progress)
+    scores, of_methods = {}, {}
+    for name, extract in each(methods, progress, f"{len(frames)} scans"):
+        scores[name], of_methods[name] = _measured(extract, frames)
+    numbers: dict[str, Any] = {"methods": of_methods}
+    of_scans = [SimilarityScores.total(of).mean for of in zip(*scores.values(), strict=True)]
+    scan = frames[median_of(range(len(frames)), of_scans.__getitem__)]
+    about = (
+        f"The museum: of {len(frames)} scans from equal parts of the bag the one with the median "
+        "mean similarity error of all methods together"
+    )
+    found = {name: extract(scan) for name, extract in methods.items()}
+    figures = [*pictures("museum-fig11", about, scan, found), _errors(scan, found)]
+    title = f"Figure 12 and Table 3, as far as they need no truth: {len(frames)} scans"
+    tables = [Table.of_numbers(title, of_methods, _COLUMNS, _NOTE)]
+    progress("following corners")
+    seen = views_of_two(follow(in_row))
+    if seen is not None:
+        views, a, b = seen
+        numbers["distance"] = _distances(views, a, b, methods)
+        tables.append(_distance_table(numbers["distance"], len(views)))
+        figures.append(_places(views, a, b))
+    return Findings(TITLE, _TEXT, tuple(tables), tuple(figures), numbers)
+
+
+_COLUMNS = {
+    "clusters a scan": ("clusters", 1),
+    "segments a scan": ("segments", 1),
+    "corners a scan": ("corners", 1),
+    "similarity error, mean [mm]": ("mean", 1e3),
+    "largest [m]": ("largest", 1),
+    "explained [%]": ("explained", 100),
+    "time [µs]": ("time", 1e6),
+}
+_NOTE = (
+    "Nothing true is known of these scans, so what is right cannot be counted. Explained: share of "
+    "the valid beams that have a line or an arc, to which the errors are measured."
+)
+_TEXT = (
+    "The paper does not say which ten frames and which five places of the museum it used. Frames "
+    "are taken from equal parts of the bag. The two corners are a convex one (A) and a concave one "
+    f"(B), {FAR[0]:g} to {FAR[1]:g} m apart, that {DEFAULT_METHOD} follows together over the "
+    "longest way in successive scans; the five places are at equal parts of that way.",
+    "A method’s corners are those nearest to the followed ones, within 0.25 m. The true distance "
+    "is not known: compare standard deviations, and shares of scans. Those of "
+    f"{DEFAULT_METHOD}, which chose the scans, favour it.",
+)
+
+
+def _measured(
+    extract: Extract, scans: Sequence[LaserScan]
+) -> tuple[list[SimilarityScores], dict[str, float]]:
+    """Return the similarity of each scan, and the numbers of a method over all scans."""
+    found = [extract(scan) for scan in scans]
+    scores = list(map(similarity_scores, scans, found))
+    total = SimilarityScores.total(scores)
+    return scores, {
+        "clusters": float(np.mean([f.clusters.max(initial=-1) + 1 for f in found])),
+        "segments": float(np.mean([len(f.segments) for f in found])),
+        "corners": float(np.mean([len(f.corners) for f in found])),
+        "mean": total.mean,
+        "largest": total.maximum,
+        "explained": total.explained,
+        "time": float(np.median(frame_times(extract, scans)))
+        if isinstance(extract, Extractor)
+        else math.nan,
+    }
+
+
+def read(path: Path, count: int) -> tuple[list[LaserScan], list[LaserScan]]:
+    """Read so many scans from equal parts of a bag, and those in a row from its first third on.
+
+    The scans are of the museum's topic, or of the one that the bag would be read by without it.
+    """
+    log = open_log(path, keep_going=True)
+    for topic in log.topics:
+        if topic.strip("/") == TOPIC:
+            log = open_log(path, topic=topic, keep_going=True)
+    step = max(len(log) // count, 1)
+    frames = list(islice(log, step // 2, None, step))[:count]
+    in_row: list[LaserScan] = []
+    for scan in islice(log, len(log) // 3, None):
+        if not in_row or scan.stamp >= in_row[-1].stamp + APART:
+            in_row.append(scan)
+        if len(in_row) == SCANS_A_FRAME * count:
+            break
+    return frames, in_row
+
+
+def follow(scans: Iterable[LaserScan]) -> list[View]:
+    """Follow the corners of scans in a row."""
+    extract, tracker, views = Extractor(DEFAULT_METHOD), Tracker(), []
+    pose, way = (0.0, 0.0, 0.0), 0.0
+    for scan in scans:
+        features = extract(scan)
+        tracks = tracker(features)
+        if tracks.motion is not None:
+            before, pose = pose, compose(pose, tracks.motion.pose)
+            way += math.dist(before[:2], pose[:2])
+        corners = {
+            number: (row["position"], bool(row["convex"]))
+            for number, row in zip(tracks.corners.tolist(), features.corners, strict=True)
+            if number >= 0
+        }
+        views.append(View(scan, features, way, corners))
+    return views
+
+
+def views_of_two(views: Sequence[View]) -> tuple[list[View], int, int] | None:
+    """Return the views that show a convex and a concave corner over the longest way, and these.
+
+    None if no two are seen together from five places.
+    """
+    together: dict[tuple[int, int], list[View]] = defaultdict(list)
+    for view in views:
+        for (a, (place, convex)), (b, (other, other_convex)) in product(
+            view.corners.items(), repeat=2
+        ):
+            if convex and not other_convex and FAR[0] <= math.dist(place, other) <= FAR[1]:
+                together[a, b].append(view)
+    enough = {pair: seen for pair, seen in together.items() if len(seen) >= PLACES}
+    if not enough:
+        return None
+    (a, b), seen = max(enough.items(), key=lambda item: item[1][-1].way - item[1][0].way)
+    return seen, a, b
+
+
+def _at_places(views: Sequence[View]) -> list[View]:
+    """Return the views nearest to five places at equal parts of the way."""
+    ways = np.array([view.way for view in views])
+    return [views[abs(ways - at).argmin()] for at in np.linspace(ways[0], ways[-1], PLACES)]
+
+
+def _distances(
+    views: Sequence[View], a: int, b: int, methods: Mapping[str, Extract]
+) -> dict[str, dict[str, Any]]:
+    """Measure the distance of the two corners by each method."""
+    numbers = {}
+    for name, extract in methods.items():
+        places, all_views = (
+            np.array(
+                [distance_found(extract(v.scan), v.corners[a][0], v.corners[b][0]) for v in of]
+            )
+            for of in (_at_places(views), views)
+        )
+        some = all_views[~np.isnan(all_views)]
+        numbers[name] = {
+            "found": len(some) / len(all_views),
+            "mean": float(some.mean()) if len(some) else math.nan,
+            "deviation": float(some.std(ddof=1)) if len(some) > 1 else math.nan,
+            "places": places,
+        }
+    return numbers
+
+
+def _distance_table(numbers: Mapping[str, Mapping[str, Any]], count: int) -> Table:
+    return Table.of_records(
+        f"Table 2: distance of A and B in {count} scans",
+        [
+            {
+                "method": name,
+                "paper: mean [m]": f"{DISTANCE}" if name == LIU_PAPER else None,
+                "here: mean [m]": _metres(of["mean"]),
+                "standard deviation [mm]": 1e3 * of["deviation"],
+                "found in [%]": 100 * of["found"],
+                **{f"place {k} [m]": _metres(at) for k, at in enumerate(of["places"], 1)},
+            }
+            for name, of in numbers.items()
+        ],
+        "The paper’s corners are others; its variance is lost.",
+    )
+
+
+def _metres(length: float) -> str | None:
+    return None if math.isnan(length) else f"{length:.3f}"
+
+
+def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
+    """Draw the similarity error of each beam, by method."""
+    shown = [name for name in (LIU_PAPER, "iepf:paper", PDBS_LINES) if name in found]
+    figure = error_strips(scan, {name: found[name] for name in shown})
+    caption = "The museum, the same scan: similarity error of each beam. Dashed: 0.01 m."
+    return Figure("museum-fig12", caption, canvas.figure_bytes(figure))
+
+
+def _places(views: Sequence[View], a: int, b: int) -> Figure:
+    """Draw what is found from the five places."""
+    figure, panels = canvas.new_panels(PLACES, 3)
+    for k, (axes, view) in enumerate(zip(panels, _at_places(views), strict=True), 1):
+        places = (view.corners[number][0] for number in (a, b))
+        draw_place(axes, k, view.scan, view.features, *places)
+    canvas.add_legend(figure)
+    caption = (
+        f"The museum: a convex corner A and a concave one B from five places ({DEFAULT_METHOD})."
+    )
+    return Figure("museum-fig13", caption, canvas.figure_bytes(figure))

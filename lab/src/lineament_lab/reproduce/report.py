@@ -1,0 +1,189 @@
+"""The report of experiments: one page, and one file with all numbers."""
+
+import json
+import os
+import platform
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from lineament.files import check_outputs, made_folder, write_text
+from lineament.output.page import (
+    Cell,
+    contents_part,
+    heading_part,
+    image_part,
+    list_part,
+    table_part,
+    text_parts,
+    write_parts,
+)
+
+from ..evaluation.ple import BenchmarkResult
+from . import experiment_names, run_experiments
+from .claims import WORDS, Claim, bands, verdicts
+from .findings import Findings, Progress, Setting, Table, cell_text
+from .seeds import Spread
+
+#: Names of the files.
+_PAGE, _NUMBERS = "index.html", "figures.json"
+_INTRODUCTION = (
+    "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
+    "The values of its tables and of its Figure 12 are not available: where one stands only there, "
+    "the column “paper” says “lost”. Its recording, ten frames of the Deutsches Museum, is not "
+    "used, unless a bag of that museum is given: the methods are compared on simulated scans and "
+    "on other recordings if present.",
+    "Simulated experiments are run with several seeds. Where these differ, a number is the median, "
+    "with the least and the greatest in brackets; figures are those of the first seed.",
+)
+
+
+def reproduce(
+    folder: str | os.PathLike[str],
+    names: Iterable[str] = (),
+    setting: Setting | None = None,
+    progress: Progress = lambda about: None,  # noqa: ARG005
+) -> Path:
+    """Run experiments and write their report: ``index.html`` and ``figures.json``.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made if it does not exist.
+    names : iterable of str
+        Experiments, or the paper's names of figures and tables; none: all.
+    setting : Setting, optional
+    progress : callable
+        Called with a few words on what is being done.
+
+    Returns
+    -------
+    pathlib.Path
+        The page.
+
+    Raises
+    ------
+    ValueError
+        If there is no such experiment.
+    LineamentError
+        If the folder cannot be written to, or a file in it is the museum's bag.
+    """
+    setting = Setting() if setting is None else setting
+    chosen, target = experiment_names(names), made_folder(folder)
+    museum = () if setting.museum is None else (setting.museum,)
+    check_outputs([target / name for name in (_PAGE, _NUMBERS)], museum)
+    return write_report(target, run_experiments(chosen, setting, progress), setting)
+
+
+def write_report(folder: Path, findings: Mapping[str, Findings], setting: Setting) -> Path:
+    """Write page and numbers of some findings; return the path of the page."""
+    about: dict[str, object] = {
+        "lineament": version("lineament"),
+        "machine": machine(),
+        "frames": setting.frames,
+        "seeds": [one.seed for one in setting.by_seed()],
+        "recordings": setting.data is not None,
+        "museum": setting.museum is not None,
+    }
+    judged = verdicts(findings)
+    written = {
+        **about,
+        "verdicts": {claim.place: verdict for claim, _, verdict in judged},
+        "experiments": {name: found.to_dict() for name, found in findings.items()},
+    }
+    text = json.dumps(written, indent=1, ensure_ascii=False)
+    write_text(folder / _NUMBERS, text + "\n")
+    shown = {**about, "seeds": ", ".join(str(one.seed) for one in setting.by_seed())}
+    facts = [(k, ("no", "yes")[v] if isinstance(v, bool) else str(v)) for k, v in shown.items()]
+    entries = {"verdicts": "The paper’s figures and tables"}
+    entries |= {name: found.title for name, found in findings.items()}
+    parts = [
+        *(list_part(facts), *text_parts(_INTRODUCTION), contents_part(entries.items())),
+        *(heading_part("verdicts", entries["verdicts"]), _verdicts_part(judged, findings)),
+    ]
+    for name, found in findings.items():
+        parts += [heading_part(name, found.title), *findings_parts(found)]
+    page = folder / _PAGE
+    write_parts(page, "lineament: the paper’s experiments", parts)
+    return page
+
+
+_VERDICTS = "", "verdict", "paper", "here", "by what the paper leaves open"
+
+
+def _verdicts_part(
+    judged: Sequence[tuple[Claim, str, str]], findings: Mapping[str, Findings]
+) -> str:
+    """Make the table of the paper's figures and tables: where they are here, and verdicts."""
+    rows, of_open = [], bands(findings)
+    for claim, here, verdict in judged:
+        found = findings.get(claim.experiment)
+        figures = {figure.name for figure in found.figures} if found else {}
+        at = claim.figure if claim.figure in figures else claim.experiment
+        place = Cell(claim.place, href=f"#{at}" if found else "")
+        word = Cell(verdict or "–", "verdict")
+        band = Cell(of_open.get(claim.place, "–"))
+        rows.append([place, word, Cell(claim.paper), Cell(here or "–"), band])
+    words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
+    note = (
+        f"{words[0].upper()}{words[1:]}. The last column is the range of the same number over all "
+        "values of the parameters that the paper does not state. A dash: not run."
+    )
+    return table_part("Verdicts", _VERDICTS, rows, note)
+
+
+def findings_parts(findings: Findings) -> list[str]:
+    """Return text, tables and figures as parts of a page."""
+    tables = [
+        table_part(
+            table.title,
+            table.columns,
+            [[_cell(cell) for cell in row] for row in table.rows],
+            table.note,
+        )
+        for table in findings.tables
+    ]
+    images = [image_part(figure.caption, figure.png, figure.name) for figure in findings.figures]
+    return [*text_parts(findings.text), *tables, *images]
+
+
+#: A cell that is a number and nothing else; a dash is one that is missing.
+_NUMBER = re.compile(r"[+−-]?\d[\d.e-]*|–")
+
+
+def _cell(cell: object) -> Cell:
+    text = cell_text(cell)
+    is_number = isinstance(cell, Spread) or _NUMBER.fullmatch(text)
+    return Cell(text, "number" if is_number else "")
+
+
+def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:
+    """Make a table for each score of the public benchmark: methods, then its authors' methods."""
+    benchmark = results[0].benchmark
+    columns = ("method", *(f"J = {budget}" for budget in benchmark.max_vertices))
+    means, authors = {r.method: r.means() for r in results}, benchmark.means()
+    tables = []
+    for score in dict.fromkeys(score for of in means.values() for score in of):
+        rows = [(method, *of[score]) for method, of in means.items() if score in of]
+        rows += [(f"{method} (authors)", *m) for method, m in authors.get(score, {}).items()]
+        tables.append(Table(f"{benchmark.name}: {score}", columns, tuple(rows)))
+    return tables
+
+
+def machine() -> str:
+    """Return processor, cores, system and Python, in a line.
+
+    Examples
+    --------
+    >>> machine().endswith(f"Python {platform.python_version()}")
+    True
+    """
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
+        name = lines[0].split(":")[1].strip() if lines else name
+    return (
+        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+    )

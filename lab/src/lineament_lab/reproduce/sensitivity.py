@@ -1,0 +1,228 @@
+"""What the paper leaves open: its claims for every value of the parameters that it does not state.
+
+One parameter at a time, and the two together that matter most; the thresholds of PDBS and IEPF,
+which the paper does not state either, likewise.
+"""
+
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lineament.extractor import Extractor
+from lineament.methods.stages import bilateral_filter
+from lineament.scan import LaserScan
+from lineament.simulation import SCENES, SENSORS
+
+from ..evaluation.counts import Counts
+from ..evaluation.kinds import corner_scores
+from ..evaluation.partition import PartitionScores, partition_scores
+from .findings import Columns, Findings, Progress, Setting, Table
+from .grid import FORMS, GATE
+from .scans import Frame, batch_of, scene_numbers, simulated_frames
+from .two_corners import POSES, WORLD, found_distances
+
+#: Changes of `liu:paper` by parameter and value. PASSES is how often the ranges are filtered.
+PASSES = "passes"
+OPEN: dict[str, dict[str, dict[str, Any]]] = {
+    "half-width of the filter [beams]": {str(h): {"half_width": h} for h in (0, 1, 2, 4, 8)},
+    "passes of the filter": {str(n): {PASSES: n} for n in (1, 2, 3)},
+    "4 and 0.3 of the filter": {
+        "standard deviations": {},
+        "variances": {"sigma_d": 2.0, "sigma_r": 0.3**0.5},
+    },
+    "λ": {f"{scale:g}": {"spacing_scale": scale} for scale in (3.0, 4.0, 6.0, 8.0, 12.0)},
+    "k": {f"{k:g}": {"density_k": k} for k in (0.0, 1.0, 2.0, 3.0, 5.0)},
+    "form of the response": {form: {"response": form} for form in FORMS},
+    "recursion": {side: {"recursion": side} for side in ("both", "after")},
+    "support at ends of clusters": {ends: {"ends": ends} for ends in ("truncated", "excluded")},
+}
+#: The two that matter most for corners.
+TOGETHER = "half-width of the filter [beams]", "form of the response"
+#: D_0 of PDBS, and the tolerance of IEPF [m].
+DISTANCES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
+TOLERANCES = (0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3)
+#: What is measured, and what the paper reports of it.
+CLAIMS: dict[str, tuple[str, float | None]] = {
+    "clusters right [%]": ("clusters", 95.11),
+    "corners found [%]": ("recall", 92.62),
+    "their precision [%]": ("precision", None),
+    "both corners found [%]": ("both", 100.0),
+}
+_COLUMNS: Columns = {label: (key, 1) for label, (key, _) in CLAIMS.items()}
+#: Scans of mixed scenes, and from each of the five places, for each frame of the setting.
+SCANS_A_FRAME, VIEWS_A_FRAME = 6, 4
+
+
+class _Data(NamedTuple):
+    frames: list[Frame]
+    views: list[list[LaserScan]]
+
+
+def run(setting: Setting, progress: Progress) -> Findings:
+    """Measure the claims of the paper for all values of what it leaves open."""
+    data = _data(setting)
+    default = _measure(data, "liu:paper", {})
+    alone: dict[str, dict[str, dict[str, float]]] = {}
+    for name, values in OPEN.items():
+        progress(name)
+        alone[name] = {v: _measure(data, "liu:paper", changes) for v, changes in values.items()}
+    rows, columns = (OPEN[name] for name in TOGETHER)
+    together = {}
+    for row, column in product(rows, columns):
+        progress(f"half-width {row}, {column}")
+        together[row, column] = _measure(data, "liu:paper", rows[row] | columns[column])
+    progress("PDBS and IEPF")
+    pdbs = {f"{d:g} m": _measure(data, "pdbs", {"rule": "fixed", "distance": d}) for d in DISTANCES}
+    iepf = {
+        clusters: {
+            f"{t:g} m": _measure(data, "iepf:paper", {"threshold": t, "clusters": clusters})
+            for t in TOLERANCES
+        }
+        for clusters in ("none", "fixed")
+    }
+    bands = _bands(default, alone)
+    return Findings(
+        "What the paper leaves open",
+        _TEXT,
+        (
+            _band_table(default, bands),
+            *(
+                Table.of_numbers(name, found, _COLUMNS, first="value")
+                for name, found in alone.items()
+            ),
+            _table_together(together, "recall", "Corners found [%]"),
+            _table_together(together, "both", "Both corners found [%]"),
+            Table.of_numbers("PDBS by its distance D_0", pdbs, _only("clusters"), first="D_0"),
+            *(
+                Table.of_numbers(
+                    f"IEPF by its tolerance, {about}", iepf[clusters], _COLUMNS, first="tolerance"
+                )
+                for clusters, about in (
+                    ("none", "as published: of the whole scan"),
+                    ("fixed", "within clusters that end at 0.3 m"),
+                )
+            ),
+        ),
+        numbers={
+            "default": default,
+            "bands": bands,
+            "alone": alone,
+            "together": {f"{row}, {column}": of for (row, column), of in together.items()},
+            "pdbs": pdbs,
+            "iepf": iepf,
+        },
+    )
+
+
+_TEXT = (
+    "The paper states σ_d, σ_r, the support radius and the threshold, and leaves open the window "
+    "and the passes of its filter, λ and k of its clusters, the form of its response, whether both "
+    "sides of a corner are searched, and what happens at the ends of clusters. It calls 4 and 0.3 "
+    "variances; we read standard deviations. Each is changed alone here, from liu:paper with the "
+    "values of this implementation; then the two together that matter most for corners.",
+    "PDBS and IEPF have one threshold each, which the paper does not state. IEPF as published "
+    "knows no clusters: it takes breakpoints for points of one line, as the paper says, and loses "
+    "most of its precision. Within clusters it does not.",
+)
+
+
+@lru_cache(maxsize=4)
+def _data(setting: Setting) -> _Data:
+    """Simulate mixed scenes, and the two corners from five places."""
+    sensor = SENSORS["paper"]
+    scenes = scene_numbers(SCANS_A_FRAME * setting.frames, setting.seed)
+    views = []
+    for k, pose in enumerate(POSES):
+        rng = np.random.default_rng([setting.seed, k, 14])
+        count = VIEWS_A_FRAME * setting.frames
+        views.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
+    return _Data(list(simulated_frames(sensor, SCENES, scenes)), views)
+
+
+def _measure(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str, float]:
+    """Measure a method by the names in `CLAIMS` [%]."""
+    own = {name: value for name, value in changes.items() if name != PASSES}
+    extractor, passes = Extractor(method, **own), int(changes.get(PASSES, 1))
+    truths = [frame.truth for frame in data.frames]
+    found = batch_of(extractor, _filtered((frame.scan for frame in data.frames), passes - 1))
+    pairs = list(zip(found, truths, strict=True))
+    clusters = PartitionScores.total(partition_scores(*pair) for pair in pairs)
+    corners = Counts.total(corner_scores(*pair).by_gate[GATE] for pair in pairs)
+    both = sum(
+        len(found_distances(batch_of(extractor, _filtered(scans, passes - 1)), pose))
+        for scans, pose in zip(data.views, POSES, strict=True)
+    )
+    shares = {
+        "clusters": clusters.success,
+        "recall": corners.recall,
+        "precision": corners.precision,
+        "both": both / sum(map(len, data.views)),
+    }
+    return {name: 100 * share for name, share in shares.items()}
+
+
+def _filtered(scans: Iterable[LaserScan], times: int) -> list[LaserScan]:
+    """Filter the ranges of scans so many times; the method does it once more."""
+    filtered = list(scans)
+    for _ in range(times):
+        filtered = [
+            LaserScan(
+                bilateral_filter(scan),
+                scan.angle_min,
+                scan.angle_increment,
+                range_min=scan.range_min,
+                range_max=scan.range_max,
+            )
+            for scan in filtered
+        ]
+    return filtered
+
+
+def _bands(
+    default: Mapping[str, float], alone: Mapping[str, Mapping[str, Mapping[str, float]]]
+) -> dict[str, dict[str, Any]]:
+    """Return the least and the greatest of each measure, and the parameter that moves it most."""
+    bands = {}
+    for key in default:
+        spans = {
+            name: sorted(of[key] for of in values.values() if not np.isnan(of[key]))
+            for name, values in alone.items()
+        }
+        by = max(spans, key=lambda name: spans[name][-1] - spans[name][0])
+        ends = [end for span in spans.values() for end in (span[0], span[-1])]
+        bands[key] = {"low": min(ends), "high": max(ends), "by": by}
+    return bands
+
+
+def _band_table(default: Mapping[str, float], bands: Mapping[str, Mapping[str, Any]]) -> Table:
+    records = []
+    for label, (key, paper) in CLAIMS.items():
+        band = bands[key]
+        records.append(
+            {
+                "": label,
+                "paper": paper,
+                "liu:paper": default[key],
+                "least of all": band["low"],
+                "greatest of all": band["high"],
+                "most by": band["by"],
+            }
+        )
+    note = "Least and greatest: over all values of the parameters below, one changed at a time."
+    return Table.of_records("Bands of what the paper leaves open", records, note)
+
+
+def _table_together(
+    together: Mapping[tuple[str, str], Mapping[str, float]], key: str, title: str
+) -> Table:
+    rows, columns = (list(OPEN[name]) for name in TOGETHER)
+    cells = ((row, *(together[row, column][key] for column in columns)) for row in rows)
+    about = f"{title} by half-width of the filter and form of the response"
+    return Table(about, ("half-width", *columns), tuple(cells))
+
+
+def _only(key: str) -> Columns:
+    return {label: (name, factor) for label, (name, factor) in _COLUMNS.items() if name == key}

@@ -1,0 +1,242 @@
+"""Features that are followed through real logs, and the motion that they give, beside ICP."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lineament.extractor import Extractor
+from lineament.methods import DEFAULT_METHOD
+from lineament.motion import Tracker, Tracks
+from lineament.scan import LaserScan, Pose
+from lineament.scan.poses import compose, relative
+
+from ..evaluation.counts import ratio
+from ..evaluation.icp import icp
+from ..evaluation.relations import read_relations
+from ..evaluation.tracking import chained, motion_errors, track_scores
+from .findings import (
+    NO_RECORDINGS,
+    Columns,
+    Figure,
+    Findings,
+    Numbers,
+    Progress,
+    Setting,
+    Table,
+    cells,
+    dot_chart,
+)
+from .scans import archived_scans
+
+#: The recordings, and the share that is left out at the beginning: the first half of fr079 is
+#: where the tracker's roughness was chosen.
+LOGS = {
+    "Intel lab": ("truth/intel_graph.npz", 0.0),
+    "fr079, second half": ("truth/fr079_graph.npz", 0.5),
+    "arena, moving": ("truth/jackal_mocap_02171554.npz", 0.0),
+    "arena, static": ("truth/jackal_static_data.npz", 0.0),
+}
+#: Their verified relations, in the folder of the recordings or beside it.
+RELATIONS = {
+    "Intel lab": "graph/intel-lab.relations",
+    "fr079, second half": "../relations/fr079.relations",
+}
+#: Successive scans of each log for each frame of the setting.
+SCANS_A_FRAME = 300
+#: Errors of the synthetic odometry: deviations [m, rad], and their growth with way and turn.
+_WAY, _TURN = (0.02, 0.1), (0.01, 0.1)
+#: Relative pose errors are given over one frame, and over so many.
+_FAR = 10
+ODOMETRY, FEATURES, ICP = "odometry, synthetic", "features", "ICP"
+CORRECTED = "the log’s corrected poses"
+#: Numbers by relations: all, those up to a minute apart, those over a minute apart.
+RELATION_KEYS = "relations", "near", "far_apart"
+
+_RELATIONS = {
+    "relations": ("motions", 1),
+    "way, mean [mm]": ("way_mean", 1e3),
+    "std": ("way_std", 1e3),
+    "median": ("way_median", 1e3),
+    "turn, mean [°]": ("turn_mean", math.degrees(1)),
+    "std ": ("turn_std", math.degrees(1)),
+    "median ": ("turn_median", math.degrees(1)),
+}
+_MOTION = {
+    "way, RMSE [mm]": ("way_rmse", 1e3),
+    "median": ("way_median", 1e3),
+    "95 %": ("way_p95", 1e3),
+    "turn, RMSE [mrad]": ("turn_rmse", 1e3),
+    "median ": ("turn_median", 1e3),
+    f"way over {_FAR} scans, median [mm]": ("far_way_median", 1e3),
+    "unobserved [%]": ("unobserved", 100),
+}
+_TRACKS = {
+    "same in both scans": ("pairs", 1),
+    "number kept [%]": ("kept", 100),
+    "switched [%]": ("switched", 100),
+    "lost [%]": ("lost", 100),
+    "length of tracks, mean [scans]": ("length_mean", 1),
+    "90 %": ("length_p90", 1),
+}
+_PANELS = {
+    "error of the way, median [mm]": ("way_median", 1e3),
+    "95 % [mm]": ("way_p95", 1e3),
+    "error of the turn, median [mrad]": ("turn_median", 1e3),
+}
+
+
+def run(setting: Setting, progress: Progress) -> Findings:
+    """Follow the features of all logs."""
+    title = "Tracking and motion in real logs"
+    paths = setting.recordings({name: file for name, (file, _) in LOGS.items()})
+    verified = setting.recordings(RELATIONS)
+    if not paths:
+        return Findings(title, (NO_RECORDINGS,))
+    found = {}
+    for log, path in paths.items():
+        progress(f"{log}: reading")
+        scans = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
+        found[log] = measure(log, scans, setting.seed, progress, verified.get(log))
+    motions = {log: of["motion"] for log, of in found.items()}
+    kinds = {
+        log: {f"{name}: {kind}": of_kind for name, of in every["tracks"].items()
+              for kind, of_kind in of.items()}
+        for log, every in found.items()
+    }  # fmt: skip
+    every, near, far = ({log: of[key] for log, of in found.items()} for key in RELATION_KEYS)
+    return Findings(
+        title,
+        _TEXT,
+        (
+            *_table("Motion against verified relations", every, _RELATIONS, "motion from"),
+            *_table("Of these, those up to a minute apart", near, _RELATIONS, "motion from"),
+            *_table("Of these, those over a minute apart", far, _RELATIONS, "motion from"),
+            *_table("Motion against the log’s corrected poses", motions, _MOTION, "motion from"),
+            *_table("Tracks", kinds, _TRACKS, "tracker: of"),
+        ),
+        (
+            Figure(
+                "tracking",
+                "Motion against the corrected poses, from scan to scan, by log (colours).",
+                dot_chart(motions, _PANELS, _PANELS),
+            ),
+        ),
+        found,
+    )
+
+
+def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table]:
+    """Make a table with a row for each log and source; none without a row."""
+    records = [
+        {"log": log, what: name, **cells(numbers, columns)}
+        for log, found in logs.items()
+        for name, numbers in found.items()
+    ]
+    return [Table.of_records(title, records)] if records else []
+
+
+_TEXT = (
+    "Verified relations come first: relative poses of pairs of scans that people aligned by hand "
+    "(Kümmerle et al. 2009), where both scans are in the log to the millisecond. Motions are put "
+    "together from the one scan to the other. Most relations are between neighbours; over a minute "
+    "and more motions drift, as nothing here closes a loop: those stand by themselves.",
+    "The log’s corrected poses are a reference second to them: they are off the relations by "
+    "themselves, in the two offices by a few centimetres. Those of the arena come from motion "
+    "capture, refined on its walls. Errors are from scan to scan, and over "
+    f"{_FAR} scans. ICP is point-to-line from scan to scan, with all points.",
+    "The odometry in the two office logs repeats the corrected poses. A synthetic one is made of "
+    f"the known poses, with normal errors of {1e3 * _WAY[0]:.0f} mm + {100 * _WAY[1]:.0f} % of the "
+    f"way (in x and y) and {_TURN[0]} rad + {100 * _TURN[1]:.0f} % of the turn in each step. "
+    "Tracker and ICP start from it, or else from the last motion; the tracker also takes from it "
+    "what the features do not determine.",
+    "A feature keeps its number if two successive scans have the same number for what is the same "
+    "by the known poses; a switch is another number that was given before, lost is a new one.",
+)
+
+
+def load_recording(path: Path, count: int, skipped: float = 0.0) -> list[LaserScan]:
+    """Load so many successive scans of an archive, after a share that is left out."""
+    scans = archived_scans(path)
+    first = int(skipped * len(scans))
+    return scans[first : first + count]
+
+
+def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
+    """Make a synthetic odometry: the known poses, with errors that accumulate."""
+    rng = np.random.default_rng(seed)
+    way = [poses[0]]
+    for pose, following in pairwise(poses):
+        x, y, turn = relative(pose, following)
+        off_way = _WAY[0] + _WAY[1] * math.hypot(x, y)
+        off_turn = _TURN[0] + _TURN[1] * abs(turn)
+        dx, dy, dt = (rng.standard_normal(3) * (off_way, off_way, off_turn)).tolist()
+        way.append(compose(way[-1], (x + dx, y + dy, turn + dt)))
+    return way
+
+
+def measure(
+    name: str,
+    scans: Sequence[LaserScan],
+    seed: int,
+    progress: Progress,
+    verified: Path | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Follow the features of a log, with an odometry and without, and run ICP on it.
+
+    Returns errors of motions by what they are from, against the poses as "motion", against the
+    relations of a file by `RELATION_KEYS`, and "tracks" by tracker and kind of feature.
+    """
+    poses = [scan.pose for scan in scans if scan.pose is not None]
+    extract = Extractor(DEFAULT_METHOD)
+    frames = [extract(scan) for scan in scans]
+    odometry = stand_in_odometry(poses, seed)
+    steps = [relative(a, b) for a, b in pairwise(odometry)]
+    motions, unobserved, tracks = {ODOMETRY: steps}, {}, {}
+    for about, priors in (("", odometry), (", no odometry", [None] * len(poses))):
+        progress(f"{name}: tracking{about}")
+        tracker, features = Tracker(), FEATURES + about
+        found = [tracker(frame, prior) for frame, prior in zip(frames, priors, strict=True)]
+        moved = [track.motion for track in found if track.motion is not None]
+        motions[features] = [motion.pose for motion in moved]
+        unobserved[features] = ratio(sum(not motion.observable for motion in moved), len(moved))
+        tracks[features] = _track_numbers(frames, found, poses)
+        progress(f"{name}: ICP{about}")
+        motions[ICP + about] = _icp_motions(scans, None if about else steps)
+    numbers: dict[str, dict[str, Any]] = {key: {} for key in RELATION_KEYS} | {"tracks": tracks}
+    if verified is not None:
+        every = read_relations(verified, np.array([scan.stamp for scan in scans]))
+        ways = {CORRECTED: poses} | {source: chained(of) for source, of in motions.items()}
+        parts = every, every.far_apart(False), every.far_apart()
+        for key, relations in zip(RELATION_KEYS, parts, strict=True):
+            numbers[key] = {by: relations.errors(way).summary() for by, way in ways.items()}
+    numbers["motion"] = {
+        source: motion_errors(motion, poses).summary()
+        | {"far_" + k: v for k, v in motion_errors(motion, poses, _FAR).summary().items()}
+        | {"unobserved": unobserved.get(source, math.nan)}
+        for source, motion in motions.items()
+    }
+    return numbers
+
+
+def _track_numbers(frames: Any, tracks: Sequence[Tracks], poses: Any) -> dict[str, Any]:
+    return {
+        kind: score.summary()
+        | {
+            "switched": ratio(score.switched, score.pairs),
+            "lost": ratio(score.lost, score.pairs),
+        }
+        for kind, score in track_scores(frames, tracks, poses).items()
+    }
+
+
+def _icp_motions(scans: Sequence[LaserScan], starts: Sequence[Pose] | None) -> list[Pose]:
+    """Return the motion from scan to scan; without starts, each search begins with the last one."""
+    motions: list[Pose] = []
+    for i in range(len(scans) - 1):
+        last = motions[-1] if motions else (0.0, 0.0, 0.0)
+        motions.append(icp(scans[i], scans[i + 1], last if starts is None else starts[i]))
+    return motions
