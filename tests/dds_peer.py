@@ -31,6 +31,7 @@ KINDS = {
     "Odometry": "nav_msgs",
     "TFMessage": "tf2_msgs",
     "DiagnosticArray": "diagnostic_msgs",
+    "Empty": "std_msgs",
 }
 
 
@@ -63,15 +64,16 @@ class Peer:
         self._writers: dict[str, Any] = {}
         self._readers: dict[str, Any] = {}
 
-    def publish(self, topic: str, kind: str, reliable: bool = True) -> None:
+    def publish(
+        self, topic: str, kind: str, reliable: bool = True, is_latched: bool = False
+    ) -> None:
         """Begin to publish."""
-        self._writers[topic] = DataWriter(
-            self._participant, self._topic(topic, kind), _qos(reliable)
-        )
+        qos = _qos(reliable, is_latched=is_latched)
+        self._writers[topic] = DataWriter(self._participant, self._topic(topic, kind), qos)
 
-    def listen(self, topic: str, kind: str, depth: int = 10) -> None:
+    def listen(self, topic: str, kind: str, depth: int = 10, is_latched: bool = False) -> None:
         """Begin to listen; the newest messages wait until they are taken, `depth` of them."""
-        qos = _qos(True, depth)
+        qos = _qos(True, depth, is_latched)
         self._readers[topic] = DataReader(self._participant, self._topic(topic, kind), qos)
 
     def garble(self, topic: str, kind: str) -> None:
@@ -120,11 +122,12 @@ class Peer:
         return Topic(self._participant, f"rt{topic}", idl(f"{KINDS[kind]}/msg/{kind}"))
 
 
-def _qos(reliable: bool, depth: int = 10) -> Qos:
+def _qos(reliable: bool, depth: int = 10, is_latched: bool = False) -> Qos:
     reliability = Policy.Reliability.Reliable(duration(seconds=1))
     if not reliable:
         reliability = Policy.Reliability.BestEffort
-    return Qos(reliability, Policy.Durability.Volatile, Policy.History.KeepLast(depth))
+    durability = Policy.Durability.TransientLocal if is_latched else Policy.Durability.Volatile
+    return Qos(reliability, durability, Policy.History.KeepLast(depth))
 
 
 def made(kind: Any, value: Any) -> Any:

@@ -9,7 +9,6 @@ import pytest
 from lineament.errors import LineamentError
 from lineament.limits import LIMITS
 from lineament.live import LiveConfig, read_config
-from lineament.live.config import resolved
 
 _NAME = "expected a name of letters, digits, _ and /"
 
@@ -25,7 +24,7 @@ _NAME = "expected a name of letters, digits, _ and /"
     ],
 )
 def test_topics_are_named_as_ros_does(topic, namespace, name):
-    assert resolved(topic, namespace) == name
+    assert LiveConfig(namespace=namespace).resolved(topic) == name
     assert LiveConfig(topic=topic, namespace=namespace).scan_topic == name
 
 
@@ -127,20 +126,26 @@ DEFAULTS = {
     "stamp": "first", "scale": 1.0, "ros": 2, "localhost": False, "reliability": "best-effort",
     "depth": 10, "method": "optimal", "deskew": "off", "laser_pose": (0.0, 0.0, 0.0),
     "upside_down": False, "mask": (), "track": False, "layers": "", "keep_going": False,
-    "rate": 1.0, "loop": False, "host": "127.0.0.1",
+    "rate": 1.0, "loop": False, "host": "127.0.0.1", "map_frame": "map", "odom_frame": "odom",
+    "base_frame": "base_link", "transform_tolerance": 1.0, "broadcast": True,
 }  # fmt: skip
 BOUNDS = {"depth": (1, 1000), "rate": (0, 1e6), "noise": (0, 1000), "scale": (1e-9, 1e9),
-          "domain": (0, 232), "foxglove": (0, 65535), "dock_track": (0, 2147483647)}  # fmt: skip
+          "domain": (0, 232), "foxglove": (0, 65535), "dock_track": (0, 2147483647),
+          "transform_tolerance": (0, 10)}  # fmt: skip
+FRACTIONS = "rate", "noise", "transform_tolerance"
 TIMES_AND_SIZES = {
     "counters": {"_MOST": 4096},
     "dds": {"NANO": 10**9, "PATIENCE": 10**6, "MOST_PUBLISHERS": 1000},
     "foxglove": {"_BACKLOG": 64},
+    "frames": {"_MOST_FRAMES": 1000, "_MOST_POSES": 1000, "GAP": 0.5, "LATE": 0.2,
+               "_SET_BACK": 1.0},
+    "localiser": {"_MOST_SCANNERS": 8, "_MANY": 20, "_SENT": 50},
     "node": {"_WAIT": 0.1, "_EACH": 1.0, "_PATIENCE": 2.0, "_MOST_FAULTY": 64},
     "participant": {"LAST_DOMAIN": 232},
     "pipeline": {"_LATEST": 2147483647_999999999, "_MOST_PUBLISHERS": 8, "_OLDEST": 0.5,
                  "_LONGEST": 1.0, "_MANY": 20},
     "raw_dds": {"_DATA": 2},
-    "received": {"_MOST_PUBLISHERS": 64},
+    "received": {"_MOST_PUBLISHERS": 64, "FARTHEST": 1e9},
     "replay": {"_LEAP": 10.0, "_STEP": 0.1, "_PUNCTUAL": 0.01, "_MOST": 64},
     "ros1": {"_PATIENCE": 3.0, "_LEAP": 10000},
 }  # fmt: skip
@@ -156,7 +161,7 @@ def test_what_holds_where_nothing_is_said():
 @pytest.mark.parametrize("name", BOUNDS)
 def test_numbers_are_taken_up_to_their_bounds(name):
     for bound, beyond in zip(BOUNDS[name], (-math.inf, math.inf), strict=True):
-        is_whole = isinstance(bound, int) and name not in ("rate", "noise")
+        is_whole = isinstance(bound, int) and name not in FRACTIONS
         off = bound + int(math.copysign(1, beyond)) if is_whole else math.nextafter(bound, beyond)
         assert getattr(LiveConfig(log="a.npz", **{name: bound}), name) == bound
         with pytest.raises(ValueError, match=f"{name} is "):

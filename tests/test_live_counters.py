@@ -7,7 +7,7 @@ from live_driving import cdr_scan, waited_for
 import lineament as ln
 from lineament.live import Received
 from lineament.live.counters import Counters
-from lineament.live.received import Inbox, received_scan
+from lineament.live.received import ODOMETRY, Inbox, received_scan
 
 BEARINGS = np.linspace(-0.5, 0.5, 101)
 
@@ -69,9 +69,9 @@ def test_a_message_is_read_when_it_is_processed():
 def test_an_inbox_keeps_the_newest_of_each_publisher():
     inbox = Inbox(depth=2)
     for arrived, name in enumerate("aabaa"):
-        inbox.put(Received(name, list, float(arrived), is_odometry=False), missing=arrived == 2)
+        inbox.put(Received(name, list, float(arrived)), missing=arrived == 2)
     for arrived in (0.5, 3.5, 9.0):
-        inbox.put(Received("a", list, arrived, is_odometry=True))
+        inbox.put(Received("a", list, arrived, ODOMETRY))
     assert [one.arrived for one in inbox.take(0)] == [2.0, 3.0, 3.5, 4.0, 9.0]
     assert (inbox.lost, inbox.take(0)) == (3, [])
     for number in range(100):

@@ -77,7 +77,7 @@ def test_scan(participant, peer):
     assert (scan.stamp, scan.frame_id) == (7.500000001, "laser")
     assert scan.stamp_ns == 7_500_000_001
     assert (scan.angle_min, scan.angle_increment, scan.scan_time) == (-0.75, 0.5, 0.125)
-    assert not came.is_odometry
+    assert came.what == "a scan"
     assert (source.publishers, source.lost, source.ended, source.problems()) == (1, 0, False, [])
     source_of(participant, topic="other")
     assert peer.listeners("/scan") == 1
@@ -119,7 +119,7 @@ def test_odometry_comes_before_the_scan(participant, peer):
     peer.write("/robot/odom", odometry_message(0.5, 3))
     eventually(lambda: all(topic.condition.triggered for topic in source._topics))
     first, second = source.receive(0.0)
-    assert (first.is_odometry, second.is_odometry) == (True, False)
+    assert (first.what, second.what) == ("an odometry", "a scan")
     pose = pytest.approx((1.0, 2.0, 0.5))
     assert first.read() == (3.5, (0.5, -1.0, 0.25), pose, "odom", "base")
     peer.write("/robot/odom", odometry_message(math.nan))

@@ -23,7 +23,7 @@ from lineament.live import (
     RosSink,
 )
 from lineament.live.pipeline import time_of, twist_of_laser
-from lineament.live.received import received_scan
+from lineament.live.received import ODOMETRY, received_scan
 from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
@@ -48,7 +48,7 @@ def moving(*twist: float, stamp: float = 1.0) -> Odometry:
 
 
 def heard(odometry: Odometry) -> Received:
-    return Received("o", lambda: odometry, 0.0, is_odometry=True)
+    return Received("o", lambda: odometry, 0.0, ODOMETRY)
 
 
 class Clock:
@@ -151,7 +151,7 @@ def test_most_beams():
             pipeline("a", ln.LaserScan(np.ones(n), 0.0, 5e-4))
 
 
-def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
+def test_odometry_is_used_before_the_scans_of_its_batch():
     scan = wall("a", 1.1, time_increment=0.001)
     total, (first, second), lines = run(
         [heard(moving(np.nan, 0.0, 0.0)), scan],
@@ -159,7 +159,7 @@ def test_the_newest_odometry_is_used_before_the_scans_of_its_batch():
         deskew="/odom",
         laser_pose=(0.2, 0.1, 0.5),
     )
-    assert (total.scans, total.dropped, total.malformed) == (2, 0, 1)
+    assert (total.scans, total.dropped, total.malformed) == (2, 0, 2)
     assert first.straight is first.scan
     expected = ln.deskew(second.scan, twist_of_laser((1.0, 0.0, 0.0), (0.2, 0.1, 0.5)))
     np.testing.assert_array_equal(second.straight.ranges, expected.ranges)

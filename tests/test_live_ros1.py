@@ -32,6 +32,8 @@ from live_driving import (
 import lineament as ln
 from lineament import LineamentError
 from lineament.live import LiveConfig, Pipeline, RosSink
+from lineament.live.received import ODOMETRY
+from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.feature_points import feature_points
 from lineament.output.ros_messages import RosMessages
@@ -132,7 +134,7 @@ def test_scan_of_a_genuine_publisher(node, scanner, topic):
     scanner.write(topic, {**scan_message(12, [1.0, 2.5, 0.0]), "intensities": [7.0, 8.0, 9.0]})
     (came,) = received(source, 1)
     scan = came.read()
-    assert (came.publisher, scan.stamp_ns, came.is_odometry) == ("/scanner", 12_500_000_001, False)
+    assert (came.publisher, scan.stamp_ns, came.what) == ("/scanner", 12_500_000_001, SCANS)
     assert scan.ranges.tolist() == [1.0, 2.5, 0.0]
     assert scan.intensities.tolist() == [7.0, 8.0, 9.0]
     assert (scan.angle_min, scan.angle_increment) == (-0.75, 0.75)
@@ -157,8 +159,8 @@ def test_odometry_comes_with_the_scans(node, scanner, topic):
     eventually(lambda: scanner.listeners("/odom"))
     scanner.write("/odom", odometry_message(0.5, 3))
     scanner.write(topic, scan_message())
-    odometry, scan = sorted(received(source, 2), key=lambda one: not one.is_odometry)
-    assert (odometry.is_odometry, scan.is_odometry) == (True, False)
+    odometry, scan = sorted(received(source, 2), key=lambda one: one.what == SCANS)
+    assert (odometry.what, scan.what) == (ODOMETRY, SCANS)
     pose = pytest.approx((1.0, 2.0, 0.5))
     assert odometry.read() == (3.5, (0.5, -1.0, 0.25), pose, "odom", "base")
 
@@ -316,6 +318,8 @@ def test_without_rospy(monkeypatch):
 #: listener or to be ended, then for a line of input.
 NODE = """
 from lineament.live import LiveConfig
+from lineament.live.received import ODOMETRY
+from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.scene import Message
 import time

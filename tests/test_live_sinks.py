@@ -9,6 +9,7 @@ import pytest
 import lineament as ln
 from lineament.live import FoxgloveSink, LiveConfig, ReplaySource, RosSink, run_live
 from lineament.live.counters import Counts, Report
+from lineament.live.pipeline import Frame
 from lineament.live.stopping import stopping
 from lineament.logs import save_npz
 from lineament.mapping import VERDICTS, LineMap
@@ -17,7 +18,7 @@ from lineament.mapping.following import Whereabouts
 from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
 
-REPORT, TIME = Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2)
+REPORT, TIME = Report(1.0, Counts(scans=1), Counts(), (0, 0), 0, {}, 0), (1, 2)
 WALLS = [((0.0, 0.0), (4.0, 0.0)), ((4.0, 0.0), (4.0, 3.0))]
 
 
@@ -29,7 +30,7 @@ class Publisher:
     def __init__(self):
         self.sent = []
 
-    def advertise(self, topic, kind):
+    def advertise(self, topic, kind, is_latched=False):  # noqa: ARG002
         assert topic
         assert kind
 
@@ -70,7 +71,7 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
     sink = RosSink(Publisher(), messages, LiveConfig())
     evidence = Evidence(12.34, 0.75, 0.2, 0.05, 100)
     where = Whereabouts(verdict, (1.0, -2.0, 0.5), np.diag((4e-4, 9e-4, turn)), evidence)
-    sink._where = where
+    sink._frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
     sink.diagnose(REPORT, TIME)
     (*_, of_node), (topic, moment, told) = given
     assert of_node["level"] == REPORT.level

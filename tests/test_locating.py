@@ -245,7 +245,7 @@ class Kept:
     def __init__(self):
         self.topics, self.sent = {}, []
 
-    def advertise(self, topic, kind):
+    def advertise(self, topic, kind, is_latched=False):  # noqa: ARG002
         self.topics[topic] = kind
 
     def listeners(self, topic):
@@ -271,10 +271,10 @@ def test_live_publishes_pose_and_verdict(files, layers):
     assert len(of_pose) == 12
     assert b"map\0" in of_pose[0].data
     publisher.sent.clear()
-    sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
+    sink.diagnose(Report(1.0, Counts(scans=1), Counts(), (0, 0), 0, {}, 0), (1, 2))
     assert len(publisher.sent) == 2
     assert b"lineament: /scan/pose\0" in publisher.sent[1].data
-    assert b"located\0" in publisher.sent[1].data
+    assert b"located, without where the scanner is mounted\0" in publisher.sent[1].data
     nowhere = ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)
     publisher.sent.clear()
     sink.publish(pipeline("b", nowhere))

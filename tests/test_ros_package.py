@@ -43,6 +43,7 @@ class Node(MagicMock):
         self.published: dict[str, list[bytes]] = {}
         self.kinds: dict[str, str] = {}
         self.get_name.return_value = "scanner"
+        self.get_namespace.return_value = "/"
         self.context.ok.return_value = True
         self.has_parameter.side_effect = lambda name: name in self.parameters
         self.get_parameter.side_effect = lambda name: SimpleNamespace(value=self.parameters[name])
@@ -228,7 +229,7 @@ def test_source_takes_bytes_and_knows_publishers(package):
     first, odometry, broken = source.receive(0.1)
     assert first.read().ranges.tolist() == [2.0, 2.0, 2.0]
     assert first.read().stamp_ns == 5_500_000_000
-    assert odometry.is_odometry
+    assert odometry.what == "an odometry"
     assert (first.publisher, broken.publisher) == ("the publisher", "0102")
     with pytest.raises(ValueError, match="ends early"):
         broken.read()

@@ -19,7 +19,7 @@ from pyarrow import csv, parquet
 
 import lineament as ln
 from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, RosSink
-from lineament.live.received import received_scan
+from lineament.live.received import ODOMETRY, received_scan
 from lineament.live.sinks import Publisher
 from lineament.logs import open_log, save_npz
 from lineament.motion import Tracker
@@ -238,7 +238,7 @@ def test_what_a_node_publishes_is_where_the_walls_are_at_the_stamp(scanner, desk
     came = []
     for k in range(6):
         moving = Odometry((EPOCH + k * NANO / RATE) / NANO, TWIST, (0, 0, 0), "odom", "base")
-        came.append(Received("o", lambda moving=moving: moving, 0.0, is_odometry=True))
+        came.append(Received("o", lambda moving=moving: moving, 0.0, ODOMETRY))
         came.append(received_scan("s", scanner.data(k, 0.002), "cdr", "sensor_msgs/LaserScan"))
     publisher = Heard()
     sink = RosSink(publisher, RosMessages("cdr"), config)

@@ -1,21 +1,20 @@
 """Scans from rclpy and features to rclpy, as the bytes that ROS 2 has on the wire."""
 
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosidl_runtime_py.utilities import get_message
 
 from lineament.live import LiveConfig
-from lineament.live.received import Received, received_odometry, received_scan
+from lineament.live.received import SCAN, Received, Wanted, wanted
 from lineament.live.sinks import Publisher
 from lineament.output.scene import Message
 
 __all__ = ["RclpyPublisher", "RclpySource"]
-
-ODOMETRY = "nav_msgs/msg/Odometry"
 
 
 class RclpySource:
@@ -42,18 +41,8 @@ class RclpySource:
         self._node, self._executor, self._config = node, executor, config
         self._came: list[Received] = []
         self.lost = 0
-        topic, kind = config.scan_topic, f"sensor_msgs/msg/{config.type}"
-        qos = _profile(config.depth, config.reliability)
-        events = SubscriptionEventCallbacks(message_lost=self._note_lost)
-        self._scans = node.create_subscription(
-            get_message(kind), topic, self._put_scan, qos, event_callbacks=events, raw=True
-        )
-        self._subscribed = {topic: (kind, self._scans)}
-        if (odometry := config.odometry_topic) is not None:
-            subscription = node.create_subscription(
-                get_message(ODOMETRY), odometry, self._put_odometry, qos, raw=True
-            )
-            self._subscribed[odometry] = ODOMETRY, subscription
+        self._subscribed = {one.topic: self._subscribe(one) for one in wanted(config)}
+        _, self._scans = self._subscribed[config.scan_topic]
 
     @property
     def ended(self) -> bool:
@@ -90,12 +79,24 @@ class RclpySource:
         for _, subscription in self._subscribed.values():
             self._node.destroy_subscription(subscription)
 
-    def _put_scan(self, data: bytes, info: Any) -> None:
-        kind, echo = f"sensor_msgs/{self._config.type}", self._config.echo
-        self._came.append(received_scan(_publisher(info), data, "cdr", kind, echo))
+    def _subscribe(self, wanted: Wanted) -> tuple[str, Any]:
+        """Subscribe to a topic; return its type, and the subscription."""
+        kind, events = wanted.kind.replace("/", "/msg/"), None
+        if wanted.what == SCAN:
+            events = SubscriptionEventCallbacks(message_lost=self._note_lost)
+        reliability = "reliable" if wanted.is_command else self._config.reliability
+        subscription = self._node.create_subscription(
+            get_message(kind),
+            wanted.topic,
+            partial(self._put, wanted),
+            _profile(self._config.depth, reliability, wanted.is_latched),
+            event_callbacks=events,
+            raw=True,
+        )
+        return kind, subscription
 
-    def _put_odometry(self, data: bytes, info: Any) -> None:
-        self._came.append(received_odometry(_publisher(info), data, "cdr"))
+    def _put(self, wanted: Wanted, data: bytes, info: Any) -> None:
+        self._came.append(wanted.received(_publisher(info), data, "cdr"))
 
     def _note_lost(self, status: Any) -> None:
         self.lost = int(status.total_count)
@@ -122,7 +123,8 @@ class RclpyPublisher(Publisher):
         self._topics.clear()
 
     def _open(self, topic: str, kind: str) -> Any:
-        qos = _profile(self._depth, "reliable")
+        is_latched = topic in self._latched
+        qos = _profile(1 if is_latched else self._depth, "reliable", is_latched)
         return self._node.create_publisher(get_message(kind), topic, qos)
 
     def _send(self, topic: Any, message: Message) -> None:
@@ -132,12 +134,13 @@ class RclpyPublisher(Publisher):
         return int(topic.get_subscription_count())
 
 
-def _profile(depth: int, reliability: str) -> QoSProfile:
-    """Make a volatile profile that keeps the last messages."""
+def _profile(depth: int, reliability: str, is_latched: bool = False) -> QoSProfile:
+    """Make a profile that keeps the last messages; volatile, unless it is latched."""
     is_reliable = reliability == "reliable"
     return QoSProfile(
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=(DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE),
     )
 
 

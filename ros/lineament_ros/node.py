@@ -41,6 +41,12 @@ KNOWN = (
     "map",
     "layers",
     "units",
+    "odometry",
+    "map_frame",
+    "odom_frame",
+    "base_frame",
+    "transform_tolerance",
+    "broadcast",
 )
 #: Below this are the parameters of the method: parameters.evidence.
 OF_METHOD = "parameters"
@@ -81,9 +87,12 @@ def _node(stack: ExitStack) -> Node:
     stack.callback(executor.shutdown)
     executor.add_node(node)
     # Names as ROS resolves them: with remappings and the namespace of the node.
-    resolved = replace(config, topic=node.resolve_topic_name(config.topic))
-    if config.odometry_topic:
-        resolved = replace(resolved, deskew=node.resolve_topic_name(config.deskew))
+    topics = {"topic": node.resolve_topic_name(config.topic)}
+    for name in ("deskew", "odometry"):
+        topic = str(getattr(config, name))
+        if config.resolved(topic) == config.odometry_topic:
+            topics[name] = node.resolve_topic_name(topic)
+    resolved = replace(config, namespace=node.get_namespace(), **topics)
     source = stack.enter_context(closing(RclpySource(node, executor, resolved)))
     publisher = stack.enter_context(closing(RclpyPublisher(node, config.depth)))
     sink = RosSink(publisher, RosMessages("cdr"), resolved)

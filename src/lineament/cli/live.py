@@ -71,6 +71,18 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
 @click.option("--units", type=UNITS, help="Units of the plan.  [default: those that it names]")
 @click.option(
+    "--odometry", metavar="TOPIC", help="Odometry of the robot on the plan.  [default: /tf]"
+)
+@click.option("--map-frame", metavar="FRAME", help="Frame of the plan.  [default: map]")
+@click.option("--odom-frame", metavar="FRAME", help="Frame of the odometry.  [default: odom]")
+@click.option("--base-frame", metavar="FRAME", help="Frame of the robot.  [default: base_link]")
+@click.option(
+    "--transform-tolerance",
+    type=click.FloatRange(0, 10),
+    help="For so long map → odom holds, in seconds.  [default: 1]",
+)
+@click.option("--broadcast/--no-broadcast", default=None, help="Publish map → odom on /tf.")
+@click.option(
     "--from", "log", type=TEXT_PATH, metavar="LOG", help="Play a log in place of a topic."
 )
 @click.option("--log-topic", metavar="TOPIC", help="Topic of the scans in the log.")

@@ -33,8 +33,10 @@ _BOUNDS: dict[str, tuple[float, float]] = {
     "domain": (0, 232),
     "foxglove": (0, 65535),
     "dock_track": (0, 2**31 - 1),
+    "transform_tolerance": (0, 10),
 }
-_NAMES = ("topic", "namespace", "name", "deskew")
+_FRAMES = ("map_frame", "odom_frame", "base_frame")
+_NAMES = ("topic", "namespace", "name", "deskew", "odometry", *_FRAMES)
 #: What each annotation accepts, and how it is called in a message.
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "str": (str, "a text"),
@@ -111,6 +113,15 @@ class LiveConfig:
         Layers of the plan that hold walls, by commas, as in `LineMap.read`.
     units : str, optional
         Units of the plan, as there.
+    odometry : str, optional
+        With a plan, a topic of ``nav_msgs/Odometry`` that says where the robot has come to; by
+        default that of `deskew`, or ``/tf``.
+    map_frame, odom_frame, base_frame : str
+        With a plan, frames of it, of the odometry, and of the robot.
+    transform_tolerance : float
+        For so long after a scan the transform from `map_frame` to `odom_frame` holds [s].
+    broadcast : bool
+        Whether that transform is published on ``/tf``.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -168,6 +179,12 @@ class LiveConfig:
     map: str | None = None
     layers: str = ""
     units: str | None = None
+    odometry: str | None = None
+    map_frame: str = "map"
+    odom_frame: str = "odom"
+    base_frame: str = "base_link"
+    transform_tolerance: float = 1.0
+    broadcast: bool = True
     log: str | None = None
     log_topic: str | None = None
     poses: str | None = None
@@ -196,21 +213,32 @@ class LiveConfig:
                 raise ValueError(f"{name} is {values}, expected {many} finite numbers")
         checked_mounting(self.laser_pose)
         object.__setattr__(self, "mask", checked_mask(self.mask))
+        self._check_together()
+
+    def _check_together(self) -> None:
+        """Check what has to fit together."""
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
         if self.log is not None and self.odometry_topic is not None:
+            name = "deskew" if self.odometry is None else "odometry"
             raise ValueError(
-                f"deskew is {self.deskew!r}, but a log is played; expected poses or scans"
+                f"{name} is {getattr(self, name)!r}, but a log is played; expected poses or scans"
             )
+        if self.odometry is not None and self.odometry_topic != self.resolved(self.odometry):
+            raise ValueError(
+                f"deskew is {self.deskew!r}, and odometry {self.odometry!r}, expected one topic"
+            )
+        if len({getattr(self, name).strip("/") for name in _FRAMES}) < len(_FRAMES):
+            raise ValueError("two of map_frame, odom_frame and base_frame are one, expected three")
         if self.log is None and self.ros == 0:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
 
     @property
     def scan_topic(self) -> str:
         """Full name of the topic of the scans."""
-        return resolved(self.topic, self.namespace)
+        return self.resolved(self.topic)
 
     @property
     def is_tracking(self) -> bool:
@@ -225,14 +253,23 @@ class LiveConfig:
     @property
     def odometry_topic(self) -> str | None:
         """Full name of the topic of the odometry, where there is one."""
-        return None if self.deskew in _NOT_TOPICS else resolved(self.deskew, self.namespace)
+        if self.deskew not in _NOT_TOPICS:
+            return self.resolved(self.deskew)
+        return None if self.odometry is None else self.resolved(self.odometry)
 
+    @property
+    def is_localiser(self) -> bool:
+        """Whether a robot is followed on a plan: its frames, and what it is asked, are listened to.
 
-def resolved(topic: str, namespace: str) -> str:
-    """Return the full name of a topic; one that begins with ``/`` is full already, as in ROS."""
-    if topic.startswith("/"):
-        return topic
-    return "/" + "/".join([*filter(None, namespace.split("/")), topic])
+        A log that is played has poses in their place.
+        """
+        return self.map is not None and self.log is None
+
+    def resolved(self, topic: str) -> str:
+        """Return the full name of a topic; one that begins with ``/`` is full already, in ROS."""
+        if topic.startswith("/"):
+            return topic
+        return "/" + "/".join([*filter(None, self.namespace.split("/")), topic])
 
 
 def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:

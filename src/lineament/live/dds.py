@@ -1,23 +1,18 @@
 """ROS 2 without ROS: its topics over DDS, by Cyclone DDS."""
 
-from collections.abc import Callable
-from functools import partial
-
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
 from cyclonedds.core import InstanceState, ReadCondition, WaitSet
 from cyclonedds.qos import Policy, Qos
 
 from ..errors import one_line
-from ..limits import Limits
 from ..output.scene import Message
 from .config import LiveConfig
 from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
 from .raw_dds import ANY_STATE, RawReader, RawWriter
-from .received import Received, received_odometry, received_scan
+from .received import SCAN, Received, Wanted, wanted
 from .sinks import Publisher
 
 NANO = 1_000_000_000
-ODOMETRY = "nav_msgs/msg/Odometry"
 #: A writer waits this long for a slow reader [ns], then drops the message.
 PATIENCE = NANO // 1000
 #: Publishers that are examined at once.
@@ -38,16 +33,12 @@ class DdsSource:
     ended = False
 
     def __init__(self, participant: Participant, config: LiveConfig, depth: int = 64) -> None:
-        subscribe = partial(_Subscription, participant, reliability=config.reliability, depth=depth)
-        kind = f"sensor_msgs/{config.type}"
-        limits = Limits.of(config.limits)
-        scan = partial(received_scan, encoding="cdr", kind=kind, echo=config.echo, limits=limits)
-        self._scans = subscribe(config.scan_topic, f"sensor_msgs/msg/{config.type}", scan)
-        self._topics = [self._scans]
-        if config.odometry_topic is not None:
-            motion = partial(received_odometry, encoding="cdr")
-            # Before the scans, which need the motion that came with them.
-            self._topics.insert(0, subscribe(config.odometry_topic, ODOMETRY, motion))
+        topics = [
+            _Subscription(participant, one, config.reliability, depth) for one in wanted(config)
+        ]
+        self._scans = topics[0]
+        # The scans come last, which need what came with them.
+        self._topics = [*topics[1:], self._scans]
         self._arrivals = WaitSet(participant.entity)
         for subscription in self._topics:
             self._arrivals.attach(subscription.condition)
@@ -71,7 +62,7 @@ class DdsSource:
         )
 
     def receive(self, timeout: float) -> list[Received]:
-        """Wait up to `timeout` [s] for messages; return all that came: odometry, then scans.
+        """Wait up to `timeout` [s] for messages; return all that came: scans last.
 
         A signal does not end the wait: it is handled when the wait is over.
         """
@@ -88,27 +79,28 @@ class _Subscription:
     """A topic that is listened to."""
 
     def __init__(
-        self,
-        participant: Participant,
-        topic: str,
-        kind: str,
-        make: Callable[[str, bytes], Received],
-        *,
-        reliability: str,
-        depth: int,
+        self, participant: Participant, wanted: Wanted, reliability: str, depth: int
     ) -> None:
-        self._topic, self._kind, self._make = topic, kind, make
-        policies = [Policy.Reliability.BestEffort, Policy.History.KeepAll]
-        policies.append(Policy.ResourceLimits(max_samples=depth))
-        if reliability == "reliable":
-            # Not to keep all: that would make the publisher wait.
-            policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]
-        opened = participant.topic(topic, kind)
-        self.reader = RawReader(participant.entity, opened, _qos(kind, *policies), depth)
+        self._wanted, self._topic = wanted, wanted.topic
+        self._kind = kind = wanted.kind.replace("/", "/msg/")
+        # Not to keep all of what is reliable: that would make the publisher wait.
+        policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]
+        if wanted.what == SCAN and reliability == "best-effort":
+            policies = [Policy.Reliability.BestEffort, Policy.History.KeepAll]
+            policies.append(Policy.ResourceLimits(max_samples=depth))
+        elif reliability == "best-effort" and not wanted.is_command:
+            policies[0] = Policy.Reliability.BestEffort
+        opened = participant.topic(wanted.topic, kind)
+        self.reader = RawReader(
+            participant.entity, opened, _qos(kind, wanted.is_latched, *policies), depth
+        )
         self.condition = ReadCondition(self.reader, ANY_STATE)
 
     def take(self) -> list[Received]:
-        return [self._make(f"{publisher:x}", data) for data, publisher in self.reader.take_raw()]
+        return [
+            self._wanted.received(f"{publisher:x}", data, "cdr")
+            for data, publisher in self.reader.take_raw()
+        ]
 
     def problems(self, found: list[tuple[str, str]]) -> list[str]:
         name = wire_topic(self._topic)
@@ -129,7 +121,7 @@ class _Subscription:
 
 
 class DdsPublisher(Publisher):
-    """Publishes messages in CDR to topics of ROS 2, reliably and volatile.
+    """Publishes messages in CDR to topics of ROS 2, reliably; volatile, unless they are latched.
 
     The newest `depth` messages of a topic are kept for a slow reader. One that does not read at all
     delays nobody: it misses messages.
@@ -140,8 +132,9 @@ class DdsPublisher(Publisher):
         self._participant, self._depth = participant, depth
 
     def _open(self, topic: str, kind: str) -> RawWriter:
-        history = Policy.History.KeepLast(self._depth)
-        qos = _qos(kind, Policy.Reliability.Reliable(PATIENCE), history)
+        is_latched = topic in self._latched
+        history = Policy.History.KeepLast(1 if is_latched else self._depth)
+        qos = _qos(kind, is_latched, Policy.Reliability.Reliable(PATIENCE), history)
         participant = self._participant
         return RawWriter(participant.entity, participant.topic(topic, kind), qos)
 
@@ -152,9 +145,10 @@ class DdsPublisher(Publisher):
         return topic.listeners
 
 
-def _qos(kind: str, *policies: object) -> Qos:
+def _qos(kind: str, is_latched: bool, *policies: object) -> Qos:
     identity = Policy.Userdata(f"typehash={type_hash(kind)};".encode())
-    return Qos(*policies, Policy.Durability.Volatile, identity)
+    durability = Policy.Durability.TransientLocal if is_latched else Policy.Durability.Volatile
+    return Qos(*policies, durability, identity)
 
 
 def _publishers(reader: BuiltinDataReader) -> list[tuple[str, str]]:

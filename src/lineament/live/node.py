@@ -8,7 +8,7 @@ from ..errors import one_line
 from ..scan import LaserScan
 from .counters import Counters, Report
 from .pipeline import Pipeline
-from .received import Received, Source
+from .received import SCAN, Received, Source
 from .sinks import Sink
 
 #: Longest wait for a scan [s]: how soon a stop is seen.
@@ -90,18 +90,17 @@ class Node:
         return self._report(counters, time.monotonic())
 
     def _newest(self, received: list[Received], counters: Counters) -> list[Received]:
-        """Keep the newest odometry, then the newest scan of each publisher, as they came."""
-        odometry = [item for item in received if item.is_odometry]
-        scans = [item for item in received if not item.is_odometry]
+        """Keep what is no scan, then the newest scan of each publisher, as they came."""
+        scans = [item for item in received if item.what == SCAN]
         newest = {item.publisher: item for item in scans}
         counters.dropped += len(scans) - len(newest)
-        return [*odometry[-1:], *newest.values()]
+        return [*(item for item in received if item.what != SCAN), *newest.values()]
 
     def _process(self, received: Received, counters: Counters) -> None:
         try:
             message = received.read()
             if not isinstance(message, LaserScan):
-                self._pipeline.hear(message)
+                self._pipeline.hear(message, received.what)
                 return
             # What can be read may still make no sense: a robot that turns a million times a sweep.
             frame = self._pipeline(received.publisher, message)
@@ -116,8 +115,7 @@ class Node:
     def _write_fault(self, received: Received, error: ValueError) -> None:
         if received.publisher not in self._faulty and len(self._faulty) < _MOST_FAULTY:
             self._faulty.add(received.publisher)
-            what = "an odometry" if received.is_odometry else "a scan"
-            text = f"{what} of {received.publisher} makes no sense: {error}"
+            text = f"{received.what} of {received.publisher} makes no sense: {error}"
             self._write(one_line(f"{text} (others like it are only counted)"))
 
     def _write_problems(self) -> None:

@@ -23,6 +23,7 @@ _LOCALHOST = """<CycloneDDS><Domain>
 #: Hashes of definitions by type (REP 2016, from Iron on; the definitions of Humble are equal).
 _HASHES = {
     "DiagnosticArray": "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
+    "Empty": "20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312",
     "LaserScan": "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
     "MarkerArray": "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf",
     "MultiEchoLaserScan": "ba5eac341cd5bbb2701527aa4568e8baec172b69cadb9a1945d6f149d087ee48",

@@ -19,10 +19,12 @@ from ..scan import LaserScan, Pose
 from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
+from .received import ODOMETRY, Heard
 
 if TYPE_CHECKING:
     from ..mapping import LineMap
     from ..mapping.following import Whereabouts
+    from .localiser import Placed
 
 #: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
 _LATEST = 2**31 * NANO - 1
@@ -38,7 +40,12 @@ _MANY = 20
 
 def time_of(scan: LaserScan) -> tuple[int, int]:
     """Seconds and nanoseconds of the stamp of a scan, clipped to what a message can hold."""
-    return divmod(min(max(scan.stamp_ns, 0), _LATEST), NANO)
+    return stamp_of(scan.stamp_ns)
+
+
+def stamp_of(nanoseconds: int) -> tuple[int, int]:
+    """Seconds and nanoseconds of a time, clipped to what a message can hold."""
+    return divmod(min(max(nanoseconds, 0), _LATEST), NANO)
 
 
 class Frame(NamedTuple):
@@ -59,6 +66,8 @@ class Frame(NamedTuple):
         The corner that is docked to; None unless one was asked for, and where it is not seen.
     where : Whereabouts or None
         Where the sensor is on the plan; None without one.
+    placed : Placed or None
+        Where the robot is on the plan; None without one, and where it is lost.
     """
 
     scan: LaserScan
@@ -68,6 +77,7 @@ class Frame(NamedTuple):
     travel: Travel | None = None
     dock: CornerPose | None = None
     where: Whereabouts | None = None
+    placed: Placed | None = None
 
 
 class Pipeline(InTurn):
@@ -97,8 +107,12 @@ class Pipeline(InTurn):
     def __init__(self, config: LiveConfig) -> None:
         self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
-        self._plan = plan_of(config)
-        self._publisher("")  # An unknown method is an error at once.
+        known = self._publisher("")  # An unknown method is an error at once.
+        self._localiser = None
+        if (plan := plan_of(config)) is not None:
+            from .localiser import Localiser
+
+            self._localiser = Localiser(config, plan, known.extractor)
         self._odometry: Odometry | None = None
         self._unmoved = 0
         self._problems: set[str] = set()
@@ -113,12 +127,7 @@ class Pipeline(InTurn):
             raise ValueError("has no beams")
         self._limits.check("beams", len(scan))
         kept = self._publisher(publisher)
-        if self._config.stamp != "first":
-            scan = scan.stamped(self._config.stamp)
-        if self._config.scale != 1:
-            scan = scan.scaled(self._config.scale)
-        if self._config.mask:
-            scan = scan.masked(self._config.mask)
+        scan = self._as_configured(scan)
         twist, kept.last = self._twist(kept, scan), scan
         self._note(scan, twist)
         straight = deskew(scan, twist)
@@ -138,21 +147,39 @@ class Pipeline(InTurn):
                 dock = kept.dock(features, tracks, travel.pose, travel.covariance)
         if not self._config.track:
             tracks = None
-        where = None if kept.follower is None else kept.follower(features, scan.pose)
-        return Frame(scan, straight, features, tracks, travel, dock, where)
+        where, placed = None, None
+        if self._localiser is not None:
+            where, placed = self._localiser(features, scan, straight)
+        return Frame(scan, straight, features, tracks, travel, dock, where, placed)
+
+    def _as_configured(self, scan: LaserScan) -> LaserScan:
+        """Return a scan with its times, in metres, without what sees the robot."""
+        if self._config.stamp != "first":
+            scan = scan.stamped(self._config.stamp)
+        if self._config.scale != 1:
+            scan = scan.scaled(self._config.scale)
+        return scan.masked(self._config.mask) if self._config.mask else scan
 
     @in_turn
-    def hear(self, odometry: Odometry) -> None:
-        """Take the newest odometry; ValueError if nothing can move like that."""
-        if not all(abs(speed) <= FASTEST for speed in odometry.twist):
-            raise ValueError(
-                f"its twist is {odometry.twist}, expected finite numbers, at most {FASTEST:g}"
-            )
-        self._odometry = odometry
+    def hear(self, message: Heard, what: str = ODOMETRY) -> None:
+        """Take what was heard beside the scans, the newest odometry say; ValueError for nonsense.
+
+        Nothing can move faster than `FASTEST`.
+        """
+        if isinstance(message, Odometry):
+            if not all(abs(speed) <= FASTEST for speed in message.twist):
+                raise ValueError(
+                    f"its twist is {message.twist}, expected finite numbers, at most {FASTEST:g}"
+                )
+            self._odometry = message
+        if self._localiser is not None:
+            self._localiser.hear(message, what)
 
     def problems(self) -> Iterator[str]:
-        """Yield why scans are not deskewed although they should be, a line each."""
+        """Yield why scans are not deskewed, or a robot is not placed, although they should be."""
         yield from sorted(self._problems)
+        if self._localiser is not None:
+            yield from self._localiser.problems()
 
     def _note(self, scan: LaserScan, twist: Twist | None) -> None:
         """Note what keeps a scan from being deskewed, where that was asked for."""
@@ -195,24 +222,19 @@ class Pipeline(InTurn):
         if name not in self._publishers:
             if len(self._publishers) >= _MOST_PUBLISHERS:
                 del self._publishers[next(iter(self._publishers))]
-            self._publishers[name] = _Publisher(self._config, self._plan)
+            self._publishers[name] = _Publisher(self._config)
         return self._publishers[name]
 
 
 class _Publisher:
     """What is kept of a publisher from scan to scan."""
 
-    def __init__(self, config: LiveConfig, plan: LineMap | None) -> None:
+    def __init__(self, config: LiveConfig) -> None:
         method = get_method(config.method, **config.parameters)
         self.extractor = Extractor(method, noise=config.noise)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
         self.dock = Dock(config.dock, track=config.dock_track) if config.is_docking else None
-        self.follower = None
-        if plan is not None:
-            from ..mapping.following import Follower
-
-            self.follower = Follower(plan)
         self.last: LaserScan | None = None
 
 

@@ -8,11 +8,19 @@ from threading import Condition
 from typing import NamedTuple, Protocol
 
 from ..limits import LIMITS, Limits
-from ..rosmsg.poses import Odometry, odometry
+from ..rosmsg.poses import Odometry, StampedPose, odometry, stamped_poses
 from ..rosmsg.scans import Decoder, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
+from .config import LiveConfig
 
+#: What messages are, as a line calls one that makes no sense.
+SCAN, ODOMETRY, LINKS, MOUNTINGS = "a scan", "an odometry", "a transform", "a mounting"
+GUESS, RELOCATE = "an initial pose", "a call to relocate"
+
+Heard = LaserScan | Odometry | list[StampedPose] | None
+#: Poses are nearer [m]: what is computed from them stays finite.
+FARTHEST = 1e9
 #: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
 _MOST_PUBLISHERS = 64
 
@@ -28,14 +36,78 @@ class Received(NamedTuple):
         Decodes it; raises ValueError, in one line, if it is malformed.
     arrived : float
         When it was taken, by the clock `time.monotonic` [s].
-    is_odometry : bool
-        Whether it is an odometry rather than a scan.
+    what : str
+        `SCAN` or another of these names.
     """
 
     publisher: str
-    read: Callable[[], LaserScan | Odometry]
+    read: Callable[[], Heard]
     arrived: float
-    is_odometry: bool = False
+    what: str = SCAN
+
+
+class Wanted(NamedTuple):
+    """A topic that is listened to, and what its messages are.
+
+    Attributes
+    ----------
+    topic, kind : str
+        Full name of the topic, and of its type: ``sensor_msgs/LaserScan``.
+    what : str
+        `SCAN` or another of these names.
+    read : callable
+        Decodes a serialised message of an encoding; ValueError, in one line, if it is malformed.
+    is_latched : bool
+        Whether the last message of each publisher is wanted that was sent before.
+    """
+
+    topic: str
+    kind: str
+    what: str
+    read: Callable[[Buffer, str], Heard]
+    is_latched: bool = False
+
+    @property
+    def is_command(self) -> bool:
+        """Whether each message counts: none may be lost on the way."""
+        return self.what in (GUESS, RELOCATE) or self.is_latched
+
+    def received(self, publisher: str, data: Buffer, encoding: str) -> Received:
+        """Return what a source gives of a serialised message that has just arrived."""
+        read = partial(self.read, data, encoding)
+        return Received(publisher, read, time.monotonic(), self.what)
+
+
+def wanted(config: LiveConfig) -> list[Wanted]:
+    """Return the topics that a node listens to: the scans, then what has to be known before."""
+    kind, limits = f"sensor_msgs/{config.type}", Limits.of(config.limits)
+    scans = Wanted(config.scan_topic, kind, SCAN, _decoder(kind, config.echo, limits))
+    found = [scans]
+    if (topic := config.odometry_topic) is not None:
+        found.append(Wanted(topic, "nav_msgs/Odometry", ODOMETRY, odometry))
+    if config.is_localiser:
+        links, placed = "tf2_msgs/TFMessage", "geometry_msgs/PoseWithCovarianceStamped"
+        read = partial(_poses, limits=limits)
+        found += [
+            Wanted("/tf_static", links, MOUNTINGS, partial(read, kind=links), is_latched=True),
+            Wanted("/tf", links, LINKS, partial(read, kind=links)),
+            Wanted(config.resolved("initialpose"), placed, GUESS, partial(read, kind=placed)),
+            Wanted(f"{config.scan_topic}/relocate", "std_msgs/Empty", RELOCATE, _nothing),
+        ]
+    return found
+
+
+def _poses(data: Buffer, encoding: str, kind: str, limits: Limits) -> list[StampedPose]:
+    """Decode all poses of a message; ValueError if one of them is not finite."""
+    found = list(stamped_poses(data, encoding, kind, limits))
+    for one in found:
+        if not all(abs(value) < FARTHEST for value in one.pose):
+            raise ValueError(f"has pose {one.pose}, expected numbers below {FARTHEST:g}")
+    return found
+
+
+def _nothing(data: Buffer, encoding: str) -> None:
+    """Decode a ``std_msgs/Empty``: that it has come is all that it says."""
 
 
 class Source(Protocol):
@@ -73,18 +145,18 @@ class Inbox:
     def __init__(self, depth: int) -> None:
         self.lost = 0
         self._depth = depth
-        self._waiting: dict[tuple[str, bool], deque[Received]] = {}
+        self._waiting: dict[tuple[str, str], deque[Received]] = {}
         self._changed = Condition()
 
     def put(self, received: Received, missing: int = 0) -> None:
         """Add a message; `missing` scans are known to have been lost just before it."""
-        key = received.publisher, received.is_odometry
+        key = received.publisher, received.what
         with self._changed:
             if key not in self._waiting and len(self._waiting) < _MOST_PUBLISHERS:
                 self._waiting[key] = deque(maxlen=self._depth)
             queue = self._waiting.get(key)
             is_full = queue is None or len(queue) == self._depth
-            self.lost += missing + (is_full and not received.is_odometry)
+            self.lost += missing + (is_full and received.what == SCAN)
             if queue is not None:
                 queue.append(received)
                 self._changed.notify()
@@ -117,8 +189,3 @@ def _decoder(kind: str, echo: str, limits: Limits) -> Decoder:
     if kind not in known:
         raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
     return known[kind]
-
-
-def received_odometry(publisher: str, data: Buffer, encoding: str) -> Received:
-    """Return what a source gives of a serialised ``nav_msgs/Odometry`` that has just arrived."""
-    return Received(publisher, partial(odometry, data, encoding), time.monotonic(), True)

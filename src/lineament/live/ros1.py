@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import xmlrpc.client
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from http.client import HTTPConnection, HTTPException
 from typing import Any
 
 from ..errors import LineamentError, one_line
-from ..limits import Limits
 from ..output.scene import Message
 from .config import LiveConfig
-from .received import Inbox, Received, received_odometry, received_scan
+from .received import SCAN, Inbox, Received, Wanted, wanted
 from .sinks import Publisher
 
-ODOMETRY = "nav_msgs/Odometry"
 #: How long the master may take to answer [s].
 _PATIENCE = 3.0
 #: A larger step of the sequence number is no loss: the publisher was started again.
@@ -63,13 +61,15 @@ class Ros1Node:
             ) from None
         return answer
 
-    def subscribe(self, topic: str, kind: str, callback: Callable[[Any, Any], None]) -> Any:
-        """Subscribe to a topic; `callback` receives each raw message, and `kind`."""
-        return self._rospy.Subscriber(topic, _raw(kind), callback, kind, tcp_nodelay=True)
+    def subscribe(self, topic: str, kind: str, callback: Callable[[Any], None]) -> Any:
+        """Subscribe to a topic; `callback` receives each raw message."""
+        return self._rospy.Subscriber(topic, _raw(kind), callback, tcp_nodelay=True)
 
-    def advertise(self, topic: str, kind: str, depth: int) -> Any:
+    def advertise(self, topic: str, kind: str, depth: int, is_latched: bool) -> Any:
         """Make a rospy publisher of raw messages."""
-        return self._rospy.Publisher(topic, _raw(kind), tcp_nodelay=True, queue_size=depth)
+        return self._rospy.Publisher(
+            topic, _raw(kind), tcp_nodelay=True, latch=is_latched, queue_size=depth
+        )
 
     def close(self) -> None:
         """Leave ROS, and close all topics; a process cannot come back."""
@@ -80,15 +80,13 @@ class Ros1Source:
     """Scans, and odometry where it is wanted, from topics of ROS 1."""
 
     def __init__(self, node: Ros1Node, config: LiveConfig) -> None:
-        self._node, self._options = node, (config.echo, Limits.of(config.limits))
-        self._inbox = Inbox(config.depth)
+        self._node, self._inbox = node, Inbox(config.depth)
         self._numbers: dict[str, int] = {}
-        topic, kind = config.scan_topic, f"sensor_msgs/{config.type}"
-        self._scans = node.subscribe(topic, kind, self._put_scan)
-        self._subscribed = {topic: (kind, self._scans)}
-        if (odometry := config.odometry_topic) is not None:
-            subscription = node.subscribe(odometry, ODOMETRY, self._put_odometry)
-            self._subscribed[odometry] = ODOMETRY, subscription
+        self._subscribed = {
+            one.topic: (one.kind, node.subscribe(one.topic, one.kind, partial(self._put, one)))
+            for one in wanted(config)
+        }
+        _, self._scans = self._subscribed[config.scan_topic]
 
     @property
     def lost(self) -> int:
@@ -128,13 +126,11 @@ class Ros1Source:
             if published.get(topic, kind) != kind
         ]
 
-    def _put_scan(self, message: Any, kind: str) -> None:
+    def _put(self, wanted: Wanted, message: Any) -> None:
         publisher = _publisher(message)
-        scan = received_scan(publisher, message.raw, "ros1", kind, *self._options)
-        self._inbox.put(scan, self._missing(publisher, message.raw))
-
-    def _put_odometry(self, message: Any, _: str) -> None:
-        self._inbox.put(received_odometry(_publisher(message), message.raw, "ros1"))
+        came = wanted.received(publisher, message.raw, "ros1")
+        missing = self._missing(publisher, message.raw) if wanted.what == SCAN else 0
+        self._inbox.put(came, missing)
 
     def _missing(self, publisher: str, data: bytes) -> int:
         """Count the scans between the last of a publisher and this one, by their numbers."""
@@ -156,7 +152,7 @@ class Ros1Publisher(Publisher):
         self._node, self._depth = node, depth
 
     def _open(self, topic: str, kind: str) -> Any:
-        return self._node.advertise(topic, kind, self._depth)
+        return self._node.advertise(topic, kind, self._depth, topic in self._latched)
 
     def _send(self, topic: Any, message: Message) -> None:
         if self._node.ended:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of
+from ..scan.fields import NANO
 from .config import LiveConfig
 from .counters import Report
-from .pipeline import Frame, plan_of, time_of
+from .pipeline import Frame, plan_of, stamp_of, time_of
 
 if TYPE_CHECKING:
     from ..mapping.following import Whereabouts
@@ -28,9 +30,15 @@ class Publisher(ABC):
 
     def __init__(self) -> None:
         self._topics: dict[str, Any] = {}
+        self._latched: set[str] = set()
 
-    def advertise(self, topic: str, kind: str) -> None:
-        """Announce a topic, so that others can subscribe before there is a message."""
+    def advertise(self, topic: str, kind: str, *, is_latched: bool = False) -> None:
+        """Announce a topic, so that others can subscribe before there is a message.
+
+        Who comes later gets the last message of one that is latched.
+        """
+        if is_latched:
+            self._latched.add(topic)
         self._topics[topic] = self._open(topic, kind)
 
     def publish(self, message: Message) -> None:
@@ -40,7 +48,12 @@ class Publisher(ABC):
         self._send(self._topics[message.topic], message)
 
     def listeners(self, topic: str) -> int:
-        """Return the number of listeners of a topic, or 1 if it has some; 0 if not advertised."""
+        """Return the number of listeners of a topic, or 1 if it has some; 0 if not advertised.
+
+        Of a latched one they may come later: there is one at least.
+        """
+        if topic in self._latched:
+            return 1
         return self._count(self._topics[topic]) if topic in self._topics else 0
 
     @abstractmethod
@@ -80,16 +93,17 @@ class RosSink:
     config : LiveConfig
         Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
         ``TOPIC/markers``; where they are tracked, the motion of the sensor goes to
-        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``, and that on a
-        plan to ``TOPIC/pose``, in the frame ``map``. The scans of a log are published too, with
-        their poses on ``/tf``.
+        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``. On a plan the
+        pose of the scanner goes to ``TOPIC/pose``, that of the robot to ``amcl_pose``, and the
+        transform from `map_frame` to `odom_frame` to ``/tf``, while they are known. The scans of a
+        log are published too, with their poses on ``/tf``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
-        self._publisher, self._make, self._name = publisher, messages, config.name
+        self._publisher, self._make, self._config = publisher, messages, config
         self._publishes_scan = config.log is not None
         self._topic = topic = config.scan_topic
-        self._where: Whereabouts | None = None
+        self._frame: Frame | None = None
         topics = {
             f"{topic}/features": "sensor_msgs/PointCloud2",
             f"{topic}/corners": "geometry_msgs/PoseArray",
@@ -102,6 +116,11 @@ class RosSink:
             topics[f"{topic}/dock"] = "geometry_msgs/PoseWithCovarianceStamped"
         if config.map is not None:
             topics[f"{topic}/pose"] = "geometry_msgs/PoseWithCovarianceStamped"
+            # As of AMCL, whose listeners ask for the last one.
+            kind = messages.kind("geometry_msgs/PoseWithCovarianceStamped")
+            publisher.advertise(config.resolved("amcl_pose"), kind, is_latched=True)
+            if config.broadcast:
+                topics["/tf"] = "tf2_msgs/TFMessage"
         if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
@@ -118,42 +137,69 @@ class RosSink:
         make, topic, scan, features = self._make, self._topic, frame.scan, frame.features
         # A log may name no frame, but /tf needs a name.
         moment = _moment(frame, scan.frame_id or (LASER_FRAME if self._publishes_scan else ""))
-        messages: dict[str, Callable[[str], Message]] = {
-            f"{topic}/features": lambda to: make.cloud(to, moment, features, frame.tracks),
-            f"{topic}/corners": lambda to: make.corners(to, moment, features),
-            f"{topic}/markers": lambda to: make.features(
-                to, moment, layers_of(markers_of(features, frame.straight))
+        if frame.where is not None:
+            moment = moment._replace(world=self._config.odom_frame)  # which is on the plan
+        messages: list[tuple[str, Callable[[str], Message]]] = [
+            (f"{topic}/features", lambda to: make.cloud(to, moment, features, frame.tracks)),
+            (f"{topic}/corners", lambda to: make.corners(to, moment, features)),
+            (
+                f"{topic}/markers",
+                lambda to: make.features(
+                    to, moment, layers_of(markers_of(features, frame.straight))
+                ),
             ),
-        }
+        ]
         if (travel := frame.travel) is not None:
-            messages[f"{topic}/odometry"] = lambda to: make.odometry(to, moment, travel)
+            messages.append((f"{topic}/odometry", lambda to: make.odometry(to, moment, travel)))
         if (dock := frame.dock) is not None:
-            messages[f"{topic}/dock"] = lambda to: make.placed(
-                to, moment, dock.pose, dock.covariance
-            )
-        self._where = where = frame.where
-        if where is not None and where.is_known:
-            on_plan = moment._replace(frame=WORLD_FRAME)
-            messages[f"{topic}/pose"] = lambda to: make.placed(
-                to, on_plan, where.pose, where.covariance
-            )
+            pose, covariance = dock
+            messages.append((f"{topic}/dock", lambda to: make.placed(to, moment, pose, covariance)))
+        if frame.where is not None:
+            messages += self._on_plan(frame, frame.where, moment)
         if self._publishes_scan:
-            if (pose := scan.pose) is not None:
-                messages["/tf"] = lambda to: make.transform(to, moment, pose)
+            if (seen_from := scan.pose) is not None:
+                messages.append(("/tf", lambda to: make.transform(to, moment, seen_from)))
             if scan.is_regular:
-                messages[topic] = lambda to: make.scan(to, moment, scan)
+                messages.append((topic, lambda to: make.scan(to, moment, scan)))
             else:
-                messages[f"{topic}/points"] = lambda to: make.points(to, moment, scan)
-        for name, message in messages.items():
+                messages.append((f"{topic}/points", lambda to: make.points(to, moment, scan)))
+        for name, message in messages:
             if self._publisher.listeners(name):
                 self._publisher.publish(message(name))
+
+    def _on_plan(
+        self, frame: Frame, where: Whereabouts, moment: Moment
+    ) -> Iterator[tuple[str, Callable[[str], Message]]]:
+        """Yield what is said of the pose on the plan; nothing but a status where it is not known.
+
+        A verdict that is another one than before is published at once.
+        """
+        make, config = self._make, self._config
+        before, self._frame = self._frame, frame
+        if before is None or _status(before, config)[:2] != _status(frame, config)[:2]:
+            self._diagnose_pose(frame, divmod(time.time_ns(), NANO))
+        on_plan = moment._replace(frame=config.map_frame)
+        if where.is_known:
+            pose, covariance = where.pose, where.covariance
+            yield f"{self._topic}/pose", lambda to: make.placed(to, on_plan, pose, covariance)
+        if (placed := frame.placed) is not None:
+            base, spread = placed.base, placed.covariance
+            yield config.resolved("amcl_pose"), lambda to: make.placed(to, on_plan, base, spread)
+            if (odom := placed.odom) is not None and config.broadcast:
+                until = frame.scan.stamp_ns + round(config.transform_tolerance * NANO)
+                link = Moment(*stamp_of(until), config.odom_frame, config.map_frame)
+                yield "/tf", lambda to: make.transform(to, link, odom)
 
     def diagnose(self, report: Report, time: tuple[int, int]) -> None:
         """Publish the report on ``/diagnostics``, and the verdict on the last pose."""
         self._diagnose(self._topic, report.level, str(report), report.values, time)
-        if (where := self._where) is not None:
-            level = 0 if where else 1 if where.is_known else 2
-            self._diagnose(f"{self._topic}/pose", level, where.verdict, _figures(where), time)
+        if (frame := self._frame) is not None:
+            self._diagnose_pose(frame, time, is_stale=not report.since.scans)
+
+    def _diagnose_pose(self, frame: Frame, time: tuple[int, int], is_stale: bool = False) -> None:
+        assert frame.where is not None
+        level, summary = (3, "no scans") if is_stale else _status(frame, self._config)
+        self._diagnose(f"{self._topic}/pose", level, summary, _figures(frame.where), time)
 
     def _diagnose(
         self, topic: str, level: int, summary: str, values: dict[str, str], time: tuple[int, int]
@@ -161,7 +207,7 @@ class RosSink:
         message = self._make.diagnostics(
             DIAGNOSTICS,
             Moment(*time, "", ""),
-            name=f"{self._name}: {topic}",
+            name=f"{self._config.name}: {topic}",
             hardware_id=self._topic,
             level=level,
             summary=summary,
@@ -228,6 +274,18 @@ class FoxgloveSink:
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
     return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)
+
+
+def _status(frame: Frame, config: LiveConfig) -> tuple[int, str]:
+    """Level of diagnostics and verdict: 0 located, 1 but for something, 2 not known."""
+    where, placed = frame.where, frame.placed
+    assert where is not None
+    level = 0 if where else 1 if where.is_known else 2
+    summary = where.verdict
+    if where.is_known and (placed is None or placed.odom is None) and config.is_localiser:
+        unknown = "where the scanner is mounted" if placed is None else "odometry"
+        level, summary = max(level, 1), f"{summary}, without {unknown}"
+    return level, summary
 
 
 def _figures(where: Whereabouts) -> dict[str, str]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._copies import InTurn, in_turn
 from ..extractor import Extractor
@@ -13,11 +14,12 @@ from ..motion import Tracker
 from ..motion.deskew import beam_times, deskew
 from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
+from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
+from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -32,6 +34,8 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says.
 DENIED = 0.12
+#: So many looks are taken near a pose that somebody says, before the whole plan is.
+GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
 _DRIFT, _TURN_DRIFT = 0.005, 0.002
 #: Error of walls and beams beside their covariances [m]: where scans are judged by themselves.
@@ -112,6 +116,22 @@ class Follower(InTurn):
         self._verdict, self._pose, self._covariance = LOST, (0.0, 0.0, 0.0), UNKNOWN
         self._missed, self._looked = 0.0, math.nan
         self._since = self._turned = math.inf
+        self._guessed = 0
+
+    @in_turn
+    def forget(self) -> None:
+        """Look for the sensor on the whole plan, by what it sees from now on."""
+        self._restart()
+
+    @in_turn
+    def suppose(self, pose: Pose, covariance: ArrayLike | None = None) -> None:
+        """Look for the sensor near a pose that somebody says: its next scans have to confirm it.
+
+        The covariance (3, 3) is by default that of 0.5 m and 10°, as of `locate`.
+        """
+        self._restart()
+        self._pose, self._guessed = pose, GUESSED
+        self._covariance = GUESS if covariance is None else covariance_of_pose(covariance)
 
     @property
     def is_known(self) -> bool:
@@ -206,6 +226,10 @@ class Follower(InTurn):
 
     def _look(self, blurred: Array) -> Location:
         """Look for what was seen on the plan: near the pose if it is known, or everywhere."""
+        if not self.is_known and self._guessed:
+            self._guessed -= 1
+            near = locate(self._local, self.plan, self._pose, self._covariance)
+            return self._found(near, blurred)
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
@@ -217,6 +241,10 @@ class Follower(InTurn):
         odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
         is_missed = found.verdict == LOST and (odds < SURE or contradicted > DENIED)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
+        return self._found(found, blurred)
+
+    def _found(self, found: Location, blurred: Array) -> Location:
+        """Join what was found near a pose with that pose."""
         if found.verdict in (LOCATED, UNOBSERVED):
             known, other = (self._pose, self._covariance), (found.pose, found.covariance + blurred)
             self._pose, self._covariance = combined(known, other)

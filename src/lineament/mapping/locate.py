@@ -161,7 +161,7 @@ def locate(
 
 #: Covariance of a pose of which nothing is known, and of a guess for which none is given.
 UNKNOWN = np.diag((1e6, 1e6, 10.0))
-_GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
+GUESS = np.diag((0.5, 0.5, math.radians(10))) ** 2
 _NOTHING = Evidence(-math.inf, 0.0, 0.0, 0.0, 0)
 
 
@@ -173,7 +173,7 @@ def _tried(anchors: Array, query: Query, plan: LineMap) -> Array:
 
 def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap) -> Array:
     """Poses within 2 σ of a guess; where those are too many, those within 4 σ that have votes."""
-    spread = _GUESS if covariance is None else covariance_of_pose(covariance)
+    spread = GUESS if covariance is None else covariance_of_pose(covariance)
     reach = 2 * np.sqrt(np.diag(spread))
     counts = 2 * np.ceil(reach / (*[BOX / 2] * 2, TURN / 2)).astype(np.int64) + 1
     if np.prod(counts.astype(float)) <= TRIED:

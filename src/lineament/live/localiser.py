@@ -1,0 +1,199 @@
+"""`Localiser`: where a robot is on a plan, and its odometry, by its scans and frames."""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..features import Features
+from ..mapping import LineMap
+from ..mapping.following import Follower, Whereabouts
+from ..motion.deskew import beam_times
+from ..rosmsg.poses import Odometry, StampedPose
+from ..scan import Array, LaserScan, Pose
+from ..scan.poses import Twist, carried, compose, inverse, relative
+from .config import LiveConfig
+from .frames import Frames, Place, frame_of
+from .received import GUESS, MOUNTINGS, RELOCATE, Heard
+
+#: Scanners that are followed; a robot has fewer, unless names are made up.
+_MOST_SCANNERS = 8
+#: Scans in a row of which the mounting, or the odometry, is not known before this is a message.
+_MANY = 20
+#: Where they should come from.
+_WHENCE = {
+    "mounting": "expected on /tf_static, or a laser_pose",
+    "odometry": "expected on /tf, or a topic of odometry",
+}
+#: Transforms that were sent, by which those of others are known.
+_SENT = 50
+
+
+class Placed(NamedTuple):
+    """Where a robot is on the plan.
+
+    Attributes
+    ----------
+    base : (x, y, theta)
+        Pose of the robot [m, m, rad].
+    covariance : ndarray, shape (3, 3)
+        Of this pose [m, m, rad].
+    odom : (x, y, theta) or None
+        Pose on the plan of the frame of the odometry; None where no odometry is known.
+    """
+
+    base: Pose
+    covariance: Array
+    odom: Pose | None
+
+
+class Localiser:
+    """Follows the scanners of a robot on a plan, by its odometry and the mountings on ``/tf``.
+
+    Where the scanner is lost, there is no `Placed`. A scanner is known by the frame of its scans: a
+    driver that is started again goes on where it was.
+
+    Parameters
+    ----------
+    config : LiveConfig
+        Frames, the mounting of the scanner, whether the odometry has its own topic.
+    plan : LineMap
+    extract : callable
+        Returns the features of a scan: of one that is upside down, and is turned over for the plan.
+    """
+
+    def __init__(
+        self, config: LiveConfig, plan: LineMap, extract: Callable[[LaserScan], Features]
+    ) -> None:
+        self._config, self._plan, self._extract = config, plan, extract
+        self._map, self._odom, self._base = map(
+            frame_of, (config.map_frame, config.odom_frame, config.base_frame)
+        )
+        self._followers: dict[str, Follower] = {}
+        self._frames = Frames()
+        self._guess: StampedPose | None = None
+        self._missing = dict.fromkeys(_WHENCE, 0)
+        self._sent: deque[Pose] = deque(maxlen=_SENT)
+        self._problems: dict[str, str] = {}
+
+    def hear(self, message: Heard, what: str) -> None:
+        """Take what was heard beside the scans; ValueError if it makes no sense."""
+        if what == RELOCATE:
+            for follower in self._followers.values():
+                follower.forget()
+        elif isinstance(message, Odometry):
+            base = message.child_frame or self._base
+            moved = StampedPose(message.stamp, self._odom, base, message.pose)
+            self._frames.add(moved)
+        elif isinstance(message, list) and what == GUESS:
+            guess = message[0]
+            if frame_of(guess.frame) != self._map:
+                raise ValueError(f"it is in frame {guess.frame!r}, expected {self._map!r}")
+            self._guess = guess
+        elif isinstance(message, list):
+            for link in message:
+                self._join(link, is_fixed=what == MOUNTINGS)
+
+    def problems(self) -> Iterator[str]:
+        """Yield what keeps the robot from being placed, a line each."""
+        yield from sorted(self._problems.values())
+
+    def __call__(
+        self, features: Features, scan: LaserScan, straight: LaserScan
+    ) -> tuple[Whereabouts, Placed | None]:
+        """Follow a scanner by its next scan: as it came, and `straight`, as its features have it.
+
+        Only the name of its frame, its time, its pose and the times of its beams are taken of it.
+        """
+        mounting, travelled = self._mounting(scan), self._travelled(scan)
+        if mounting is not None and mounting.is_upside_down:
+            features = self._extract(straight.turned_over())
+        follower, laser = self._follower(scan.frame_id), scan.pose
+        if self._config.is_localiser:
+            laser = None
+            if mounting is not None and travelled is not None:
+                laser = compose(travelled, mounting.pose)
+        mounted = (0.0, 0.0, 0.0) if mounting is None else mounting.pose
+        self._suppose(follower, travelled, mounted)
+        skew = _skew(scan, follower.twist) if straight is scan else (0.0, 0.0, 0.0)
+        where = follower(features, laser, skew)
+        if mounting is None or not where.is_known:
+            return where, None
+        base = compose(where.pose, inverse(mounted))
+        odom = None if travelled is None else compose(base, inverse(travelled))
+        if odom is not None:
+            self._sent.append(odom)
+        return where, Placed(base, carried(where.covariance, where.pose, base), odom)
+
+    def _follower(self, frame: str) -> Follower:
+        if frame not in self._followers:
+            if len(self._followers) >= _MOST_SCANNERS:
+                del self._followers[next(iter(self._followers))]
+            self._followers[frame] = Follower(self._plan)
+        return self._followers[frame]
+
+    def _mounting(self, scan: LaserScan) -> Place | None:
+        """Where the scanner is on the robot; None if that is not known."""
+        config, frame = self._config, frame_of(scan.frame_id)
+        if any(config.laser_pose) or config.upside_down or not config.is_localiser:
+            return Place(config.laser_pose, config.upside_down)
+        return self._find("mounting", self._base, frame, scan)
+
+    def _travelled(self, scan: LaserScan) -> Pose | None:
+        """Where the robot has come to by its odometry; None if that is not known."""
+        if not self._config.is_localiser:
+            laser = inverse(self._config.laser_pose)
+            return None if scan.pose is None else compose(scan.pose, laser)
+        found = self._find("odometry", self._odom, self._base, scan)
+        return None if found is None else found.pose
+
+    def _find(self, what: str, parent: str, child: str, scan: LaserScan) -> Place | None:
+        """Return where a frame is in another one; None, and a problem in the end, if unknown."""
+        try:
+            found = self._frames.find(parent, child, scan.stamp)
+        except LookupError as error:
+            self._missing[what] += 1
+            if self._missing[what] >= _MANY:
+                self._problems[what] = f"the robot is not placed: {error}, {_WHENCE[what]}"
+            return None
+        self._missing[what] = 0
+        self._problems.pop(what, None)
+        return found
+
+    def _suppose(self, follower: Follower, travelled: Pose | None, mounting: Pose) -> None:
+        """Let a scanner be looked for where the robot is said to be, and has gone since."""
+        if (guess := self._guess) is None:
+            return
+        self._guess, base = None, guess.pose
+        if travelled is not None:
+            try:
+                then = self._frames.find(self._odom, self._base, guess.stamp).pose
+                base = compose(base, relative(then, travelled))
+            except LookupError:
+                pass  # It holds for now: who sends it by hand seldom gives a time.
+        follower.suppose(compose(base, mounting), guess.covariance)
+
+    def _join(self, link: StampedPose, is_fixed: bool) -> None:
+        """Take a transform; note that somebody else places the robot too: it jumps to and fro."""
+        parent, child = frame_of(link.frame), frame_of(link.child_frame)
+        if child != self._odom:
+            if parent != self._odom or self._config.odometry_topic is None:
+                self._frames.add(link, is_fixed=is_fixed)
+            return
+        is_placed = parent == self._map and self._config.broadcast
+        if is_placed and not any(np.allclose(link.pose, pose, atol=1e-6) for pose in self._sent):
+            self._problems["another"] = (
+                f"{self._map} → {self._odom} is on /tf from another node as well: "
+                "stop that, or give --no-broadcast"
+            )
+
+
+def _skew(scan: LaserScan, twist: Twist | None) -> Pose:
+    """Return what a scan as a whole may be off that was taken on the way, and not deskewed."""
+    times = beam_times(scan)
+    if times is None or twist is None:
+        return (0.0, 0.0, 0.0)
+    x, y, turn = (np.abs(twist) * np.ptp(times) / 2).tolist()
+    return x, y, math.remainder(turn, 2 * math.pi)

@@ -1,0 +1,432 @@
+"""A robot on a plan: its frames, what it is asked, and that it is never said to be where it is not.
+
+The robot drives through a simulated storey; its scanner is mounted ahead, and turned.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from functools import cache
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from live_driving import Running, eventually, heard
+
+import lineament as ln
+from lineament.live import Frame, LiveConfig, Pipeline, RosSink
+from lineament.live.frames import Frames
+from lineament.live.received import (
+    GUESS,
+    LINKS,
+    MOUNTINGS,
+    ODOMETRY,
+    RELOCATE,
+    wanted,
+)
+from lineament.live.sinks import Publisher
+from lineament.mapping import LineMap
+from lineament.output.ros_messages import RosMessages
+from lineament.rosmsg.poses import Odometry, StampedPose, stamped_poses
+from lineament.scan import Pose
+from lineament.scan.poses import compose, inverse, relative
+from lineament.simulation import SENSORS, Wheels, office
+
+MOUNTING = (0.25, -0.1, 0.4)
+RATE = 5.0
+
+
+class Moment(NamedTuple):
+    """A scan, where the robot believes that it has come to, and where it is."""
+
+    scan: ln.LaserScan
+    believed: Pose
+    base: Pose
+
+
+@cache
+def driven(seed: int = 1, count: int = 60) -> tuple[Moment, ...]:
+    """Drive through a storey, from the time 100 s on."""
+    storey = office(seed, (30, 20))
+    scans, truth = storey.drive(
+        SENSORS["lms181"], seed=seed, speed=0.7, rate=RATE, wheels=Wheels(), people=2
+    )
+    on_robot = inverse(MOUNTING)
+    return tuple(
+        Moment(
+            scan.with_pose(None).stamped("first", round(1e9 * (100 + scan.stamp))),
+            compose(scan.pose, on_robot),
+            compose(true, on_robot),
+        )
+        for scan, true in islice(zip(scans, truth, strict=True), count)
+    )
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return written(tmp_path_factory.mktemp("plan") / "own.dxf", 1)
+
+
+def written(path, seed: int) -> str:
+    LineMap.from_lines(office(seed, (30, 20)).plan.segments, side=1).write(path)
+    return str(path)
+
+
+def named(scan: ln.LaserScan, frame: str) -> ln.LaserScan:
+    fields = {name: getattr(scan, name) for name in ("range_min", "range_max", "stamp")}
+    return ln.LaserScan(scan.ranges, scan.angle_min, scan.angle_increment, frame_id=frame, **fields)
+
+
+class Robot:
+    """A pipeline on a plan, and what a robot says to it."""
+
+    def __init__(self, plan: str, **options) -> None:
+        self.pipeline = Pipeline(LiveConfig(map=plan, **options))
+        self.mount()
+
+    def mount(self) -> None:
+        """Say where the scanner is, by way of a frame between."""
+        self.say(MOUNTINGS, StampedPose(0.0, "base_footprint", "/base_link", (0.0, 0.0, 0.0)))
+        self.say(MOUNTINGS, StampedPose(0.0, "base_link", "laser", MOUNTING))
+
+    def say(self, what: str, *links: StampedPose) -> None:
+        self.pipeline.hear(list(links), what)
+
+    def move(self, moment: Moment, late: float = 0.0) -> None:
+        stamp = moment.scan.stamp - late
+        self.say(LINKS, StampedPose(stamp, "odom", "base_footprint", moment.believed))
+
+    def see(self, moment: Moment) -> Frame:
+        return self.pipeline("scanner", named(moment.scan, "laser"))
+
+    def drive(self, moments) -> list[Frame]:
+        frames = []
+        for moment in moments:
+            self.move(moment)
+            frames.append(self.see(moment))
+        return frames
+
+
+def off(pose: Pose, true: Pose) -> tuple[float, float]:
+    x, y, turn = relative(true, pose)
+    return math.hypot(x, y), abs(turn)
+
+
+def assert_right(frame: Frame, moment: Moment, most: float = 0.05) -> None:
+    """The robot is where it is said to be, also by way of its odometry."""
+    on_plan = compose(frame.placed.odom, moment.believed)
+    for pose in (frame.placed.base, on_plan):
+        way, turn = off(pose, moment.base)
+        assert way < most
+        assert turn < 0.02
+    error = np.subtract(frame.placed.base, moment.base)
+    error[2] = math.remainder(error[2], 2 * math.pi)
+    assert error @ np.linalg.solve(frame.placed.covariance, error) < 40
+
+
+def test_a_robot_is_placed_with_its_scanner_mounted_and_its_odometry(plan):
+    frames = Robot(plan).drive(driven())
+    placed = [(f, m) for f, m in zip(frames, driven(), strict=True) if f.placed]
+    assert len(placed) > 30
+    for frame, moment in placed:
+        assert_right(frame, moment)
+    assert frames[-1].placed
+    assert all(bool(f.placed) == f.where.is_known for f in frames)
+
+
+def test_a_scanner_upside_down_and_odometry_by_a_topic(plan):
+    """Its frame is turned about x: bearings count the other way."""
+    robot = Robot(plan, odometry="/odom")
+    fixed = StampedPose(0.0, "base_link", "laser", MOUNTING, None, True)
+    robot.say(MOUNTINGS, fixed)
+    for moment in driven():
+        odometry = Odometry(
+            moment.scan.stamp, (0.0, 0.0, 0.0), moment.believed, "odom", "base_footprint"
+        )
+        robot.pipeline.hear(odometry, ODOMETRY)
+        robot.say(LINKS, StampedPose(moment.scan.stamp, "odom", "base_footprint", (9.0, 9.0, 1.0)))
+        frame = robot.pipeline("scanner", named(moment.scan.turned_over(), "laser"))
+    assert_right(frame, moment)
+
+
+def located(plan: str, count: int = 30, **options) -> tuple[Robot, list[Frame]]:
+    robot = Robot(plan, **options)
+    frames = robot.drive(driven()[:count])
+    assert frames[-1].placed
+    return robot, frames
+
+
+def test_a_robot_that_is_carried_away_is_nowhere_within_half_a_second(plan):
+    robot, _ = located(plan)
+    before, elsewhere = driven()[29], driven(1, 150)[140:150]
+    assert off(before.base, elsewhere[0].base)[0] > 2.5
+    # Its wheels do not notice.
+    lifted = [m._replace(believed=before.believed) for m in elsewhere]
+    lifted = [
+        m._replace(scan=m.scan.stamped("first", before.scan.stamp_ns + (k + 1) * 200_000_000))
+        for k, m in enumerate(lifted)
+    ]
+    frames = robot.drive(lifted)
+    for frame, moment in list(zip(frames, lifted, strict=True))[2:]:
+        if frame.placed:
+            assert off(frame.placed.base, moment.base)[0] < 0.2
+    assert not frames[1].placed
+
+
+def test_initial_poses_are_guesses_that_scans_have_to_confirm(plan):
+    moments = driven()
+    robot, here = Robot(plan), moments[0].base
+
+    def guess(by: Pose, **fields) -> None:
+        said = StampedPose(fields.pop("stamp", 0.0), "map", "", compose(here, by))
+        robot.say(GUESS, said._replace(**fields))
+
+    # Of two the later counts, and the wrong one does no harm.
+    guess((4.0, 2.0, 1.0))
+    guess((0.2, -0.1, 0.1), covariance=np.diag((0.25, 0.25, 0.07)))
+    frames = robot.drive(moments[:3])
+    assert_right(frames[-1], moments[2])
+    # That is forgotten where another is said; a wrong one is refused, and the robot found again.
+    guess((6.0, 3.0, 2.0))
+    frames = robot.drive(moments[3:60])
+    assert not frames[0].placed
+    for frame, moment in zip(frames, moments[3:60], strict=True):
+        assert frame.placed is None or off(frame.placed.base, moment.base)[0] < 0.2
+    assert frames[-1].placed
+
+
+def test_an_initial_pose_of_a_while_ago_is_moved_by_the_odometry(plan):
+    moments, robot = driven(), Robot(plan)
+    robot.drive(moments[:20])
+    robot.say(GUESS, StampedPose(moments[10].scan.stamp, "/map", "", moments[10].base))
+    (frame,) = robot.drive(moments[20:21])
+    assert_right(frame, moments[20])
+
+
+def test_initial_poses_that_make_no_sense(plan):
+    robot = Robot(plan)
+    with pytest.raises(ValueError, match="it is in frame 'odom', expected 'map'"):
+        robot.say(GUESS, StampedPose(0.0, "odom", "", (0.0, 0.0, 0.0)))
+    (initial,) = (one for one in wanted(LiveConfig(map=plan)) if one.what == GUESS)
+    header = struct.pack("<3I4s", 1, 0, 4, b"map\0")
+    numbers = struct.pack("<7d36d", math.nan, *[0.0] * 5, 1.0, *[0.0] * 36)
+    with pytest.raises(ValueError, match="expected numbers below"):
+        initial.received("a", b"\0\1\0\0" + header + numbers, "cdr").read()
+
+
+def test_a_robot_is_looked_for_anew(plan):
+    robot, _ = located(plan)
+    robot.pipeline.hear(None, RELOCATE)
+    frames = robot.drive(driven()[30:60])
+    assert not frames[0].placed
+    assert_right(frames[-1], driven()[59])
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_on_the_plan_of_another_building_there_is_no_transform(tmp_path, seed):
+    robot = Robot(written(tmp_path / "other.dxf", seed))
+    for k, moment in enumerate(driven()):
+        if k % 7 == 0:
+            robot.say(GUESS, StampedPose(0.0, "map", "", moment.base))
+        robot.move(moment)
+        assert robot.see(moment).placed is None
+
+
+def test_a_gap_in_the_tree_is_a_line_and_no_transform(plan):
+    robot, _ = located(plan)
+    frames = [robot.see(moment) for moment in driven()[30:60]]  # without odometry
+    assert frames[0].placed
+    assert all(frame.placed is None or frame.placed.odom is None for frame in frames)
+    (problem,) = robot.pipeline.problems()
+    assert problem.startswith("the robot is not placed: base_footprint in odom is known from 100.")
+    robot.move(driven()[59])
+    assert list(robot.pipeline.problems()) == [problem]
+    robot.pipeline = Pipeline(LiveConfig(map=plan))
+    frames = robot.drive(driven()[:30])
+    assert not any(frame.placed for frame in frames)
+    assert "no transforms lead from base_link to laser" in " ".join(robot.pipeline.problems())
+    assert any(frame.where.is_known for frame in frames)  # the scanner itself is
+
+
+def test_a_driver_that_is_started_again_goes_on(plan):
+    robot, _ = located(plan)
+    robot.move(driven()[30])
+    frame = robot.pipeline("another publisher", named(driven()[30].scan, "laser"))
+    assert_right(frame, driven()[30])
+
+
+def test_somebody_else_who_places_the_robot_is_a_line(plan):
+    robot, frames = located(plan)
+    ours = StampedPose(200.0, "map", "odom", frames[-1].placed.odom)
+    robot.say(LINKS, ours)
+    assert not list(robot.pipeline.problems())
+    robot.say(LINKS, ours._replace(pose=(1.0, 2.0, 3.0)))
+    (problem,) = robot.pipeline.problems()
+    assert problem.startswith("map → odom is on /tf from another node as well")
+    quiet, _ = located(plan, broadcast=False)
+    quiet.say(LINKS, ours._replace(pose=(1.0, 2.0, 3.0)))
+    assert not list(quiet.pipeline.problems())
+
+
+# Frames.
+
+
+def test_frames_move_at_constant_velocity_between_poses_and_a_little_after():
+    frames, ring = Frames(), math.remainder
+    for k in range(5):
+        turn = 3.0 + 0.1 * k
+        pose = (math.sin(turn), -math.cos(turn), ring(turn, 2 * math.pi))
+        frames.add(StampedPose(10 + 0.1 * k, "odom", "base", pose))
+    for stamp in (10.0, 10.07, 10.2, 10.33, 10.4, 10.55):
+        turn = 3.0 + stamp - 10
+        expected = (math.sin(turn), -math.cos(turn), ring(turn, 2 * math.pi))
+        assert frames.find("odom", "base", stamp).pose == pytest.approx(expected)
+    for stamp in (9.99, 10.61):
+        with pytest.raises(LookupError, match=r"base in odom is known from 10.000 to 10.400 s"):
+            frames.find("odom", "base", stamp)
+    # What comes late changes nothing; a clock that is set back begins anew.
+    frames.add(StampedPose(10.1, "odom", "base", (9.0, 9.0, 9.0)))
+    assert frames.find("odom", "base", 10.4).pose[0] < 1.1
+    frames.add(StampedPose(3.0, "odom", "base", (1.0, 0.0, 0.0)))
+    frames.add(StampedPose(3.6, "odom", "base", (2.0, 0.0, 0.0)))
+    assert frames.find("odom", "base", 3.6).pose == (2.0, 0.0, 0.0)
+    with pytest.raises(LookupError):
+        frames.find("odom", "base", 3.3)  # nobody knows the way between
+
+
+def test_a_tree_that_is_a_ring_or_leads_elsewhere_is_refused():
+    frames = Frames()
+    for parent, child in (("a", "b"), ("b", "a"), ("c", "d")):
+        frames.add(StampedPose(0.0, parent, child, (1.0, 0.0, 0.0)), is_fixed=True)
+    for child in ("a", "d", "unknown"):
+        with pytest.raises(LookupError, match=f"no transforms lead from odom to {child}"):
+            frames.find("odom", child, 0.0)
+    assert frames.find("c", "c", 0.0).pose == (0.0, 0.0, 0.0)
+    frames.add(StampedPose(0.0, "d", "e", (0.0, 1.0, 0.5), None, True), is_fixed=True)
+    frames.add(StampedPose(0.0, "e", "f", (0.0, 1.0, 0.0)), is_fixed=True)
+    x, y, theta = frames.find("c", "f", 0.0).pose
+    assert frames.find("c", "f", 0.0).is_upside_down
+    assert (x, y, theta) == pytest.approx((1 + math.sin(0.5), 1 - math.cos(0.5), 0.5))
+
+
+# What is published.
+
+
+class Taken(Publisher):
+    """Keeps messages by topic; nobody listens but to `/tf`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: dict[str, list[bytes]] = {}
+
+    def _open(self, topic: str, kind: str) -> str:
+        assert "/" in kind
+        return topic
+
+    def _send(self, topic: str, message) -> None:
+        self.sent.setdefault(topic, []).append(message.data)
+
+    def _count(self, topic: str) -> int:
+        return topic in ("/tf", "/scan/pose")
+
+
+@pytest.mark.parametrize("broadcast", [True, False])
+def test_what_is_published_of_a_robot_that_is_found_and_lost(plan, broadcast):
+    config = LiveConfig(map=plan, broadcast=broadcast, transform_tolerance=0.25, map_frame="floor")
+    robot, taken = Robot(plan, map_frame="floor"), Taken()
+    sink = RosSink(taken, RosMessages("cdr"), config)
+    counts = []
+    moments = driven()[:40]
+    for k, moment in enumerate(moments):
+        if k == 30:
+            robot.pipeline.hear(None, RELOCATE)
+        if k < 39:
+            robot.move(moment)
+        frame = robot.see(moment)
+        sink.publish(frame)
+        counts.append((len(taken.sent.get("/tf", ())), len(taken.sent.get("/amcl_pose", ()))))
+        assert (counts[-1] != (counts[-2] if k else (0, 0))) == bool(frame.placed)
+        if k == 29:
+            statuses = len(taken.sent["/diagnostics"])
+        if k == 30:  # at once, not with the next report
+            assert len(taken.sent["/diagnostics"]) == statuses + 1
+            assert b"not on this map" in taken.sent["/diagnostics"][-1] or frame.placed is None
+        if k == 29 and broadcast:
+            (link,) = stamped_poses(taken.sent["/tf"][-1], "cdr", "tf2_msgs/TFMessage")
+            assert (link.frame, link.child_frame) == ("floor", "odom")
+            assert link.stamp == pytest.approx(moment.scan.stamp + 0.25)
+            assert link.pose == pytest.approx(frame.placed.odom)
+    kind = "geometry_msgs/PoseWithCovarianceStamped"
+    (base,) = stamped_poses(taken.sent["/amcl_pose"][29 - 1], "cdr", kind)
+    assert base.frame == "floor"
+    assert (counts[-1][0] > 0) == broadcast
+    assert "/amcl_pose" in taken._latched
+
+
+def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:
+    sec = math.floor(stamp)
+    header = {"stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))}, "frame_id": parent}
+    x, y, theta = pose
+    turned = {"z": math.sin(theta / 2), "w": math.cos(theta / 2)}
+    transform = {"translation": {"x": x, "y": y}, "rotation": turned}
+    return {"transforms": [{"header": header, "child_frame_id": child, "transform": transform}]}
+
+
+def pose_of(link: dict) -> Pose:
+    place, turned = link["translation"], link["rotation"]
+    return place["x"], place["y"], 2 * math.atan2(turned["z"], turned["w"])
+
+
+def test_over_dds_as_nav2_has_it(peer, domain, plan):
+    """A mounting that was said before the node came, and a pose for who comes after it."""
+    peer.publish("/scan", "LaserScan")
+    peer.publish("/tf", "TFMessage")
+    peer.publish("/tf_static", "TFMessage", True, True)
+    peer.publish("/initialpose", "PoseWithCovarianceStamped")
+    peer.publish("/scan/relocate", "Empty")
+    peer.listen("/tf", "TFMessage", 100)
+    peer.write("/tf_static", link_message(0.0, "base_link", "laser", MOUNTING))
+    moments, beams = driven(), driven()[0].scan
+    steps = iter(range(len(moments)))
+    with Running(domain=domain, map=plan, base_frame="base_link") as node:
+        told = ("/scan", "/tf", "/tf_static", "/initialpose", "/scan/relocate")
+        eventually(lambda: all(map(peer.listeners, told)))
+
+        def step() -> None:
+            moment = moments[k := next(steps)]
+            stamp = moment.scan.stamp
+            peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
+            sec = math.floor(stamp)
+            scan = {
+                "header": {
+                    "stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))},
+                    "frame_id": "laser",
+                },
+                "angle_min": beams.angle_min,
+                "angle_increment": beams.angle_increment,
+                "range_max": 30.0,
+                "ranges": moment.scan.ranges.tolist(),
+            }
+            peer.write("/scan", scan)
+            assert k < 55
+
+        def link() -> dict | None:
+            step()
+            for message in peer.take("/tf"):
+                for one in message["transforms"]:
+                    if one["header"]["frame_id"] == "map":
+                        return one
+            return None
+
+        found = eventually(link, pause=0.05)
+        peer.listen("/amcl_pose", "PoseWithCovarianceStamped", 1, True)
+        pose = heard(peer, "/amcl_pose")  # nothing is sent meanwhile
+    stamp = found["header"]["stamp"]["sec"] + found["header"]["stamp"]["nanosec"] / 1e9 - 1.0
+    (moment,) = (m for m in moments if abs(m.scan.stamp - stamp) < 1e-6)
+    base = compose(pose_of(found["transform"]), moment.believed)
+    assert off(base, moment.base)[0] < 0.05
+    assert found["child_frame_id"] == "odom"
+    assert pose["header"]["frame_id"] == "map"
+    assert not any("sense" in line for line in node.lines)
