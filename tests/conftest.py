@@ -173,8 +173,8 @@ def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
             for key in {"note", "text", *written["figures"]} & prose.keys():
                 prose[key] = " ".join(NUMBER.findall(str(prose[key])))
         for claim in (claim for claim in CLAIMS if claim.experiment == name):
-            here, margins = claim.judge(findings.numbers)
-            written[claim.place] = [here, *map(float, margins)]
+            here, margins, blind = claim.judge(findings.numbers)
+            written[claim.place] = [here, *map(float, (*margins, *blind))]
         steps = [report.split(": ", 1)[-1] for report in reports]
         lines = [" > ".join(steps), *numbers_of(written | bands({name: findings})), *drawn]
         assert_approved(f"experiments/{name}", lines)

@@ -24,7 +24,7 @@ class Paper:
     min_points: int = 3
     support_radius: int = 6
     threshold: float = 0.66
-    response: str = "product_scaled"  # open
+    response: str = "tangent"  # 22; open: others
     recursion: str = "both"  # open: "after" is step 7 to the letter
     ends: str = "truncated"  # open
     fit: str = "y_of_x"  # "slope_intercept" is equation 23 to the letter

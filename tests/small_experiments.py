@@ -10,7 +10,6 @@ from lineament_lab.reproduce import (
     definitions,
     grid,
     layers,
-    noise,
     real,
     scans,
     scenes,
@@ -18,13 +17,10 @@ from lineament_lab.reproduce import (
     success,
     two_corners,
 )
-from lineament_lab.reproduce.grid import Parameters
 
 from lineament.simulation import SENSORS
 
 PAPER = SENSORS["paper"]
-#: Found on a small grid elsewhere; here it is only to be quick.
-CHOSEN = Parameters("relative", 8, 6, 0.25)
 
 
 def silent(about):
@@ -35,12 +31,11 @@ def silent(about):
 def small(monkeypatch):
     """Few methods, sensors, kinds and parameters; each call takes 1 µs longer than the last."""
     clock = (0.5e-6 * k for k in accumulate(count())).__next__
-    few = {"METHODS": ("liu", "pdbs", "iepf"), "best_parameters": lambda *_: CHOSEN}
+    few = {"METHODS": ("liu", "pdbs", "iepf")}
     here = {"machine": lambda: "this one", "version": lambda _: "1"}
     here["os"] = SimpleNamespace(sysconf=lambda _: 2**16)
     for module, changes in (
         (contenders, few),
-        (noise, {"best_parameters": lambda *_: CHOSEN}),
         (scans, {"_COPIES": 1, "_BATCHES": 2, "time": SimpleNamespace(perf_counter=clock)}),
         (definitions, here),
         (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),

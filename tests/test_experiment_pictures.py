@@ -71,9 +71,9 @@ def test_figure_9_has_the_median_and_the_range_of_the_seeds(shown):
     """AR is the radius over 100, and 0.1, 0.2, 0.5 more by the seed; at another threshold 0."""
     grids = [
         {
-            grid.Parameters(form, half_width, radius, threshold): {
-                "of_actual": (threshold == grid.THRESHOLD) * (radius / 100 + more)
-            }
+            grid.Parameters(form, half_width, radius, threshold): dict.fromkeys(
+                grid.CRITERIA, (threshold == grid.THRESHOLD) * (radius / 100 + more)
+            )
             for form in grid.FORMS
             for half_width in grid.HALF_WIDTHS
             for radius in (5, 6, 8)
@@ -84,7 +84,7 @@ def test_figure_9_has_the_median_and_the_range_of_the_seeds(shown):
     repetition._figure(grids, "support_radius", "fig9a", "x", "")
     repetition._figure(grids, "threshold", "fig9b", "x", "")
     by_radius, by_threshold = ([of for of in figure.axes if of.lines] for figure in shown)
-    assert len(by_radius) == len(by_threshold) == len(grid.HALF_WIDTHS)
+    assert len(by_radius) == len(by_threshold) == 2 * len(grid.HALF_WIDTHS)
     for axes in by_radius:
         peak, *curves = drawn(axes)
         assert set(peak[:, 0]) == {grid.RADIUS}

@@ -23,7 +23,7 @@ SETTINGS = {
              "RADII": (3, 4, 5, 6, 7, 8, 10, 12, 16), "SCENES_A_FRAME": 2,
              "THRESHOLDS": (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.66, 0.8, 1.0, 1.5),
              "TURNS": (0.25, 0.5, 0.75)},
-    "layers": {"PAPER": {"liu": 95.11, "liu:paper": 95.11, "pdbs, fixed": 83.55},
+    "layers": {"OF_PAPER": {"liu:paper": 95.11, "pdbs, fixed": 83.55},
                "PAPER_COUNTS": (11, 5), "SOUGHT": 400},
     "museum": {"SCANS_A_FRAME": 40, "APART": 0.1, "FAR": (1.0, 5.0), "PLACES": 5},
     "noise": {"OFF": 0.1, "SIZES": [(0.1, 0.3), (0.3, 0.6), (0.6, 1.2), (1.2, math.inf)]},

@@ -27,7 +27,7 @@ from lineament_lab.reproduce import (
     two_corners,
 )
 from lineament_lab.reproduce.seeds import Spread
-from small_experiments import CHOSEN, PAPER, silent, small  # noqa: F401
+from small_experiments import PAPER, silent, small  # noqa: F401
 
 import lineament as ln
 from lineament.logs import save_npz
@@ -150,21 +150,19 @@ def test_scene_of_figure_10_has_as_many_clusters_and_corners(seed):
 
 
 class TestMethods:
-    def test_every_method_takes_part_as_published_and_with_shared_steps(self, monkeypatch):
-        monkeypatch.setattr(contenders, "best_parameters", lambda *_: CHOSEN)
-        names = list(contenders.every_method(Setting(), silent))
-        assert [n.split(",")[0] for n in names[:4]] == ["liu:paper", "liu:paper", "liu", "liu"]
-        assert names[4:6] == ["liu:tuned", "liu’s operator, shared steps"]
-        assert names[6:8] == ["optimal", "pdbs"]
+    def test_every_method_takes_part_as_published_and_with_shared_steps(self):
+        names = list(contenders.every_method())
+        assert names[:4] == ["liu:paper", "liu:figure9", "liu", "liu:tuned"]
+        assert names[4:7] == ["liu’s operator, shared steps", "optimal", "pdbs"]
         rivals = [name for name in METHODS if name not in ("liu", "optimal", "pdbs")]
-        assert names[8:-1] == [row for name in rivals for row in (f"{name}:paper", name)]
+        assert names[7:-1] == [row for name in rivals for row in (f"{name}:paper", name)]
         assert names[-1] == "blind cut, shared steps"
-        features = list(contenders.feature_methods(Setting(), silent))
+        features = list(contenders.feature_methods())
         assert features == [name for name in names if name != "pdbs"]
-        fitted = list(contenders.fitted_methods(Setting(), silent))
+        fitted = list(contenders.fitted_methods())
         assert fitted == ["pdbs, fitted" if name == "pdbs" else name for name in names]
         drawn = list(filter(contenders.is_drawn, fitted))
-        assert drawn == [*names[2:5], "optimal", "pdbs, fitted", "iepf:paper", *rivals]
+        assert drawn == [*names[:4], "optimal", "pdbs, fitted", "iepf:paper", *rivals]
 
     def test_controls_cut_where_they_are_said_to(self):
         """A wall of 25 points: a blind cut at every eighth leaves one line after the settling."""
@@ -263,9 +261,9 @@ class TestTexts:
 
     def test_table_of_similarity(self):
         scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
-        (row,) = similarity._table("x", {"iepf": scores}).rows
+        (row,) = similarity._table("x", {"iepf:paper": scores}).rows
         rms = math.sqrt((100 + 900 + 25 + 225) / 4)
-        assert row[:6] == ("iepf", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
+        assert row[:6] == ("iepf:paper", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
         assert row[6:] == ("up to 250 mm", 50)
 
     def test_mean_nees_is_compared_with_its_interval(self):

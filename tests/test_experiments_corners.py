@@ -30,7 +30,7 @@ class TestRepetition:
         ar |= {("product", 2, 8, 0.66): 0.7, ("product", 2, 6, 0.5): 0.6}
         other = {"f1": 0.5}
         return {
-            p: other | {"of_actual": ar.get(p, 0.1 * (p[0] != "relative")), "among_found": 1 - p[3]}
+            p: other | {"half_sum": ar.get(p, 0.1 * (p[0] != "relative")), "repetition": 1 - p[3]}
             for form in grid.FORMS
             for half_width in grid.HALF_WIDTHS
             for radius in (5, 6, 8)
@@ -39,23 +39,23 @@ class TestRepetition:
         }
 
     def test_largest_is_among_those_asked_for(self, made):
-        assert grid.largest(made, "of_actual") == ("tangent", 8, 8, 0.66)
-        assert grid.largest(made, "of_actual", response="product") == ("product", 2, 8, 0.66)
+        assert grid.largest(made, "half_sum") == ("tangent", 8, 8, 0.66)
+        assert grid.largest(made, "half_sum", response="product") == ("product", 2, 8, 0.66)
         fixed = {"response": "product", "support_radius": 6}
-        assert grid.largest(made, "of_actual", **fixed) == ("product", 2, 6, 0.5)
-        assert grid.largest(made, "among_found", threshold=0.8).threshold == 0.8
-        assert grid.largest(made, "among_found").threshold == 0.5
+        assert grid.largest(made, "half_sum", **fixed) == ("product", 2, 6, 0.5)
+        assert grid.largest(made, "repetition", threshold=0.8).threshold == 0.8
+        assert grid.largest(made, "repetition").threshold == 0.5
 
     def test_readings_are_alike_whose_peak_is_at_the_papers_parameters(self, made):
         flat = [paper.reading for paper in repetition._papers() if paper.response != "relative"]
         flat.remove("product, half-width 2")
-        assert repetition._alike(made) == flat
-        made[Parameters("tangent", 8, 8, 0.66)]["of_actual"] = 0.95
+        assert repetition._alike(made, "half_sum") == flat
+        made[Parameters("tangent", 8, 8, 0.66)]["half_sum"] = 0.95
         flat.remove("tangent, half-width 8")
-        assert repetition._alike(made) == flat
+        assert repetition._alike(made, "half_sum") == flat
 
     def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(self, made):
-        rows = {name: cells for name, *cells in repetition._peaks(made).rows}
+        rows = {name: cells for name, *cells in repetition._peaks(made, "half_sum").rows}
         assert rows["paper"] == [6, "lost", 0.66, "lost", "lost", "lost"]
         assert rows["tangent, half-width 8"] == [8, 0.91, 0.66, 0.9, 0.9, 0.91]
         assert rows["product, half-width 2"] == [8, 0.7, 0.5, 0.6, 0.1, 0.7]
@@ -77,7 +77,7 @@ class TestRepetition:
 
     def test_everything_a_corner_repeats_well_and_is_wrong(self):
         everywhere = grid.repetition(Parameters("tangent", 8, 6, 0.0), range(1))
-        assert everywhere["among_found"] > 0.9
+        assert everywhere["repetition"] > 0.9
         assert everywhere["precision"] < 0.1
         assert everywhere["corners_per_view"] > 100
         nothing = grid.repetition(Parameters("relative", 8, 6, 5.0), range(1))

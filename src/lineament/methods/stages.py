@@ -144,7 +144,7 @@ def adaptive_clusters(
 
 
 def corner_response(
-    points: ArrayLike, *, support_radius: int = 6, response: str = "product_scaled"
+    points: ArrayLike, *, support_radius: int = 6, response: str = "tangent"
 ) -> Array:
     """Response of the corner detection operator along one cluster (equations 15-22).
 
@@ -178,7 +178,7 @@ def primary_corners(
     *,
     support_radius: int = 6,
     threshold: float = 0.66,
-    response: str = "product_scaled",
+    response: str = "tangent",
     recursion: str = "both",
     ends: str = "truncated",
     min_points: int = 3,

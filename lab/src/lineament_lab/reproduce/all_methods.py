@@ -5,7 +5,7 @@ import numpy as np
 from lineament.simulation import SCENES, SENSORS
 
 from ..evaluation.scores import Scores, evaluate
-from .contenders import LIU_NOTE, LIU_PAPER, PARTITION_ONLY, RIVALS_NOTE, every_method
+from .contenders import LIU, LIU_NOTE, PARTITION_ONLY, RIVALS_NOTE, every_method
 from .findings import Figure, Findings, Numbers, Progress, Setting, Table, dot_chart, each
 from .scans import batch_of, interleaved_times, scene_numbers, simulated_frames, time_ratio
 
@@ -39,7 +39,7 @@ _PANELS = {
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Score all methods on frames of all kinds of scenes, for each sensor."""
-    methods = every_method(setting, progress)
+    methods = every_method()
     scenes = scene_numbers(len(SCENES) * setting.frames, setting.seed)
     numbers: dict[str, dict[str, dict[str, float]]] = {}
     for name, sensor in SENSORS.items():
@@ -54,7 +54,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
             if method == PARTITION_ONLY or "corner_precision_0.10" not in of:
                 of = {k: v for k, v in of.items() if not k.startswith((*kinds, "arc"))}
             of["time"] = float(np.median(times[method]))
-            of["time_ratio"] = time_ratio(times[method], times[LIU_PAPER])[0]
+            of["time_ratio"] = time_ratio(times[method], times[LIU])[0]
             numbers[name][method] = of
     progress("drawing")
     shown = {

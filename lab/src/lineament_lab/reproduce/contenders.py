@@ -13,24 +13,25 @@ from lineament.methods.stages import fit_line
 from lineament.scan import LaserScan
 
 from .controls import BlindCut, OperatorCut
-from .findings import Progress, Setting
-from .grid import best_parameters
 
-LITERAL, LITERAL_BEST = "liu:paper, paper’s numbers", "liu:paper, best of Figure 9"
-LIU_PAPER, LIU_BEST = "liu, paper’s numbers", "liu, best of Figure 9"
-LIU_TUNED, LIU_SHARED = "liu:tuned", "liu’s operator, shared steps"
+#: The paper by its letter; by the reading that brings Figure 9 nearest; with better last steps.
+PAPER, FIGURE_9, LIU = "liu:paper", "liu:figure9", "liu"
+TUNED, LIU_SHARED = "liu:tuned", "liu’s operator, shared steps"
 BLIND = "blind cut, shared steps"
+#: The rival of the paper, as published.
+IEPF = "iepf:paper"
 PDBS_LINES = "pdbs, fitted"
 #: The method that returns clusters and breakpoints only.
 PARTITION_ONLY = "pdbs"
 
 LIU_NOTE = (
-    "liu:paper has the paper’s last steps: y = kx + b through filtered ranges, corners on "
-    "measured points; the response is the reading of equation 22 by which Figure 9 reproduces "
-    "best. liu fits lines to the raw ranges, and corners are where they meet. Both run with the "
-    "paper’s numbers and with those that its experiment, Figure 9, finds best here; liu:tuned has "
-    "numbers chosen as those of its rivals were: by F1 of corners, in simulated scenes of which "
-    "nothing is reported."
+    "liu:paper has the response of equation 22, a sum of distances to the tangent, and the paper’s "
+    "last steps: y = kx + b through filtered ranges, corners on measured points. liu:figure9 is "
+    "the same with the reading of the response, of five, that brings Figure 9 nearest: chosen "
+    "after the fact. liu has the response of equation 22, too, but fits lines to the raw ranges, "
+    "and its corners are where they meet. These have the paper’s numbers; those of liu:tuned were "
+    "chosen as its rivals’ were: by F1 of corners, in simulated scenes of which nothing is "
+    "reported."
 )
 RIVALS_NOTE = (
     "Each rival has two rows: name:paper is the method as published, with its own clusters or none "
@@ -43,39 +44,32 @@ RIVALS_NOTE = (
 Extract = Callable[[LaserScan], Features]
 
 
-def liu_methods(setting: Setting, progress: Progress) -> dict[str, Extractor]:
-    """Make `liu` and its preset `paper`, with the paper's numbers, the best of Figure 9, tuned."""
-    best = best_parameters(setting, progress)
-    return {
-        LITERAL: Extractor("liu:paper"),
-        LITERAL_BEST: best.extractor("liu:paper"),
-        LIU_PAPER: Extractor("liu"),
-        LIU_BEST: best.extractor("liu"),
-        LIU_TUNED: Extractor("liu:tuned"),
-    }
+def liu_methods() -> dict[str, Extractor]:
+    """Make `liu`, and its presets that experiments compare."""
+    return {name: Extractor(name) for name in (PAPER, FIGURE_9, LIU, TUNED)}
 
 
-def every_method(setting: Setting, progress: Progress) -> dict[str, Extractor]:
+def every_method() -> dict[str, Extractor]:
     """Make all methods; rivals as published, then with the shared steps; at the end the control."""
-    methods = liu_methods(setting, progress) | {LIU_SHARED: Extractor(OperatorCut())}
+    methods = liu_methods() | {LIU_SHARED: Extractor(OperatorCut())}
     for name in METHODS:
         published = hasattr(get_method(name), "published")
         names = (f"{name}:paper", name) if published else (name,)
-        methods |= {one: Extractor(one) for one in names if name != "liu"}
+        methods |= {one: Extractor(one) for one in names if name != LIU}
     return methods | {BLIND: Extractor(BlindCut())}
 
 
-def feature_methods(setting: Setting, progress: Progress) -> dict[str, Extractor]:
+def feature_methods() -> dict[str, Extractor]:
     """Make all methods that return segments."""
-    methods = every_method(setting, progress)
+    methods = every_method()
     del methods[PARTITION_ONLY]
     return methods
 
 
-def fitted_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
+def fitted_methods() -> dict[str, Extract]:
     """Make all methods; `pdbs` with a line for each cluster, as in the paper's Figure 11."""
     methods: dict[str, Extract] = {}
-    for name, extractor in every_method(setting, progress).items():
+    for name, extractor in every_method().items():
         if name == PARTITION_ONLY:
             methods[PDBS_LINES] = partial(_with_lines, extractor)
         else:
@@ -84,12 +78,12 @@ def fitted_methods(setting: Setting, progress: Progress) -> dict[str, Extract]:
 
 
 def is_drawn(name: str) -> bool:
-    """Whether pictures show a method: of the rivals as published the paper's IEPF alone.
+    """Whether pictures show a method: as published the paper's own and its IEPF alone.
 
     Tables have all of them.
     """
-    left_out = (LITERAL, LITERAL_BEST, LIU_SHARED, BLIND)
-    return name == "iepf:paper" or not (name in left_out or name.endswith(":paper"))
+    published = name.endswith(":paper") and name not in (PAPER, IEPF)
+    return not (published or name in (LIU_SHARED, BLIND))
 
 
 def _with_lines(extract: Extractor, scan: LaserScan) -> Features:

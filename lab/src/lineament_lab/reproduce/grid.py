@@ -1,4 +1,4 @@
-"""Average repetition AR of `liu` for all parameters of Figure 9."""
+"""Average repetition of `liu` for all parameters of Figure 9."""
 
 from functools import lru_cache
 from itertools import product
@@ -17,8 +17,8 @@ from ..evaluation.matching import match
 from .findings import Progress, Setting
 from .scans import batch_of, scene_numbers
 
-#: Forms of the response: what equation 22 and the text of Figure 9 may mean.
-FORMS = ("product_scaled", "chord_scaled", "tangent", "product", "relative")
+#: Forms of the response: equation 22, and what else it and the text of Figure 9 may mean.
+FORMS = ("tangent", "product", "relative", "chord_scaled", "product_scaled")
 #: Half-widths of the filter [beams], which the paper does not state: that of `Liu`, and a wide.
 HALF_WIDTHS = (2, 8)
 #: The support radius [beams] and the threshold that the paper takes from its Figure 9.
@@ -30,10 +30,10 @@ GATE = 0.10
 #: Scenes for each frame of the setting; turns of the sensor in each scene [beams].
 SCENES_A_FRAME, TURNS = 2, (0.25, 0.5, 0.75)
 
-#: What N_o may be in AR = ½ (N_r/N_o + N_r/N_t), by the name of the number.
+#: What may be largest in Figure 9, by the name of the number.
 CRITERIA = {
-    "of_actual": "the actual corners",
-    "among_found": "the corners found before the turn",
+    "repetition": "AR of two views (Awrangjeb and Lu)",
+    "half_sum": "½ (precision + recall) of one view",
 }
 
 
@@ -65,13 +65,8 @@ class Parameters(NamedTuple):
 Grid = dict[Parameters, dict[str, float]]
 
 
-def best_parameters(setting: Setting, progress: Progress) -> Parameters:
-    """Return the parameters with the largest AR of the actual corners, over all readings."""
-    return largest(repetition_grid(setting, progress), "of_actual")
-
-
 def largest(grid: Grid, criterion: str, **fixed: object) -> Parameters:
-    """Return the parameters with the largest AR, among those with some fields fixed."""
+    """Return the parameters that are best by a criterion, among those with some fields fixed."""
     among = [p for p in grid if all(getattr(p, name) == value for name, value in fixed.items())]
     return max(among, key=lambda p: grid[p][criterion])
 
@@ -82,7 +77,7 @@ def repetition_scenes(setting: Setting, *, reported: bool) -> range:
 
 
 def repetition_grid(setting: Setting, progress: Progress) -> Grid:
-    """Measure AR of all parameters with the literal pipeline, on scenes that are not reported."""
+    """Measure all parameters with the paper's last steps, on scenes that are not reported."""
     numbers = repetition_scenes(setting, reported=False)
     grid = {}
     for form, half_width in product(FORMS, HALF_WIDTHS):
@@ -95,12 +90,14 @@ def repetition_grid(setting: Setting, progress: Progress) -> Grid:
 
 @lru_cache(maxsize=8192)
 def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
-    """Measure AR of the literal pipeline with some parameters, over some scenes, by `CRITERIA`.
+    """Measure some parameters with the paper's last steps, over some scenes, by `CRITERIA`.
 
     Each scene is seen once and then again after turns by parts of a beam, with fresh noise. AR is
     that of Awrangjeb and Lu, *Robust image corner detection based on the chord-to-point distance
-    accumulation technique*, IEEE Transactions on Multimedia 2008. It is the mean over the views: a
-    view without corners counts as 0, so that a single right corner in each view earns little.
+    accumulation technique*, IEEE Transactions on Multimedia 2008: ½ (N_r/N_o + N_r/N_t), where of
+    the N_o corners of the first view and the N_t of the second N_r are the same. It knows no
+    truth. The half sum compares the second view alone with the truth. Both are means over the
+    views: one without corners counts as 0, so that a single right corner in each earns little.
     """
     views = _views(numbers)
     found = batch_of(parameters.extractor("liu:paper"), [scan for scan, _, _ in views])
@@ -113,8 +110,8 @@ def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
             repeated.append(average_repetition(before, features, turn))
             turned.append(float(len(features.corners)))
     return {
-        "of_actual": _mean([0.5 * (c.recall + c.precision) for c in counts if c.true]),
-        "among_found": _mean(repeated),
+        "repetition": _mean(repeated),
+        "half_sum": _mean([0.5 * (c.recall + c.precision) for c in counts if c.true]),
         "corners_per_view": _mean(turned),
         **Counts.total(counts).summary(),
     }

@@ -14,13 +14,13 @@ from lineament.scan import LaserScan
 from lineament.simulation import SENSORS
 
 from ..evaluation.partition import PartitionScores, partition_scores
-from .contenders import fitted_methods
+from .contenders import LIU, PAPER, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, median_of
 from .scans import Frame, scene_numbers, simulated_frames
 from .scenes import TRUE, pictures
 
 #: What the paper reports of ten frames of its recording [%].
-PAPER = {"liu": 95.11, "liu:paper": 95.11, "pdbs, fixed": 83.55}
+OF_PAPER = {PAPER: 95.11, "pdbs, fixed": 83.55}
 #: Clusters and corners of Figure 10, and how many scenes are looked at for such a one.
 PAPER_COUNTS, SOUGHT = (11, 5), 400
 _COLUMNS = {
@@ -38,7 +38,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     """Score the clusters of layered obstacles, and draw the results of all methods on one scan."""
     scenes = scene_numbers(4 * setting.frames, setting.seed)
     rules = {f"pdbs, {rule}": Extractor("pdbs", rule=rule) for rule in RULES}
-    methods = {"liu": Extractor("liu"), "liu:paper": Extractor("liu:paper"), **rules}
+    methods = {PAPER: Extractor(PAPER), LIU: Extractor(LIU), **rules}
     numbers: dict[str, dict[str, Any]] = {}
     lead, tables = {}, []
     for sensor in ("paper", "utm30lx"):
@@ -50,18 +50,18 @@ def run(setting: Setting, progress: Progress) -> Findings:
         }
         scores = {name: PartitionScores.total(of) for name, of in each.items()}
         numbers[sensor] = {name: score.summary() for name, score in scores.items()}
-        success = 100 * (scores["liu"].success - scores["pdbs, fixed"].success)
+        success = 100 * (scores[PAPER].success - scores["pdbs, fixed"].success)
         lead[sensor] = f"{success:+.1f}".replace("-", "−")
-        rows = {n: {"paper": PAPER.get(n, math.nan)} | of for n, of in numbers[sensor].items()}
+        rows = {n: {"paper": OF_PAPER.get(n, math.nan)} | of for n, of in numbers[sensor].items()}
         title = f"Clusters of layered obstacles, sensor “{sensor}”"
         tables.append(Table.of_numbers(title, rows, _COLUMNS, f"{len(scenes)} scans."))
     progress("drawing")
-    mixed = scores["liu"].regions
+    mixed = scores[PAPER].regions
     of_frames = [PartitionScores.total(of) for of in zip(*each.values(), strict=True)]
     shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
-    few = {name: methods[name](shown.scan) for name in ("liu", "pdbs, fixed")}
+    few = {name: methods[name](shown.scan) for name in (PAPER, "pdbs, fixed")}
     alike = like_figure_10(setting.seed)
-    found = {name: e(alike.scan) for name, e in fitted_methods(setting, progress).items()}
+    found = {name: e(alike.scan) for name, e in fitted_methods().items()}
     found = {TRUE: alike.truth} | found
     counts = numbers["example"] = {
         name: {

@@ -19,7 +19,7 @@ from lineament.scan import Array, LaserScan
 from lineament.scan.poses import compose
 
 from ..evaluation.similarity import SimilarityScores, similarity_scores
-from .contenders import LIU_PAPER, PDBS_LINES, Extract, fitted_methods
+from .contenders import PAPER, PDBS_LINES, Extract, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
 from .scans import frame_times
 from .scenes import pictures
@@ -58,7 +58,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         return Findings(TITLE, text)
     progress("reading")
     frames, in_row = read(setting.museum, setting.frames)
-    methods = fitted_methods(setting, progress)
+    methods = fitted_methods()
     scores, of_methods = {}, {}
     for name, extract in each(methods, progress, f"{len(frames)} scans"):
         scores[name], of_methods[name] = _measured(extract, frames)
@@ -219,7 +219,7 @@ def _distance_table(numbers: Mapping[str, Mapping[str, Any]], count: int) -> Tab
         [
             {
                 "method": name,
-                "paper: mean [m]": f"{DISTANCE}" if name == LIU_PAPER else None,
+                "paper: mean [m]": f"{DISTANCE}" if name == PAPER else None,
                 "here: mean [m]": _metres(of["mean"]),
                 "standard deviation [mm]": 1e3 * of["deviation"],
                 "found in [%]": 100 * of["found"],
@@ -237,7 +237,7 @@ def _metres(length: float) -> str | None:
 
 def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     """Draw the similarity error of each beam, by method."""
-    shown = [name for name in (LIU_PAPER, "iepf:paper", PDBS_LINES) if name in found]
+    shown = [name for name in (PAPER, "iepf:paper", PDBS_LINES) if name in found]
     figure = error_strips(scan, {name: found[name] for name in shown})
     caption = "The museum, the same scan: similarity error of each beam. Dashed: 0.01 m."
     return Figure("museum-fig12", caption, canvas.figure_bytes(figure))

@@ -18,8 +18,8 @@ from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 from ..evaluation.counts import ratio, rms
 from ..evaluation.scores import Scores, evaluate
+from .contenders import FIGURE_9, LIU, PAPER
 from .findings import Figure, Findings, Progress, Setting, Table, each, log_axis
-from .grid import best_parameters
 from .scans import scene_numbers
 
 #: The paper's scanner, with a noise point in every fiftieth beam.
@@ -44,7 +44,7 @@ _RANGES = {
     "raw, rms [mm]": ("raw", 1e3),
     "filtered, rms [mm]": ("filtered", 1e3),
     "off by > 0.1 m after [%]": ("off_after", 100),
-    "labelled noise by liu [%]": ("labelled", 100),
+    "labelled noise by liu:paper [%]": ("labelled", 100),
 }
 _FEATURES = {
     "corners a scan": ("corners_a_scan", 1),
@@ -72,15 +72,12 @@ def run(setting: Setting, progress: Progress) -> Findings:
     progress(f"simulating {len(numbers)} scans")
     frames = [_frame(*scene(("room", "hall")[i % 2], n), n) for i, n in enumerate(numbers)]
     ranges = _ranges(frames)
-    chosen = best_parameters(setting, progress)
-    best = chosen._asdict()
     variants = {
-        "paper’s numbers, not filtered": Extractor("liu", half_width=0),
-        "paper’s numbers, filtered": Extractor("liu"),
-        "best of Figure 9, not filtered": Extractor("liu", **best | {"half_width": 0}),
-        "best of Figure 9, filtered": Extractor("liu", **best),
-        "the same, lines fitted to filtered ranges": Extractor("liu", measure="filtered", **best),
+        f"{name}, {how}": Extractor(name, **changes)
+        for name in (PAPER, FIGURE_9, LIU)
+        for how, changes in (("not filtered", {"half_width": 0}), ("filtered", {}))
     }
+    variants[f"{LIU}, lines fitted to filtered ranges"] = Extractor(LIU, measure="filtered")
     features = {}
     for name, extract in each(variants, progress, "features"):
         scores = Scores.total(evaluate(extract(f.scan), f.truth) for f in frames)
@@ -90,7 +87,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     names = {place: _NAMES.get(place, f"noise points, off by {place}") for place in ranges}
     return Findings(
         "Noise points, filtered and not (Figures 2 and 3)",
-        _text(str(chosen), ranges, features),
+        _text(ranges, features),
         (
             Table.of_numbers(
                 "Errors of ranges",
@@ -116,13 +113,13 @@ def run(setting: Setting, progress: Progress) -> Findings:
 
 
 def _text(
-    best: str, ranges: Mapping[str, Mapping[str, float]], features: Mapping[str, Mapping[str, Any]]
+    ranges: Mapping[str, Mapping[str, float]], features: Mapping[str, Mapping[str, Any]]
 ) -> tuple[str, ...]:
     labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in ranges.items()}
     smallest, largest = (_size(*SIZES[i]) for i in (0, -1))
     raw, filtered = (
         [
-            f"{100 * features[f'paper’s numbers, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
+            f"{100 * features[f'{PAPER}, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
             for of in ("precision", "recall")
         ]
         for how in ("not filtered", "filtered")
@@ -136,9 +133,8 @@ def _text(
         f"which labels {labelled[largest]} of the points off by {largest} as noise, "
         f"{labelled[smallest]} of those off by {smallest}, and {labelled['planes']} of the good "
         "points on planes. The filter moves edges and corners by more than the noise.",
-        f"With the paper’s numbers, {raw[0]} of the corners found are right without the filter, "
-        f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found. The best "
-        f"numbers of Figure 9 are: {best}.",
+        f"By {PAPER}, {raw[0]} of the corners found are right without the filter, "
+        f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found.",
     )
 
 
@@ -172,7 +168,7 @@ def _size(low: float, high: float) -> str:
 
 def _ranges(frames: list[_Frame]) -> dict[str, dict[str, float]]:
     """Errors of raw and filtered ranges, and share of points labelled noise, by place."""
-    liu, numbers = Extractor("liu"), {}
+    liu, numbers = Extractor(PAPER), {}
     raw = np.concatenate([f.scan.ranges - f.true for f in frames])
     filtered = np.concatenate([bilateral_filter(f.scan) - f.true for f in frames])
     labelled = np.concatenate([liu(f.scan).clusters < 0 for f in frames])

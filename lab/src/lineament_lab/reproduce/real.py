@@ -106,7 +106,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     title, logs = "Real scans", _logs(setting)
     if not logs:
         return Findings(title, (NO_RECORDINGS,))
-    methods, frames = feature_methods(setting, progress), setting.frames
+    methods, frames = feature_methods(), setting.frames
     unread: list[str] = []
 
     def scored(

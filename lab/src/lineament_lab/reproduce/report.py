@@ -22,7 +22,8 @@ from lineament.output.page import (
 
 from ..evaluation.ple import BenchmarkResult
 from . import experiment_names, run_experiments
-from .claims import WORDS, Claim, bands, verdicts
+from .claims import BLIND_TOO, WORDS, Claim, bands, verdicts
+from .contenders import PAPER
 from .findings import Findings, Progress, Setting, Table, cell_text
 from .seeds import Spread
 
@@ -127,8 +128,10 @@ def _verdicts_part(
         rows.append([place, word, Cell(claim.paper), Cell(here or "–"), band])
     words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
     note = (
-        f"{words[0].upper()}{words[1:]}. The last column is the range of the same number over all "
-        "values of the parameters that the paper does not state. A dash: not run."
+        f"{words[0].upper()}{words[1:]}. Judged is {PAPER}, the letter of the paper. "
+        f"‘{BLIND_TOO[2:].capitalize()}’: cuts at every eighth point, without a detector, hold as "
+        "well, and the measure says nothing of detection. The last column is the range of the same "
+        "number over all values of the parameters that the paper does not state. A dash: not run."
     )
     return table_part("Verdicts", _VERDICTS, rows, note)
 

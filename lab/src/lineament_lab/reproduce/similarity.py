@@ -15,28 +15,28 @@ from lineament.simulation import SENSORS
 
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
 from .compare import SIMILARITY, SIMILARITY_NOTE
-from .contenders import LIU_BEST, LIU_PAPER, PDBS_LINES, Extract, fitted_methods
+from .contenders import LIU, PAPER, PDBS_LINES, Extract, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, cells
 from .scans import INDOORS, recorded_scans, scene_numbers, simulated_frames
 
 #: The literal pipeline, by the points that its lines are fitted to.
-FILTERED = "liu:paper, filtered points"
+FILTERED = f"{PAPER}, filtered points"
 #: What the paper says of its largest errors; its other values are lost.
-PAPER = {
-    LIU_PAPER: "within 10 mm",
+OF_PAPER = {
+    PAPER: "within 10 mm",
     FILTERED: "within 10 mm",
-    "iepf": "up to 250 mm",
+    "iepf:paper": "up to 250 mm",
     PDBS_LINES: "up to 250 mm",
 }
-#: What its Figure 12 shows, the better numbers of its method, and the default.
-SHOWN = (LIU_PAPER, LIU_BEST, "iepf", PDBS_LINES, DEFAULT_METHOD)
+#: What its Figure 12 shows, its method with better last steps, and the default.
+SHOWN = (PAPER, LIU, "iepf:paper", PDBS_LINES, DEFAULT_METHOD)
 #: An error that the paper calls small [m].
 SMALL = 0.01
 
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Measure similarity errors on simulated scans and on recordings."""
-    methods = fitted_methods(setting, progress)
+    methods = fitted_methods()
     numbers = scene_numbers(len(INDOORS) * setting.frames, setting.seed)
     frames = list(simulated_frames(SENSORS["paper"], INDOORS, numbers))
     simulated = "simulated rooms, corridors and halls"
@@ -54,12 +54,12 @@ def run(setting: Setting, progress: Progress) -> Findings:
         scores = {name: SimilarityScores.total(of) for name, of in parts.items()}
         found[where] = {"the true lines": true} | scores if where == simulated else scores
         progress(f"{where}: drawing")
-        largest = [score.maximum for score in parts[LIU_PAPER]]
+        largest = [score.maximum for score in parts[PAPER]]
         middle = int(np.argsort(largest, kind="stable")[(len(some) - 1) // 2])
         figures.append(_figure(where, some[middle], methods))
     return Findings(
         "Similarity error (Figure 12)",
-        _text(true, found[simulated][LIU_PAPER]),
+        _text(true, found[simulated][PAPER]),
         tuple(_table(where, scores) for where, scores in found.items()),
         tuple(figures),
         {where: {m: s.summary() for m, s in of.items()} for where, of in found.items()},
@@ -78,7 +78,7 @@ def _text(true: SimilarityScores, liu: SimilarityScores) -> tuple[str, ...]:
         "small errors, and measurements without a line have none. So there are two numbers: how "
         "many are explained, and the error of those. The last row is the literal pipeline: "
         "filtered points, and lines fitted to them.",
-        f"With the paper’s numbers, {100 * liu.explained:.0f} % are explained, and the largest "
+        f"By {PAPER}, {100 * liu.explained:.0f} % are explained, and the largest "
         f"error is {liu.maximum:.2f} m: a cluster whose corners are missed gets one line.",
     )
 
@@ -86,7 +86,7 @@ def _text(true: SimilarityScores, liu: SimilarityScores) -> tuple[str, ...]:
 def _of_filtered_points(scan: LaserScan) -> SimilarityScores:
     """Errors of the filtered points from the lines that the literal pipeline fits to them."""
     filtered = LaserScan(bilateral_filter(scan), angles=scan.angles)
-    return similarity_scores(filtered, Extractor("liu:paper")(scan))
+    return similarity_scores(filtered, Extractor(PAPER)(scan))
 
 
 def _table(where: str, scores: dict[str, SimilarityScores]) -> Table:
@@ -96,7 +96,7 @@ def _table(where: str, scores: dict[str, SimilarityScores]) -> Table:
             {
                 "method": method,
                 **cells(score.summary(), SIMILARITY),
-                "largest, paper": PAPER.get(method),
+                "largest, paper": OF_PAPER.get(method),
                 "within 10 mm [%]": 100 * float((score.errors <= SMALL).mean()),
             }
             for method, score in scores.items()
@@ -125,7 +125,7 @@ def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:
     least = f"{1e3 * drawing.LEAST_ERROR:g} mm"
     caption = (
         f"Similarity error of each explained measurement of a scan, {where}: that whose largest "
-        f"error with {LIU_PAPER} is the median. Dashed: the 0.01 m of the paper. All axes are the "
+        f"error with {PAPER} is the median. Dashed: the 0.01 m of the paper. All axes are the "
         f"same and logarithmic; errors below {least} are drawn at {least}."
     )
     name = "-".join(["fig12", *where.lower().replace(",", "").split()[:2]])
