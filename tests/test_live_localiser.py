@@ -20,6 +20,7 @@ from lineament.live import Frame, LiveConfig, Pipeline, RosSink
 from lineament.live.frames import Frames
 from lineament.live.received import (
     GUESS,
+    JUDGED,
     LINKS,
     MOUNTINGS,
     ODOMETRY,
@@ -270,6 +271,71 @@ def test_somebody_else_who_places_the_robot_is_a_line(plan):
     assert not list(quiet.pipeline.problems())
 
 
+# Another localiser is judged.
+
+
+def believes(robot: Robot, moment: Moment, by: Pose = (0.03, -0.04, 0.01)) -> None:
+    robot.say(JUDGED, StampedPose(moment.scan.stamp, "map", "", compose(moment.base, by)))
+
+
+def test_a_pose_that_is_right_and_one_after_the_robot_was_carried(plan):
+    robot, moments = Robot(plan, judge="/amcl_pose"), driven()
+    assert robot.drive(moments[:1])[0].judgement is None  # nobody has said anything
+    believes(robot, moments[0])
+    frames = robot.drive(moments[1:40])
+    # It is judged with each scan: between its poses it moves on with the odometry.
+    assert all(frame.judgement.verdict != "wrong" for frame in frames)
+    assert all(frame.judgement for frame in frames[20:])
+    last = frames[-1].judgement
+    assert off(last.pose, compose(moments[39].base, MOUNTING))[0] < 0.25
+    assert math.hypot(*last.off[:2]) < 0.25
+    lifted = [
+        m._replace(scan=m.scan.stamped("first", moments[39].scan.stamp_ns + (k + 1) * 200_000_000))
+        for k, m in enumerate(driven(1, 150)[100:110])
+    ]
+    lifted = [m._replace(believed=moments[39].believed) for m in lifted]
+    first, second, *_ = robot.drive(lifted)
+    assert not first.judgement
+    assert second.judgement.verdict == "wrong"
+
+
+def test_poses_to_judge_that_make_no_sense(plan):
+    robot, moments = Robot(plan, judge="/amcl_pose"), driven()
+    with pytest.raises(ValueError, match="it is in frame 'world', expected 'map'"):
+        robot.say(JUDGED, StampedPose(0.0, "world", "", (0.0, 0.0, 0.0)))
+    robot.say(JUDGED, StampedPose(7.0, "map", "", moments[0].base))  # a clock that is another one
+    frames = robot.drive(moments[:30])
+    assert not any(frame.judgement for frame in frames)
+    (problem,) = robot.pipeline.problems()
+    assert problem.startswith("the robot is not judged: base_footprint in odom is known from 100")
+
+
+def test_what_is_published_of_a_pose_that_is_judged(plan):
+    config, robot, moments = (
+        LiveConfig(map=plan, judge="amcl_pose"),
+        Robot(plan, judge="x"),
+        driven(),
+    )
+    config, taken = LiveConfig(map=plan, judge="amcl_pose"), Taken()
+    topics = ("/amcl_pose/verdict", "/amcl_pose/ours")
+    taken.heard = (*topics, "/tf")
+    sink = RosSink(taken, RosMessages("cdr"), config)
+    assert not {"/tf", "/amcl_pose"} & set(taken._topics)  # that is for the other one
+    for k, moment in enumerate(moments[:40]):
+        believes(robot, moment, (0.0, 0.0, 0.0) if k < 38 else (5.0, 1.0, 1.5))
+        robot.move(moment)
+        sink.publish(robot.see(moment))
+        if k == 37:
+            assert "/amcl_pose/ours" not in taken.sent
+            assert b"right\0" in taken.sent["/amcl_pose/verdict"][-1]
+    assert len(taken.sent["/amcl_pose/verdict"]) == 40
+    assert b"wrong\0" in taken.sent["/amcl_pose/verdict"][-1]
+    assert b"wrong\0" in taken.sent["/diagnostics"][-1]
+    kind = "geometry_msgs/PoseWithCovarianceStamped"
+    (ours,) = stamped_poses(taken.sent["/amcl_pose/ours"][-1], "cdr", kind)
+    assert off(ours.pose, moment.base)[0] < 0.05
+
+
 # Frames.
 
 
@@ -315,7 +381,9 @@ def test_a_tree_that_is_a_ring_or_leads_elsewhere_is_refused():
 
 
 class Taken(Publisher):
-    """Keeps messages by topic; nobody listens but to `/tf`."""
+    """Keeps messages by topic; nobody listens but to those that are `heard`."""
+
+    heard = "/tf", "/scan/pose"
 
     def __init__(self) -> None:
         super().__init__()
@@ -329,7 +397,7 @@ class Taken(Publisher):
         self.sent.setdefault(topic, []).append(message.data)
 
     def _count(self, topic: str) -> int:
-        return topic in ("/tf", "/scan/pose")
+        return topic in self.heard
 
 
 @pytest.mark.parametrize("broadcast", [True, False])

@@ -68,10 +68,10 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
     """0 where it is located, 1 where it is but for a direction, 2 where it is not known."""
     messages = RosMessages("cdr")
     given = recorded(messages, "diagnostics")
-    sink = RosSink(Publisher(), messages, LiveConfig())
+    sink = RosSink(Publisher(), messages, LiveConfig(map="a.dxf", log="a.npz"))
     evidence = Evidence(12.34, 0.75, 0.2, 0.05, 100)
     where = Whereabouts(verdict, (1.0, -2.0, 0.5), np.diag((4e-4, 9e-4, turn)), evidence)
-    sink._frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
+    sink._plan._frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
     sink.diagnose(REPORT, TIME)
     (*_, of_node), (topic, moment, told) = given
     assert of_node["level"] == REPORT.level

@@ -47,6 +47,7 @@ KNOWN = (
     "base_frame",
     "transform_tolerance",
     "broadcast",
+    "judge",
 )
 #: Below this are the parameters of the method: parameters.evidence.
 OF_METHOD = "parameters"

@@ -82,6 +82,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="For so long map → odom holds, in seconds.  [default: 1]",
 )
 @click.option("--broadcast/--no-broadcast", default=None, help="Publish map → odom on /tf.")
+@click.option("--judge", metavar="TOPIC", help="Judge the poses of another localiser on the plan.")
 @click.option(
     "--from", "log", type=TEXT_PATH, metavar="LOG", help="Play a log in place of a topic."
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 import tomllib
 from collections.abc import Mapping
@@ -15,41 +14,9 @@ from ..errors import LineamentError
 from ..limits import LIMITS, Limits
 from ..scan import Pose
 from ..scan.changes import Mask, checked_mask
-from ..scan.fields import STAMPS, checked_mounting
+from ..scan.fields import checked_mounting
+from .checking import FRAMES, Point, check
 
-_CHOICES: dict[str, tuple[object, ...]] = {
-    "type": ("LaserScan", "MultiEchoLaserScan"),
-    "echo": ("first", "last", "strongest"),
-    "stamp": STAMPS,
-    "reliability": ("best-effort", "reliable"),
-    "ros": (0, 1, 2),
-    "units": ("m", "dm", "cm", "mm", "ft", "in"),
-}
-_BOUNDS: dict[str, tuple[float, float]] = {
-    "depth": (1, 1000),
-    "rate": (0, 1e6),
-    "noise": (0, 1000),
-    "scale": (1e-9, 1e9),
-    "domain": (0, 232),
-    "foxglove": (0, 65535),
-    "dock_track": (0, 2**31 - 1),
-    "transform_tolerance": (0, 10),
-}
-_FRAMES = ("map_frame", "odom_frame", "base_frame")
-_NAMES = ("topic", "namespace", "name", "deskew", "odometry", *_FRAMES)
-#: What each annotation accepts, and how it is called in a message.
-_KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
-    "str": (str, "a text"),
-    "bool": (bool, "true or false"),
-    "int": (int, "a whole number"),
-    "float": ((int, float), "a number"),
-    "Pose": ((tuple, list), "three numbers"),
-    "Mask": ((tuple, list), "pairs of bearings"),
-    "Point": ((tuple, list), "two numbers"),
-    "Mapping[str, Any]": (Mapping, "a table"),
-}
-#: x, y [m].
-Point = tuple[float, float]
 #: Values of `LiveConfig.deskew` that are not topics.
 _NOT_TOPICS = ("off", "scans", "poses")
 
@@ -122,6 +89,9 @@ class LiveConfig:
         For so long after a scan the transform from `map_frame` to `odom_frame` holds [s].
     broadcast : bool
         Whether that transform is published on ``/tf``.
+    judge : str, optional
+        With a plan, a topic of ``geometry_msgs/PoseWithCovarianceStamped``: the poses of another
+        localiser, which get a verdict each. Then nothing of ours takes their place.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -185,6 +155,7 @@ class LiveConfig:
     base_frame: str = "base_link"
     transform_tolerance: float = 1.0
     broadcast: bool = True
+    judge: str | None = None
     log: str | None = None
     log_topic: str | None = None
     poses: str | None = None
@@ -198,7 +169,7 @@ class LiveConfig:
 
     def __post_init__(self) -> None:
         for known in fields(self):
-            _check(known.name, str(known.type), getattr(self, known.name))
+            check(known.name, str(known.type), getattr(self, known.name))
         Limits.of(self.limits)
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
@@ -230,7 +201,10 @@ class LiveConfig:
             raise ValueError(
                 f"deskew is {self.deskew!r}, and odometry {self.odometry!r}, expected one topic"
             )
-        if len({getattr(self, name).strip("/") for name in _FRAMES}) < len(_FRAMES):
+        if self.judge is not None and not self.is_localiser:
+            missing = "map" if self.map is None else "topic of scans in place of a log"
+            raise ValueError(f"judge is {self.judge!r}, expected a {missing} as well")
+        if len({getattr(self, name).strip("/") for name in FRAMES}) < len(FRAMES):
             raise ValueError("two of map_frame, odom_frame and base_frame are one, expected three")
         if self.log is None and self.ros == 0:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
@@ -256,6 +230,16 @@ class LiveConfig:
         if self.deskew not in _NOT_TOPICS:
             return self.resolved(self.deskew)
         return None if self.odometry is None else self.resolved(self.odometry)
+
+    @property
+    def judge_topic(self) -> str | None:
+        """Full name of the topic of the poses that are judged, if any."""
+        return None if self.judge is None else self.resolved(self.judge)
+
+    @property
+    def is_broadcasting(self) -> bool:
+        """Whether the transform of the odometry is published."""
+        return self.broadcast and self.map is not None and self.judge is None
 
     @property
     def is_localiser(self) -> bool:
@@ -304,22 +288,3 @@ def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
         if name not in known:
             raise LineamentError(f"{path}: has {name!r}, expected one of {', '.join(known)}")
     return {k: tuple(value) if isinstance(value, list) else value for k, value in found.items()}
-
-
-def _check(name: str, annotation: str, value: Any) -> None:
-    """Check the type of a parameter, and its value where a table above bounds it."""
-    kind, _, optional = annotation.partition(" | ")
-    if optional and value is None:
-        return
-    types, wanted = _KINDS[kind]
-    is_known = isinstance(value, types)
-    if not is_known or (isinstance(value, bool) and kind != "bool"):
-        raise ValueError(f"{name} is {value!r}, expected {wanted}")
-    if name in _CHOICES and value not in _CHOICES[name]:
-        wanted = ", ".join(map(str, _CHOICES[name]))
-        raise ValueError(f"{name} is {value!r}, expected one of {wanted}")
-    if name in _BOUNDS and not _BOUNDS[name][0] <= value <= _BOUNDS[name][1]:
-        raise ValueError(f"{name} is {value}, expected {_BOUNDS[name][0]} to {_BOUNDS[name][1]}")
-    text = value.strip("/") or "none" if name == "namespace" else value
-    if name in _NAMES and not re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII):
-        raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")

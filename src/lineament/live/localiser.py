@@ -10,13 +10,14 @@ import numpy as np
 from ..features import Features
 from ..mapping import LineMap
 from ..mapping.following import Follower, Whereabouts
+from ..mapping.judging import Judge, Judgement
 from ..motion.deskew import beam_times
 from ..rosmsg.poses import Odometry, StampedPose
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist, carried, compose, inverse, relative
 from .config import LiveConfig
 from .frames import Frames, Place, frame_of
-from .received import GUESS, MOUNTINGS, RELOCATE, Heard
+from .received import GUESS, JUDGED, MOUNTINGS, RELOCATE, Heard
 
 #: Scanners that are followed; a robot has fewer, unless names are made up.
 _MOST_SCANNERS = 8
@@ -26,6 +27,7 @@ _MANY = 20
 _WHENCE = {
     "mounting": "expected on /tf_static, or a laser_pose",
     "odometry": "expected on /tf, or a topic of odometry",
+    "pose to judge": "the stamp of the pose that is to be judged",
 }
 #: Transforms that were sent, by which those of others are known.
 _SENT = 50
@@ -74,6 +76,9 @@ class Localiser:
         self._followers: dict[str, Follower] = {}
         self._frames = Frames()
         self._guess: StampedPose | None = None
+        self._judge = None if config.judge is None else Judge(plan)
+        self._claim: StampedPose | None = None
+        self._claimed_odom: Pose | None = None
         self._missing = dict.fromkeys(_WHENCE, 0)
         self._sent: deque[Pose] = deque(maxlen=_SENT)
         self._problems: dict[str, str] = {}
@@ -87,11 +92,14 @@ class Localiser:
             base = message.child_frame or self._base
             moved = StampedPose(message.stamp, self._odom, base, message.pose)
             self._frames.add(moved)
-        elif isinstance(message, list) and what == GUESS:
-            guess = message[0]
-            if frame_of(guess.frame) != self._map:
-                raise ValueError(f"it is in frame {guess.frame!r}, expected {self._map!r}")
-            self._guess = guess
+        elif isinstance(message, list) and what in (GUESS, JUDGED):
+            (said,) = message
+            if frame_of(said.frame) != self._map:
+                raise ValueError(f"it is in frame {said.frame!r}, expected {self._map!r}")
+            if what == GUESS:
+                self._guess = said
+            else:
+                self._claim = said
         elif isinstance(message, list):
             for link in message:
                 self._join(link, is_fixed=what == MOUNTINGS)
@@ -102,7 +110,7 @@ class Localiser:
 
     def __call__(
         self, features: Features, scan: LaserScan, straight: LaserScan
-    ) -> tuple[Whereabouts, Placed | None]:
+    ) -> tuple[Whereabouts, Placed | None, Judgement | None]:
         """Follow a scanner by its next scan: as it came, and `straight`, as its features have it.
 
         Only the name of its frame, its time, its pose and the times of its beams are taken of it.
@@ -119,13 +127,19 @@ class Localiser:
         self._suppose(follower, travelled, mounted)
         skew = _skew(scan, follower.twist) if straight is scan else (0.0, 0.0, 0.0)
         where = follower(features, laser, skew)
+        judgement = None
+        if self._judge is not None and mounting is not None:
+            claimed = self._claimed(travelled)
+            if claimed is not None:
+                judgement = self._judge(features, compose(claimed, mounted), where)
         if mounting is None or not where.is_known:
-            return where, None
+            return where, None, judgement
         base = compose(where.pose, inverse(mounted))
         odom = None if travelled is None else compose(base, inverse(travelled))
         if odom is not None:
             self._sent.append(odom)
-        return where, Placed(base, carried(where.covariance, where.pose, base), odom)
+        covariance = carried(where.covariance, where.pose, base)
+        return where, Placed(base, covariance, odom), judgement
 
     def _follower(self, frame: str) -> Follower:
         if frame not in self._followers:
@@ -139,24 +153,25 @@ class Localiser:
         config, frame = self._config, frame_of(scan.frame_id)
         if any(config.laser_pose) or config.upside_down or not config.is_localiser:
             return Place(config.laser_pose, config.upside_down)
-        return self._find("mounting", self._base, frame, scan)
+        return self._find("mounting", self._base, frame, scan.stamp)
 
     def _travelled(self, scan: LaserScan) -> Pose | None:
         """Where the robot has come to by its odometry; None if that is not known."""
         if not self._config.is_localiser:
             laser = inverse(self._config.laser_pose)
             return None if scan.pose is None else compose(scan.pose, laser)
-        found = self._find("odometry", self._odom, self._base, scan)
+        found = self._find("odometry", self._odom, self._base, scan.stamp)
         return None if found is None else found.pose
 
-    def _find(self, what: str, parent: str, child: str, scan: LaserScan) -> Place | None:
+    def _find(self, what: str, parent: str, child: str, stamp: float) -> Place | None:
         """Return where a frame is in another one; None, and a problem in the end, if unknown."""
         try:
-            found = self._frames.find(parent, child, scan.stamp)
+            found = self._frames.find(parent, child, stamp)
         except LookupError as error:
             self._missing[what] += 1
             if self._missing[what] >= _MANY:
-                self._problems[what] = f"the robot is not placed: {error}, {_WHENCE[what]}"
+                done = "judged" if what == "pose to judge" else "placed"
+                self._problems[what] = f"the robot is not {done}: {error}, {_WHENCE[what]}"
             return None
         self._missing[what] = 0
         self._problems.pop(what, None)
@@ -175,6 +190,18 @@ class Localiser:
                 pass  # It holds for now: who sends it by hand seldom gives a time.
         follower.suppose(compose(base, mounting), guess.covariance)
 
+    def _claimed(self, travelled: Pose | None) -> Pose | None:
+        """Where somebody else believes the robot to be: at the last pose, and gone on since."""
+        if (claim := self._claim) is not None:
+            then = self._find("pose to judge", self._odom, self._base, claim.stamp)
+            if then is not None:
+                self._claim, self._claimed_odom = None, compose(claim.pose, inverse(then.pose))
+            elif self._missing["pose to judge"] >= _MANY:
+                return None
+        if travelled is None or self._claimed_odom is None:
+            return None
+        return compose(self._claimed_odom, travelled)
+
     def _join(self, link: StampedPose, is_fixed: bool) -> None:
         """Take a transform; note that somebody else places the robot too: it jumps to and fro."""
         parent, child = frame_of(link.frame), frame_of(link.child_frame)
@@ -182,7 +209,7 @@ class Localiser:
             if parent != self._odom or self._config.odometry_topic is None:
                 self._frames.add(link, is_fixed=is_fixed)
             return
-        is_placed = parent == self._map and self._config.broadcast
+        is_placed = parent == self._map and self._config.is_broadcasting
         if is_placed and not any(np.allclose(link.pose, pose, atol=1e-6) for pose in self._sent):
             self._problems["another"] = (
                 f"{self._map} → {self._odom} is on /tf from another node as well: "

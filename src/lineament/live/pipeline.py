@@ -24,6 +24,7 @@ from .received import ODOMETRY, Heard
 if TYPE_CHECKING:
     from ..mapping import LineMap
     from ..mapping.following import Whereabouts
+    from ..mapping.judging import Judgement
     from .localiser import Placed
 
 #: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
@@ -68,6 +69,8 @@ class Frame(NamedTuple):
         Where the sensor is on the plan; None without one.
     placed : Placed or None
         Where the robot is on the plan; None without one, and where it is lost.
+    judgement : Judgement or None
+        Whether the pose of another localiser is right; None unless it is asked, and has one.
     """
 
     scan: LaserScan
@@ -78,6 +81,7 @@ class Frame(NamedTuple):
     dock: CornerPose | None = None
     where: Whereabouts | None = None
     placed: Placed | None = None
+    judgement: Judgement | None = None
 
 
 class Pipeline(InTurn):
@@ -147,10 +151,11 @@ class Pipeline(InTurn):
                 dock = kept.dock(features, tracks, travel.pose, travel.covariance)
         if not self._config.track:
             tracks = None
-        where, placed = None, None
-        if self._localiser is not None:
-            where, placed = self._localiser(features, scan, straight)
-        return Frame(scan, straight, features, tracks, travel, dock, where, placed)
+        frame = Frame(scan, straight, features, tracks, travel, dock)
+        if self._localiser is None:
+            return frame
+        where, placed, judgement = self._localiser(features, scan, straight)
+        return frame._replace(where=where, placed=placed, judgement=judgement)
 
     def _as_configured(self, scan: LaserScan) -> LaserScan:
         """Return a scan with its times, in metres, without what sees the robot."""

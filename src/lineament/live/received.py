@@ -16,7 +16,7 @@ from .config import LiveConfig
 
 #: What messages are, as a line calls one that makes no sense.
 SCAN, ODOMETRY, LINKS, MOUNTINGS = "a scan", "an odometry", "a transform", "a mounting"
-GUESS, RELOCATE = "an initial pose", "a call to relocate"
+GUESS, RELOCATE, JUDGED = "an initial pose", "a call to relocate", "a pose to judge"
 
 Heard = LaserScan | Odometry | list[StampedPose] | None
 #: Poses are nearer [m]: what is computed from them stays finite.
@@ -70,7 +70,7 @@ class Wanted(NamedTuple):
     @property
     def is_command(self) -> bool:
         """Whether each message counts: none may be lost on the way."""
-        return self.what in (GUESS, RELOCATE) or self.is_latched
+        return self.what in (GUESS, RELOCATE, JUDGED) or self.is_latched
 
     def received(self, publisher: str, data: Buffer, encoding: str) -> Received:
         """Return what a source gives of a serialised message that has just arrived."""
@@ -94,6 +94,8 @@ def wanted(config: LiveConfig) -> list[Wanted]:
             Wanted(config.resolved("initialpose"), placed, GUESS, partial(read, kind=placed)),
             Wanted(f"{config.scan_topic}/relocate", "std_msgs/Empty", RELOCATE, _nothing),
         ]
+    if (topic := config.judge_topic) is not None:
+        found.append(Wanted(topic, placed, JUDGED, partial(read, kind=placed)))
     return found
 
 

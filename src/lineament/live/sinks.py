@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import math
-import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of
-from ..scan.fields import NANO
 from .config import LiveConfig
 from .counters import Report
-from .pipeline import Frame, plan_of, stamp_of, time_of
+from .pipeline import Frame, plan_of, time_of
+from .plan_topics import DIAGNOSTICS, PlanTopics, Status
 
 if TYPE_CHECKING:
-    from ..mapping.following import Whereabouts
     from ..output.foxglove import FoxgloveMessages
-
-DIAGNOSTICS = "/diagnostics"
 
 
 class Publisher(ABC):
@@ -93,17 +88,16 @@ class RosSink:
     config : LiveConfig
         Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
         ``TOPIC/markers``; where they are tracked, the motion of the sensor goes to
-        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``. On a plan the
-        pose of the scanner goes to ``TOPIC/pose``, that of the robot to ``amcl_pose``, and the
-        transform from `map_frame` to `odom_frame` to ``/tf``, while they are known. The scans of a
-        log are published too, with their poses on ``/tf``.
+        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``; and with a
+        plan there are `PlanTopics`. The scans of a log are published too, with their poses on
+        ``/tf``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
         self._publisher, self._make, self._config = publisher, messages, config
         self._publishes_scan = config.log is not None
         self._topic = topic = config.scan_topic
-        self._frame: Frame | None = None
+        self._plan = None if config.map is None else PlanTopics(publisher, messages, config)
         topics = {
             f"{topic}/features": "sensor_msgs/PointCloud2",
             f"{topic}/corners": "geometry_msgs/PoseArray",
@@ -114,13 +108,6 @@ class RosSink:
             topics[f"{topic}/odometry"] = "nav_msgs/Odometry"
         if config.is_docking:
             topics[f"{topic}/dock"] = "geometry_msgs/PoseWithCovarianceStamped"
-        if config.map is not None:
-            topics[f"{topic}/pose"] = "geometry_msgs/PoseWithCovarianceStamped"
-            # As of AMCL, whose listeners ask for the last one.
-            kind = messages.kind("geometry_msgs/PoseWithCovarianceStamped")
-            publisher.advertise(config.resolved("amcl_pose"), kind, is_latched=True)
-            if config.broadcast:
-                topics["/tf"] = "tf2_msgs/TFMessage"
         if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
@@ -154,8 +141,6 @@ class RosSink:
         if (dock := frame.dock) is not None:
             pose, covariance = dock
             messages.append((f"{topic}/dock", lambda to: make.placed(to, moment, pose, covariance)))
-        if frame.where is not None:
-            messages += self._on_plan(frame, frame.where, moment)
         if self._publishes_scan:
             if (seen_from := scan.pose) is not None:
                 messages.append(("/tf", lambda to: make.transform(to, moment, seen_from)))
@@ -166,54 +151,15 @@ class RosSink:
         for name, message in messages:
             if self._publisher.listeners(name):
                 self._publisher.publish(message(name))
-
-    def _on_plan(
-        self, frame: Frame, where: Whereabouts, moment: Moment
-    ) -> Iterator[tuple[str, Callable[[str], Message]]]:
-        """Yield what is said of the pose on the plan; nothing but a status where it is not known.
-
-        A verdict that is another one than before is published at once.
-        """
-        make, config = self._make, self._config
-        before, self._frame = self._frame, frame
-        if before is None or _status(before, config)[:2] != _status(frame, config)[:2]:
-            self._diagnose_pose(frame, divmod(time.time_ns(), NANO))
-        on_plan = moment._replace(frame=config.map_frame)
-        if where.is_known:
-            pose, covariance = where.pose, where.covariance
-            yield f"{self._topic}/pose", lambda to: make.placed(to, on_plan, pose, covariance)
-        if (placed := frame.placed) is not None:
-            base, spread = placed.base, placed.covariance
-            yield config.resolved("amcl_pose"), lambda to: make.placed(to, on_plan, base, spread)
-            if (odom := placed.odom) is not None and config.broadcast:
-                until = frame.scan.stamp_ns + round(config.transform_tolerance * NANO)
-                link = Moment(*stamp_of(until), config.odom_frame, config.map_frame)
-                yield "/tf", lambda to: make.transform(to, link, odom)
+        if self._plan is not None:
+            self._plan.publish(frame, moment)
 
     def diagnose(self, report: Report, time: tuple[int, int]) -> None:
         """Publish the report on ``/diagnostics``, and the verdict on the last pose."""
-        self._diagnose(self._topic, report.level, str(report), report.values, time)
-        if (frame := self._frame) is not None:
-            self._diagnose_pose(frame, time, is_stale=not report.since.scans)
-
-    def _diagnose_pose(self, frame: Frame, time: tuple[int, int], is_stale: bool = False) -> None:
-        assert frame.where is not None
-        level, summary = (3, "no scans") if is_stale else _status(frame, self._config)
-        self._diagnose(f"{self._topic}/pose", level, summary, _figures(frame.where), time)
-
-    def _diagnose(
-        self, topic: str, level: int, summary: str, values: dict[str, str], time: tuple[int, int]
-    ) -> None:
-        message = self._make.diagnostics(
-            DIAGNOSTICS,
-            Moment(*time, "", ""),
-            name=f"{self._config.name}: {topic}",
-            hardware_id=self._topic,
-            level=level,
-            summary=summary,
-            values=values,
-        )
-        self._publisher.publish(message)
+        status = Status(self._topic, report.level, str(report), report.values)
+        self._publisher.publish(status.message(self._make, self._config, DIAGNOSTICS, time))
+        if self._plan is not None:
+            self._plan.diagnose(time, is_stale=not report.since.scans)
 
 
 class FoxgloveSink:
@@ -274,29 +220,3 @@ class FoxgloveSink:
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
     return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)
-
-
-def _status(frame: Frame, config: LiveConfig) -> tuple[int, str]:
-    """Level of diagnostics and verdict: 0 located, 1 but for something, 2 not known."""
-    where, placed = frame.where, frame.placed
-    assert where is not None
-    level = 0 if where else 1 if where.is_known else 2
-    summary = where.verdict
-    if where.is_known and (placed is None or placed.odom is None) and config.is_localiser:
-        unknown = "where the scanner is mounted" if placed is None else "odometry"
-        level, summary = max(level, 1), f"{summary}, without {unknown}"
-    return level, summary
-
-
-def _figures(where: Whereabouts) -> dict[str, str]:
-    """Pose, deviations and evidence by name, as text."""
-    (x, y, theta), evidence = where.pose, where.evidence
-    of_x, of_y, of_theta = (math.sqrt(where.covariance[k, k]) for k in range(3))
-    return {
-        "x [m]": f"{x:.3f} ± {of_x:.3f}",
-        "y [m]": f"{y:.3f} ± {of_y:.3f}",
-        "theta [°]": f"{math.degrees(theta):.2f} ± {math.degrees(of_theta):.2f}",
-        "explained [%]": f"{100 * evidence.explained:.1f}",
-        "contradicted [%]": f"{100 * evidence.contradicted:.1f}",
-        "log odds": f"{evidence.log_odds:.1f}",
-    }

@@ -1,0 +1,157 @@
+"""How often `Judge` is wrong of a localiser that is right, and how soon it notices a kidnapping.
+
+A robot drives through simulated storeys among people, with furniture that the plan does not have,
+or has elsewhere; another localiser believes in poses as AMCL does, 5 cm and 1° off, each 0.25 m or
+11°, and moves on with the wheels between. Once in two minutes the robot is carried to another
+place, unnoticed by its wheels; 20 s later it is where it is believed to be again. Counted are the
+seconds until the verdict is not "right", and until it is "wrong"; and each time that a pose that is
+right is called wrong, apart from the 5 s after the robot comes back.
+"""
+
+import argparse
+import itertools
+import math
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+import lineament as ln
+from lineament.mapping import LineMap
+from lineament.mapping.following import Follower
+from lineament.mapping.judging import RIGHT, WRONG, Judge
+from lineament.scan import Pose
+from lineament.scan.poses import compose, relative
+from lineament.simulation import SENSORS, Building, Wheels, World, office
+
+RATE, SPEED, PEOPLE = 5.0, 0.8, 8
+#: A robot is carried away after so long, for so long; after that nothing counts for so long [s].
+EACH, AWAY, SETTLING = 120.0, 20.0, 5.0
+#: How the other localiser is off, and when it looks at its scans [m, m, rad].
+ERROR, UPDATE = (0.05, 0.05, math.radians(1)), (0.25, math.radians(11))
+
+
+class Found(NamedTuple):
+    """What is counted on one drive."""
+
+    plan: str
+    seconds: float
+    right: float
+    alarms: int
+    alarmed: float
+    not_right: list[float]
+    wrong: list[float]
+
+
+def believed(truth: list[Pose], wheels: list[Pose], rng: np.random.Generator) -> Iterator[Pose]:
+    """Yield what a localiser that is right believes, which moves on with the wheels."""
+    known, at = None, wheels[0]
+    for true, wheel in zip(truth, wheels, strict=True):
+        moved = relative(at, wheel)
+        if known is None or math.hypot(*moved[:2]) > UPDATE[0] or abs(moved[2]) > UPDATE[1]:
+            known, at = compose(true, tuple(rng.normal(0, ERROR))), wheel
+        yield compose(known, relative(at, wheel))
+
+
+def judged(seed: int, sensor: str) -> list[Found]:
+    """Drive through one storey, on two plans of it."""
+    storey = office(seed, (40.0, 24.0))
+    walls = LineMap.from_lines(storey.plan.segments, side=1)
+    furnished = LineMap.from_lines(storey.world.segments)
+    return [
+        _driven(storey, "walls alone", walls, seed, sensor),
+        _driven(_moved(storey, seed), "furniture, a third moved", furnished, seed, sensor),
+    ]
+
+
+def _moved(storey: Building, seed: int, share: float = 1 / 3) -> Building:
+    """Return a storey a share of whose furniture stands elsewhere."""
+    rng, n = np.random.default_rng([seed, 78]), len(storey.plan.segments)
+    new = storey.refurnished(seed + 5000, share).world
+    kept = np.repeat(rng.random((len(storey.world.segments) - n) // 4) > share, 4)
+    circles = storey.world.circles[rng.random(len(storey.world.circles)) > share]
+    walls = np.vstack((new.segments, storey.world.segments[n:][kept]))
+    return replace(storey, world=World(walls, np.vstack((new.circles, circles))))
+
+
+def _driven(world: Building, name: str, plan: LineMap, seed: int, sensor: str) -> Found:
+    rng = np.random.default_rng([seed, 77])
+    options = {"seed": seed, "speed": SPEED, "rate": RATE, "wheels": Wheels(), "people": PEOPLE}
+    scans, truth = world.drive(SENSORS[sensor], **options)
+    scans = list(scans)
+    wheels = [scan.pose for scan in scans]
+    extract, follower, judge = ln.Extractor(), Follower(plan), Judge(plan)
+    seconds = right = alarmed = 0.0
+    alarms, was_wrong, not_right, wrong = 0, False, [], []
+    carried, since, elsewhere = None, -math.inf, None
+    for k, belief in enumerate(believed(truth, wheels, rng)):
+        stamp = k / RATE
+        scan = scans[k]
+        if carried is None and stamp % EACH >= EACH - AWAY and stamp > EACH / 2:
+            carried, elsewhere = stamp, world.free_pose(rng)
+            not_right.append(math.inf)
+            wrong.append(math.inf)
+        elif carried is not None and stamp - carried >= AWAY:
+            carried, since = None, stamp
+        if carried is not None:
+            # Where it was put down it goes on by the same motions, as far as it stands free.
+            scene = world.with_people(seed, stamp, elsewhere, PEOPLE)
+            scan = SENSORS[sensor].scan(scene, elsewhere, rng, scan.stamp).with_pose(wheels[k])
+        features = extract(scan)
+        verdict = judge(features, belief, follower(features, scan.pose)).verdict
+        if carried is not None:
+            after = stamp - carried + 1 / RATE  # it may have been put down just behind a scan
+            if math.hypot(*relative(belief, elsewhere)[:2]) < 1.0:
+                not_right[-1] = wrong[-1] = math.nan  # by chance near where it is believed to be
+            if verdict != RIGHT:
+                not_right[-1] = min(not_right[-1], after)
+            if verdict == WRONG:
+                wrong[-1] = min(wrong[-1], after)
+        elif stamp - since > SETTLING:
+            seconds += 1 / RATE
+            right += (verdict == RIGHT) / RATE
+            alarms += verdict == WRONG and not was_wrong
+            alarmed += (verdict == WRONG) / RATE
+        was_wrong = verdict == WRONG
+    return Found(name, seconds, right, alarms, alarmed, not_right, wrong)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hours", type=float, default=24.0, help="of driving, at least")
+    parser.add_argument("--seed", type=int, default=100)
+    parser.add_argument("--sensor", default="lms181")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    options = parser.parse_args()
+    found: list[Found] = []
+    with ProcessPoolExecutor(options.workers) as pool:
+        for first in itertools.count(options.seed, options.workers):
+            seeds = range(first, first + options.workers)
+            for one in pool.map(judged, seeds, [options.sensor] * options.workers):
+                found += one
+            if sum(one.seconds for one in found) > 3600 * options.hours:
+                break
+    print(f"seeds {options.seed} to {first + options.workers - 1}, {options.sensor}")
+    print("| plan | hours | right | wrong alarms | a day | kidnapped | not right in .5 s | wrong |")
+    print("|---|--:|--:|--:|--:|--:|--:|--:|")
+    for name in dict.fromkeys(one.plan for one in found):
+        some = [one for one in found if one.plan == name]
+        hours = sum(one.seconds for one in some) / 3600
+        alarms = sum(one.alarms for one in some)
+        off, wrong = (
+            np.array([t for times in lists for t in times if not math.isnan(t)])
+            for lists in ([one.not_right for one in some], [one.wrong for one in some])
+        )
+        share = sum(one.right for one in some) / (36 * hours)
+        print(
+            f"| {name} | {hours:.1f} | {share:.2f} % | {alarms} | {24 * alarms / hours:.1f} | "
+            f"{len(off)} | {100 * (off <= 0.5).mean():.2f} % | "
+            f"{100 * (wrong <= 0.5).mean():.1f} % |"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""What the parameters of a live node may be: their types, choices and bounds."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ..scan.fields import STAMPS
+
+_CHOICES: dict[str, tuple[object, ...]] = {
+    "type": ("LaserScan", "MultiEchoLaserScan"),
+    "echo": ("first", "last", "strongest"),
+    "stamp": STAMPS,
+    "reliability": ("best-effort", "reliable"),
+    "ros": (0, 1, 2),
+    "units": ("m", "dm", "cm", "mm", "ft", "in"),
+}
+_BOUNDS: dict[str, tuple[float, float]] = {
+    "depth": (1, 1000),
+    "rate": (0, 1e6),
+    "noise": (0, 1000),
+    "scale": (1e-9, 1e9),
+    "domain": (0, 232),
+    "foxglove": (0, 65535),
+    "dock_track": (0, 2**31 - 1),
+    "transform_tolerance": (0, 10),
+}
+FRAMES = ("map_frame", "odom_frame", "base_frame")
+_NAMES = ("topic", "namespace", "name", "deskew", "odometry", "judge", *FRAMES)
+#: What each annotation accepts, and how it is called in a message.
+_KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
+    "str": (str, "a text"),
+    "bool": (bool, "true or false"),
+    "int": (int, "a whole number"),
+    "float": ((int, float), "a number"),
+    "Pose": ((tuple, list), "three numbers"),
+    "Mask": ((tuple, list), "pairs of bearings"),
+    "Point": ((tuple, list), "two numbers"),
+    "Mapping[str, Any]": (Mapping, "a table"),
+}
+#: x, y [m].
+Point = tuple[float, float]
+
+
+def check(name: str, annotation: str, value: Any) -> None:
+    """Check the type of a parameter, and its value where a table above bounds it."""
+    kind, _, optional = annotation.partition(" | ")
+    if optional and value is None:
+        return
+    types, wanted = _KINDS[kind]
+    is_known = isinstance(value, types)
+    if not is_known or (isinstance(value, bool) and kind != "bool"):
+        raise ValueError(f"{name} is {value!r}, expected {wanted}")
+    if name in _CHOICES and value not in _CHOICES[name]:
+        wanted = ", ".join(map(str, _CHOICES[name]))
+        raise ValueError(f"{name} is {value!r}, expected one of {wanted}")
+    if name in _BOUNDS and not _BOUNDS[name][0] <= value <= _BOUNDS[name][1]:
+        raise ValueError(f"{name} is {value}, expected {_BOUNDS[name][0]} to {_BOUNDS[name][1]}")
+    text = value.strip("/") or "none" if name == "namespace" else value
+    if name in _NAMES and not re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII):
+        raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
