@@ -17,7 +17,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
@@ -172,40 +171,32 @@ class Results:
         return markdown(("optimal", *found), rows)
 
     def real(self) -> str:
-        """All methods on all recordings, by measures that need no truth."""
+        """Methods on all recordings, by measures that need no truth, with intervals."""
+        from lineament_lab.reproduce.findings import Interval
+        from lineament_lab.reproduce.real import FURTHER_LOGS
+        from lineament_lab.reproduce.recordings import bootstrap
+
         found = self.numbers("real")
-        free, standing, repeats = (found[k] for k in ("free_space", "standing", "repeats"))
-        rows = [
-            (
-                method,
-                self.total(free, method, "phantom_in_100m"),
-                100 * self.total(free, method, "covered"),
-                *(self.middle(standing, method, kind) for kind in ("segments", "corners")),
-                *(
-                    sum(of[method][key] for of in repeats.values()) or None
-                    for key in ("count", "count_without_edges")
-                ),
+        rows = []
+        for method in ON_RECORDINGS:
+            pools = found["pooled"]["all"][method]
+            counts = {log: of[method]["count"] for log, of in found["repeats"].items()}
+            kept = [counts[log] for log in FURTHER_LOGS if log in counts]
+            repeated = (bootstrap(of, sum) for of in (list(counts.values()), kept))
+            rows.append(
+                (
+                    method,
+                    pools["phantom_in_100m"],
+                    Interval(*(100 * value for value in pools["covered"])),
+                    *(pools.get(f"{kind}_nees") for kind in ("segments", "corners")),
+                    *(of if of.value else None for of in repeated),
+                )
             )
-            for method in next(iter(free.values()))
-        ]
         columns = (
             *("method", "phantom m in 100 m", "covered [%]", "segment NEES, still"),
-            *("corner NEES, still", "corners repeated", "without edges"),
+            *("corner NEES, still", "corners repeated", "of logs kept from the fit"),
         )
         return markdown(columns, rows)
-
-    @staticmethod
-    def total(found: Mapping[str, Any], method: str, key: str) -> float:
-        """Return the mean of a number over the recordings."""
-        values = [of[method][key] for of in found.values() if key in of[method]]
-        return sum(values) / len(values)
-
-    @staticmethod
-    def middle(found: Mapping[str, Any], method: str, kind: str) -> float | None:
-        """Return the median NEES of features of 30 to 99 measurements over the recordings."""
-        bins = [of[method][kind]["30-99"] for of in found.values()]
-        values = [of["nees_median"] for of in bins if of["pairs"] >= 10]
-        return median(values) if values else None
 
     def arena(self) -> str:
         """Corners of a real arena, at rest and moving."""
@@ -341,6 +332,11 @@ SOME = (
     *("optimal", "liu:paper", "liu:figure9", "liu", "liu:tuned", "iepf:paper"),
     "split_and_merge:paper",
     *("liu’s operator, shared steps", "iepf", "split_and_merge", "blind cut, shared steps"),
+)
+#: Methods of the table of recordings: those, and the other rivals as published.
+ON_RECORDINGS = (
+    *SOME,
+    *(f"{name}:paper" for name in ("line_tracking", "hough", "ransac", "region_growing")),
 )
 #: What motions are from, in the table of relations.
 MOTIONS = "the log’s corrected poses", "features", "ICP", "features, no odometry"

@@ -194,6 +194,11 @@ class TestSensitivity:
         }
         bands = sensitivity._bands({"recall": 4.0}, alone)
         assert bands == {"recall": {"low": 1.0, "high": 5.0, "by": "a"}}
+        alone["c"] = {"x": {"recall": math.nan}}
+        assert sensitivity._bands({"recall": 4.0}, alone) == bands
+        nothing = sensitivity._bands({"recall": 4.0}, {"c": alone["c"]})["recall"]
+        assert math.isnan(nothing["low"])
+        assert math.isnan(nothing["high"])
 
     def test_two_parameters_together_are_a_table_of_both(self):
         rows, columns = (list(sensitivity.OPEN[name]) for name in sensitivity.TOGETHER)

@@ -219,12 +219,13 @@ class TestReal:
         assert found["corner_rmse"] < 0.02
         assert findings.numbers["arena"] == {}
         measures = len(real.FREE_SPACE), 2 * len(real.STANDING_STILL), len(real.REPEATS), 1
-        assert len(findings.tables) == sum(measures)
-        assert {table.columns for table in findings.tables[:-1]} == {
-            ("recording", "optimal", "iepf")
-        }
-        assert findings.tables[3].rows[1][:2] == ("all", 100.0)
-        again = findings.tables[6]
+        pooled, tables = findings.tables[:2], findings.tables[2:]
+        assert [table.title for table in pooled] == list(real._POOLS.values())
+        assert repr(pooled[0].rows) == repr(pooled[1].rows)
+        assert len(tables) == sum(measures)
+        assert {table.columns for table in tables[:-1]} == {("recording", "optimal", "iepf")}
+        assert tables[3].rows[1][:2] == ("all", 100.0)
+        again = tables[6]
         assert again.title == "Standing still, segments: found again [%]"
         assert [row[:2] for row in again.rows[:1]] == [("wedge.npz", 100.0)]
         json.dumps(findings.to_dict(), allow_nan=False)
@@ -235,8 +236,11 @@ class TestReal:
         logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
         monkeypatch.setattr(real, "LOGS", logs)
         findings = real.run(Setting(1, 0, data_dir), silent)
-        assert len(findings.numbers["free_space"]) >= 24
-        unread = set(findings.text[-1].rstrip(".").split(": ")[1].split(", "))
+        assert len(findings.numbers["free_space"]) >= 20
+        unread = set(findings.text[-2].rstrip(".").split(": ")[1].split(", "))
+        doubles = findings.numbers["doubles"]
+        assert doubles["mcap/scans_demo.mcap"] == "rosbag1/scans_demo.bag"
+        assert len(doubles) >= 4
         assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
         assert set(scans.STANDING) < set(findings.numbers["standing"])
         assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]

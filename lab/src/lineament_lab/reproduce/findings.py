@@ -234,10 +234,21 @@ def median_of(items: Iterable[T], score: Callable[[T], float]) -> T:
     return in_order[(len(in_order) - 1) // 2]
 
 
+class Interval(NamedTuple):
+    """A number and its 95 % interval, whose ends may be NaN: unknown."""
+
+    value: float
+    low: float
+    high: float
+
+
 def cell_text(cell: object) -> str:
     """Write a cell of a table: fractions with three digits, and their range over the seeds."""
     if isinstance(cell, Spread):
         return cell.written(cell_text)
+    if isinstance(cell, Interval):
+        value, low, high = map(cell_text, cell)
+        return f"{value} ({low}–{high})" if math.isfinite(cell.low) else value
     value = plain(cell)
     if not isinstance(value, float):
         return "–" if value is None else str(value)

@@ -36,6 +36,7 @@ from .findings import (
     cells,
     each,
 )
+from .recordings import BUILDINGS, by_building, distinct, pooled, pooled_table
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
 #: Method whose quality is compared with the repeats.
@@ -103,7 +104,7 @@ Scored = dict[str, dict[str, S]]
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Measure every method on all recordings."""
-    title, logs = "Real scans", _logs(setting)
+    title, (logs, doubles) = "Real scans", distinct(_logs(setting))
     if not logs:
         return Findings(title, (NO_RECORDINGS,))
     methods, frames = feature_methods(), setting.frames
@@ -151,7 +152,14 @@ def run(setting: Setting, progress: Progress) -> Findings:
         scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
         arenas[name] = {method: of for method, (of, _) in scores.items()}
         figures.append(arena_figure(name, arena, scores))
+    pools = {
+        about: pooled(*(by_building(_only(of, chosen)) for of in (free, standing)))
+        for about, chosen in (("all", False), ("nothing chosen", True))
+    }
+    pools = {about: rows for about, rows in pools.items() if rows}
     numbers = {
+        "pooled": pools,
+        "doubles": doubles,
         "free_space": _numbers(free, FreeSpaceScores.summary),
         "standing": _numbers(
             standing, lambda of: {"segments": of.segments.bins(), "corners": of.corners.bins()}
@@ -162,8 +170,13 @@ def run(setting: Setting, progress: Progress) -> Findings:
     every_free = {**free, "all": _totals(free, FreeSpaceScores)}
     return Findings(
         title,
-        (*_TEXT, *([f"Left out, as they hold no scans: {', '.join(unread)}."] if unread else [])),
         (
+            *_TEXT,
+            *([f"Left out, as they hold no scans: {', '.join(unread)}."] if unread else []),
+            *([f"Left out, as others have the same scans: {', '.join(doubles)}."] * bool(doubles)),
+        ),
+        (
+            *(pooled_table(_POOLS[about], rows) for about, rows in pools.items()),
             *_tables(_numbers(every_free, FreeSpaceScores.summary), FREE_SPACE),
             *(table for kind in ("segments", "corners") for table in _standing(standing, kind)),
             *_tables(repeats, REPEATS),
@@ -175,6 +188,11 @@ def run(setting: Setting, progress: Progress) -> Findings:
     )
 
 
+#: Titles of the pooled tables.
+_POOLS = {
+    "all": "All buildings",
+    "nothing chosen": "Recordings on which nothing was chosen",
+}
 _TEXT = (
     "Free space: segments are sampled every 2 cm. A sample is phantom if the three beams around it "
     "all continued by more than 0.2 m, or all ended more than 0.2 m before. A measurement is "
@@ -203,6 +221,11 @@ def _logs(setting: Setting) -> dict[str, Path]:
     except LogError:
         return {}
     return {path.relative_to(setting.data).as_posix(): path for path in paths}
+
+
+def _only(scored: Scored[S], unknown: bool) -> Scored[S]:
+    """Return the scores of all recordings, or of those on which nothing was chosen."""
+    return {log: of for log, of in scored.items() if not (unknown and log in BUILDINGS)}
 
 
 def _totals(scored: Scored[S], kind: type[S]) -> dict[str, S]:

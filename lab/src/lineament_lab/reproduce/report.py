@@ -24,7 +24,7 @@ from ..evaluation.ple import BenchmarkResult
 from . import experiment_names, run_experiments
 from .claims import BLIND_TOO, WORDS, Claim, bands, verdicts
 from .contenders import PAPER
-from .findings import Findings, Progress, Setting, Table, cell_text
+from .findings import Findings, Interval, Progress, Setting, Table, cell_text
 from .seeds import Spread
 
 #: Names of the files.
@@ -157,7 +157,7 @@ _NUMBER = re.compile(r"[+−-]?\d[\d.e-]*|–")
 
 def _cell(cell: object) -> Cell:
     text = cell_text(cell)
-    is_number = isinstance(cell, Spread) or _NUMBER.fullmatch(text)
+    is_number = isinstance(cell, Spread | Interval) or _NUMBER.fullmatch(text)
     return Cell(text, "number" if is_number else "")
 
 

@@ -187,10 +187,11 @@ def _bands(
     """Return the least and the greatest of each measure, and the parameter that moves it most."""
     bands = {}
     for key in default:
-        spans = {
+        known = {
             name: sorted(of[key] for of in values.values() if not np.isnan(of[key]))
             for name, values in alone.items()
         }
+        spans = {name: span for name, span in known.items() if span} or {"": [np.nan]}
         by = max(spans, key=lambda name: spans[name][-1] - spans[name][0])
         ends = [end for span in spans.values() for end in (span[0], span[-1])]
         bands[key] = {"low": min(ends), "high": max(ends), "by": by}
