@@ -16,7 +16,7 @@ from lineament_lab.evaluation import NormalisedErrors
 from numpy.typing import NDArray
 
 from lineament import Extractor, FeatureBatch
-from lineament.methods import METHODS
+from lineament.methods import method_names
 
 Array = NDArray[np.float64]
 COUNTS = (4, 5, 6, 8, 10, 12, 16, 20, 23, 24, 30, 60)
@@ -140,7 +140,7 @@ def main() -> None:
     parser.add_argument("--method", action="append")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    for method in options.method or METHODS:
+    for method in options.method or method_names(presets=False):
         extractor = Extractor(method, noise=options.sigma if options.given else None)
         print(f"\n| {method} | " + " | ".join(map(str, COUNTS)) + " |\n" + "|---" * 13 + "|")
         for name in SCENES:

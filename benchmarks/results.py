@@ -292,10 +292,10 @@ class Results:
         from lineament_lab.reproduce import scans as recorded
 
         from lineament import Extractor
-        from lineament.methods import METHODS
+        from lineament.methods import method_names
         from lineament.simulation import SENSORS
 
-        methods = {name: Extractor(name) for name in METHODS}
+        methods = {name: Extractor(name) for name in method_names(presets=False)}
         rows: dict[str, list[object]] = {name: [name] for name in methods}
         for sensor in ("paper", "utm30lx"):
             scenes = recorded.scene_numbers(30, 0)

@@ -22,6 +22,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNELS = "src/lineament/kernels"
+#: Folders of kernels: of the package, and of the laboratory, which call the former.
+FOLDERS = KERNELS, "lab/src/lineament_lab/kernels"
 #: What a level is to LLVM; another machine's is whatever all of its kind have.
 FEATURES = {
     "x86-64-v2": "+cx16,+sahf,+popcnt,+sse3,+sse4.1,+sse4.2,+ssse3",
@@ -29,7 +31,10 @@ FEATURES = {
     "+sse4.1,+sse4.2,+ssse3,+xsave",
 }
 #: Kernels that take half of the time.
-FIRST_HALF = ("lineament_optimal", "lineament_tracking", "lineament_mapping")
+FIRST_HALF = (
+    *("lineament_optimal", "lineament_tracking", "lineament_mapping"),
+    *("lineament_hough", "lineament_line_tracking", "lineament_ransac"),
+)
 
 
 def levels(machine: str) -> list[str]:
@@ -54,14 +59,14 @@ def ask_numba_for(level: str, cache: str) -> None:
     os.environ |= {"LINEAMENT_JIT": "1", "NUMBA_DISABLE_JIT": "0", "NUMBA_BOUNDSCHECK": "0"}
     # Nothing is kept of the way from the source to the library.
     os.environ["NUMBA_CACHE_DIR"] = cache
-    sys.path.insert(0, str(ROOT / "src"))
+    sys.path[:0] = [str((ROOT / folder).parents[1]) for folder in FOLDERS]
 
 
-def kernels() -> list[Any]:
-    """Return the kernels of all modules, in the order of their names."""
+def kernels(folder: str) -> list[Any]:
+    """Return the kernels of all modules of a folder, in the order of their names."""
     found = []
-    for path in sorted((ROOT / KERNELS).rglob("*.py")):
-        parts = path.relative_to(ROOT / "src").with_suffix("").parts
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        parts = path.relative_to((ROOT / folder).parents[1]).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
         for value in vars(importlib.import_module(name)).values():
             options = getattr(value, "targetoptions", {"no_cpython_wrapper": True})
@@ -172,12 +177,12 @@ def link(objects: list[bytes], out: Path) -> None:
         loader().seal(out).write_text(loader().sealed(out))
 
 
-def part_of(share: int) -> list[bytes]:
-    """Compile one of two halves of the kernels, which take the same time, to object files."""
+def part_of(folder: str, share: int) -> list[bytes]:
+    """Compile one of two halves of some kernels, which take the same time, to object files."""
     from lineament.kernels.library import symbol
 
     objects = []
-    for kernel in kernels():
+    for kernel in kernels(folder):
         name = symbol(kernel.__module__, kernel.__name__)
         if name.startswith(FIRST_HALF) == (share == 0):
             result = compiled(kernel)
@@ -190,19 +195,20 @@ def part_of(share: int) -> list[bytes]:
 def main() -> None:
     """Compile for the level and into the file that the command line names."""
     if len(sys.argv) == 3:
-        level, out = sys.argv[1], Path(sys.argv[2]).absolute()
+        level, outs = sys.argv[1], [Path(sys.argv[2]).absolute()]
     else:
         level = loader().levels()[0]
-        out = ROOT / KERNELS / f"{level}{loader().SUFFIX}"
-        if loader().is_current(out):
-            return
-    if linker() is None:
+        outs = [ROOT / folder / f"{level}{loader().SUFFIX}" for folder in FOLDERS]
+        outs = [out for out in outs if not loader().is_current(out)]
+    if outs and linker() is None:
         raise SystemExit("no linker: neither cc nor the Python package ziglang is installed")
-    with tempfile.TemporaryDirectory() as empty:
-        ask_numba_for(level, empty)
-        with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-            link(list(chain(*pool.map(part_of, range(2)))), out)
-    print(f"{out.name}: {out.stat().st_size / 1000:.0f} kB")
+    for out in outs:
+        (folder,) = (one for one in FOLDERS if Path(one).parent.name == out.parent.parent.name)
+        with tempfile.TemporaryDirectory() as empty:
+            ask_numba_for(level, empty)
+            with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+                link(list(chain(*pool.map(part_of, [folder] * 2, range(2)))), out)
+        print(f"{folder}/{out.name}: {out.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

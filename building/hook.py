@@ -13,7 +13,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-from compile import KERNELS, levels, linker, loader  # noqa: E402
+from compile import levels, linker, loader  # noqa: E402
 
 
 class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -30,7 +30,7 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
         if linker() is None:
             self.app.display_warning("no linker: the wheel has no kernels, its users need numba")
             return
-        folder = Path(self.root, KERNELS)
+        (folder,) = Path(self.root, "src").glob("*/kernels")
         # LINEAMENT_LEVELS=native: for this machine alone, in less time.
         native = os.environ.get("LINEAMENT_LEVELS") == "native"
         wanted = loader().levels()[:1] if native else levels(platform.machine())
@@ -44,7 +44,7 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
             raise SystemExit("the kernels could not be compiled, see above")
         for out in outs.values():
             for file in (out, loader().seal(out)):
-                build_data["force_include"][str(file)] = f"lineament/kernels/{file.name}"
+                build_data["force_include"][str(file)] = f"{folder.parent.name}/kernels/{file.name}"
         build_data["pure_python"] = False
         tag = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["tag"] = f"py3-none-{tag}"

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.dataset as ds
+from lineament_lab.methods.iepf import IEPF
 
 from lineament import LaserScan
 from lineament.logs import save_npz
-from lineament.methods.iepf import IEPF
 from lineament.methods.parameters import parameter
 
 

@@ -5,6 +5,8 @@ from dataclasses import astuple
 from itertools import pairwise
 
 import numpy as np
+from lineament_lab.kernels.line_tracking import track_lines
+from lineament_lab.methods.pdbs import PDBS
 from liu_2023 import Clusters, distances, pieces_of, polar
 from naive import noise_of as estimated
 from naive import valid
@@ -13,8 +15,6 @@ from naive_fit import breakpoints, estimate, principal_line, range_variance
 from lineament import LaserScan
 from lineament.features import noise_row
 from lineament.kernels import layout as at
-from lineament.kernels.rivals.line_tracking import track_lines
-from lineament.methods.pdbs import PDBS
 from lineament.methods.workspace import Block
 
 

@@ -31,7 +31,7 @@ def silent(about):
 def small(monkeypatch):
     """Few methods, sensors, kinds and parameters; each call takes 1 µs longer than the last."""
     clock = (0.5e-6 * k for k in accumulate(count())).__next__
-    few = {"METHODS": ("liu", "pdbs", "iepf")}
+    few = {"METHODS": ("liu",), "RIVALS": ("pdbs", "iepf")}
     here = {"machine": lambda: "this one", "version": lambda _: "1"}
     here["os"] = SimpleNamespace(sysconf=lambda _: 2**16)
     for module, changes in (

@@ -13,7 +13,7 @@ import yaml  # which distributed needs
 
 import lineament as ln
 from lineament.cli import cli
-from lineament.methods import METHODS, stages
+from lineament.methods import method_names, stages
 from lineament.methods.liu import Liu
 
 ROOT = Path(__file__).parent.parent
@@ -35,6 +35,7 @@ def test_site_has_each_page_and_each_public_package_once():
     for source in documents.values():
         assert (ROOT / source).exists()
     packages = {"commands", "lineament", "lineament.bounds", "lineament.methods.stages"}
+    packages |= {"lineament.methods.functions", "lineament.plugins"}
     found_packages = (
         *pkgutil.walk_packages(ln.__path__, "lineament."),
         *pkgutil.walk_packages(lineament_lab.__path__, "lineament_lab."),
@@ -68,7 +69,7 @@ def test_equations_state_the_defaults():
 
 def test_methods_commands_and_public_names_are_what_there_is():
     methods = (ROOT / "docs" / "methods.md").read_text(encoding="utf-8")
-    for name in METHODS:
+    for name in method_names(presets=False):
         assert f"| `{name}`" in methods
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for command in re.findall(r"^lineament (\w+)", text, re.MULTILINE):

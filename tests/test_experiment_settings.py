@@ -6,9 +6,8 @@ import re
 from dataclasses import fields
 
 import pytest
+from lineament_lab.methods.lines import PieceMethod
 from lineament_lab.reproduce import EXPERIMENTS, controls, experiment_names
-
-from lineament.methods.lines import PieceMethod
 
 SETTINGS = {
     "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,

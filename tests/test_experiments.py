@@ -9,6 +9,7 @@ import pytest
 from handmade import features
 from lineament_lab.evaluation import Counts, FeatureScores, Scores, SimilarityScores
 from lineament_lab.evaluation.consistency import NormalisedErrors
+from lineament_lab.methods import RIVALS
 from lineament_lab.reproduce import (
     EXPERIMENTS,
     Setting,
@@ -31,7 +32,6 @@ from small_experiments import PAPER, silent, small  # noqa: F401
 
 import lineament as ln
 from lineament.logs import save_npz
-from lineament.methods import METHODS
 from lineament.methods.stages import corner_response
 from lineament.output import canvas, drawing
 from lineament.simulation import SENSORS, room, truth
@@ -154,7 +154,7 @@ class TestMethods:
         names = list(contenders.every_method())
         assert names[:4] == ["liu:paper", "liu:figure9", "liu", "liu:tuned"]
         assert names[4:7] == ["liu’s operator, shared steps", "optimal", "pdbs"]
-        rivals = [name for name in METHODS if name not in ("liu", "optimal", "pdbs")]
+        rivals = [name for name in RIVALS if name != "pdbs"]
         assert names[7:-1] == [row for name in rivals for row in (f"{name}:paper", name)]
         assert names[-1] == "blind cut, shared steps"
         features = list(contenders.feature_methods())

@@ -6,7 +6,7 @@ from worlds import degenerate_scans, random_scan
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.explain import explain
-from lineament.methods import METHODS
+from lineament.methods import method_names
 from lineament.simulation import SENSORS, scene
 
 NOISE = RangeNoise(sigma=0.01)
@@ -188,6 +188,7 @@ def agrees(trace, beam, explanation):
 
 
 QUICK = ("optimal", "liu", "iepf")
+METHODS = method_names(presets=False)
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in METHODS if name not in QUICK]
 
 

@@ -16,7 +16,7 @@ from worlds import degenerate_scans, full_circle, random_scan, seen
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.features import TABLES
-from lineament.methods import METHODS, get_method, method_names
+from lineament.methods import get_method, method_names
 from lineament.methods.parameters import MOST_VERTICES
 from lineament.methods.workspace import Block
 
@@ -124,7 +124,7 @@ def ends_of(bounds):
 
 
 def at_their_ends():
-    for name in METHODS:
+    for name in method_names(presets=False):
         for field in fields(type(get_method(name))):
             for value in ends_of(field.metadata["bounds"]):
                 yield pytest.param(name, {field.name: value}, id=f"{name}-{field.name}={value}")
@@ -210,7 +210,8 @@ def test_noise_among_sparse_clutter_is_that_of_the_scanner():
         trunks = [trunk for trunk in trunks if math.hypot(*trunk[:2]) > 0.6]
         sensor = Sensor("lms", 181, -math.pi / 2, math.pi / 180, 0.0, 30.0, RangeNoise(0.01))
         scan = sensor.scan(World([], trunks), (0.0, 0.0, 0.0), rng)
-        sigmas.append([Extractor(name)(scan).noise.range_variance(2.0) ** 0.5 for name in METHODS])
+        noises = [Extractor(name)(scan).noise for name in method_names(presets=False)]
+        sigmas.append([noise.range_variance(2.0) ** 0.5 for noise in noises])
     assert np.median(sigmas, axis=0).max() < 0.03
     assert np.max(sigmas) <= 0.1 * (1 + 1e-9)
 

@@ -4,6 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.methods.hough import Hough
+from lineament_lab.methods.ransac import Ransac
+from lineament_lab.methods.region_growing import RegionGrowing
 from naive_partition import tracked
 from naive_regions import assert_same_pieces, grow
 from worlds import (
@@ -20,9 +23,6 @@ from worlds import (
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.kernels import layout as at
-from lineament.methods.hough import Hough
-from lineament.methods.ransac import Ransac
-from lineament.methods.region_growing import RegionGrowing
 
 # The iterative end point fit, split-and-merge
 

@@ -8,7 +8,7 @@ import pytest
 
 import lineament as ln
 from lineament import Extractor
-from lineament.methods import DEFAULT_METHOD, METHODS, get_method
+from lineament.methods import DEFAULT_METHOD, get_method, method_names
 from lineament.methods.liu import Liu
 
 NAN, INF = math.nan, math.inf
@@ -176,6 +176,9 @@ def test_presets():
     assert (plain.threshold, plain.proportion, plain.noise_factor) == (0.15, 0.0, 0.0)
     assert (plain.clusters, plain.settling, plain.corner) == ("none", False, "beam")
     assert get_method("pdbs:paper").grazing_angle == math.radians(10)
+
+
+METHODS = method_names(presets=False)
 
 
 def test_every_method_is_there():

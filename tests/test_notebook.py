@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 from approved import assert_approved, figure_lines
 from handmade import arc, breakpoint_at, corner, edge, features, segment
+from lineament_lab.methods import IEPF
 from matplotlib import pyplot
 from worlds import BOX, full_circle, room
 
 import lineament as ln
 from lineament.cli import run
 from lineament.features import TABLES, noise_row
-from lineament.methods import METHODS, stages
+from lineament.methods import METHODS, method_names, stages
 from lineament.output import notebook
 from lineament.simulation import Sensor
 
@@ -66,10 +67,10 @@ def test_ranges_are_taken_as_a_scan(scan, call):
 
 def test_methods_are_given_by_name_object_or_class(scan):
     by_name = ln.extract(scan, method="iepf", min_piece=9)
-    for made in (ln.methods.IEPF(min_piece=9), ln.methods.get_method("iepf", min_piece=9)):
+    for made in (IEPF(min_piece=9), ln.methods.get_method("iepf", min_piece=9)):
         assert ln.extract(scan, method=made).segments.tobytes() == by_name.segments.tobytes()
-    extractor = ln.Extractor(ln.methods.IEPF, noise=0.01, min_piece=9)
-    assert extractor.method == ln.methods.IEPF(min_piece=9)
+    extractor = ln.Extractor(IEPF, noise=0.01, min_piece=9)
+    assert extractor.method == IEPF(min_piece=9)
     assert repr(extractor) == f"Extractor({extractor.method!r}, noise={ln.RangeNoise(0.01)!r})"
     assert set(METHODS.values()) < set(dir(ln.methods))
     for name, cls in METHODS.items():
@@ -531,7 +532,7 @@ def test_methods_are_listed(capsys):
     assert all(len(line.split()) > 1 for line in lines)
 
 
-@pytest.mark.parametrize("name", [*METHODS, "liu:paper"])
+@pytest.mark.parametrize("name", [*method_names(presets=False), "liu:paper"])
 def test_parameters_are_listed_with_units_defaults_and_bounds(name, capsys):
     assert run(["methods", name]) == 0
     out = capsys.readouterr().out

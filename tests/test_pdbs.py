@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from lineament_lab.methods.pdbs import RULES
 from worlds import NOISE, fan, full_circle, scan_of, wall
 
 from lineament import Extractor, LaserScan
-from lineament.methods.pdbs import RULES
 
 # The rules by hand
 

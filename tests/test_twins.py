@@ -7,6 +7,7 @@ import pytest
 from equality import assert_same_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lineament_lab.methods.pdbs import RULES
 from naive_partition import assert_same_lines, assert_same_partition, assert_same_split, untied
 from naive_regions import assert_same_pieces, grow, sample, vote
 from worlds import NOISE, degenerate_scans, random_scan
@@ -14,7 +15,6 @@ from worlds import NOISE, degenerate_scans, random_scan
 from lineament import Extractor, RangeNoise, open_log
 from lineament.kernels.corner_operator import RESPONSES
 from lineament.kernels.line_fit import FITS
-from lineament.methods.pdbs import RULES
 
 SENSOR, SMALL_NOISE = RangeNoise(0.01, 0.01, 0.002, 0.01), RangeNoise(0.01, 0.002, 0.001, 0.01)
 CHANGED = {"threshold": 0.02, "min_piece": 2, "noise": SENSOR}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from .features import TABLES, FeatureBatch, Features, noise_row
 from .features.records import BREAKPOINTS, SEGMENTS
 from .methods import DEFAULT_METHOD, Method, get_method
+from .methods.functions import as_method
 from .methods.trace import Trace
 from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
@@ -36,8 +37,9 @@ class Extractor:
 
     Parameters
     ----------
-    method : str or Method
-        Name of a method (``"liu"``, ``"liu:paper"``), or one of `lineament.methods`.
+    method : str, callable or Method
+        Name of a method (``"liu"``, ``"liu:paper"``, ``"my.py:find"``), one of `lineament.methods`,
+        or a function from a scan to segments, see `lineament.methods.functions`.
     noise : RangeNoise or float, optional
         Noise of the sensor, or its sigma [m]; estimated from each scan if it is not given.
     **parameters
@@ -59,18 +61,12 @@ class Extractor:
 
     def __init__(
         self,
-        method: str | Method = DEFAULT_METHOD,
+        method: str | Method | Callable[[LaserScan], Any] = DEFAULT_METHOD,
         *,
         noise: NoiseLike | None = None,
         **parameters: Any,
     ) -> None:
-        if isinstance(method, type):
-            method = method(**parameters)
-        elif not hasattr(method, "run"):
-            method = get_method(method, **parameters)
-        elif parameters:
-            raise ValueError("parameters are given together with a method that was made before")
-        self._method = cast(Method, method)
+        self._method = _method_of(method, parameters)
         self._noise = None if noise is None else RangeNoise.of(noise)
         self._noise_row = noise_row(self._noise)
         #: For calls with a scan, and for batches.
@@ -208,10 +204,21 @@ class Extractor:
         return Block(frame, self._noise_row, capacity, self._method.own_arrays(len(frame)))
 
 
+def _method_of(method: Any, parameters: dict[str, Any]) -> Method:
+    """Return the method of a name, a class or a function, or as it was made."""
+    if isinstance(method, type):
+        return as_method(method(**parameters))
+    if not callable(method) and not hasattr(method, "run"):
+        return get_method(method, **parameters)
+    if parameters:
+        raise ValueError("parameters are given together with a method that was made before")
+    return as_method(method)
+
+
 def extract(
     scan: LaserScan | ArrayLike,
     *,
-    method: str | Method = DEFAULT_METHOD,
+    method: str | Method | Callable[[LaserScan], Any] = DEFAULT_METHOD,
     noise: NoiseLike | None = None,
     angle_min: float | None = None,
     angle_increment: float | None = None,
@@ -259,7 +266,7 @@ def extract(
 def trace(
     scan: LaserScan | ArrayLike,
     *,
-    method: str | Method = DEFAULT_METHOD,
+    method: str | Method | Callable[[LaserScan], Any] = DEFAULT_METHOD,
     noise: NoiseLike | None = None,
     angle_min: float | None = None,
     angle_increment: float | None = None,

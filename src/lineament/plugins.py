@@ -16,7 +16,10 @@ METHODS, COMMANDS = "lineament.methods", "lineament.commands"
 
 #: What the laboratory adds: where it is missing, the message names the package.
 LABORATORY = {
-    METHODS: (),
+    METHODS: (
+        *("pdbs", "iepf", "split_and_merge", "line_tracking", "hough", "ransac"),
+        "region_growing",
+    ),
     COMMANDS: ("bench", "compare", "reproduce"),
 }
 

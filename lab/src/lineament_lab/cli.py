@@ -58,6 +58,13 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
 @click.option(
     "--frames", type=click.IntRange(min=1), default=10, show_default=True, help="Scans a kind."
 )
+@click.option(
+    "-m",
+    "--method",
+    "methods",
+    multiple=True,
+    help="A method besides those that are compared, such as my.py:find; repeatable.",
+)
 @SEED
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds in a row."
@@ -77,12 +84,14 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
 def reproduce(output: Path, names: tuple[str, ...], quiet: bool, **setting: Any) -> None:
     """Run the paper's experiments: a page, and all numbers as JSON."""
     from lineament.cli.progress import status
+    from lineament.methods import get_method
 
     from .reproduce import Setting, experiment_names
     from .reproduce.report import reproduce
 
     with wrong_usage():
         chosen = experiment_names(names)
+        any(map(get_method, setting["methods"]))
     with status(quiet) as show:
         page = reproduce(output, chosen, Setting(**setting), show)
     if not quiet:

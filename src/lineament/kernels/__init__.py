@@ -14,7 +14,7 @@ import math
 from functools import partial
 from pathlib import Path
 
-from ..errors import needed_by
+from ..errors import LineamentError, needed_by
 from ..progress import hear_compiler
 from .library import HERE, NoLibraryError, load, state
 
@@ -34,16 +34,25 @@ except NoLibraryError as reason:
         "no_cpython_wrapper": True,
         "no_cfunc_wrapper": True,
     }
-    # Of a cached kernel numba compares its own file, not what it calls: each state has a folder.
-    _CACHE = str(Path(config.CACHE_DIR or HERE / "__pycache__") / state())
 
-    def kernel(function):
-        """Compile what Python calls: without the GIL. No fastmath: NaN means something here."""
-        before, config.CACHE_DIR = config.CACHE_DIR, _CACHE
-        try:
-            return njit(cache=True, nogil=True, error_model="numpy")(function)
-        finally:
-            config.CACHE_DIR = before
+    def kernel_of(home):
+        """Return what compiles the kernels in a folder, for Python to call: without the GIL.
+
+        No fastmath: NaN means something here. They may call those of this package.
+        """
+        # Of a cached kernel numba compares its own file, not what it calls: a folder a state.
+        cache = str(Path(config.CACHE_DIR or home / "__pycache__") / state(home))
+
+        def kernel(function):
+            before, config.CACHE_DIR = config.CACHE_DIR, cache
+            try:
+                return njit(cache=True, nogil=True, error_model="numpy")(function)
+            finally:
+                config.CACHE_DIR = before
+
+        return kernel
+
+    kernel = kernel_of(HERE)
 
     #: For what only kernels call: without the wrappers for Python and C, which take time to make.
     helper = njit(**_INTERNAL)
@@ -63,6 +72,20 @@ else:
         return function
 
     kernel = _library.entry
+
+    def kernel_of(home):
+        """Return what gives the compiled kernels in a folder, which may call those of this package.
+
+        What a library has is not called by what numba compiles: they have one, or all are numba's.
+        """
+        try:
+            return load(home).entry
+        except NoLibraryError as reason:
+            raise LineamentError(
+                f"the kernels in {home} are not compiled ({reason}): "
+                "set LINEAMENT_JIT=1, by which numba compiles all kernels"
+            ) from None
+
     helper = inlined = sums = contracted = jitable = _as_it_is
 
     def bind(entry, *arguments):

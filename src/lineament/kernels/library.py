@@ -41,15 +41,16 @@ class NoLibraryError(Exception):
     """There is no library of these kernels for this machine; the text says why."""
 
 
-def sources() -> list[Path]:
-    """Return the files that the kernels are made of."""
-    kernels = (path for path in HERE.rglob("*.py") if path.name != "library.py")
+def sources(home: Path | None = None) -> list[Path]:
+    """Return the files that the kernels of a folder are made of; those of others call ours."""
+    homes = {HERE, home or HERE}
+    kernels = (path for one in homes for path in one.rglob("*.py") if path.name != "library.py")
     return sorted([*kernels, HERE.parent / "features" / "records.py"])
 
 
-def state() -> str:
+def state(home: Path | None = None) -> str:
     """Return a hash of the kernels' source."""
-    whole = b"".join(path.read_bytes() for path in sources())
+    whole = b"".join(path.read_bytes() for path in sources(home))
     return hashlib.sha256(whole).hexdigest()[:16]
 
 
@@ -60,7 +61,7 @@ def seal(path: Path) -> Path:
 
 def sealed(path: Path) -> str:
     """Return what its seal has where a library is whole, and of the kernels as they are."""
-    return hashlib.sha256(state().encode() + path.read_bytes()).hexdigest()
+    return hashlib.sha256(state(path.parent).encode() + path.read_bytes()).hexdigest()
 
 
 def is_current(path: Path) -> bool:
@@ -156,17 +157,18 @@ def symbol(module: str, name: str) -> str:
     return "_".join(("lineament", *module.split(".")[2:], name))
 
 
-def load() -> Library:
-    """Load the library for this machine; NoLibraryError says why there is none."""
+def load(home: Path | None = None) -> Library:
+    """Load the library of a folder for this machine; NoLibraryError says why there is none."""
+    home = home or HERE
     if asked := next((name for name in _BY_NUMBA if os.environ.get(name, "0") != "0"), None):
         raise NoLibraryError(f"{asked} is set")
-    if not any(HERE.glob(f"*{SUFFIX}")):
+    if not any(home.glob(f"*{SUFFIX}")):
         raise NoLibraryError("the package was built without compiled kernels")
     try:
         ran = levels()
     except OSError as error:
         raise NoLibraryError(f"the CPU is not known ({error})") from None
     for level in ran:
-        if (path := HERE / f"{level}{SUFFIX}").exists():
+        if (path := home / f"{level}{SUFFIX}").exists():
             return Library(path)
     raise NoLibraryError(f"no compiled kernels are for this CPU ({platform.machine()})")

@@ -1,11 +1,16 @@
-"""The methods, by name: each a frozen dataclass of its parameters, in one file."""
+"""The methods, by name: each a frozen dataclass of its parameters, in one file.
+
+Those of other packages are found by their entry points, see `lineament.plugins`; a function of
+yours in a file by ``my.py:find``, see `functions`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
+from .. import plugins
 from .._lazy import lazily
 
 if TYPE_CHECKING:
@@ -14,32 +19,15 @@ if TYPE_CHECKING:
 
     from ..features import Features
     from ..scan import LaserScan
-    from .hough import Hough as Hough
-    from .iepf import IEPF as IEPF
-    from .line_tracking import LineTracking as LineTracking
     from .liu import Liu as Liu
     from .optimal import Optimal as Optimal
-    from .pdbs import PDBS as PDBS
-    from .ransac import Ransac as Ransac
-    from .region_growing import RegionGrowing as RegionGrowing
-    from .split_and_merge import SplitAndMerge as SplitAndMerge
     from .trace import Trace
     from .workspace import Block
 
 DEFAULT_METHOD = "optimal"
 
-#: Name of each method, and the class that it is, in the module of the same name.
-METHODS = {
-    "optimal": "Optimal",
-    "liu": "Liu",
-    "pdbs": "PDBS",
-    "iepf": "IEPF",
-    "split_and_merge": "SplitAndMerge",
-    "line_tracking": "LineTracking",
-    "hough": "Hough",
-    "ransac": "Ransac",
-    "region_growing": "RegionGrowing",
-}
+#: Name of each method of ours, and the class that it is, in the module of the same name.
+METHODS = {"optimal": "Optimal", "liu": "Liu"}
 
 
 __all__ = ["DEFAULT_METHOD", "METHODS", "Method", "describe", "get_method", "method_names"]
@@ -74,7 +62,8 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     Parameters
     ----------
     name : str
-        A name of `METHODS`, or ``name:preset`` for one of the method's presets.
+        A name of `method_names`, with ``name:preset`` for one of the method's presets; or
+        ``FILE.py:NAME`` for a function or a class of yours, see `functions.as_method`.
     **parameters
         Fields of the method's dataclass that differ from its defaults (or its preset's).
 
@@ -93,33 +82,76 @@ def get_method(name: str, /, **parameters: Any) -> Method:
     """
     if not isinstance(name, str):
         raise TypeError(
-            f"method is {name!r:.60}, expected a name or a method: {', '.join(METHODS)}"
+            f"method is {name!r:.60}, expected a name, a function of a scan, or a method: "
+            f"{', '.join(method_names(presets=False))}"
         )
+    from .functions import from_file, is_file
+
+    if is_file(name):
+        return from_file(name, parameters)
     base, _, preset = name.partition(":")
-    cls = _method_class(base) if base in METHODS else None
-    if cls is None or (preset and preset not in cls.presets):
-        known_methods = ", ".join(method_names())
-        raise ValueError(f"method {name!r} is unknown, expected one of: {known_methods}")
+    cls = _method_class(base)
+    if cls is None or (preset and preset not in _presets(cls)):
+        problem = plugins.missing(plugins.METHODS, base)
+        known = f"method {name!r} is unknown, expected one of: {', '.join(method_names())}"
+        raise ValueError(f"method {problem}" if problem and cls is None else known)
+    return made(name, getattr(cls, preset) if preset else cls, cls, parameters)
+
+
+def made(name: str, make: Any, cls: Any, parameters: dict[str, Any]) -> Method:
+    """Make a method of a class, by itself or by one of its presets; name what it has not."""
+    from .functions import as_method
     from .parameters import unknown
 
-    known = [field.name for field in fields(cls)]
-    for parameter in parameters:
-        if parameter not in known:
-            raise ValueError(unknown(f"method {base!r}", parameter, known))
-    return cast(Method, (getattr(cls, preset) if preset else cls)(**parameters))
+    if is_dataclass(cls):
+        known = [field.name for field in fields(cls)]
+        for parameter in parameters:
+            if parameter not in known:
+                base, _, last = name.partition(":")
+                owner = base if last in _presets(cls) or not last else name
+                raise ValueError(unknown(f"method {owner!r}", parameter, known))
+    return as_method(make(**parameters), name)
 
 
 def _method_class(name: str) -> Any:
-    return getattr(import_module(f".{name}", __name__), METHODS[name])
+    """Return the class of a method, or None; a ValueError if a package's cannot be loaded."""
+    if name in METHODS:
+        return getattr(import_module(f".{name}", __name__), METHODS[name])
+    entry = plugins.plugins(plugins.METHODS).get(name)
+    if entry is None:
+        return None
+    try:
+        return entry.load()
+    except Exception as error:
+        raise ValueError(
+            f"method {name!r} cannot be loaded from {entry.value}: {type(error).__name__}: {error}"
+        ) from error
 
 
-def method_names() -> list[str]:
-    """List the names of all methods, each followed by those of its presets."""
-    return [
-        full
-        for name in METHODS
-        for full in (name, *(f"{name}:{preset}" for preset in _method_class(name).presets))
-    ]
+def _presets(cls: Any) -> tuple[str, ...]:
+    return tuple(getattr(cls, "presets", ()))
+
+
+def method_names(presets: bool = True) -> list[str]:
+    """List the names of all methods, ours first, each followed by those of its presets.
+
+    Examples
+    --------
+    >>> method_names(presets=False)[:2]
+    ['optimal', 'liu']
+    """
+    names = [*METHODS, *(name for name in plugins.plugins(plugins.METHODS) if name not in METHODS)]
+    if not presets:
+        return names
+    return [full for name in names for full in (name, *(f"{name}:{p}" for p in _presets_of(name)))]
+
+
+def _presets_of(name: str) -> tuple[str, ...]:
+    """Return a method's presets; a package that cannot be loaded costs no other."""
+    try:
+        return _presets(_method_class(name))
+    except ValueError:
+        return ()
 
 
 def describe(name: str = "") -> str:
@@ -132,28 +164,22 @@ def describe(name: str = "") -> str:
     >>> print(describe("optimal").splitlines()[3])
     evidence         12                            a number > 0
     """
-    from .parameters import indented, sentence
+    from .parameters import described
 
     if not name:
-        names = method_names()
-        abouts = [
-            _about(getattr(_method_class(m), p) if p else _method_class(m))
-            for m, _, p in (full.partition(":") for full in names)
-        ]
-        return "\n".join(f"{full:<23} {about}" for full, about in zip(names, abouts, strict=True))
-    method: Any = get_method(name)
-    lines = [f"{name}: {_about(type(method))}"]
-    if method.presets:
-        lines += [f"Presets: {', '.join(f'{method.name}:{preset}' for preset in method.presets)}"]
-    lines += ["", f"{'parameter':<16} {'default':<22} {'unit':<6} bounds"]
-    for one in fields(method):
-        value = getattr(method, one.name)
-        value = f"{value:.6g}" if isinstance(value, float) else str(value)
-        about = one.metadata
-        lines += [f"{one.name:<16} {value:<22} {about['unit']:<6} {about['bounds']}"]
-        lines += indented(f"{sentence(about['meaning'])}.")
-    return "\n".join(lines)
+        return "\n".join(f"{full:<23} {_about_name(full)}" for full in method_names())
+    return described(name, get_method(name))
 
 
-def _about(documented: Any) -> str:
-    return str(documented.__doc__).strip().splitlines()[0]
+def _about_name(full: str) -> str:
+    name, _, preset = full.partition(":")
+    try:
+        cls = _method_class(name)
+    except ValueError as error:
+        return str(error)
+    return about(getattr(cls, preset) if preset else cls)
+
+
+def about(documented: Any) -> str:
+    """Return the first line of a docstring."""
+    return (documented.__doc__ or "no description").strip().splitlines()[0]

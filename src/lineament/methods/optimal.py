@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ..features.records import CORNERS, SEGMENTS
 from ..kernels import bind
+from ..kernels.breakpoints import BORGES_ALDON
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.optimal import layout as at
 from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
 from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
-from ..kernels.rivals.pdbs import BORGES_ALDON
 from ..kernels.vertices import hold_together
 from .base import MethodBase
 from .parameters import MOST_VERTICES, method, parameter

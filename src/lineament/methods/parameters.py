@@ -2,10 +2,10 @@
 
 import sys
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
 from functools import wraps
-from inspect import cleandoc, signature
+from inspect import cleandoc, isfunction, signature
 from numbers import Integral, Real
 from textwrap import wrap
 from typing import Any, TypeVar, dataclass_transform
@@ -106,6 +106,24 @@ def sentence(meaning: str) -> str:
 def indented(text: str) -> list[str]:
     """Break a text into indented lines."""
     return wrap(text, 96, initial_indent="    ", subsequent_indent="    ")
+
+
+def described(name: str, method: Any) -> str:
+    """Describe a method in plain text: its parameters, defaults, units and bounds."""
+    method = getattr(method, "function", method)  # of somebody's own
+    documented = method if isfunction(method) else type(method)
+    lines = [f"{name}: {(documented.__doc__ or 'no description').strip().splitlines()[0]}"]
+    if presets := getattr(method, "presets", ()):
+        lines += [f"Presets: {', '.join(f'{method.name}:{preset}' for preset in presets)}"]
+    lines += ["", f"{'parameter':<16} {'default':<22} {'unit':<6} bounds"]
+    for one in fields(method) if is_dataclass(method) else ():
+        value = getattr(method, one.name)
+        value = f"{value:.6g}" if isinstance(value, float) else str(value)
+        about = {"unit": "", "bounds": "", "meaning": "", **one.metadata}
+        lines += [f"{one.name:<16} {value:<22} {about['unit']:<6} {about['bounds']}".rstrip()]
+        if about["meaning"]:
+            lines += indented(f"{sentence(about['meaning'])}.")
+    return "\n".join(lines)
 
 
 _EXAMPLE = """Examples

@@ -12,10 +12,10 @@ from ..features import TABLES
 from ..features.records import words
 from ..kernels import bind
 from ..kernels import layout as at
+from ..kernels.breakpoints import part_by_distance
 from ..kernels.line_fit import TOTAL
 from ..kernels.measuring import measure
 from ..kernels.noise import estimate_noise
-from ..kernels.rivals.pdbs import part_by_distance
 from ..kernels.units import find_farthest
 from ..scan import LaserScan
 from ..scan.units import CODES, FAR
@@ -107,13 +107,22 @@ class Block:
         floats, ints, noise = self.workspace
         estimate_noise(floats, ints, self.bearings, *limits, self.noise, noise)
 
+    def scan(self) -> LaserScan:
+        """Return the scan that was taken, without its stamp and pose: a batch has none here."""
+        frame = self.frame
+        limits: dict[str, Any] = {"range_min": self.range_min, "range_max": self.range_max}
+        ranges = self.ranges[self.row]
+        if frame.is_regular:
+            return LaserScan(ranges, frame.angle_min, frame.angle_increment, **limits)
+        return LaserScan(ranges, angles=frame.angles, **limits)
+
     @property
     def workspace(self) -> tuple[Array, NDArray[np.int64], Array]:
         """Workspace and noise of the scan that was taken, as kernels are given them."""
         return self.floats, self.ints, self.noises[self.row]
 
     def part(self, rule: tuple[int, float, float], max_missing: int, min_points: int) -> None:
-        """Part the scan that was taken into clusters, see `kernels.rivals.pdbs`."""
+        """Part the scan that was taken into clusters, see `kernels.breakpoints`."""
         floats, ints, noise = self.workspace
         limits = max_missing, min_points
         part_by_distance(floats, ints, self.bearings, self.sensor, noise, rule, *limits)

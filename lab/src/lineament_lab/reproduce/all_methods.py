@@ -39,7 +39,7 @@ _PANELS = {
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Score all methods on frames of all kinds of scenes, for each sensor."""
-    methods = every_method()
+    methods = every_method(setting.methods)
     scenes = scene_numbers(len(SCENES) * setting.frames, setting.seed)
     numbers: dict[str, dict[str, dict[str, float]]] = {}
     for name, sensor in SENSORS.items():

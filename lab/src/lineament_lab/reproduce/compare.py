@@ -13,7 +13,7 @@ import numpy as np
 from lineament.extractor import Extractor
 from lineament.features import Features
 from lineament.logs import open_log
-from lineament.methods import METHODS
+from lineament.methods import method_names
 from lineament.output import canvas
 from lineament.output.figures import scan_figure
 from lineament.output.page import write_parts
@@ -119,7 +119,7 @@ def compare_log(
     ValueError for an unknown method.
     """
     log = open_log(path, **reading)
-    extractors = {name: Extractor(name) for name in methods or METHODS}
+    extractors = {name: Extractor(name) for name in methods or method_names(presets=False)}
     scan, timed = log.scan(index), list(islice(log, _TIMED))
     return compare_scan(scan, extractors, timed, f"{Path(path).name}, scan {index}", track)
 

@@ -1,6 +1,6 @@
 """The methods that experiments compare, by their names in tables."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -12,6 +12,7 @@ from lineament.methods import METHODS, get_method
 from lineament.methods.stages import fit_line
 from lineament.scan import LaserScan
 
+from ..methods import RIVALS
 from .controls import BlindCut, OperatorCut
 
 #: The paper by its letter; by the reading that brings Figure 9 nearest; with better last steps.
@@ -49,27 +50,28 @@ def liu_methods() -> dict[str, Extractor]:
     return {name: Extractor(name) for name in (PAPER, FIGURE_9, LIU, TUNED)}
 
 
-def every_method() -> dict[str, Extractor]:
+def every_method(more: Iterable[str] = ()) -> dict[str, Extractor]:
     """Make all methods; rivals as published, then with the shared steps; at the end the control."""
     methods = liu_methods() | {LIU_SHARED: Extractor(OperatorCut())}
-    for name in METHODS:
+    for name in (*METHODS, *RIVALS):
         published = hasattr(get_method(name), "published")
         names = (f"{name}:paper", name) if published else (name,)
         methods |= {one: Extractor(one) for one in names if name != LIU}
+    methods |= {name: Extractor(name) for name in more}
     return methods | {BLIND: Extractor(BlindCut())}
 
 
-def feature_methods() -> dict[str, Extractor]:
+def feature_methods(more: Iterable[str] = ()) -> dict[str, Extractor]:
     """Make all methods that return segments."""
-    methods = every_method()
+    methods = every_method(more)
     del methods[PARTITION_ONLY]
     return methods
 
 
-def fitted_methods() -> dict[str, Extract]:
+def fitted_methods(more: Iterable[str] = ()) -> dict[str, Extract]:
     """Make all methods; `pdbs` with a line for each cluster, as in the paper's Figure 11."""
     methods: dict[str, Extract] = {}
-    for name, extractor in every_method().items():
+    for name, extractor in every_method(more).items():
         if name == PARTITION_ONLY:
             methods[PDBS_LINES] = partial(_with_lines, extractor)
         else:

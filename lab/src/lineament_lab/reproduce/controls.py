@@ -5,9 +5,10 @@ import numpy as np
 from lineament.kernels import layout as at
 from lineament.kernels.corner_operator import RESPONSES
 from lineament.kernels.cutting import cut
-from lineament.methods.lines import PieceMethod
 from lineament.methods.parameters import method, parameter
 from lineament.methods.workspace import Block
+
+from ..methods.lines import PieceMethod
 
 
 @method

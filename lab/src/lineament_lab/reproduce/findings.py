@@ -196,6 +196,8 @@ class Setting:
         How many seeds in a row the simulated experiments are run with.
     museum : Path or None
         Bag of the museum that the paper's recordings are from.
+    methods : tuple of str
+        Methods besides those that are compared, such as ``my.py:find``.
     """
 
     frames: int = 10
@@ -203,6 +205,7 @@ class Setting:
     data: Path | None = None
     seeds: int = 5
     museum: Path | None = None
+    methods: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, least in (("frames", 1), ("seed", 0), ("seeds", 1)):

@@ -8,12 +8,12 @@ import numpy as np
 
 from lineament.extractor import Extractor
 from lineament.features import Features
-from lineament.methods.pdbs import RULES
 from lineament.output import canvas, drawing
 from lineament.scan import LaserScan
 from lineament.simulation import SENSORS
 
 from ..evaluation.partition import PartitionScores, partition_scores
+from ..methods.pdbs import RULES
 from .contenders import LIU, PAPER, fitted_methods
 from .findings import Figure, Findings, Progress, Setting, Table, median_of
 from .scans import Frame, scene_numbers, simulated_frames
@@ -61,7 +61,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
     few = {name: methods[name](shown.scan) for name in (PAPER, "pdbs, fixed")}
     alike = like_figure_10(setting.seed)
-    found = {name: e(alike.scan) for name, e in fitted_methods().items()}
+    found = {name: e(alike.scan) for name, e in fitted_methods(setting.methods).items()}
     found = {TRUE: alike.truth} | found
     counts = numbers["example"] = {
         name: {

@@ -58,7 +58,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         return Findings(TITLE, text)
     progress("reading")
     frames, in_row = read(setting.museum, setting.frames)
-    methods = fitted_methods()
+    methods = fitted_methods(setting.methods)
     scores, of_methods = {}, {}
     for name, extract in each(methods, progress, f"{len(frames)} scans"):
         scores[name], of_methods[name] = _measured(extract, frames)

@@ -107,7 +107,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
     title, (logs, doubles) = "Real scans", distinct(_logs(setting))
     if not logs:
         return Findings(title, (NO_RECORDINGS,))
-    methods, frames = feature_methods(), setting.frames
+    methods, frames = feature_methods(setting.methods), setting.frames
     unread: list[str] = []
 
     def scored(

@@ -36,7 +36,7 @@ _COLUMNS = {
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Score and draw scans of simulated scenes and of recordings."""
-    methods = fitted_methods()
+    methods = fitted_methods(setting.methods)
     tables, figures = [], []
     numbers: dict[str, Any] = {}
     everything = dict.fromkeys(methods, Scores())

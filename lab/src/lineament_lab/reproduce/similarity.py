@@ -36,7 +36,7 @@ SMALL = 0.01
 
 def run(setting: Setting, progress: Progress) -> Findings:
     """Measure similarity errors on simulated scans and on recordings."""
-    methods = fitted_methods()
+    methods = fitted_methods(setting.methods)
     numbers = scene_numbers(len(INDOORS) * setting.frames, setting.seed)
     frames = list(simulated_frames(SENSORS["paper"], INDOORS, numbers))
     simulated = "simulated rooms, corridors and halls"

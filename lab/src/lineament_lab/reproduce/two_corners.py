@@ -56,7 +56,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         progress(f"simulating place {k + 1}")
         rng = np.random.default_rng([setting.seed, k, 13])
         scans.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
-    methods = feature_methods()
+    methods = feature_methods(setting.methods)
     found = {
         name: [found_distances(batch_of(extract, s), p) for s, p in zip(scans, POSES, strict=True)]
         for name, extract in each(methods, progress, "distances")

@@ -6,9 +6,11 @@ seeded region growing*, International Journal of Advanced Robotic Systems 15 (20
 
 from typing import NamedTuple
 
-from .. import helper, kernel
-from ..arrays import Floats1, Floats2, Ints2
-from .. import layout as at
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.arrays import Floats1, Floats2, Ints2
+
+from . import kernel
 from .stretches import is_piece, prepare, stretch_line
 
 

@@ -9,11 +9,13 @@ import math
 
 import numpy as np
 
-from .. import helper, kernel
-from ..arrays import Floats1, Floats2, Ints2
-from .. import layout as at
-from ..cutting import add_candidate, add_side, list_pieces, next_candidate
-from ..line_fit import WEIGHTED, fit_line, range_variance
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.arrays import Floats1, Floats2, Ints2
+from lineament.kernels.cutting import add_candidate, add_side, list_pieces, next_candidate
+from lineament.kernels.line_fit import WEIGHTED, fit_line, range_variance
+
+from . import kernel
 
 
 @kernel

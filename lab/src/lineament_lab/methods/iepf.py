@@ -9,12 +9,13 @@ data*, RoMoCo 2017.
 
 from typing import Any, ClassVar
 
-from ..kernels.line_fit import TOTAL, WEIGHTED
-from ..kernels.rivals.splitting import split
-from .base import MethodBase
+from lineament.kernels.line_fit import TOTAL, WEIGHTED
+from lineament.methods.base import MethodBase
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.splitting import split
 from .lines import PieceMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 
 @method

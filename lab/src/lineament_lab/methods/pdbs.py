@@ -9,14 +9,14 @@ Intelligent and Robotic Systems 40, 2004.
 import math
 from typing import Any, Self
 
-from ..kernels.rivals import pdbs
-from .base import MethodBase
-from .parameters import method, parameter
-from .workspace import Block
+from lineament.kernels import breakpoints
+from lineament.methods.base import MethodBase
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
 
 #: Names of the rules.
 RULES = {
-    name: getattr(pdbs, name.upper())
+    name: getattr(breakpoints, name.upper())
     for name in ("fixed", "dietmayer", "santos", "lee", "borges_aldon")
 }
 

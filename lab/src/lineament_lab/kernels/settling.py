@@ -8,10 +8,12 @@ import math
 
 import numpy as np
 
-from .. import helper, kernel
-from ..arrays import Floats1, Floats2, Ints2
-from .. import layout as at
-from ..line_fit import normal_variance
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.arrays import Floats1, Floats2, Ints2
+from lineament.kernels.line_fit import normal_variance
+
+from . import kernel
 from .stretches import fill_moments, joint_line, stretch_line
 
 #: Two pieces are one if a joint line costs less than this many variances of a point. χ² of two

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from .. import helper
-from .. import layout as at
-from ..line_fit import range_variance
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.line_fit import range_variance
 
 
 @helper

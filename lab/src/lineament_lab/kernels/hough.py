@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import helper, kernel
-from ..arrays import Floats1, Floats2, Ints2, Shorts2
-from .. import layout as at
-from ..line_fit import range_variance
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.arrays import Floats1, Floats2, Ints2, Shorts2
+from lineament.kernels.line_fit import range_variance
+
+from . import kernel
 from .stretches import is_piece, prepare, refined_run, take_run
 
 

@@ -7,11 +7,12 @@ seeded region growing*, International Journal of Advanced Robotic Systems 15(1),
 from operator import attrgetter
 from typing import Any, ClassVar
 
-from ..kernels.rivals.region_growing import Parameters, grow_regions
-from ..kernels.rivals.settling import divide_overlaps
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.region_growing import Parameters, grow_regions
+from ..kernels.settling import divide_overlaps
 from .lines import NearMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 _numbers = attrgetter(*Parameters._fields)
 

@@ -9,12 +9,13 @@ ICRA 2003.
 
 from typing import Any, ClassVar
 
-from ..kernels.rivals.settling import merge_alike
-from ..kernels.rivals.splitting import split
-from .base import MethodBase
+from lineament.methods.base import MethodBase
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.settling import merge_alike
+from ..kernels.splitting import split
 from .lines import PieceMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 
 @method

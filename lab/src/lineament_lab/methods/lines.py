@@ -3,14 +3,15 @@
 import math
 from typing import Any, ClassVar, Self
 
-from ..kernels import layout as at
-from ..kernels.budget import LINK, WORST, limit_pieces
-from ..kernels.line_fit import FITS, WEIGHTED
-from ..kernels.rivals.pdbs import BORGES_ALDON, FIXED
-from ..kernels.rivals.settling import settle
-from .base import MethodBase
-from .parameters import MOST_VERTICES, method, parameter
-from .workspace import Block, budget_scratch
+from lineament.kernels import layout as at
+from lineament.kernels.breakpoints import BORGES_ALDON, FIXED
+from lineament.kernels.budget import LINK, WORST, limit_pieces
+from lineament.kernels.line_fit import FITS, WEIGHTED
+from lineament.methods.base import MethodBase
+from lineament.methods.parameters import MOST_VERTICES, method, parameter
+from lineament.methods.workspace import Block, budget_scratch
+
+from ..kernels.settling import settle
 
 
 @method

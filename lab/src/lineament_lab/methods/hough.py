@@ -12,10 +12,11 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.rivals.hough import Parameters, find_by_votes
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.hough import Parameters, find_by_votes
 from .lines import NearMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 _numbers = attrgetter(*Parameters._fields)
 

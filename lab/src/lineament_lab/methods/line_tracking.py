@@ -10,10 +10,11 @@ primitives produced by a 2D range finder*, ICRA 1996.
 
 from typing import Any, ClassVar
 
-from ..kernels.rivals.line_tracking import track_lines
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.line_tracking import track_lines
 from .lines import PieceMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 
 @method

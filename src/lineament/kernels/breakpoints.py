@@ -7,12 +7,12 @@ M.-J. Aldon, *Line extraction in 2D range images for mobile robotics* (2004).
 
 import math
 
-from .. import LARGEST, helper, kernel, usable
-from ..arrays import Floats1, Floats2, Ints2
-from ..layout import Sensor
-from .. import layout as at
-from ..clustering import list_points, part_points
-from ..line_fit import range_variance
+from . import LARGEST, helper, kernel, usable
+from .arrays import Floats1, Floats2, Ints2
+from .layout import Sensor
+from . import layout as at
+from .clustering import list_points, part_points
+from .line_fit import range_variance
 
 #: What the distance of two neighbouring points is compared with.
 FIXED, DIETMAYER, SANTOS, LEE, BORGES_ALDON = range(5)

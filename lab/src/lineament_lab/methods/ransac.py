@@ -8,10 +8,11 @@ Autonomous Robots 23, 2007.
 
 from operator import attrgetter
 
-from ..kernels.rivals.ransac import PERIOD, Parameters, find_by_consensus
+from lineament.methods.parameters import method, parameter
+from lineament.methods.workspace import Block
+
+from ..kernels.ransac import PERIOD, Parameters, find_by_consensus
 from .lines import NearMethod
-from .parameters import method, parameter
-from .workspace import Block
 
 _numbers = attrgetter(*Parameters._fields)
 

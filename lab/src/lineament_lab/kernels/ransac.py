@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import helper, kernel
-from ..arrays import Floats1, Floats2, Ints2
-from .. import layout as at
+from lineament.kernels import helper
+from lineament.kernels import layout as at
+from lineament.kernels.arrays import Floats1, Floats2, Ints2
+
+from . import kernel
 from .stretches import is_piece, longest_run, prepare, refined_run, take_run
 
 #: Of the generator: a prime, so that it runs through all numbers below but 0.

@@ -1,1 +1,0 @@
-"""Kernels of the methods that `optimal` and `liu` are compared with."""
