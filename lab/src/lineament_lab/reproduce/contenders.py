@@ -51,7 +51,7 @@ def liu_methods() -> dict[str, Extractor]:
 
 
 def every_method(more: Iterable[str] = ()) -> dict[str, Extractor]:
-    """Make all methods; rivals as published, then with the shared steps; at the end the control."""
+    """Make all methods; rivals as published, then with the shared steps; `more`; the control."""
     methods = liu_methods() | {LIU_SHARED: Extractor(OperatorCut())}
     for name in (*METHODS, *RIVALS):
         published = hasattr(get_method(name), "published")
