@@ -235,7 +235,8 @@ def _commands() -> str:
         with Context(command, info_name=name, terminal_width=100, max_content_width=100) as context:
             text.append(f"## {name}\n\n``` {{ .text .output }}\n{command.get_help(context)}\n```")
         if isinstance(command, Group):
-            waiting += [(f"{name} {part}", one) for part, one in command.commands.items()]
+            parts = command.list_commands(context)
+            waiting += [(f"{name} {part}", command.get_command(context, part)) for part in parts]
     return "\n\n".join(text)
 
 

@@ -7,8 +7,9 @@ A target makes an input by chance (`make`), which can be pickled, and checks wha
 import dataclasses
 import json
 import math
+import time
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from random import Random
 from typing import Any, ClassVar
@@ -27,13 +28,14 @@ from worlds import degenerate_scans, random_scan
 from lineament import Extractor, LaserScan, RangeNoise, open_log
 from lineament.features import TABLES
 from lineament.live import LiveConfig, Node, Pipeline, RosSink
-from lineament.live.received import received_odometry, received_scan
+from lineament.live.received import ODOMETRY, Received, received_scan
 from lineament.live.sinks import Publisher
 from lineament.logs import save_log
 from lineament.methods import get_method, method_names
 from lineament.output import ENDINGS, open_writer
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
+from lineament.rosmsg.poses import odometry
 from lineament.view import Session
 from lineament.view.api import RequestError, answer
 
@@ -306,7 +308,7 @@ class Messages(Target):
     def check(self, made: tuple[int, str, str, bytes]) -> str:
         option, kind, encoding, data = made
         if kind == "Odometry":
-            received = received_odometry("o", data, encoding)
+            received = Received("o", partial(odometry, data, encoding), time.monotonic(), ODOMETRY)
         else:
             received = received_scan("a", data, encoding, f"sensor_msgs/{kind}")
         lines: list[str] = []

@@ -107,7 +107,8 @@ SAME = {
 
 
 def commands(group, before=()):
-    for name, command in group.commands.items():
+    for name in group.list_commands(None):
+        command = group.get_command(None, name)
         if isinstance(command, click.Group):
             yield from commands(command, (*before, name))
         else:
