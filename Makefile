@@ -106,6 +106,9 @@ wheel: library
 	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament-*-py3-none-*.whl
 	build/empty/$(notdir $(BIN))/python benchmarks/installed.py
 	cd build/empty && $(notdir $(BIN))/lineament demo --quiet -o demo && ls demo
+	LINEAMENT_LEVELS=$(LEVELS) $(BIN)/python -m build --no-isolation --quiet --wheel -o dist lab
+	build/empty/$(notdir $(BIN))/python -m pip install --quiet --constraint build/constraints.txt dist/lineament_lab-*.whl
+	cd build/empty && $(notdir $(BIN))/lineament compare demo/drive.npz -o rivals.html --quiet && ls rivals.html
 
 # The first minutes of a new user, from the built wheel in an empty environment: each step, and its time.
 .PHONY: new-user

@@ -1,4 +1,4 @@
-"""The pictures of recorded scans in README and docs/live.md.
+"""The pictures of recorded scans in docs/python.md and docs/live.md.
 
 Run: python benchmarks/doc_pictures.py [-o docs], with LINEAMENT_DATA, and with pillow, rerun-sdk
 and Xvfb (Debian: xvfb mesa-vulkan-drivers) for the screenshot of rerun.
@@ -14,7 +14,7 @@ from pathlib import Path
 from PIL import Image
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
-#: The log and the scan of README, and the log of the screenshot.
+#: The log and the scan of docs/python.md, and the log of the screenshot.
 SCAN = ("graph/killian.g2o.zip", 1890)
 LOG = "rosbag1/jackal_mocap.bag"
 #: What rerun's messages cover on the right is cut off [pixel, of a picture twice as wide].
