@@ -55,7 +55,9 @@ def test_citation_has_the_article_that_the_method_names():
 
 def test_workflow_runs_what_a_commit_runs_on_each_system_and_python():
     workflow = read_yaml(".github/workflows/ci.yml")
-    (job,) = workflow["jobs"].values()
+    quick, job = workflow["jobs"].values()
+    assert quick["steps"][-1]["run"].startswith("make test ")
+    assert job["needs"] == "quick"
     matrix = job["strategy"]["matrix"]
     listed = [c.rpartition(" ")[2] for c in PROJECT["classifiers"] if "Python :: 3." in c]
     assert matrix["python"] == listed
