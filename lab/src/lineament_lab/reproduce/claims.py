@@ -164,8 +164,8 @@ def _repetition(n: Any) -> Judged:
     }
     letter = Liu.paper()
     return Judged(
-        f"There it is within {FLAT} of the largest, of {len(readings)} readings of what the paper "
-        f"leaves open, in {'; in '.join(f'{k:.0f} by {about}' for about, k in alike.items())}",
+        f"Of {len(readings)} readings, within {FLAT} of the largest there: "
+        f"{'; '.join(f'{k:.0f} by {about}' for about, k in alike.items())}",
         [margins["repetition"][letter.response, letter.half_width]],
     )
 
@@ -267,7 +267,7 @@ CLAIMS = (
     ),
     Claim(
         *("Figure 10", "layers", "fig10", "11 clusters and 5 corners, as in the scene"),
-        _by_letter("A simulated scene with as many", _counts),
+        _by_letter("A scene with as many", _counts),
     ),
     Claim(
         *("Figure 11", "scenes", "fig11-room", "Better lines than PDBS and IEPF"),
