@@ -99,6 +99,17 @@ def _each(*entities: Callable[[Any], Any]) -> Callable[[Path], None]:
     return lambda path: drawn(path, lambda space, _: [add(space) for add in entities])
 
 
+def _gridded(size: int, pixels: bytes) -> Callable[[Path], None]:
+    """Write a grid whose image has so many rows and columns, and these bytes again and again."""
+
+    def write(path: Path) -> None:
+        rows = pixels * (size * size // len(pixels)) if size < 10_000 else pixels
+        path.with_suffix(".pgm").write_bytes(b"P5\n%d %d\n255\n" % (size, size) + rows)
+        path.write_text(f"image: {path.stem}.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
+
+    return write
+
+
 #: What each is beyond (or ""), how it is written, limits, and what is said of it or of the plan.
 PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
     "laughs.dxf": ("entities", lambda path: drawn(path, _laughs), {}, ""),
@@ -115,6 +126,8 @@ PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
         "",
     ),
     "ellipse.dxf": ("chords", _each(lambda to: to.add_ellipse((0, 0), (1e9, 0), 0.5)), {}, ""),
+    "huge.yaml": ("cells", _gridded(10_000, b"\0"), {}, ""),
+    "stripes.yaml": ("entities", _gridded(502, b"\0\376"), {}, ""),
     "arcs.dxf": ("walls", lambda path: drawn(path, _columns_of_arcs), {}, ""),
     "sparse.dxf": ("drawing", sparse, {}, ""),
     "sparse.parquet": ("drawing", sparse, {}, ""),

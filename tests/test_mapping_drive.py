@@ -290,7 +290,7 @@ def test_the_command_writes_map_and_poses(tmp_path, ending):
     ("given", "message"),
     [
         (["-o", "m.dxf"], "no beam returned anything"),
-        (["-o", "m.png"], "expected an ending of .dxf, .svg, .parquet"),
+        (["-o", "m.png"], "expected an ending of .dxf, .svg, .parquet, .yaml"),
         (["-o", "m.svg", "--poses", "p.csv"], "expected an ending of .tum"),
         (["-o", "m.svg", "--onto", "none.dxf"], "none.dxf"),
     ],

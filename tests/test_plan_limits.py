@@ -17,7 +17,7 @@ from lineament.limits import LIMITS
 from lineament.logs import save_log
 from lineament.mapping import LineMap, hypotheses
 from lineament.mapping.hypotheses import REACH, beside, meetings
-from lineament.mapping.line_map import make_index
+from lineament.mapping.index import make_index
 from lineament.mapping.walls import walls_of
 from lineament.simulation import SENSORS, drive, room
 
@@ -154,7 +154,7 @@ def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys):
     found = str(tmp_path / "found.parquet")
     for command in (["locate", log, "--map", path], ["map", log, "--onto", path]):
         assert run([*command, "-o", found, "--limit", "entities=2"]) == 1
-        assert "a.parquet: has 8 entities or rows" in capsys.readouterr().err
+        assert "a.parquet: has 8 entities, rows" in capsys.readouterr().err
 
 
 # Corners, and what lists walls

@@ -43,11 +43,14 @@ class Limits:
     drawing : int
         Bytes of the file of a plan.
     entities : int
-        Entities of a drawing with its blocks expanded, or rows of a table that is a plan.
+        Entities of a drawing with its blocks expanded, rows of a table that is a plan, or borders
+        between free and occupied cells of a grid.
     chords : int
         Chords that a curve of a drawing becomes, each off it by at most 1 cm.
     walls : int
         Lines of a drawing, those of curves included.
+    cells : int
+        Cells of an occupancy grid.
     fetch : int
         Seconds that a log at an address may take to answer, and each megabyte of it to arrive.
 
@@ -74,6 +77,7 @@ in Python limits={'beams': N})
     entities: int = 250_000
     chords: int = 10_000
     walls: int = 100_000
+    cells: int = 1 << 26
     fetch: int = 60
 
     def __post_init__(self) -> None:
@@ -121,9 +125,10 @@ _ABOUT = {
     "depth": "has {} levels of JSON, or of blocks",
     "name": "has {} bytes in a name",
     "drawing": "has {} bytes in a plan",
-    "entities": "has {} entities or rows, blocks expanded",
+    "entities": "has {} entities, rows or borders of cells, blocks expanded",
     "chords": "has {} chords in a curve",
     "walls": "has {} lines",
+    "cells": "has {} cells",
     "fetch": "takes {} s to answer, or to send a megabyte",
 }
 #: What holds unless something else is asked for.

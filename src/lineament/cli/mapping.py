@@ -18,7 +18,9 @@ from .options import (
 )
 from .options import reading_odometry as reading
 
-MAP = click.option("--map", "plan", type=PATH, required=True, help="The plan: .dxf or .parquet.")
+MAP = click.option(
+    "--map", "plan", type=PATH, required=True, help="The plan: .dxf, .yaml (nav2) or .parquet."
+)
 LAYERS = click.option(
     "--layers",
     metavar="NAMES",
@@ -28,14 +30,16 @@ LAYERS = click.option(
 UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
 _NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
 #: Formats that a map is written in.
-_ENDINGS = (".dxf", ".svg", ".parquet")
+_ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
 
 
 @click.command("map")
 @LOG
-@click.option("-o", "--output", required=True, type=PATH, help="The map: .dxf, .svg or .parquet.")
+@click.option(
+    "-o", "--output", required=True, type=PATH, help="The map: .dxf, .svg, .parquet or .yaml."
+)
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
-@click.option("--onto", type=PATH, help="A plan in whose frame the map is: .dxf or .parquet.")
+@click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
 @_NO_ODOMETRY
 @METHOD
 @SET

@@ -11,6 +11,7 @@
 """
 
 from .evidence import Evidence
+from .grids import Grid
 from .line_map import LineMap
 from .local_map import LocalMap, Query
 from .locate import VERDICTS, Location, locate
@@ -21,6 +22,7 @@ __all__ = [
     "VERDICTS",
     "WALL",
     "Evidence",
+    "Grid",
     "LineMap",
     "LocalMap",
     "Location",

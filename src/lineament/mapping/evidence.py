@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..kernels.mapping.beams import judge
 from ..scan import Array
-from .line_map import Index
+from .index import Index
 
 #: Shares of the beams that end on a wall of the plan, before one (furniture, people), and behind
 #: one, where the pose is right; and where it is one of those that corners suggest, but wrong.

@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,34 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 from .._copies import ReadOnly, locked
 from ..errors import LineamentError, one_line, warn
 from ..features import ARC, CORNER, Features, make_records
-from ..kernels.mapping.layout import list_walls
 from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .drawings import read_drawing
+from .grids import GRID_ENDINGS, IMAGES, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
+from .index import Index, make_index, rings
+from .outlines import walls_of_grid
 from .plans import doubts, plan_error, read_table
 from .sights import columns_shown, walls_shown
-from .walls import COLUMN, lengths_of, rows_of, segments_of, shared, walls_of
+from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
 #: Farther from the origin, coordinates are too coarse to be believed [m].
 FARTHEST = 1e8
-#: Size of the cells by which walls are found [m], how far around a wall they reach; most cells, and
-#: most in the boxes around all walls.
-_CELL, _AROUND, _MOST_CELLS, _MOST_LISTED = 0.75, 0.3, 4_000_000, 20_000_000
-#: Walls of which a round column is made to meet beams.
-_SIDES = 12
-
-
-class Index(NamedTuple):
-    """The walls as the kernels take them, and which of them lie near a place."""
-
-    walls: Array
-    grid: Array
-    begins: NDArray[np.int64]
-    members: NDArray[np.int64]
 
 
 class LineMap(ReadOnly):
@@ -163,7 +151,10 @@ class LineMap(ReadOnly):
         Lines may also be pairs of ends (n, 2, 2). `side` is 1 for lines that are seen from their
         left alone. Raises ValueError for other shapes.
         """
-        circles, lines = _rows("columns", columns, (3,)), _rows("lines", ends, (4,), (2, 2))
+        circles, lines = (
+            rows_shaped("columns", columns, (3,)),
+            rows_shaped("lines", ends, (4,), (2, 2)),
+        )
         found = np.zeros(len(circles), COLUMN)
         found["center"], found["radius"], found["views"] = circles[:, :2], circles[:, 2], 1
         lines = lines.reshape(-1, 2, 2)
@@ -219,6 +210,27 @@ class LineMap(ReadOnly):
         return cls(*(records[records["views"] >= min_views] for records in shown), sigma=sigma)
 
     @classmethod
+    def from_grid(cls, grid: Grid, *, sigma: float = 0.0, limits: Limits | None = None) -> Self:
+        """Take the walls of an occupancy grid: the faces of what is occupied, seen from free cells.
+
+        A wall lies in the middle of its cells, where a robot has hits. Its covariance is that of a
+        place somewhere in a cell, all of its cells off alike. A LineamentError without a wall, or
+        with more borders of cells than the limit of ``entities``.
+
+        Examples
+        --------
+        >>> cells = np.zeros((20, 20), np.int8)
+        >>> cells[4:16, 8:] = 100
+        >>> LineMap.from_grid(Grid(cells, 0.05)).walls["start"].round(3).tolist()
+        [[1.0, 0.225], [0.425, 0.225], [0.425, 0.775]]
+        """
+        walls = walls_of_grid(grid, limits or Limits())
+        if not len(walls):
+            n = int(grid.occupied.sum())
+            raise LineamentError(f"has no walls: {n} of {grid.cells.size} cells are occupied")
+        return cls(walls, sigma=sigma)
+
+    @classmethod
     def read(
         cls,
         path: str | os.PathLike[str],
@@ -228,14 +240,15 @@ class LineMap(ReadOnly):
         sigma: float = 0.0,
         limits: Mapping[str, int] | None = None,
     ) -> Self:
-        """Read a plan: DXF, or a table of features in the frame of the world (Parquet).
+        """Read a plan: DXF, an occupancy grid, or a table of features in the world's frame.
 
         A plan as large as no building, or of which parts are left out, is a `LineamentWarning`.
 
         Parameters
         ----------
         path : path-like
-            A ``.dxf`` of any program, or a ``.parquet`` of ``lineament extract --world``.
+            A ``.dxf`` of any program, the ``.yaml`` of a map of map_server (ROS, nav2) with its
+            image, or a ``.parquet`` of ``lineament extract --world``.
         layers : sequence of str, optional
             The layers of a DXF that hold walls, ``*`` stands for anything; by default those with
             "wall" in their name, or all if there are none.
@@ -246,7 +259,7 @@ class LineMap(ReadOnly):
 
         limits : mapping, optional
             Limits that differ from those of ``lineament.limits.Limits``: of the plan's bytes
-            (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``.
+            (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``, ``cells``.
 
         Raises
         ------
@@ -261,9 +274,15 @@ class LineMap(ReadOnly):
             elif ending == ".parquet":
                 features, left_out = read_table(path, most)
                 plan = cls.from_features([features], sigma=sigma)
+            elif ending in GRID_ENDINGS:
+                plan, left_out = cls.from_grid(Grid.read(path, most), sigma=sigma, limits=most), 0
+            elif ending in IMAGES:
+                raise LineamentError(
+                    "is the image of a grid, expected the .yaml that has its name and its scale"
+                )
             else:
                 raise LineamentError(
-                    f"a plan is a .dxf or a .parquet, not {ending or 'this'}: "
+                    f"a plan is a .dxf, a .parquet or the .yaml of a grid, not {ending or 'this'}: "
                     "`lineament map LOG -o plan.dxf` makes one of a drive"
                 )
             plan.left_out += left_out
@@ -271,7 +290,7 @@ class LineMap(ReadOnly):
         except LineamentError as error:
             problem = str(error).removeprefix(f"{path}: ")
             raise plan_error(path)(problem) from None
-        if doubt := doubts(plan.size, plan.left_out):
+        if doubt := doubts(plan.size, plan.left_out, ending in GRID_ENDINGS):
             warn(one_line(f"{path}: {doubt}"))
         return plan
 
@@ -291,39 +310,30 @@ class LineMap(ReadOnly):
             frame_id="map",
         )
 
+    def to_grid(
+        self, resolution: float = 0.05, seen: Iterable[tuple[LaserScan, Pose]] = ()
+    ) -> Grid:
+        """Draw walls and columns into an occupancy grid of cells of this size [m].
+
+        `seen` are scans with their poses in the map's frame: what their beams passed through is
+        free. All else is unknown: of a plan alone, nothing says where a robot may be.
+
+        Examples
+        --------
+        >>> plan = LineMap.from_lines([[0.0, 0.0, 1.0, 0.0]])
+        >>> int(plan.to_grid().occupied.sum())
+        20
+        """
+        return Grid.drawn(np.concatenate((self.ends, rings(self.columns))), seen, resolution)
+
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the map in a format of ``lineament extract``, chosen by the ending of the path."""
+        """Write the map, in the format of the ending of the path.
+
+        Those are the formats of ``lineament extract``, and ``.yaml``: an occupancy grid without
+        free cells, see `to_grid`, with its image beside it.
+        """
+        if Path(path).suffix.lower() in GRID_ENDINGS:
+            self.to_grid().write(path)
+            return
         with open_writer(path) as writer:
             writer.write(self.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
-
-
-def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float) -> Index:
-    """List the walls by cells, with round columns as short walls behind them."""
-    turns = np.linspace(0, 2 * math.pi, _SIDES + 1)
-    ring = np.stack((np.cos(turns), np.sin(turns)), axis=1)[::-1]  # seen from outside: its left
-    rings = columns["center"][:, None] + columns["radius"][:, None, None] * ring
-    sides = walls_of(np.stack((rings[:, :-1], rings[:, 1:]), axis=2).reshape(-1, 2, 2), side=1)
-    every = np.concatenate((walls, sides))
-    table, ends = rows_of(every), np.stack((every["start"], every["end"]), axis=1)
-    table[:, 6] += sigma**2
-    along = ends[:, 1] - ends[:, 0]
-    low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0
-    boxes = float(np.prod(abs(along) + 2 * (_AROUND + _CELL), axis=1).sum())
-    area = float(np.prod(high - low))
-    cell = max(_CELL, math.sqrt(area / _MOST_CELLS), math.sqrt(boxes / _MOST_LISTED))
-    counts = np.ceil((high - low) / cell)
-    grid, begins = np.array([*low, cell, *counts]), np.zeros(2 * int(np.prod(counts)) + 1, np.int64)
-    list_walls(table, grid, _AROUND, begins[1:], np.empty(0, np.int64))
-    begins = np.cumsum(begins)
-    members = np.empty(begins[-1], np.int64)
-    list_walls(table, grid, _AROUND, begins[:-1].copy(), members)
-    return Index(table, grid, begins, members)
-
-
-def _rows(name: str, given: ArrayLike, *shapes: tuple[int, ...]) -> Array:
-    """Numbers of one of some shapes in each row; none is a row of nothing."""
-    rows = np.array(given, np.float64)
-    if rows.size and rows.shape[1:] not in shapes:
-        wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
-        raise ValueError(f"{name} have shape {rows.shape}, expected {wanted}")
-    return rows.reshape(-1, *shapes[0])

@@ -44,20 +44,25 @@ def is_a_building(size: float) -> bool:
     return _BUILDINGS[0] <= size <= _BUILDINGS[1]
 
 
-def doubts(extent: tuple[float, float], left_out: int) -> str:
+def doubts(extent: tuple[float, float], left_out: int, is_grid: bool = False) -> str:
     """Return what may be wrong with a plan: it is of no building, or parts are left out; or ""."""
     (wide, deep), said = extent, []
     if left_out:
         said.append(f"{left_out} walls or columns have impossible numbers, left out")
     if not is_a_building(max(extent)):
         size = f"{wide:.4g} m x {deep:.4g} m"
-        said.append(f"is {size}: is it drawn in other units? (units=, --units)")
+        why = (
+            "is its resolution right?"
+            if is_grid
+            else "is it drawn in other units? (units=, --units)"
+        )
+        said.append(f"is {size}: {why}")
     return "; ".join(said)
 
 
-def check_file(path: str | os.PathLike[str], limits: Limits) -> None:
+def check_file(path: str | os.PathLike[str], limits: Limits, name: str = "") -> None:
     """Raise a LineamentError unless a plan is a regular file within the limit."""
-    error = plan_error(path)
+    error = plan_error(name or path)
     try:
         status = Path(path).stat()
     except OSError as problem:

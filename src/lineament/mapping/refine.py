@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from ..kernels.mapping.refining import refine as kernel
 from ..motion.association import chi_square
 from ..scan import Array
-from .line_map import Index
+from .index import Index
 from .local_map import Query
 
 #: First deviations of a pose that corners suggest, and of one that was refined [m, rad].

@@ -140,3 +140,12 @@ def bent(variance: Array | float, length: Array) -> Array:
     spread[:, 0, 0] = variance
     spread[:, 1, 1] = 4 * variance / np.maximum(length, 0.1) ** 2
     return spread
+
+
+def rows_shaped(name: str, given: ArrayLike, *shapes: tuple[int, ...]) -> Array:
+    """Return numbers of one of some shapes in each row; none is a row of nothing."""
+    rows = np.array(given, np.float64)
+    if rows.size and rows.shape[1:] not in shapes:
+        wanted = " or ".join(str(("n", *shape)).replace("'", "") for shape in shapes)
+        raise ValueError(f"{name} have shape {rows.shape}, expected {wanted}")
+    return rows.reshape(-1, *shapes[0])

@@ -16,6 +16,7 @@ from ..files import check_outputs, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import LineMap
 from ..mapping.drive_map import Drive
+from ..mapping.grids import GRID_ENDINGS, all_files
 from ..mapping.making import make_map, onto_plan
 from ..output import open_writer
 from ..progress import Track, untracked
@@ -71,7 +72,8 @@ def map_log(
     path : path-like
         The log, of any format that `lineament.open_log` reads.
     output : path-like
-        The map: ``.dxf``, ``.svg`` or ``.parquet``.
+        The map: ``.dxf``, ``.svg`` or ``.parquet``; or ``.yaml``, an occupancy grid with its image
+        ``.pgm`` beside it, in which the walls are occupied, and free is what beams passed through.
     extractor : Extractor, optional
         The method.
     poses : path-like, optional
@@ -102,10 +104,14 @@ def map_log(
     (60, True)
     """
     extractor = Extractor() if extractor is None else extractor
-    open_writer(output)
+    is_grid = Path(output).suffix.lower() in GRID_ENDINGS
+    if not is_grid:
+        open_writer(output)
     with needed_by("map"):  # now, not when the drive is followed
         import_module("scipy")
-    check_outputs(filter(None, (output, poses)), filter(None, (path, onto)))
+    onto_files = [] if onto is None else all_files(onto, is_read=True)
+    written = [*all_files(output), *([] if poses is None else [poses])]
+    check_outputs(written, [path, *onto_files])
     plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
@@ -124,8 +130,12 @@ def map_log(
     if plan is not None:
         made = onto_plan(made, plan)
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
-    with placed:  # Both files, or none.
-        made.map.write(output)
+    with placed:  # All files, or none.
+        if is_grid:
+            seen = [(frame.scan, made.poses[frame.index]) for frame in drive.frames]
+            made.map.to_grid(seen=seen).write(output)
+        else:
+            made.map.write(output)
     way = sum(
         math.dist(a[:2], b[:2])
         for a, b in zip(made.survey.poses, made.survey.poses[1:], strict=False)
