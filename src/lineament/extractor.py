@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from .features import TABLES, FeatureBatch, Features, noise_row
 from .features.records import BREAKPOINTS, SEGMENTS
 from .methods import DEFAULT_METHOD, Method, get_method
-from .methods.functions import as_method
 from .methods.trace import Trace
 from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
@@ -207,11 +206,15 @@ class Extractor:
 def _method_of(method: Any, parameters: dict[str, Any]) -> Method:
     """Return the method of a name, a class or a function, or as it was made."""
     if isinstance(method, type):
-        return as_method(method(**parameters))
-    if not callable(method) and not hasattr(method, "run"):
+        method = method(**parameters)
+    elif not callable(method) and not hasattr(method, "run"):
         return get_method(method, **parameters)
-    if parameters:
+    elif parameters:
         raise ValueError("parameters are given together with a method that was made before")
+    if hasattr(method, "run"):
+        return cast(Method, method)
+    from .methods.functions import as_method
+
     return as_method(method)
 
 

@@ -10,8 +10,7 @@ import click
 
 from ..errors import LineamentError, LineamentWarning, NothingFoundError
 from ..progress import compiling_shown
-from .added import Commands
-from .commands import COMMANDS
+from .finding import Commands
 from .options import complain
 from .progress import show_compiling
 from .terminating import Terminated, terminating
@@ -24,7 +23,6 @@ _UNWRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EFBIG, errno.EDQUOT, 
 
 @click.group(
     cls=Commands,
-    commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(package_name="lineament", message="%(package)s %(version)s")

@@ -5,9 +5,7 @@ from typing import Any
 
 import click
 
-from .extract import extract
-from .live import live
-from .mapping import LAYERS, UNITS, locate, map_command
+from .mapping import LAYERS, UNITS
 from .options import (
     HUSH,
     LOG,
@@ -24,7 +22,6 @@ from .options import (
     reading,
     wrong_usage,
 )
-from .simulating import demo, simulate
 
 
 @click.command()
@@ -159,10 +156,3 @@ def warmup(methods: tuple[str, ...], quiet: bool) -> None:
         seconds = warm_up(methods)
     if not quiet:
         click.echo(f"kernels ready after {seconds:.2f} s")
-
-
-_ALL = (
-    *(extract, info, plot, view, live, locate, map_command, demo),
-    *(methods, warmup, simulate),
-)
-COMMANDS = {command.name: command for command in _ALL if command.name}

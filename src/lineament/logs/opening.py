@@ -33,9 +33,10 @@ READERS = (
 _SHARED_ENDINGS = (".log", ".json", ".csv", ".tsv", ".dat", ".npz", ".txt", ".zip")
 
 
-def readers() -> list[type[Log]]:
-    """Return the classes of all readers, in the order in which they look at a file."""
-    return [getattr(import_module(f".{name}", __package__), reader) for name, reader in READERS]
+def readers() -> Iterator[type[Log]]:
+    """Yield the classes of all readers, in the order in which they look at a file."""
+    for name, reader in READERS:
+        yield getattr(import_module(f".{name}", __package__), reader)
 
 
 def _recognised(head: Head) -> type[Log] | None:

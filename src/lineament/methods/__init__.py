@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
 
 from .. import plugins
 from .._lazy import lazily
@@ -85,9 +85,9 @@ def get_method(name: str, /, **parameters: Any) -> Method:
             f"method is {name!r:.60}, expected a name, a function of a scan, or a method: "
             f"{', '.join(method_names(presets=False))}"
         )
-    from .functions import from_file, is_file
+    if name.rpartition(":")[0].endswith(".py"):
+        from .functions import from_file
 
-    if is_file(name):
         return from_file(name, parameters)
     base, _, preset = name.partition(":")
     cls = _method_class(base)
@@ -100,7 +100,6 @@ def get_method(name: str, /, **parameters: Any) -> Method:
 
 def made(name: str, make: Any, cls: Any, parameters: dict[str, Any]) -> Method:
     """Make a method of a class, by itself or by one of its presets; name what it has not."""
-    from .functions import as_method
     from .parameters import unknown
 
     if is_dataclass(cls):
@@ -110,7 +109,12 @@ def made(name: str, make: Any, cls: Any, parameters: dict[str, Any]) -> Method:
                 base, _, last = name.partition(":")
                 owner = base if last in _presets(cls) or not last else name
                 raise ValueError(unknown(f"method {owner!r}", parameter, known))
-    return as_method(make(**parameters), name)
+    method = make(**parameters)
+    if hasattr(method, "run"):
+        return cast(Method, method)
+    from .functions import as_method
+
+    return as_method(method, name)
 
 
 def _method_class(name: str) -> Any:

@@ -118,11 +118,6 @@ def as_method(given: Any, name: str = "") -> Method:
     raise TypeError(f"method is {given!r:.60}, expected a name, a function of a scan, or a method")
 
 
-def is_file(name: str) -> bool:
-    """Whether a name is that of a function in a file: ``FILE.py:NAME``."""
-    return name.rpartition(":")[0].endswith(".py")
-
-
 def from_file(name: str, parameters: dict[str, Any]) -> Method:
     """Make a method of a function or a class in a file of Python, by ``FILE.py:NAME``.
 

@@ -1,25 +1,42 @@
-"""The commands with those that other packages add, see `lineament.plugins`."""
+"""The commands by name, each imported when it is asked for; with those of other packages."""
 
+from importlib import import_module
 from importlib.metadata import EntryPoint
-from typing import Any
+from typing import Any, cast
 
 import click
 
 from ..errors import LineamentError
 from ..plugins import COMMANDS, missing, plugins
 
+#: Where each of our own commands is.
+OWN = {
+    "demo": "simulating:demo",
+    "extract": "extract:extract",
+    "info": "commands:info",
+    "live": "live:live",
+    "locate": "mapping:locate",
+    "map": "mapping:map_command",
+    "methods": "commands:methods",
+    "plot": "commands:plot",
+    "simulate": "simulating:simulate",
+    "view": "commands:view",
+    "warmup": "commands:warmup",
+}
+
 
 class Commands(click.Group):
     """Our own commands, and those of other packages; ours where both have a name."""
 
-    def list_commands(self, context: click.Context) -> list[str]:
+    def list_commands(self, context: click.Context) -> list[str]:  # noqa: ARG002
         """Return the names of all."""
-        return sorted({*super().list_commands(context), *plugins(COMMANDS)})
+        return sorted({*OWN, *plugins(COMMANDS)})
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         """Return the command of a name; what is missing names its package."""
-        if own := super().get_command(context, name):
-            return own
+        if name in OWN:
+            module, _, own = OWN[name].partition(":")
+            return cast(click.Command, getattr(import_module(f".{module}", __package__), own))
         if entry := plugins(COMMANDS).get(name):
             return _loaded(entry)
         if problem := missing(COMMANDS, name):
