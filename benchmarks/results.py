@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = ROOT / "docs" / "results.md", ROOT / "README.md"
+DOCUMENTS = tuple(ROOT / name for name in ("docs/results.md", "README.md", "docs/comparison.md"))
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 SEEDS = range(5)
 #: Kernels and methods, what simulates, bounds and moves; metrics and experiments.
@@ -121,6 +121,7 @@ class Results:
         data = DATA if DATA.is_dir() else None
         self.setting = Setting(frames, SEEDS[0], data, seeds=len(SEEDS))
         self.found: dict[str, Any] = {}
+        self.timed: dict[str, dict[str, Any]] = {}
 
     def findings(self, name: str) -> Any:
         """Return what an experiment found: numbers that differ by seed have their range."""
@@ -298,27 +299,58 @@ class Results:
         ]
         return markdown(("method", "explained [%]", "RMS error of these [mm]"), rows)
 
-    def speed(self) -> str:
-        """Times of methods in turns in one run, as ratios to that of `liu`."""
-        import numpy as np
+    def times(self) -> dict[str, dict[str, Any]]:
+        """Time methods in turns, once: by sensor and method the rounds and scans [s]."""
         from lineament_lab.reproduce import scans as recorded
 
         from lineament import Extractor
         from lineament.methods import method_names
         from lineament.simulation import SENSORS
 
-        methods = {name: Extractor(name) for name in method_names(presets=False)}
-        rows: dict[str, list[object]] = {name: [name] for name in methods}
-        for sensor in ("paper", "utm30lx"):
-            scenes = recorded.scene_numbers(30, 0)
-            frames = recorded.simulated_frames(SENSORS[sensor], recorded.INDOORS, scenes)
-            times = recorded.interleaved_times(methods, [frame.scan for frame in frames])
-            for name, taken in times.items():
-                middle, least, most = recorded.time_ratio(taken, times["liu"])
+        if not self.timed:
+            methods = {name: Extractor(name) for name in method_names(presets=False)}
+            for sensor in ("paper", "utm30lx"):
+                scenes = recorded.scene_numbers(30, 0)
+                frames = recorded.simulated_frames(SENSORS[sensor], recorded.INDOORS, scenes)
+                scans = [frame.scan for frame in frames]
+                self.timed[sensor] = recorded.interleaved_times(methods, scans)
+        return self.timed
+
+    def speed(self) -> str:
+        """Times of methods in turns in one run, as ratios to that of `liu`."""
+        import numpy as np
+        from lineament_lab.reproduce.scans import time_ratio
+
+        times = self.times()
+        rows: dict[str, list[object]] = {name: [name] for name in times["paper"]}
+        for of in times.values():
+            for name, taken in of.items():
+                middle, least, most = time_ratio(taken, of["liu"])
                 ratio = f"{middle:.1f} ({least:.1f}–{most:.1f})"
                 rows[name] += [1e6 * float(np.median(taken)), ratio]
         columns = [f"{beams} beams{what}" for beams in (481, 1081) for what in (" [µs]", " ÷ liu")]
         return markdown(("method", *columns), rows.values())
+
+    def ours(self) -> str:
+        """What the comparison with other projects says of this one."""
+        import numpy as np
+
+        found, times = self.numbers("all_methods"), self.times()["paper"]
+        arenas = self.numbers("real")["arena"] if self.setting.data else {}
+        rest, moving = (arenas.get(name, {}) for name in ("arena, static", "arena, moving"))
+        rows = [
+            (
+                name,
+                1e6 * float(np.median(times[name])),
+                *(two_digits(found[s][name]["corner_f1_0.10"]) for s in ("paper", "noisy")),
+                *(of.get(name, {}).get("recall") for of in (rest, moving)),
+                1e3 * rest[name]["median_error"] if rest else None,
+            )
+            for name in ("optimal", "iepf", "split_and_merge")
+        ]
+        columns = ("481 beams [µs]", "corner F1, σ = 1 cm", "σ = 3 cm, 2 % lost")
+        arena = ("arena, recall at rest", "moving", "error [mm]")
+        return markdown(("method", *columns, *arena), rows)
 
     def process(self) -> str:
         """What a process costs: starts and threads."""
@@ -337,7 +369,7 @@ class Results:
 
 TABLES = (
     *("speed", "process", "maps", "relations", "tracking", "real", "arena"),
-    *("simulation", "summary", "sensors", "optimal", "similarity", "claims"),
+    *("simulation", "summary", "sensors", "optimal", "similarity", "claims", "ours"),
 )
 #: Methods of the shorter tables; lineament reproduce has them all.
 SOME = (
