@@ -26,7 +26,7 @@ CONFIGURATION = """<CycloneDDS><Domain>
 
 KINDS = {
     **dict.fromkeys(("LaserScan", "MultiEchoLaserScan", "PointCloud2"), "sensor_msgs"),
-    **dict.fromkeys(("PoseArray", "PoseWithCovarianceStamped"), "geometry_msgs"),
+    **dict.fromkeys(("PoseArray", "PoseStamped", "PoseWithCovarianceStamped"), "geometry_msgs"),
     "MarkerArray": "visualization_msgs",
     "Odometry": "nav_msgs",
     "TFMessage": "tf2_msgs",

@@ -49,6 +49,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"namespace": "r\n"}, f"namespace is 'r\\n', {_NAME}"),
         ({"deskew": "up!"}, f"deskew is 'up!', {_NAME}"),
         ({"deskew": "poses"}, "deskew is 'poses', which only a log has; expected a topic, or"),
+        ({"dock_shape": "a.dxf"}, "dock_shape is 'a.dxf', expected a dock as well"),
         ({"odometry": "odom", "log": "a.bag"}, "odometry is 'odom', but a log is played; expected"),
         ({"odometry": "odom", "deskew": "o"}, "deskew is 'o', and odometry 'odom', expected one"),
         ({"odom_frame": "/map"}, "two of map_frame, odom_frame and base_frame are one, expected"),

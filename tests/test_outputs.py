@@ -79,7 +79,7 @@ READ_AND_WRITTEN = {
     "demo": ("log", "output"),
     "extract": ("logs", "output"),
     "info": ("log", ""),
-    "live": ("config map log", ""),
+    "live": ("config map dock_shape log", ""),
     "locate": ("log plan", "output"),
     "map": ("log onto", "output poses"),
     "plot": ("log", "output"),

@@ -38,6 +38,7 @@ KNOWN = (
     "track",
     "dock",
     "dock_track",
+    "dock_shape",
     "map",
     "layers",
     "units",

@@ -66,6 +66,9 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 @MASK
 @click.option("--track", **_FLAG, help="Number features from scan to scan.")
 @click.option("--dock", type=float, nargs=2, help="x y of a corner: publish its pose.")
+@click.option(
+    "--dock-shape", type=TEXT_PATH, metavar="DXF", help="A shape in place of a corner, near --dock."
+)
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
 @click.option("--map", type=TEXT_PATH, metavar="PLAN", help="Publish the pose on this plan.")
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")

@@ -74,6 +74,9 @@ class LiveConfig:
         followed, and its pose goes to ``TOPIC/dock``.
     dock_track : int, optional
         The same of the corner of this track.
+    dock_shape : str, optional
+        A DXF of a `lineament.docking.Shape`, which is followed in place of a corner; its origin is
+        within 0.5 m of `dock`.
     map : str, optional
         A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``.
     layers : str
@@ -146,6 +149,7 @@ class LiveConfig:
     track: bool = False
     dock: Point | None = None
     dock_track: int | None = None
+    dock_shape: str | None = None
     map: str | None = None
     layers: str = ""
     units: str | None = None
@@ -190,6 +194,8 @@ class LiveConfig:
         """Check what has to fit together."""
         if self.dock is not None and self.dock_track is not None:
             raise ValueError("dock and dock_track are given, expected one of them")
+        if self.dock_shape is not None and self.dock is None:
+            raise ValueError(f"dock_shape is {self.dock_shape!r}, expected a dock as well")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
         if self.log is not None and self.odometry_topic is not None:

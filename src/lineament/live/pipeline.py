@@ -22,6 +22,7 @@ from .config import LiveConfig
 from .received import ODOMETRY, Heard
 
 if TYPE_CHECKING:
+    from ..docking import ShapeDock, ShapePose
     from ..mapping import LineMap
     from ..mapping.following import Whereabouts
     from ..mapping.judging import Judgement
@@ -63,8 +64,8 @@ class Frame(NamedTuple):
         None unless tracking is on.
     travel : Travel or None
         Where the sensor has come to; None unless features are tracked, for whatever purpose.
-    dock : CornerPose or None
-        The corner that is docked to; None unless one was asked for, and where it is not seen.
+    dock : CornerPose, ShapePose or None
+        What is docked to; None unless it was asked for, and where it is not seen.
     where : Whereabouts or None
         Where the sensor is on the plan; None without one.
     placed : Placed or None
@@ -78,7 +79,7 @@ class Frame(NamedTuple):
     features: Features
     tracks: Tracks | None
     travel: Travel | None = None
-    dock: CornerPose | None = None
+    dock: CornerPose | ShapePose | None = None
     where: Whereabouts | None = None
     placed: Placed | None = None
     judgement: Judgement | None = None
@@ -239,7 +240,7 @@ class _Publisher:
         self.extractor = Extractor(method, noise=config.noise)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
-        self.dock = Dock(config.dock, track=config.dock_track) if config.is_docking else None
+        self.dock = dock_of(config) if config.is_docking else None
         self.last: LaserScan | None = None
 
 
@@ -251,6 +252,16 @@ def plan_of(config: LiveConfig) -> LineMap | None:
 
     layers = config.layers.split(",") if config.layers else None
     return LineMap.read(config.map, layers, units=config.units, limits=config.limits)
+
+
+def dock_of(config: LiveConfig) -> Dock | ShapeDock:
+    """Make what follows the corner, or the shape, that is configured."""
+    if config.dock_shape is None:
+        return Dock(config.dock, track=config.dock_track)
+    from ..docking import Shape, ShapeDock
+
+    assert config.dock is not None
+    return ShapeDock(Shape.read(config.dock_shape), config.dock)
 
 
 def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:

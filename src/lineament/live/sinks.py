@@ -88,15 +88,16 @@ class RosSink:
     config : LiveConfig
         Features go to ``TOPIC/features`` (a point for each), ``TOPIC/corners`` and
         ``TOPIC/markers``; where they are tracked, the motion of the sensor goes to
-        ``TOPIC/odometry``, the pose of a corner that is asked for to ``TOPIC/dock``; and with a
-        plan there are `PlanTopics`. The scans of a log are published too, with their poses on
-        ``/tf``.
+        ``TOPIC/odometry``, the pose of what is docked to to ``TOPIC/dock``, and without its
+        covariance to ``detected_dock_pose``; with a plan there are `PlanTopics`. The scans of a
+        log are published too, with their poses on ``/tf``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
         self._publisher, self._make, self._config = publisher, messages, config
         self._publishes_scan = config.log is not None
         self._topic = topic = config.scan_topic
+        self._docked = config.resolved("detected_dock_pose")
         self._plan = None if config.map is None else PlanTopics(publisher, messages, config)
         topics = {
             f"{topic}/features": "sensor_msgs/PointCloud2",
@@ -108,6 +109,7 @@ class RosSink:
             topics[f"{topic}/odometry"] = "nav_msgs/Odometry"
         if config.is_docking:
             topics[f"{topic}/dock"] = "geometry_msgs/PoseWithCovarianceStamped"
+            topics[self._docked] = "geometry_msgs/PoseStamped"
         if self._publishes_scan:
             topics |= {"/tf": "tf2_msgs/TFMessage", topic: "sensor_msgs/LaserScan"}
             topics[f"{topic}/points"] = "sensor_msgs/PointCloud2"
@@ -139,8 +141,10 @@ class RosSink:
         if (travel := frame.travel) is not None:
             messages.append((f"{topic}/odometry", lambda to: make.odometry(to, moment, travel)))
         if (dock := frame.dock) is not None:
-            pose, covariance = dock
-            messages.append((f"{topic}/dock", lambda to: make.placed(to, moment, pose, covariance)))
+            messages += [
+                (f"{topic}/dock", lambda to: make.placed(to, moment, dock.pose, dock.covariance)),
+                (self._docked, lambda to: make.pose(to, moment, dock.pose)),
+            ]
         if self._publishes_scan:
             if (seen_from := scan.pose) is not None:
                 messages.append(("/tf", lambda to: make.transform(to, moment, seen_from)))

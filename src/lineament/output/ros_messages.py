@@ -73,6 +73,12 @@ class RosMessages(SceneMessages):
         writer.array(_six(travel.twist_covariance))
         return self._message(topic, "nav_msgs/Odometry", writer)
 
+    def pose(self, topic: str, moment: Moment, pose: Pose) -> Message:
+        """``geometry_msgs/PoseStamped``, in the frame of the moment."""
+        writer = self._begin(moment)
+        writer.numbers("7d", *_pose(pose))
+        return self._message(topic, "geometry_msgs/PoseStamped", writer)
+
     def placed(self, topic: str, moment: Moment, pose: Pose, covariance: Array) -> Message:
         """``geometry_msgs/PoseWithCovarianceStamped``, in the frame of the moment."""
         writer = self._begin(moment)
