@@ -40,6 +40,7 @@ RUNS = {
     "view wall.npz -m iepf --no-browser": "",
     "map room.npz -o plan.dxf": "plan.dxf",
     "map room.npz -o plan.svg --poses drive.tum": "drive.tum",
+    "plan walls.parquet -o drawn.svg": "drawn.svg",
     "locate room.npz --map walls.parquet -o where.csv": "where.csv",
     "live --from wall.npz --ros 0 --rate 0 -m iepf": "",
     "demo wall.npz -o demo": "demo",

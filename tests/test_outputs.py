@@ -82,6 +82,7 @@ READ_AND_WRITTEN = {
     "live": ("config map dock_shape log", ""),
     "locate": ("log plan", "output"),
     "map": ("log onto", "output poses"),
+    "plan": ("plan", "output"),
     "plot": ("log", "output"),
     "reproduce": ("data museum", "output"),
     "simulate": ("", "output"),
@@ -99,6 +100,7 @@ SAME = {
     "map log poses": "map log.npz -o m.svg --poses {}.tum",
     "map onto output": "map log.npz --onto plan.dxf -o {}.dxf",
     "map onto poses": "map log.npz --onto plan.dxf -o m.svg --poses {}.tum",
+    "plan plan output": "plan plan.dxf -o {}.dxf",
     "plot log output": "plot log.npz -o {}.png",
     # It reads recordings by their names in that folder, and writes none of them.
     "reproduce data output": "",
@@ -419,7 +421,7 @@ def test_a_plan_of_no_size_is_a_warning(files, capsys):
 
 
 def test_what_is_no_plan_says_how_to_make_one(files, capsys):
-    (files / "plan.svg").touch()
-    assert status_of("locate log.npz --map plan.svg -o a.tum") == 1
+    (files / "plan.ifc").touch()
+    assert status_of("locate log.npz --map plan.ifc -o a.tum") == 1
     (said,) = complaints(capsys.readouterr().err)
-    assert said.endswith("not .svg: `lineament map LOG -o plan.dxf` makes one of a drive")
+    assert said.endswith("not .ifc: `lineament map LOG -o plan.dxf` makes one of a drive")

@@ -29,7 +29,12 @@ from .options import (
 @reading
 @QUIET
 def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
-    """Print what LOG contains."""
+    """Print what LOG contains, or a plan: .dxf, .svg, .parquet, or the .yaml of a grid."""
+    from ..tasks.plan import PLANS, describe_plan
+
+    if Path(log).suffix.lower() in PLANS:
+        click.echo(describe_plan(log, reading["limits"]))
+        return
     from ..logs import open_log, summarize
     from .progress import tracker
 

@@ -17,6 +17,7 @@ OWN = {
     "live": "live:live",
     "locate": "mapping:locate",
     "map": "mapping:map_command",
+    "plan": "mapping:plan",
     "methods": "commands:methods",
     "plot": "commands:plot",
     "simulate": "simulating:simulate",

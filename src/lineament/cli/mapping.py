@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from .options import (
+    LIMITS,
     LOG,
     METHOD,
     NOISE,
@@ -19,7 +20,11 @@ from .options import (
 from .options import reading_odometry as reading
 
 MAP = click.option(
-    "--map", "plan", type=PATH, required=True, help="The plan: .dxf, .yaml (nav2) or .parquet."
+    "--map",
+    "plan",
+    type=PATH,
+    required=True,
+    help="The plan: .dxf, .yaml of nav2, .parquet, .svg.",
 )
 LAYERS = click.option(
     "--layers",
@@ -134,3 +139,32 @@ def locate(
     found.check_found()
     if found.warning:
         complain(f"lineament: {found.warning}")
+
+
+@click.command()
+@click.argument("plan", type=PATH)
+@click.option("-o", "--output", required=True, type=PATH, help="Another plan, or a picture.")
+@LAYERS
+@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@click.option(
+    "--resolution",
+    type=click.FloatRange(min=0, min_open=True),
+    default=0.05,
+    show_default=True,
+    help="Size of the cells of a grid that is drawn [m].",
+)
+@click.option("--dark", is_flag=True, help="Draw on black.")
+@LIMITS
+@QUIET
+def plan(plan: Path, output: Path, quiet: bool, **given: Any) -> None:
+    """Write PLAN in another format, or draw it.
+
+    PLAN is a .dxf, .yaml (an occupancy grid of nav2), .parquet or .svg of lineament; OUTPUT one of
+    them, .csv, .jsonl, .geojson (in metres), .png or .pdf.
+    """
+    from ..tasks.plan import ENDINGS, convert_plan
+
+    check_ending(output, ENDINGS)
+    done = convert_plan(plan, output, **given)
+    if not quiet:
+        click.echo(done)

@@ -16,8 +16,8 @@ from ..limits import Limits
 from ..scan import Array, LaserScan, Pose
 from .grid_files import FREE, OCCUPIED, RAW, SCALE, UNKNOWN, read_about, read_shades, values_of
 
-#: Endings of the file that names the image of a grid, and of images.
-GRID_ENDINGS, IMAGES = (".yaml", ".yml"), (".pgm", ".png")
+#: Endings of the file that names the image of a grid.
+GRID_ENDINGS = (".yaml", ".yml")
 #: Shades that map_saver writes, and its thresholds.
 _SHADES, _OCCUPIED, _FREE = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}, 0.65, 0.196
 #: Free cells around what is drawn; a line is drawn so far on its solid side [cells].

@@ -17,13 +17,14 @@ from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
 from .drawings import read_drawing
-from .grids import GRID_ENDINGS, IMAGES, Grid
+from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
 from .index import Index, make_index, rings
 from .outlines import walls_of_grid
-from .plans import doubts, plan_error, read_table
+from .plans import doubts, plan_error, read_table, unknown_plan
 from .sights import columns_shown, walls_shown
-from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, walls_of
+from .svg_plans import read_svg
+from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned_back, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0
@@ -248,7 +249,7 @@ class LineMap(ReadOnly):
         ----------
         path : path-like
             A ``.dxf`` of any program, the ``.yaml`` of a map of map_server (ROS, nav2) with its
-            image, or a ``.parquet`` of ``lineament extract --world``.
+            image, a ``.parquet`` of ``lineament extract --world``, or an ``.svg`` of lineament.
         layers : sequence of str, optional
             The layers of a DXF that hold walls, ``*`` stands for anything; by default those with
             "wall" in their name, or all if there are none.
@@ -256,7 +257,6 @@ class LineMap(ReadOnly):
             Those of a DXF: m, dm, cm, mm, ft or in; by default those that it names, or metres.
         sigma : float
             How far the drawn walls are from where they stand [m].
-
         limits : mapping, optional
             Limits that differ from those of ``lineament.limits.Limits``: of the plan's bytes
             (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``, ``cells``.
@@ -274,17 +274,13 @@ class LineMap(ReadOnly):
             elif ending == ".parquet":
                 features, left_out = read_table(path, most)
                 plan = cls.from_features([features], sigma=sigma)
+            elif ending == ".svg":
+                lines, circles, left_out = read_svg(path, most)
+                plan = cls.from_lines(lines, circles, sigma=sigma)
             elif ending in GRID_ENDINGS:
                 plan, left_out = cls.from_grid(Grid.read(path, most), sigma=sigma, limits=most), 0
-            elif ending in IMAGES:
-                raise LineamentError(
-                    "is the image of a grid, expected the .yaml that has its name and its scale"
-                )
             else:
-                raise LineamentError(
-                    f"a plan is a .dxf, a .parquet or the .yaml of a grid, not {ending or 'this'}: "
-                    "`lineament map LOG -o plan.dxf` makes one of a drive"
-                )
+                raise unknown_plan(ending)
             plan.left_out += left_out
             len(plan.corners)  # refuses more walls beside each other than a building has
         except LineamentError as error:
@@ -320,8 +316,7 @@ class LineMap(ReadOnly):
 
         Examples
         --------
-        >>> plan = LineMap.from_lines([[0.0, 0.0, 1.0, 0.0]])
-        >>> int(plan.to_grid().occupied.sum())
+        >>> int(LineMap.from_lines([[0.0, 0.0, 1.0, 0.0]]).to_grid().occupied.sum())
         20
         """
         return Grid.drawn(np.concatenate((self.ends, rings(self.columns))), seen, resolution)
@@ -330,10 +325,15 @@ class LineMap(ReadOnly):
         """Write the map, in the format of the ending of the path.
 
         Those are the formats of ``lineament extract``, and ``.yaml``: an occupancy grid without
-        free cells, see `to_grid`, with its image beside it.
+        free cells, see `to_grid`, with its image beside it. In a table a wall is seen from its
+        left: one that may be seen from either side has two rows.
         """
-        if Path(path).suffix.lower() in GRID_ENDINGS:
+        ending, plan = Path(path).suffix.lower(), self
+        if ending in GRID_ENDINGS:
             self.to_grid().write(path)
             return
+        both = self.walls[self.walls["side"] == 0]
+        if len(both) and ending not in (".dxf", ".svg", ".geojson"):
+            plan = LineMap(np.append(self.walls, turned_back(both)), self.columns)
         with open_writer(path) as writer:
-            writer.write(self.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
+            writer.write(plan.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))

@@ -39,6 +39,16 @@ def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
     return make
 
 
+def unknown_plan(ending: str) -> LineamentError:
+    """Return the error of a file that is no plan by its ending, with what to do about it."""
+    if ending in (".pgm", ".png"):
+        return LineamentError("is an image, expected the .yaml of the grid that it is of")
+    return LineamentError(
+        f"a plan is a .dxf, .parquet, .svg or the .yaml of a grid, not {ending or 'this'}: "
+        "`lineament map LOG -o plan.dxf` makes one of a drive"
+    )
+
+
 def is_a_building(size: float) -> bool:
     """Whether a plan so long [m] can be that of a building."""
     return _BUILDINGS[0] <= size <= _BUILDINGS[1]

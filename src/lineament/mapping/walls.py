@@ -80,6 +80,15 @@ def moved(walls: Records, frame: Pose) -> Records:
     return found
 
 
+def turned_back(walls: Records) -> Records:
+    """Return walls as they are from their other side."""
+    found = walls.copy()
+    found["start"], found["end"] = walls["end"], walls["start"]
+    found["angle"] = wrapped(walls["angle"] + math.pi)
+    found["covariance"] *= [[1, -1], [-1, 1]]
+    return found
+
+
 def shared(records: Records, dtype: np.dtype[np.void]) -> Records:
     """Return records of another kind, of which the fields that both have are set."""
     found = np.zeros(len(records), dtype)

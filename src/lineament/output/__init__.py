@@ -20,6 +20,7 @@ _WRITERS = {
     ".rrd": ("rrd", "RerunWriter"),
     ".svg": ("svg", "SvgWriter"),
     ".dxf": ("dxf", "DxfWriter"),
+    ".geojson": ("geojson", "GeoJsonWriter"),
 }
 
 #: The endings that `open_writer` knows.
@@ -34,7 +35,8 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
     path : path-like
         The file, which is replaced if it is there: ``.parquet`` or ``.csv`` (one row a feature),
         ``.jsonl`` (one line a scan), ``.mcap`` (for Foxglove), ``.ros2.mcap`` (for RViz), ``.rrd``
-        (for rerun), ``.svg`` or ``.dxf`` (a plan). They are described in ``docs/formats.md``.
+        (for rerun), ``.svg``, ``.dxf`` or ``.geojson`` (a plan). They are described in
+        ``docs/formats.md``.
     topics : sequence of str
         The topics that the scans come from, where a log has several: tables have a column then.
 

@@ -51,6 +51,33 @@ def plot_scan(
     canvas.save(scan_figure(scan, features_by_method, **shown), path)
 
 
+def plot_walls(
+    lines: Array,
+    centers: Array,
+    radii: Array,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "",
+    dark: bool = False,
+) -> None:
+    """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Circle
+
+    canvas.check_ending(path)
+    points = np.concatenate((lines.reshape(-1, 2), centers))
+    wide = canvas.PAGE_WIDTH
+    figure = canvas.new_figure(wide, canvas.plane_height(points, wide), dark=dark)
+    axes = figure.subplots()
+    about = f"{count(len(lines), 'wall')}, {count(len(radii), 'column')}"
+    canvas.style_plane(axes, title, about, points)
+    theme = canvas.theme_of(axes)
+    axes.add_collection(LineCollection(list(lines), colors=theme.ink, linewidths=0.8))
+    for center, radius in zip(centers.tolist(), radii.tolist(), strict=True):
+        axes.add_patch(Circle(center, radius, fill=False, color=theme.arc))
+    canvas.save(figure, path)
+
+
 def scan_figure(
     scan: LaserScan,
     features_by_method: Mapping[str, Features],

@@ -1,0 +1,132 @@
+"""`lineament plan` and `info` of plans: every format into every other, and what is refused."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from handmade import arc, features, segment
+
+import lineament as ln
+from lineament.cli import run
+from lineament.mapping import Grid, LineMap
+from lineament.output import open_writer
+
+ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
+
+
+@pytest.fixture
+def plan(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = LineMap.from_lines(ROOM, [[2.0, 1.5, 0.25]])
+    made.write("room.svg")
+    return made
+
+
+def ends_of(plan):
+    return sorted(map(tuple, plan.ends.reshape(-1, 4).round(5).tolist()))
+
+
+@pytest.mark.parametrize("ending", ["dxf", "svg", "parquet"])
+def test_a_plan_goes_through_each_format_and_back(plan, ending):
+    source = "room.dxf" if ending == "svg" else "room.svg"
+    plan.write(source)
+    layers = ["--layers", "WALLS,ARCS"]  # of a DXF, columns are not among the walls
+    assert run(["plan", source, "-o", f"a.{ending}", "-q", *layers]) == 0
+    again = LineMap.read(f"a.{ending}", layers=["WALLS", "ARCS"])
+    if ending == "parquet":  # seen from the left alone: each wall twice
+        assert len(again.walls) == 8
+        assert (again.walls["side"] == 1).all()
+        both = [*ROOM.tolist(), *ROOM[:, [2, 3, 0, 1]].tolist()]
+        np.testing.assert_allclose(ends_of(again), sorted(map(tuple, both)), atol=1e-5)
+    else:
+        assert (again.walls["side"] == 0).all()
+        np.testing.assert_allclose(ends_of(again), ends_of(plan), atol=1e-5)
+    np.testing.assert_allclose(again.columns["center"], [[2.0, 1.5]])
+    np.testing.assert_allclose(again.columns["radius"], [0.25])
+
+
+@pytest.mark.usefixtures("plan")
+def test_a_plan_becomes_a_grid_and_a_grid_keeps_its_cells(capsys):
+    assert run(["plan", "room.svg", "-o", "a.yaml", "--resolution", "0.1"]) == 0
+    assert "no cell is free" in capsys.readouterr().out
+    grid = Grid.read("a.yaml")
+    assert grid.resolution == 0.1
+    assert run(["plan", "a.yaml", "-o", "b.yml", "-q"]) == 2
+    assert run(["plan", "a.yaml", "-o", "b.yaml", "-q"]) == 0
+    assert (Grid.read("b.yaml").cells == grid.cells).all()
+
+
+def test_geojson_has_walls_columns_and_corners_in_metres(plan):
+    assert run(["plan", "room.svg", "-o", "a.geojson", "-q"]) == 0
+    found = json.loads(Path("a.geojson").read_text(encoding="utf-8"))
+    assert found["type"] == "FeatureCollection"
+    assert found["unit"] == "metre"
+    kinds = [one["properties"]["kind"] for one in found["features"]]
+    assert kinds == ["wall"] * 4 + ["arc"] + ["corner"] * 4
+    wall, column = found["features"][0]["geometry"], found["features"][4]["geometry"]
+    assert wall == {"type": "LineString", "coordinates": [[0, 0], [4, 0]]}
+    (ring,) = column["coordinates"]
+    assert column["type"] == "Polygon"
+    assert ring[0] == pytest.approx(ring[-1], abs=1e-6)
+    assert len(plan.corners) == 4
+
+
+@pytest.mark.usefixtures("plan")
+@pytest.mark.parametrize("ending", ["png", "pdf", "csv", "jsonl"])
+def test_pictures_and_tables_are_written(ending):
+    assert run(["plan", "room.svg", "-o", f"a.{ending}", "-q", "--dark"]) == 0
+    assert Path(f"a.{ending}").stat().st_size > 300
+
+
+def test_arcs_of_an_svg_are_the_circles_that_they_are_parts_of(tmp_path):
+    n, center = 200, np.array((2.0, 0.3))
+    for first, last in ((-0.5, 0.4), (-1.2, 1.2)):
+        bearings = np.linspace(first, last, n)
+        scan = ln.LaserScan(np.full(n, 1.0), first, bearings[1] - bearings[0])
+        round_ = arc(*center, 0.5, 0, n - 1)
+        with open_writer(tmp_path / "a.svg") as writer:
+            writer.write(features(segments=[segment((0, -1), (3, -1), 0, 9)], arcs=[round_]), scan)
+        (column,) = LineMap.read(tmp_path / "a.svg").columns
+        np.testing.assert_allclose(column["center"], center, atol=1e-5)
+        assert math.isclose(column["radius"], 0.5, abs_tol=1e-6)
+
+
+def test_info_describes_a_plan_or_a_grid(plan, capsys):
+    assert run(["info", "room.svg"]) == 0
+    said = capsys.readouterr().out
+    assert "walls    4, 14.0 m in all, 0 of them" in said
+    assert "columns  1" in said
+    plan.write("a.yaml")
+    assert run(["info", "a.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert "cells of 0.05 m" in said
+    assert "0.0 % free" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "line"),
+    [
+        (["plan", "room.svg", "-o", "a.gif"], 2, "expected an ending of .dxf, .yaml, .svg"),
+        (["plan", "room.svg", "-o", "room.svg"], 1, "would replace room.svg, which is read"),
+        (["plan", "none.svg", "-o", "a.dxf"], 1, "none.svg: No such file"),
+        (["plan", "log.npz", "-o", "a.dxf"], 1, "a plan is a .dxf, .parquet, .svg or the .yaml"),
+        (["plan", "other.svg", "-o", "a.dxf"], 1, "other.svg: is no plan that lineament wrote"),
+        (["plan", "broken.svg", "-o", "a.dxf"], 1, "broken.svg: is no SVG: "),
+        (["plan", "a.yaml", "-o", "a.yaml"], 1, "a.yaml: would replace a.yaml, which is read"),
+        (["info", "other.svg"], 1, "other.svg: is no plan that lineament wrote"),
+    ],
+)
+def test_what_cannot_be_converted_is_one_line(plan, capsys, arguments, status, line):
+    for name, text in (
+        ("other.svg", '<svg xmlns="http://www.w3.org/2000/svg"><g id="walls"/></svg>'),
+        ("broken.svg", "<svg"),
+        ("log.npz", ""),
+    ):
+        Path(name).write_text(text, encoding="utf-8")
+    plan.write("a.yaml")
+    assert run(arguments) == status
+    said = capsys.readouterr().err
+    assert line in said
+    assert said.count("\n") == 1
