@@ -234,7 +234,7 @@ class TestSeeds:
             (["F1 0.50 of liu2", "F1 0.75 of liu2"], "F1 0.50 (0.50–0.75) of liu2"),
             (
                 ["A 1. It holds.", "A 2. It fails."],
-                "A 1 (1–2). It holds. (1 of 2 seeds); It fails. (1 of 2 seeds)",
+                "A 1 (1–2). It holds. (so in 1 of 2 seeds)",
             ),
             (["9.6 – 25.3", "9.7 – 20.0"], "9.6 (9.6–9.7) – 20.0 (20.0–25.3)"),
         ],

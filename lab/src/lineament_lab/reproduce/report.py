@@ -1,5 +1,6 @@
 """The report of experiments: one page, and one file with all numbers."""
 
+import io
 import json
 import os
 import platform
@@ -29,6 +30,8 @@ from .seeds import Spread
 
 #: Names of the files.
 _PAGE, _NUMBERS = "index.html", "figures.json"
+#: Colours of a picture: those of ten methods, and what is between them and the paper.
+_COLORS = 64
 _INTRODUCTION = (
     "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
     "The values of its tables and of its Figure 12 are not available: where one stands only there, "
@@ -147,8 +150,22 @@ def findings_parts(findings: Findings) -> list[str]:
         )
         for table in findings.tables
     ]
-    images = [image_part(figure.caption, figure.png, figure.name) for figure in findings.figures]
+    images = [
+        image_part(figure.caption, _smaller(figure.png), figure.name) for figure in findings.figures
+    ]
     return [*text_parts(findings.text), *tables, *images]
+
+
+def _smaller(png: bytes) -> bytes:
+    """Return a picture with so few colours that the page can be sent by mail."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as image:
+        method, plain = Image.Quantize.FASTOCTREE, Image.Dither.NONE
+        few = image.convert("RGB").quantize(_COLORS, method=method, dither=plain)
+    few.save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
 
 
 #: A cell that is a number and nothing else; a dash is one that is missing.

@@ -58,11 +58,13 @@ def run(setting: Setting, progress: Progress) -> Findings:
         )
         tables.append(Table.of_numbers(f"Scans of a simulated {kind}", rows, _COLUMNS, note))
         of_frames = [Scores.total(of) for of in zip(*scores.values(), strict=True)]
-        order = median_of(enumerate(of_frames), lambda item: item[1].segments.counts.f1)[0]
-        frame = frames[order]
+        corners = [len(frame.truth.corners) for frame in frames]
+        full = [k for k, count in enumerate(corners) if count >= np.median(corners)]
+        f1 = [scores.segments.counts.f1 for scores in of_frames]
+        frame = frames[median_of(full, f1.__getitem__)]
         about = (
-            f"Simulated {kind}: of {len(frames)} scans the one with the median F1 of the segments "
-            "of all methods together"
+            f"Simulated {kind}: of {len(full)} of {len(frames)} scans, those with most corners, "
+            "the one with the median F1 of the segments of all methods together"
         )
         found = {name: extract(frame.scan) for name, extract in methods.items()}
         figures += pictures(f"fig11-{kind}", about, frame.scan, {TRUE: frame.truth} | found)

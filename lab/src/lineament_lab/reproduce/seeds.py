@@ -127,21 +127,23 @@ _SENTENCES = re.compile(r"(?<=[.:;]) ")
 
 
 def merged_text(texts: Sequence[str]) -> str:
-    """Merge sentences that differ in their numbers; those that differ otherwise are all given.
+    """Merge sentences that differ in their numbers; of those that differ otherwise, most count.
 
     Examples
     --------
     >>> merged_text(["3 of 9. It holds.", "4 of 9. It holds.", "8 of 9. It fails."])
-    '4 (3–8) of 9. It holds. (2 of 3 seeds); It fails. (1 of 3 seeds)'
+    '4 (3–8) of 9. It holds. (so in 2 of 3 seeds)'
     """
     if len(set(texts)) == 1:
         return texts[0]
     sentences = [_SENTENCES.split(text) for text in texts]
     if len({len(each) for each in sentences}) == 1 < len(sentences[0]):
         return " ".join(merged_text(same) for same in zip(*sentences, strict=True))
-    if len({_NUMBER.sub("", text) for text in texts}) > 1:
-        counts = Counter(texts).items()
-        return "; ".join(f"{text} ({count} of {len(texts)} seeds)" for text, count in counts)
+    forms = Counter(_NUMBER.sub("", text) for text in texts)
+    if len(forms) > 1:
+        form, count = forms.most_common(1)[0]
+        alike = merged_text([text for text in texts if _NUMBER.sub("", text) == form])
+        return f"{alike} (so in {count} of {len(texts)} seeds)"
     tokens = iter([_merged_token(each) for each in zip(*map(_NUMBER.findall, texts), strict=True)])
     return _NUMBER.sub(lambda _: next(tokens), texts[0])
 
