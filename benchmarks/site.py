@@ -133,6 +133,18 @@ def on_post_build(config: Any) -> None:
     folder = Path(config.site_dir, "search")
     index = (folder / "search_index.json").read_text("utf-8")
     (folder / "search_index.js").write_text(f"var __index = {index}", "utf-8")
+    lines = [f"# {config.site_name}", "", f"> {config.site_description}", *_outline(config.nav)]
+    Path(config.site_dir, "llms.txt").write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def _outline(nav: Any) -> Iterator[str]:
+    """Yield the navigation as the lines of llms.txt: a section a part, a link a page."""
+    for part in nav:
+        ((title, inside),) = part.items() if isinstance(part, dict) else (("", part),)
+        if isinstance(inside, str):
+            yield f"- [{title or inside}]({inside.removesuffix('.md')}.html)"
+        else:
+            yield from ("", f"## {title}", "", *_outline(inside))
 
 
 def on_post_page(output: str, page: Page, **_: Any) -> str:
