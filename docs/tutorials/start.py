@@ -36,8 +36,8 @@ features
 # That is what a notebook shows. The first call compiles the kernels, once for
 # each installation; from then on a scan takes well below a millisecond. Each kind
 # is an array with named
-# [fields](reference/lineament.features.md#lineament.features.CORNER), here the
-# corners with a [quality](optimal.md) above 0.9:
+# [fields](../reference/lineament.features.md#lineament.features.CORNER), here the
+# corners with a [quality](../optimal.md) above 0.9:
 
 # %%
 corners = features.corners[features.corners["quality"] > 0.9]
@@ -49,7 +49,7 @@ for corner in corners[:4]:
 # %% [markdown]
 # ## A picture
 #
-# On axes of your own with `ax=`; [formats](formats.md#pictures-of-plot-and-demo)
+# On axes of your own with `ax=`; [formats](../formats.md#pictures-of-plot-and-demo)
 # explains the marks.
 
 # %% alt="The scan with its walls, corners and columns"
@@ -58,7 +58,7 @@ axes = features.plot()
 # %% [markdown]
 # ## Your own log
 #
-# Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](logs.md) are
+# Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](../logs.md) are
 # opened alike. Put yours in place of this one, which is made on the spot:
 
 # %%
@@ -82,7 +82,7 @@ log
 # ## A table
 #
 # `lineament extract drive.bag -o features.parquet` writes a row for each feature;
-# a folder in place of a file takes [many logs](scale.md) at once. In Python:
+# a folder in place of a file takes [many logs](../scale.md) at once. In Python:
 
 # %%
 import pyarrow as pa
@@ -95,9 +95,9 @@ corners[["scan", "stamp", "x", "y", "quality", "corner"]].head()
 # %% [markdown]
 # ## Go on
 #
-# - The tutorials: [a bag to a data frame](tutorials/frame.md), [corners in the
-#   world](tutorials/world.md), [where am I](tutorials/where.md), [a docking
-#   pose](tutorials/dock.md), [live on a robot](tutorials/live.md), [many logs on
-#   Dask](tutorials/dask.md).
-# - What it finds in [real scans](gallery.md), and [how good that is](results.md).
-# - [The methods](methods.md), and all names [from Python](python.md).
+# - The tutorials: [a bag to a data frame](frame.md), [corners in the
+#   world](world.md), [where am I](where.md), [a docking
+#   pose](dock.md), [live on a robot](live.md), [many logs on
+#   Dask](dask.md).
+# - What it finds in [real scans](../gallery.md), and [how good that is](../results.md).
+# - [The methods](../methods.md), and all names [from Python](../python.md).
