@@ -42,10 +42,14 @@ class NoLibraryError(Exception):
 
 
 def sources(home: Path | None = None) -> list[Path]:
-    """Return the files that the kernels of a folder are made of; those of others call ours."""
-    homes = {HERE, home or HERE}
-    kernels = (path for one in homes for path in one.rglob("*.py") if path.name != "library.py")
-    return sorted([*kernels, HERE.parent / "features" / "records.py"])
+    """Return the files that the kernels of a folder are made of; those of others call ours.
+
+    Their order is the same wherever both are installed.
+    """
+    homes = dict.fromkeys((HERE, home or HERE))
+    kernels = [path for one in homes for path in sorted(one.rglob("*.py"))]
+    own = [path for path in kernels if path != HERE / "library.py"]
+    return [HERE.parent / "features" / "records.py", *own]
 
 
 def state(home: Path | None = None) -> str:
