@@ -1,10 +1,9 @@
 # %% [markdown]
 # # Many logs on Dask
 #
-# A folder of logs becomes one data set: a file for each log, whole or not at all,
-# and a manifest that says what became of each. The work is spread over the
-# workers of a Dask cluster; here two processes on this machine, elsewhere
-# whatever your cluster is, if its workers see the same paths.
+# A folder of logs becomes one data set: a file for each log, and a manifest
+# that says what became of each. Here two processes on this machine do the work;
+# on a cluster, its workers have to see the same paths.
 
 # %%
 from pathlib import Path
@@ -22,8 +21,8 @@ print(*sorted(path.name for path in Path("logs").iterdir()))
 # %% [markdown]
 # ## Extract
 #
-# `lineament extract logs/ -o features/ --dask tcp://scheduler:8786` is the same
-# from the shell; without `--dask` the logs go to a process on each processor.
+# From the shell this is `lineament extract logs/ -o features/ --dask
+# tcp://scheduler:8786`. Without `--dask` a process on each processor works.
 
 # %%
 import lineament as ln
@@ -35,8 +34,8 @@ with cluster, dask_executor(cluster.scheduler_address) as executor:
     print(extract_logs("logs", "features", ln.Extractor(), executor=executor))
 
 # %% [markdown]
-# One log was broken. It has stopped no other, and the manifest, one line of JSON
-# a log, says what is wrong with it:
+# One log is broken. It stops no other, and its line in the manifest says what
+# is wrong:
 
 # %%
 import pandas as pd
@@ -49,8 +48,8 @@ manifest[["outcome", "scans", "invalid", "bytes", "seconds"]].round(3)
 # %% [markdown]
 # ## Query
 #
-# pyarrow, DuckDB, Spark and Dask itself read the folder as one table with a
-# column `log`, and only the columns and logs that a query asks for.
+# pyarrow, DuckDB, Spark and Dask read the folder as one table with a column
+# `log`, and only the columns and logs that a query asks for.
 
 # %%
 import pyarrow.dataset as ds
@@ -63,7 +62,7 @@ corners = dataset.to_table(
 per_scan = corners.to_pandas().groupby("log").size() / 40
 
 # %% [markdown]
-# In this case: how many good corners each scanner finds in each world.
+# How many good corners does each scanner find in each world?
 
 # %% alt="Good corners in a scan, by the world it was taken in and the scanner"
 names = per_scan.index.str.removesuffix(".npz").str.split("-", expand=True)
@@ -74,13 +73,13 @@ _ = axes.set_ylabel("good corners a scan")
 # %% [markdown]
 # ## Again
 #
-# With `resume=True` (`--resume`) a run does only what is missing, or was done by
-# another version, with other parameters, or on a log that has changed since. Here
-# that is the broken log, and it is tried again:
+# With `resume=True` (`--resume`) a run does only what is missing, has changed,
+# or was done by another version or with other parameters. Here that is the
+# broken log:
 
 # %%
 print(extract_logs("logs", "features", ln.Extractor(), resume=True))
 
 # %% [markdown]
-# [Many logs](../scale.md) has what becomes of workers that die, disks that fill
-# up and logs in object stores, and what a day of a fleet of 10,000 robots costs.
+# [Many logs](../scale.md) says what happens when a worker dies or a disk is
+# full, and what a day of a fleet of 10,000 robots costs.

@@ -2,10 +2,10 @@
 # # A docking pose
 #
 # A robot that drives to a dock needs the pose of the dock in its own frame, ten
-# times a second, with a covariance that its controller can rely on. Any corner of
-# two walls gives such a pose: its place is where the lines of both walls meet,
-# its x axis is their bisector. lineament follows one corner from scan to scan by
-# its track, so that it is not mistaken for another.
+# times a second, with a covariance that its controller can rely on. A corner of
+# two walls gives one: its position is where their lines meet, its x axis is
+# their bisector. lineament follows the corner by its track, so that it is not
+# mistaken for another.
 
 # %%
 import lineament as ln
@@ -18,16 +18,14 @@ scans = list(drive(world, way, SENSORS["utm30lx"], speed=0.5, rate=10, seed=3))
 print(len(scans), "scans, the first from", scans[0].pose)
 
 # %% [markdown]
-# The drive is simulated, so that the truth is known: the corner is at (3, 2) of
-# the room. On a robot the scans come from a log or from a topic, and nothing else
-# changes.
+# The drive is simulated, so the truth is known: the corner is at (3, 2) of the
+# room. On a robot the scans come from a log or a topic.
 #
 # ## Choose a corner
 #
 # `Dock` takes a point in the frame of the first scan, and chooses the corner
-# nearest to it; within a metre is near enough. The tracker finds which features
-# of a scan are those of the last one, and from them the motion between; the
-# odometer adds the motions up.
+# nearest to it, within a metre. The tracker matches features to those of the
+# last scan and gives the motion between; the odometer adds the motions up.
 
 # %% alt="The first scan, with the corner that is followed"
 from lineament.motion import inverse
@@ -60,14 +58,14 @@ sigma = np.sqrt(np.diag(last.covariance))
 print("standard deviations [mm, mm, mrad]:", (1000 * sigma).round(2))
 
 # %% [markdown]
-# A scan in which the corner is hidden gives None: a controller that goes on by
-# odometry in between does not notice.
+# Where the corner is hidden, `dock` gives None, and the controller goes on by
+# odometry.
 #
 # ## Is the covariance right?
 #
-# The pose of the scanner is known in a simulation, so the corner can be put into
-# the room by it. Errors should stay within two standard deviations in 19 of 20
-# scans. The band becomes narrower as the robot comes closer.
+# In a simulation the true pose of the scanner puts the corner into the room.
+# Errors should stay within two standard deviations in 19 of 20 scans. The band
+# narrows as the robot comes closer.
 
 # %% alt="Errors of the pose of the corner along the drive, within two standard deviations"
 from matplotlib import pyplot as plt
@@ -95,14 +93,13 @@ print(f"within two standard deviations: {(np.abs(errors) < 2 * sigma).mean():.0%
 # %% [markdown]
 # ## On the robot
 #
-# The node does the same, and publishes the pose as
-# `geometry_msgs/PoseWithCovarianceStamped`:
+# The node publishes the pose as `geometry_msgs/PoseWithCovarianceStamped`:
 #
 # ```sh
 # lineament live --dock 5.3 1.8    # the corner nearest to this point, in the first scan
 # lineament live --dock-track 17   # or the one with this track
 # ```
 #
-# The covariance is that of the noise alone. Real walls are not straight; how far
-# off they are is the field `misfit` of the two segments, and
+# The covariance is that of the noise alone. Real walls are not straight: the
+# field `misfit` of both segments says how far off they are, and
 # [live](../live.md#topics) has what was measured on a robot.

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # A bag to a data frame
 #
-# From a recording to the questions one asks of it with pandas. The log is a ROS 1
-# bag of two Hokuyo scanners that stand in an office while people walk by. Where
-# that recording is not at hand, a simulated drive takes its place; the code is
-# the same for every [format](../logs.md).
+# From a recording to the questions that one asks of it with pandas. The log is
+# a ROS 1 bag of two Hokuyo scanners in an office where people walk by. Where it
+# is not at hand, a simulated drive takes its place; the code is the same for
+# every [format](../logs.md).
 
 # %%
 import os
@@ -24,9 +24,9 @@ print(len(log), "scans on", *log.topics)
 # %% [markdown]
 # ## Look first
 #
-# `lineament info` reports what a log holds, and `ln.plot` draws a scan of it.
-# Measurements have the colour of their cluster, diamonds are corners, smaller and
-# lighter ones edges, where a wall ends before what is behind it.
+# `ln.plot` draws a scan (and `lineament info` prints what a log holds).
+# Measurements have the colour of their cluster. Diamonds are corners; smaller,
+# lighter ones are edges, where a wall ends before what is behind it.
 
 # %% alt="A scan of the log, with segments, corners and clusters"
 axes = ln.plot(path, scan=40)
@@ -34,9 +34,9 @@ axes = ln.plot(path, scan=40)
 # %% [markdown]
 # ## Extract
 #
-# `lineament extract LOG -o features.parquet` does this from the shell: all scans,
-# one row for each feature, in memory that does not grow with the log. Where a log
-# has several topics, a column names that of each row.
+# From the shell this is `lineament extract LOG -o features.parquet`: all scans,
+# one row for each feature, in memory that does not grow with the log. Where a
+# log has several topics, a column names that of each row.
 
 # %%
 from lineament.tasks.extract import extract_log
@@ -54,13 +54,13 @@ frame.groupby("kind", observed=True)[
 ].count()
 
 # %% [markdown]
-# Columns that a kind does not fill are null: segments have a length, corners a
-# quality, arcs a radius. [Formats](../formats.md#parquet-one-row-a-feature) lists
-# them all.
+# A column that a kind does not fill is null: segments have a length, corners a
+# quality, arcs a radius. [Formats](../formats.md#parquet-one-row-a-feature)
+# lists them all.
 #
 # ## Ask
 #
-# How much wall is seen in each scan, and how many corners that can be relied on?
+# How much wall does each scan see, and how many corners that can be relied on?
 
 # %%
 scans = pd.DataFrame(
@@ -74,10 +74,10 @@ scans = pd.DataFrame(
 scans.describe().loc[["mean", "std", "min", "max"]].round(2)
 
 # %% [markdown]
-# And how well are they known? The covariance of a corner is in `cov_00`, `cov_01`
-# and `cov_11`; the square root of its trace is the error to expect. Corners whose
-# walls are long and near are known to a millimetre, those of short walls or far
-# away to some centimetres. The axis is logarithmic.
+# How well are the corners known? The covariance is in `cov_00`, `cov_01` and
+# `cov_11`; the square root of its trace is the error to expect. Near corners of
+# long walls are known to a millimetre, others to some centimetres. The axis is
+# logarithmic.
 
 # %% alt="Histogram of the standard deviations of the corners"
 corners = frame.query("kind == 'corner'")
@@ -89,11 +89,10 @@ axes.set_xlabel("standard deviation of a corner [mm]")
 _ = axes.set_ylabel("corners")
 
 # %% [markdown]
-# The same questions without pandas: DuckDB reads the file as it is,
+# DuckDB, polars, Arrow and Spark read the same file:
 #
 # ```sql
 # SELECT scan, sum(length) FROM 'features.parquet' WHERE kind = 'segment' GROUP BY scan;
 # ```
 #
-# and polars, Arrow and Spark do as well. Next: [the same corners in the frame of
-# the world](world.md).
+# Next: [the same corners in the frame of the world](world.md).

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Live on a robot
 #
-# `lineament live` listens to a scanner and publishes what it finds, over DDS:
-# everything that speaks ROS 2 hears it, and ROS need not be installed. Here a log
+# `lineament live` listens to a scanner and publishes what it finds over DDS:
+# all that speaks ROS 2 hears it, and ROS need not be installed. Here a log
 # plays the robot, in a process beside this notebook, which subscribes to the
 # features as a program on the robot would.
 
@@ -30,15 +30,14 @@ node = Popen(command, stdout=PIPE, stderr=STDOUT, text=True)
 print(next(line for line in node.stdout if "finds features" in line))
 
 # %% [markdown]
-# On a robot, `lineament live --track` is all of it: it takes the scans of `/scan`
-# in place of a log.
+# On a robot, `lineament live --track` is all of it: it takes the scans of
+# `/scan`.
 #
 # ## Subscribe
 #
-# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`. In
-# a node of ROS 2 the message comes from `create_subscription`. Without ROS, its
-# type is written down for Cyclone DDS, which `pip install 'lineament[live]'`
-# brings along:
+# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`.
+# A node of ROS 2 gets it by `create_subscription`. Without ROS, the type is
+# written down for Cyclone DDS (`pip install 'lineament[live]'`):
 
 # %%
 import numpy as np
@@ -71,9 +70,9 @@ reader = DataReader(participant, topic)
 # %% [markdown]
 # ## Read
 #
-# A point is a feature, its numbers are the named fields of the message
-# ([formats](../formats.md#feature-cloud-sensor_msgspointcloud2) lists them).
-# NumPy sees them as they are, whoever sent them:
+# A point is a feature, and its numbers are the named
+# [fields](../formats.md#feature-cloud-sensor_msgspointcloud2) of the message.
+# NumPy sees them as they are:
 
 # %%
 TYPES = {5: "<i4", 6: "<u4", 7: "<f4"}  # of PointField.datatype
@@ -92,8 +91,8 @@ for stamp, points in clouds[::10]:
 # %% [markdown]
 # ## Tracks
 #
-# With `--track` the field `track` is a number that lasts from scan to scan. Here
-# are the walls of the last scan, and where each of its corners has been before,
+# With `--track` the field `track` is a number that lasts from scan to scan.
+# Here are the walls of the last scan, and where its corners have been before,
 # in the frame of the scanner: the robot drives down a corridor, and the corners
 # come towards it.
 
@@ -118,8 +117,7 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # %% [markdown]
 # ## Stop
 #
-# SIGINT and SIGTERM end the node cleanly, and its last lines say what it has
-# done.
+# SIGINT and SIGTERM end the node cleanly; its last lines say what it has done.
 
 # %%
 node.terminate()
@@ -127,6 +125,6 @@ print(node.stdout.read().strip())
 print("exit status", node.wait(20))
 
 # %% [markdown]
-# Beside the features there are `/scan/corners`, `/scan/markers` for RViz,
-# `/scan/odometry` and `/scan/dock`, each with its covariance; [live](../live.md)
-# describes them, the options, and how to see the same in Foxglove.
+# There are also `/scan/corners`, `/scan/markers` for RViz, `/scan/odometry` and
+# `/scan/dock`. [Live](../live.md) describes them, the options, and how to see
+# the same in Foxglove.

@@ -2,22 +2,22 @@
 # # lineament in five minutes
 #
 # lineament finds lines, corners, arcs and clusters in the scans of a 2-D LiDAR,
-# each with its covariance. It reads the logs that robots write, runs in real time
-# beside a scanner, and needs neither ROS nor a compiler.
+# each with its covariance. It reads the logs that robots write, and runs in
+# real time beside a scanner, without ROS.
 #
 # ## Install
 #
-# With Python 3.11 or newer, from a checkout or from a wheel:
+# With Python 3.11 or newer:
 #
 # ```sh
-# pip install .            # or: pip install lineament-*.whl
+# pip install lineament-*.whl    # or, from a checkout: pip install . (compiles some minutes)
 # lineament --help
 # ```
 #
 # ## A scan
 #
-# Ranges and the geometry of the scanner are all that is needed. Here they come
-# from a simulated scanner, a Hokuyo UTM-30LX in a hall with round columns:
+# You give ranges and the geometry of the scanner. Here they come from a
+# simulated Hokuyo UTM-30LX in a hall with round columns:
 
 # %%
 import lineament as ln
@@ -33,11 +33,10 @@ features = ln.extract(
 features
 
 # %% [markdown]
-# That is what a notebook shows. The first call compiles the kernels, once for
-# each installation; from then on a scan takes well below a millisecond. Each kind
-# is an array with named
-# [fields](../reference/lineament.features.md#lineament.features.CORNER), here the
-# corners with a [quality](../optimal.md) above 0.9:
+# A scan takes well below a millisecond. A notebook shows this table and
+# picture. Each kind is an array with named
+# [fields](../reference/lineament.features.md#lineament.features.CORNER). Here are
+# the corners with a [quality](../optimal.md) above 0.9:
 
 # %%
 corners = features.corners[features.corners["quality"] > 0.9]
@@ -49,8 +48,8 @@ for corner in corners[:4]:
 # %% [markdown]
 # ## A picture
 #
-# On axes of your own with `ax=`; [formats](../formats.md#pictures-of-plot-and-demo)
-# explains the marks.
+# [Formats](../formats.md#pictures-of-plot-and-demo) explains the marks; `ax=`
+# draws on your own axes.
 
 # %% alt="The scan with its walls, corners and columns"
 axes = features.plot()
@@ -58,8 +57,8 @@ axes = features.plot()
 # %% [markdown]
 # ## Your own log
 #
-# Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](../logs.md) are
-# opened alike. Put yours in place of this one, which is made on the spot:
+# Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](../logs.md)
+# open alike. Put yours in place of this one:
 
 # %%
 from lineament.simulation import simulate_log
@@ -71,7 +70,7 @@ log = ln.open_log("drive.npz")
 log
 
 # %% [markdown]
-# The same from the shell, and the pages that help to look at it:
+# From the shell:
 #
 # ```sh
 # lineament info drive.bag             # topics, scans, rates, what is invalid
@@ -81,8 +80,8 @@ log
 #
 # ## A table
 #
-# `lineament extract drive.bag -o features.parquet` writes a row for each feature;
-# a folder in place of a file takes [many logs](../scale.md) at once. In Python:
+# `lineament extract drive.bag -o features.parquet` writes a row for each
+# feature; a folder takes [many logs](../scale.md) at once. In Python:
 
 # %%
 import pyarrow as pa
@@ -97,7 +96,7 @@ corners[["scan", "stamp", "x", "y", "quality", "corner"]].head()
 #
 # - The tutorials: [a bag to a data frame](frame.md), [corners in the
 #   world](world.md), [where am I](where.md), [a docking
-#   pose](dock.md), [live on a robot](live.md), [many logs on
-#   Dask](dask.md).
-# - What it finds in [real scans](../gallery.md), and [how good that is](../results.md).
-# - [The methods](../methods.md), and all names [from Python](../python.md).
+#   pose](dock.md), [live on a robot](live.md), [many logs
+#   on Dask](dask.md).
+# - [Real scans](../gallery.md), and [how good the results are](../results.md).
+# - [The methods](../methods.md), and all of it [from Python](../python.md).

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # From a bag to “where am I”
 #
-# A robot is driven through a building once, and its bag becomes a plan. From then
-# on a few metres of way are enough to know where on the plan the robot is,
-# without a first guess, and how sure that is. The building is simulated here, so
-# that the truth is known; people walk in it, and the wheels slip. Any other
-# [log](../logs.md) does as well.
+# A robot drives through a building once, and its bag becomes a plan. From then
+# on a few metres of way show where on the plan the robot is, without a first
+# guess, and how sure that is. The building is simulated, so the truth is known;
+# people walk in it, and the wheels slip. Any other [log](../logs.md) does as
+# well.
 
 # %%
 import lineament as ln
@@ -33,7 +33,7 @@ print(len(monday_truth), "scans on Monday,", len(tuesday_truth), "on Tuesday")
 # ## Ten lines
 #
 # Monday’s bag becomes a plan. On Tuesday, when other people are about, the
-# robot is switched on somewhere, and goes a few metres:
+# robot is switched on somewhere and drives a few metres:
 
 # %%
 from itertools import islice
@@ -51,10 +51,10 @@ where = locate(local, plan)
 where
 
 # %% [markdown]
-# The verdict is one of four: located, ambiguous, a direction unobserved, or not on
-# this map. Only a pose that is *located* is to be relied upon; with `sigma`, its
-# covariance holds that the walls of the plan are 1 cm off. The frame of the plan
-# is that of Monday's first scan:
+# The verdict is one of four: located, ambiguous, a direction unobserved, or not
+# on this map. Rely on a pose only if it is *located*. `sigma` says that the
+# walls of the plan may be 1 cm off. The frame of the plan is that of Monday's
+# first scan:
 
 # %%
 import numpy as np
@@ -65,8 +65,8 @@ x, y, turn = relative(truth, where.pose)
 print(f"off by {1000 * np.hypot(x, y):.1f} mm and {np.degrees(turn):.2f}°")
 
 # %% [markdown]
-# A `LocalMap` keeps the last 5 m of the way. A single scan says less; where rooms
-# are alike, it may be ambiguous:
+# A `LocalMap` keeps the last 5 m of the way. A single scan holds less; where
+# rooms are alike, it may be ambiguous:
 
 # %%
 print(locate(features, plan))
@@ -74,8 +74,8 @@ print(locate(features, plan))
 # %% [markdown]
 # ## A whole log
 #
-# From the shell it is two commands; the second follows the robot, and reports where
-# it is lost. It deskews the scans, if they say how long a sweep takes; those of
+# From the shell it is two commands. The second follows the robot, and reports
+# where it is lost. It deskews scans that say how long a sweep takes; those of
 # this simulation are taken at once.
 #
 # ```sh
@@ -124,8 +124,8 @@ print(f"{located.mean():.0%} located; median {1000 * np.median(off):.0f} mm,")
 print(f"largest {1000 * off.max():.0f} mm")
 
 # %% [markdown]
-# The plan holds Monday’s furniture. Where all of it has been moved, too many beams
-# pass through what was there; the verdict there is that this is not the map:
+# The plan holds Monday’s furniture. When all of it has moved, too many beams
+# pass through what was there, and the verdict is that this is not the map:
 
 # %%
 wednesday, _ = record("wednesday", storey.refurnished(7), seed=3)
@@ -139,5 +139,5 @@ other = LineMap.from_lines(office(5, (30, 20)).plan.segments)
 print(locate(local, other).verdict)
 
 # %% [markdown]
-# How the pose is found, and how often it is right, is in [Where on a
-# plan](../locate.md); how the plan is made in [Maps](../maps.md).
+# [Where on a plan](../locate.md) says how the pose is found and how often it is
+# right, [Maps](../maps.md) how the plan is made.

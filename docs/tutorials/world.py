@@ -1,11 +1,12 @@
 # %% [markdown]
 # # Corners in the world
 #
-# Features are found in the frame of the scanner. Where a log has poses, lineament
-# moves them into the world, covariances turned with them. This tutorial makes a
-# map of corners from a drive, and asks how well one corner is known after it has
-# been seen many times. The log is a drive through an office building in Freiburg,
-# with the poses of a SLAM system, or a simulated one where that is not at hand.
+# Features are found in the frame of the scanner. Where a log has poses,
+# lineament moves them into the world and turns their covariances. This tutorial
+# makes a map of corners from a drive, and asks how well a corner is known that
+# has been seen many times. The log is a drive through an office building in
+# Freiburg with the poses of a SLAM system, or a simulated one where that is not
+# at hand.
 
 # %%
 import os
@@ -32,9 +33,8 @@ print(done.scans, "scans,", done.features["corners"], "corners")
 #     --poses '/tf:map->odom->base_link->laser'
 # ```
 #
-# the second for a bag, where a topic has to say [which
-# poses](../logs.md#ros-logs). Each row has the pose of its scan beside the
-# feature. Standard deviations are the roots of the variances, here in mm:
+# For a bag, you say [which poses](../logs.md#poses). Each row has the pose of
+# its scan. Standard deviations are the roots of the variances, here in mm:
 
 # %%
 import pandas as pd
@@ -48,7 +48,7 @@ columns = ["scan", "pose_x", "pose_y", "pose_theta", "x", "y", "sd_x", "sd_y"]
 corners[columns].head().round(3)
 
 # %% [markdown]
-# Walls and corners, all in one frame, are a map:
+# Walls and corners in one frame are a map:
 
 # %% alt="Walls of the whole drive, its corners, and the way of the scanner"
 import numpy as np
@@ -66,11 +66,10 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # %% [markdown]
 # ## One corner, seen many times
 #
-# Take the corner with the most neighbours within 10 cm, and draw each of its
-# sightings with the ellipse that should hold 95 % of its errors. The ellipses
-# point in different directions: a wall seen at a grazing angle says little about
-# where along it the corner is, and that direction has been turned into the world
-# with the rest.
+# Take the corner with the most neighbours within 10 cm, and draw each sighting
+# with the ellipse that should hold 95 % of its errors. The ellipses point in
+# different directions: a wall seen at a grazing angle says little about where
+# along it the corner is.
 
 # %% alt="The sightings of one corner, with their 95 % ellipses"
 from matplotlib.patches import Ellipse
@@ -95,11 +94,10 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # %% [markdown]
 # ## What the ellipses leave out
 #
-# The ellipses are those of the noise of the scanner. Weighted by them, the
-# sightings have a mean, and what they are off it should be χ² with two degrees of
-# freedom, with a median of 1.39. In a simulation it is. On a real drive it is far
-# more: the poses are off by centimetres, and that, not the noise of the scanner,
-# is what limits the map.
+# The ellipses are those of the noise of the scanner. What the sightings are off
+# their weighted mean should be χ² with two degrees of freedom, with a median of
+# 1.39. In a simulation it is. On a real drive it is far more: the poses are off
+# by centimetres, and that limits the map.
 
 # %%
 weights = np.linalg.inv(covariances[place])
@@ -112,8 +110,7 @@ print(f"scatter {1000 * off.std():.1f} mm, median of χ² {chi2:.1f}, expected 1
 
 # %% [markdown]
 # Bags say how well their poses are known, as `PoseWithCovarianceStamped` or
-# `Odometry`. `--world` then adds that to the covariance of each feature, and in
-# Python `features.transform(*scan.pose, scan.pose_covariance)` does. It is the
-# same error for all features of a scan:
-# [formats](../formats.md#in-the-world-world) has the formula, and what a mean
-# over many scans does not take away.
+# `Odometry`. `--world` adds that to the covariance of each feature; in Python
+# `features.transform(*scan.pose, scan.pose_covariance)` does. The error is
+# common to all features of a scan: [formats](../formats.md#in-the-world-world)
+# has the formula.
