@@ -1,12 +1,15 @@
 """Occupancy grids: read as map_server reads them, walls at hand-worked places, written again."""
 
 import math
+import os
 import re
-from itertools import product
+from itertools import pairwise, product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import label
 
 import lineament as ln
 from lineament.cli import run
@@ -14,7 +17,7 @@ from lineament.limits import Limits
 from lineament.logs import save_log
 from lineament.mapping import Grid, LineMap
 from lineament.mapping.grid_files import parse_flat
-from lineament.mapping.outlines import outlines, partition
+from lineament.mapping.outlines import areas, outlines, partition
 from lineament.simulation import SENSORS, World, drive
 
 YAML = "image: a.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
@@ -103,6 +106,38 @@ def test_outlines_go_around_cells_that_touch_at_a_corner():
         a[0] * b[1] - a[1] * b[0] for a, b in zip(one.corners, one.corners[1:], strict=False)
     )
     assert area == -2.0  # free on the left: around what is solid, clockwise
+
+
+def test_areas_are_rings_with_holes():
+    rows = [
+        "#########",
+        "#.......#",
+        "#.#.###.#",
+        "#...#.#.#",
+        "#.#.###..",
+        "#...#...#",
+        "#########",
+    ]
+    free = np.array([[letter == "." for letter in row] for row in rows])
+    found = areas(free)
+    assert sorted(len(polygon) for polygon in found) == [1, 3]
+    for polygon in found:
+        size = sum(
+            0.5 * sum(a[0] * b[1] - a[1] * b[0] for a, b in pairwise(ring)) for ring in polygon
+        )
+        inner = len(polygon) == 1
+        assert size == (1 if inner else free.sum() - 1)
+        assert all((ring[0] == ring[-1]).all() for ring in polygon)
+    assert areas(np.zeros((3, 3), bool)) == []
+    (whole,) = areas(np.ones((3, 4), bool))
+    assert sorted(map(tuple, whole[0][1:].tolist())) == [(0, 0), (0, 3), (4, 0), (4, 3)]
+    rng = np.random.default_rng(0)
+    for share in (0.3, 0.6, 0.8):
+        free = rng.random((30, 40)) < share
+        found = areas(free)
+        assert sum(map(len, found)) == len(outlines(~np.pad(free, 1), np.pad(free, 1)))
+        _, count = label(free)
+        assert len(found) == count
 
 
 def test_the_partition_is_the_best_of_all():
@@ -363,6 +398,38 @@ def test_what_beams_pass_through_is_free():
         Grid.drawn(line, resolution=0)
     with pytest.raises(ln.LineamentError, match="cells, more than the limit of 90"):
         Grid.drawn(line, limits=Limits(cells=90))
+
+
+PLANS = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"), "..", "plans")
+
+
+@pytest.mark.skipif(not (PLANS / "depot.yaml").exists(), reason="there are no plans of robots")
+@pytest.mark.parametrize(
+    ("name", "size", "metres", "longest"),
+    [
+        ("depot", (30.1, 15.2), (280, 360), 10.0),  # racks, boxes and columns in one hall
+        ("warehouse", (30.1, 50.1), (420, 520), 20.0),  # cells of 3 cm
+        ("tb3_sandbox", (5.6, 5.1), (20, 32), 1.5),  # a hexagon around nine columns
+        ("stata_basement", (85.8, 42.0), (450, 600), 10.0),  # turned by 180°, colours, broken walls
+        pytest.param(  # furniture, walls of one to three cells
+            *("building_31", (30.3, 31.5), (500, 800), 4.0), marks=pytest.mark.slow
+        ),
+        ("testmap", (1.2, 1.0), (2, 4), 0.6),  # turned by 1 rad
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.* is its resolution right")
+def test_plans_of_robots_have_their_walls(name, size, metres, longest):
+    plan = LineMap.read(PLANS / f"{name}.yaml")
+    np.testing.assert_allclose(plan.size, size, atol=0.15)
+    lengths = np.linalg.norm(plan.ends[:, 1] - plan.ends[:, 0], axis=1)
+    assert metres[0] < lengths.sum() < metres[1]
+    assert lengths.max() > longest
+
+
+@pytest.mark.skipif(not (PLANS / "depot.yaml").exists(), reason="there are no plans of robots")
+def test_a_grid_without_its_image_names_it():
+    with pytest.raises(ln.LineamentError, match=r"invalid_image\.yaml: invalid\.png: No such file"):
+        LineMap.read(PLANS / "invalid_image.yaml")
 
 
 WORLD = World([[-3, -2, 3, -2], [3, -2, 3, 1.5], [3, 1.5, 1, 1.5], [1, 1.5, 1, 2.5],

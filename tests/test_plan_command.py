@@ -73,6 +73,23 @@ def test_geojson_has_walls_columns_and_corners_in_metres(plan):
     assert len(plan.corners) == 4
 
 
+def test_geojson_of_a_grid_has_what_is_free(tmp_path):
+    cells = np.full((20, 30), 100, np.int8)
+    cells[4:16, 4:26] = 0
+    cells[8:12, 10:20] = -1
+    Grid(cells, 0.1, (1.0, 2.0, math.pi / 2)).write(tmp_path / "a.yaml")
+    assert run(["plan", str(tmp_path / "a.yaml"), "-o", str(tmp_path / "a.geojson"), "-q"]) == 0
+    found = json.loads((tmp_path / "a.geojson").read_text(encoding="utf-8"))["features"]
+    (free,) = [one["geometry"] for one in found if one["properties"]["kind"] == "free"]
+    assert free["type"] == "Polygon"
+    outer, hole = free["coordinates"]
+    # A cell (column, row) is at x = 1 - 0.1 row, y = 2 + 0.1 column.
+    corners = {(0.6, 2.4), (0.6, 4.6), (-0.6, 4.6), (-0.6, 2.4)}
+    assert {tuple(place) for place in outer} == corners
+    assert len(hole) == 5
+    assert sum(one["properties"]["kind"] == "wall" for one in found) == 4
+
+
 @pytest.mark.usefixtures("plan")
 @pytest.mark.parametrize("ending", ["png", "pdf", "csv", "jsonl"])
 def test_pictures_and_tables_are_written(ending):

@@ -88,6 +88,41 @@ def outlines(occupied: NDArray[np.bool_], free: NDArray[np.bool_]) -> list[Outli
     return found
 
 
+def areas(cells: NDArray[np.bool_]) -> list[list[Array]]:
+    """Return the polygons of cells that hang together by their sides, in cells.
+
+    Each is its outer ring, counter-clockwise, then the rings of its holes; the last corner of a
+    ring is its first.
+    """
+    inside = np.pad(cells, 1)
+    rings = [outline.corners - 1.0 for outline in outlines(~inside, inside)]
+    upright = [np.zeros((0, 3))]
+    for k, ring in enumerate(rings):
+        at = np.flatnonzero(ring[1:, 0] == ring[:-1, 0])
+        low = np.minimum(ring[at, 1], ring[at + 1, 1])
+        upright.append(np.column_stack((low, ring[at, 0], np.full(len(at), k))))
+    rows = np.concatenate(upright)
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    of = rows[:, 2].astype(np.int64)
+    # What lies to the left of a hole is the ring around it, or another hole in that ring.
+    leftmost = np.lexsort((rows[:, 1], of))[np.searchsorted(np.sort(of), np.arange(len(rings)))]
+    around = np.where(_turn(rings) > 0, np.arange(len(rings)), of[leftmost - 1])
+    while (around != around[around]).any():
+        around = around[around]
+    found: dict[int, list[Array]] = {}
+    for k in np.lexsort((_turn(rings) < 0, around)).tolist():
+        steps = np.diff(rings[k], axis=0)
+        bends = np.any(steps != np.roll(steps, 1, axis=0), axis=1)
+        corners = rings[k][:-1][bends]
+        found.setdefault(int(around[k]), []).append(np.concatenate((corners, corners[:1])))
+    return list(found.values())
+
+
+def _turn(rings: list[Array]) -> Array:
+    """Return the areas within rings, negative where these are clockwise."""
+    return np.array([(r[:-1, 0] * np.diff(r[:, 1])).sum() for r in rings])
+
+
 def _chained(tails: Numbers, heads: Numbers, way: Numbers, wide: int) -> list[tuple[Numbers, bool]]:
     """Return the borders that follow each other, as numbers, and whether they come back."""
     n, keys = len(way), (tails @ (1, wide)) * 4 + way

@@ -1,5 +1,6 @@
 """GeoJSON: a plan for GIS and web pages, in metres of the plan and not in degrees."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,15 @@ from .plans import Plan, PlanWriter
 class GeoJsonWriter(PlanWriter):
     """Writes a wall as a LineString, an arc as a Polygon or LineString, a corner as a Point.
 
-    Each has its `kind`, walls how often they were seen. Numbers are rounded to 1 µm.
+    Each has its `kind`, walls how often they were seen. Numbers are rounded to 1 µm. `areas` are
+    polygons that are known to be free, each a list of rings (n, 2), the outer one first.
     """
 
+    areas: Sequence[Sequence[Array]] = ()
+
     def _draw(self, temporary: Path, plan: Plan) -> None:
-        marks, rows = plan.markers, []
+        marks = plan.markers
+        rows = [feature("Polygon", list(map(_rounded, area)), kind="free") for area in self.areas]
         for ends, views in zip(marks.segments, plan.views.tolist(), strict=True):
             rows.append(feature("LineString", _rounded(ends), kind="wall", views=views))
         for strip, (arc, is_whole) in zip(marks.arc_strips(), plan.arcs(), strict=True):

@@ -10,9 +10,12 @@ from ..files import check_outputs
 from ..limits import Limits
 from ..mapping import Grid, LineMap
 from ..mapping.grids import GRID_ENDINGS, all_files
+from ..mapping.outlines import areas
 from ..mapping.walls import lengths_of
 from ..output import open_writer
 from ..output.figures import plot_walls
+from ..output.geojson import GeoJsonWriter
+from ..scan import LaserScan
 
 #: Formats that a plan is written in: pictures, and those that are read again or go on elsewhere.
 PICTURES = (".png", ".pdf")
@@ -71,10 +74,19 @@ def convert_plan(
         plot_walls(plan.ends, *rings, output, title=Path(path).name, dark=dark)
     elif ending in GRID_ENDINGS:
         plan.to_grid(resolution).write(output)
+    elif is_grid and ending == ".geojson":
+        _write_areas(Grid.read(path, Limits.of(limits)), plan, output)
     else:
         plan.write(output)
     free = ": no cell is free, as a plan alone does not say" * (ending in GRID_ENDINGS)
     return f"{path} -> {output}: {plan}{free}"
+
+
+def _write_areas(grid: Grid, plan: LineMap, output: str | os.PathLike[str]) -> None:
+    """Write the walls of a grid and its free space as GeoJSON."""
+    with GeoJsonWriter(output) as writer:
+        writer.areas = [[grid.placed(ring) for ring in area] for area in areas(grid.free)]
+        writer.write(plan.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
 
 
 def describe_plan(path: str | os.PathLike[str], limits: dict[str, int] | None = None) -> str:
