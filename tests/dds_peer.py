@@ -28,7 +28,7 @@ KINDS = {
     **dict.fromkeys(("LaserScan", "MultiEchoLaserScan", "PointCloud2"), "sensor_msgs"),
     **dict.fromkeys(("PoseArray", "PoseStamped", "PoseWithCovarianceStamped"), "geometry_msgs"),
     "MarkerArray": "visualization_msgs",
-    "Odometry": "nav_msgs",
+    **dict.fromkeys(("OccupancyGrid", "Odometry"), "nav_msgs"),
     "TFMessage": "tf2_msgs",
     "DiagnosticArray": "diagnostic_msgs",
     "Empty": "std_msgs",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ from lineament.live.received import (
     GUESS,
     JUDGED,
     LINKS,
+    MAP,
     MOUNTINGS,
     ODOMETRY,
     RELOCATE,
@@ -30,6 +31,7 @@ from lineament.live.received import (
 from lineament.live.sinks import Publisher
 from lineament.mapping import LineMap
 from lineament.output.ros_messages import RosMessages
+from lineament.rosmsg.grids import OccupancyGrid
 from lineament.rosmsg.poses import Odometry, StampedPose, stamped_poses
 from lineament.scan import Pose
 from lineament.scan.poses import compose, inverse, relative
@@ -498,3 +500,65 @@ def test_over_dds_as_nav2_has_it(peer, domain, plan):
     assert found["child_frame_id"] == "odom"
     assert pose["header"]["frame_id"] == "map"
     assert not any("sense" in line for line in node.lines)
+
+
+# A map on a topic.
+
+
+def grid_of(seed: int, resolution: float = 0.05) -> OccupancyGrid:
+    """The storey as a robot has mapped it: what is around it is unknown."""
+    grid = LineMap.from_lines(office(seed, (30, 20)).plan.segments, side=1).to_grid(resolution)
+    cells = np.where(grid.occupied, 100, 0).astype(np.int8)
+    return OccupancyGrid("map", cells, resolution, grid.origin)
+
+
+def test_a_map_on_a_topic_and_another_one_that_follows():
+    robot, moments = Robot("/map"), driven()
+    frame = robot.drive(moments[:1])[0]
+    assert (frame.where, frame.placed) == (None, None)
+    taken = Taken()
+    taken.heard = ()
+    RosSink(taken, RosMessages("cdr"), LiveConfig(map="/map")).publish(frame)
+    assert b"no map on /map\0" in taken.sent["/diagnostics"][-1]
+    robot.pipeline.hear(grid_of(1), MAP)
+    frames = robot.drive(moments[1:30])
+    assert_right(frames[-1], moments[29], 0.1)
+    # The same once more changes nothing; one that is finer is gone on with from where it is.
+    robot.pipeline.hear(grid_of(1), MAP)
+    robot.pipeline.hear(grid_of(1, 0.04), MAP)
+    frames = robot.drive(moments[30:38])
+    assert_right(frames[-1], moments[37], 0.1)
+    robot.pipeline.hear(grid_of(2), MAP)
+    frames = robot.drive(moments[38:60])
+    assert not any(frame.placed for frame in frames)
+    for grid, problem in (
+        (grid_of(1)._replace(frame="world"), "it is in frame 'world', expected 'map'"),
+        (grid_of(1)._replace(cells=np.zeros((9, 9), np.int8)), "has no walls: 0 of 81"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            robot.pipeline.hear(grid, MAP)
+
+
+def grid_message(resolution=0.05, size=(2, 3), n=6, turned=(0.0, 0.0, 0.0, 1.0)) -> bytes:
+    header = struct.pack("<3I4s", 1, 0, 4, b"map\0")
+    about = struct.pack("<2If2I4x7d", 0, 0, resolution, *size, 1.0, 2.0, 0.0, *turned)
+    return b"\0\1\0\0" + header + about + struct.pack(f"<I{n}b", n, *range(-1, n - 1))
+
+
+def test_maps_as_they_are_sent():
+    (wanted_map,) = (one for one in wanted(LiveConfig(map="map")) if one.what == MAP)
+    assert (wanted_map.topic, wanted_map.is_latched) == ("/map", True)
+    read = partial(wanted_map.read, encoding="cdr")
+    grid = read(grid_message(turned=(0.0, 0.0, math.sin(0.25), math.cos(0.25))))
+    assert grid.cells.tolist() == [[-1, 0], [1, 2], [3, 4]]
+    assert (grid.frame, grid.origin) == ("map", pytest.approx((1.0, 2.0, 0.5)))
+    for message, problem in (
+        (grid_message(0.0), "has cells of 0 m"),
+        (grid_message(math.nan), "has cells of nan m"),
+        (grid_message(size=(2, 2)), "has 6 cells, expected 2 x 2"),
+        (grid_message(size=(0, 0), n=0), "has 0 cells"),
+        (grid_message()[:-3], "ends early"),
+        (grid_message(turned=(1.0, 0.0, 0.0, 0.0)), "its origin is not level"),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            read(message)

@@ -78,7 +78,8 @@ class LiveConfig:
         A DXF of a `lineament.docking.Shape`, which is followed in place of a corner; its origin is
         within 0.5 m of `dock`.
     map : str, optional
-        A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``.
+        A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``. A name without an
+        ending, ``/map``, is a topic of ``nav_msgs/OccupancyGrid``, unless a log is played.
     layers : str
         Layers of the plan that hold walls, by commas, as in `LineMap.read`.
     units : str, optional
@@ -236,6 +237,12 @@ class LiveConfig:
         if self.deskew not in _NOT_TOPICS:
             return self.resolved(self.deskew)
         return None if self.odometry is None else self.resolved(self.odometry)
+
+    @property
+    def map_topic(self) -> str | None:
+        """Full name of the topic of the plan, where it is one."""
+        is_topic = self.map is not None and self.log is None and not Path(self.map).suffix
+        return self.resolved(self.map) if is_topic and self.map is not None else None
 
     @property
     def judge_topic(self) -> str | None:

@@ -7,11 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import LineamentError
 from ..features import Features
 from ..mapping import LineMap
 from ..mapping.following import Follower, Whereabouts
+from ..mapping.grids import Grid
 from ..mapping.judging import Judge, Judgement
 from ..motion.deskew import beam_times
+from ..rosmsg.grids import OccupancyGrid
 from ..rosmsg.poses import Odometry, StampedPose
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist, carried, compose, inverse, relative
@@ -23,6 +26,8 @@ from .received import GUESS, JUDGED, MOUNTINGS, RELOCATE, Heard
 _MOST_SCANNERS = 8
 #: Scans in a row of which the mounting, or the odometry, is not known before this is a message.
 _MANY = 20
+#: Cells of a map on a topic are occupied from, and free up to, such values: as of map_server.
+_SURE = 65, 25
 #: Where they should come from.
 _WHENCE = {
     "mounting": "expected on /tf_static, or a laser_pose",
@@ -61,13 +66,14 @@ class Localiser:
     ----------
     config : LiveConfig
         Frames, the mounting of the scanner, whether the odometry has its own topic.
-    plan : LineMap
+    plan : LineMap, optional
+        None until there is a map on a topic.
     extract : callable
         Returns the features of a scan: of one that is upside down, and is turned over for the plan.
     """
 
     def __init__(
-        self, config: LiveConfig, plan: LineMap, extract: Callable[[LaserScan], Features]
+        self, config: LiveConfig, plan: LineMap | None, extract: Callable[[LaserScan], Features]
     ) -> None:
         self._config, self._plan, self._extract = config, plan, extract
         self._map, self._odom, self._base = map(
@@ -76,7 +82,9 @@ class Localiser:
         self._followers: dict[str, Follower] = {}
         self._frames = Frames()
         self._guess: StampedPose | None = None
-        self._judge = None if config.judge is None else Judge(plan)
+        self._judge = None if config.judge is None or plan is None else Judge(plan)
+        self._map_heard: OccupancyGrid | None = None
+        self._known: dict[str, Whereabouts] = {}
         self._claim: StampedPose | None = None
         self._claimed_odom: Pose | None = None
         self._missing = dict.fromkeys(_WHENCE, 0)
@@ -88,6 +96,8 @@ class Localiser:
         if what == RELOCATE:
             for follower in self._followers.values():
                 follower.forget()
+        elif isinstance(message, OccupancyGrid):
+            self._take(message)
         elif isinstance(message, Odometry):
             base = message.child_frame or self._base
             moved = StampedPose(message.stamp, self._odom, base, message.pose)
@@ -110,11 +120,14 @@ class Localiser:
 
     def __call__(
         self, features: Features, scan: LaserScan, straight: LaserScan
-    ) -> tuple[Whereabouts, Placed | None, Judgement | None]:
+    ) -> tuple[Whereabouts | None, Placed | None, Judgement | None]:
         """Follow a scanner by its next scan: as it came, and `straight`, as its features have it.
 
         Only the name of its frame, its time, its pose and the times of its beams are taken of it.
+        Nothing is known before there is a plan.
         """
+        if self._plan is None:
+            return None, None, None
         mounting, travelled = self._mounting(scan), self._travelled(scan)
         if mounting is not None and mounting.is_upside_down:
             features = self._extract(straight.turned_over())
@@ -126,7 +139,7 @@ class Localiser:
         mounted = (0.0, 0.0, 0.0) if mounting is None else mounting.pose
         self._suppose(follower, travelled, mounted)
         skew = _skew(scan, follower.twist) if straight is scan else (0.0, 0.0, 0.0)
-        where = follower(features, laser, skew)
+        where = self._known[scan.frame_id] = follower(features, laser, skew)
         judgement = None
         if self._judge is not None and mounting is not None:
             claimed = self._claimed(travelled)
@@ -141,10 +154,31 @@ class Localiser:
         covariance = carried(where.covariance, where.pose, base)
         return where, Placed(base, covariance, odom), judgement
 
+    def _take(self, grid: OccupancyGrid) -> None:
+        """Take a map, unless it is the same again: who was followed is looked for where it was."""
+        if frame_of(grid.frame) != self._map:
+            raise ValueError(f"it is in frame {grid.frame!r}, expected {self._map!r}")
+        before, self._map_heard = self._map_heard, grid
+        is_placed_alike = before is not None and before[2:] == grid[2:]
+        if before is not None and is_placed_alike and np.array_equal(before.cells, grid.cells):
+            return
+        try:
+            known = Grid(grid.cells, grid.resolution, grid.origin, *_SURE)
+            self._plan = plan = LineMap.from_grid(known)
+        except LineamentError as error:
+            raise ValueError(str(error)) from None
+        self._judge = None if self._config.judge is None else Judge(plan)
+        self._followers = {frame: Follower(plan) for frame in self._followers}
+        for frame, where in self._known.items():
+            if where.is_known and frame in self._followers:
+                self._followers[frame].suppose(where.pose, where.covariance)
+
     def _follower(self, frame: str) -> Follower:
+        assert self._plan is not None
         if frame not in self._followers:
             if len(self._followers) >= _MOST_SCANNERS:
-                del self._followers[next(iter(self._followers))]
+                gone = next(iter(self._followers))
+                del self._followers[gone], self._known[gone]
             self._followers[frame] = Follower(self._plan)
         return self._followers[frame]
 

@@ -114,10 +114,10 @@ class Pipeline(InTurn):
         self._publishers: dict[str, _Publisher] = {}
         known = self._publisher("")  # An unknown method is an error at once.
         self._localiser = None
-        if (plan := plan_of(config)) is not None:
+        if config.map is not None:
             from .localiser import Localiser
 
-            self._localiser = Localiser(config, plan, known.extractor)
+            self._localiser = Localiser(config, plan_of(config), known.extractor)
         self._odometry: Odometry | None = None
         self._unmoved = 0
         self._problems: set[str] = set()
@@ -245,8 +245,8 @@ class _Publisher:
 
 
 def plan_of(config: LiveConfig) -> LineMap | None:
-    """Read the plan that is configured, if any."""
-    if config.map is None:
+    """Read the plan that is configured, if it is a file."""
+    if config.map is None or config.map_topic is not None:
         return None
     from ..mapping import LineMap
 

@@ -129,7 +129,8 @@ def _summaries(frame: Frame, config: LiveConfig) -> list[tuple[int, str]]:
 def _statuses(frame: Frame, config: LiveConfig) -> list[Status]:
     """Statuses of our pose, and then of one that is judged."""
     where, placed = frame.where, frame.placed
-    assert where is not None
+    if where is None:
+        return [Status(f"{config.scan_topic}/pose", 2, f"no map on {config.map_topic}", {})]
     level, summary = 0 if where else 1 if where.is_known else 2, where.verdict
     if where.is_known and config.is_localiser and (placed is None or placed.odom is None):
         unknown = "where the scanner is mounted" if placed is None else "odometry"

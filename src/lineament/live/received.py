@@ -8,6 +8,7 @@ from threading import Condition
 from typing import NamedTuple, Protocol
 
 from ..limits import LIMITS, Limits
+from ..rosmsg.grids import OccupancyGrid, occupancy_grid
 from ..rosmsg.poses import Odometry, StampedPose, odometry, stamped_poses
 from ..rosmsg.scans import Decoder, decoders
 from ..rosmsg.wire import Buffer
@@ -17,8 +18,9 @@ from .config import LiveConfig
 #: What messages are, as a line calls one that makes no sense.
 SCAN, ODOMETRY, LINKS, MOUNTINGS = "a scan", "an odometry", "a transform", "a mounting"
 GUESS, RELOCATE, JUDGED = "an initial pose", "a call to relocate", "a pose to judge"
+MAP = "a map"
 
-Heard = LaserScan | Odometry | list[StampedPose] | None
+Heard = LaserScan | Odometry | OccupancyGrid | list[StampedPose] | None
 #: Poses are nearer [m]: what is computed from them stays finite.
 FARTHEST = 1e9
 #: Publishers that an inbox has room for: a robot has fewer, unless names are made up.
@@ -94,6 +96,9 @@ def wanted(config: LiveConfig) -> list[Wanted]:
             Wanted(config.resolved("initialpose"), placed, GUESS, partial(read, kind=placed)),
             Wanted(f"{config.scan_topic}/relocate", "std_msgs/Empty", RELOCATE, _nothing),
         ]
+    if (topic := config.map_topic) is not None:
+        read_map = partial(occupancy_grid, limits=limits)
+        found.append(Wanted(topic, "nav_msgs/OccupancyGrid", MAP, read_map, is_latched=True))
     if (topic := config.judge_topic) is not None:
         found.append(Wanted(topic, placed, JUDGED, partial(read, kind=placed)))
     return found
