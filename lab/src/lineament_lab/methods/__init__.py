@@ -3,7 +3,18 @@
 ``lineament`` finds them by their entry points, as it does anybody's: ``Extractor("iepf")``.
 """
 
+from typing import TYPE_CHECKING
+
 from lineament._lazy import lazily
+
+if TYPE_CHECKING:
+    from .hough import Hough as Hough
+    from .iepf import IEPF as IEPF
+    from .line_tracking import LineTracking as LineTracking
+    from .pdbs import PDBS as PDBS
+    from .ransac import Ransac as Ransac
+    from .region_growing import RegionGrowing as RegionGrowing
+    from .split_and_merge import SplitAndMerge as SplitAndMerge
 
 #: Name of each rival, and the class that it is, in the module of the same name.
 RIVALS = {
