@@ -21,6 +21,7 @@ import pytest
 from hypothesis import settings
 
 from lineament import LaserScan, open_log
+from lineament.plugins import plugins
 
 # A program for a Python that has ROS 1.
 collect_ignore = ["ros1_peer.py"]
@@ -103,6 +104,25 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write_log
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """Install a package of one module, with entry points, for a test."""
+
+    def made(code: str, entries: str, name: str = "stranger") -> None:
+        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
+        about = tmp_path / f"{name}-1.0.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (about / "entry_points.txt").write_text(entries, encoding="utf-8")
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        plugins.cache_clear()
+
+    yield made
+    sys.modules.pop("stranger", None)
+    plugins.cache_clear()
 
 
 @pytest.fixture

@@ -5,35 +5,7 @@ import math
 import numpy as np
 
 from lineament import LaserScan
-
-
-def hostile_scans(n, rng):
-    """Make scans that show nothing, by name."""
-    mixed = rng.uniform(2, 4, n)
-    mixed[rng.random(n) < 0.2] = np.nan
-    spike = np.full(n, 2.0)
-    spike[n // 2] = 5.0
-    return {
-        "white noise": rng.uniform(0.1, 10, n),
-        "white noise of all sizes": 10.0 ** rng.uniform(-3, 3, n),
-        "constant": np.full(n, 3.0),
-        "one spike": spike,
-        "near and far": np.where(np.arange(n) % 2, 1.0, 5.0),
-        "near and far in twos": np.where(np.arange(n) // 2 % 2, 1.0, 5.0),
-        "near and far in threes": np.where(np.arange(n) // 3 % 2, 1.0, 1.2),
-        "all mixed": mixed,
-        "walk": np.abs(2 + np.cumsum(rng.normal(0, 0.05, n))),
-        "lattice": np.round(rng.uniform(0.5, 2, n), 1),
-        "huge": np.full(n, 1e300),
-        "huge and noisy": 1e300 * rng.uniform(0.9, 1, n),
-        "large": 1e9 * rng.uniform(0.9, 1, n),
-        "tiny": np.full(n, 1e-300),
-        "tiny and noisy": 1e-9 * rng.uniform(0.9, 1, n),
-        "all NaN": np.full(n, np.nan),
-        "all infinite": np.full(n, np.inf),
-        "negative": -rng.uniform(1, 2, n),
-        "every sort": rng.choice([np.nan, np.inf, -np.inf, 0, -1, 1e-320, 1e308, 1, 2], n),
-    }
+from lineament.checks.scans import hostile_scans
 
 
 def all_hostile():

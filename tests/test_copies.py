@@ -19,7 +19,7 @@ from lineament.logs import save_npz
 from lineament.mapping import LineMap, LocalMap
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.following import Follower
-from lineament.methods import get_method, method_names
+from lineament.methods import get_method
 from lineament.motion import Dock, Odometer
 from lineament.output import open_writer
 from lineament.simulation import SENSORS, drive, room
@@ -52,23 +52,6 @@ def values(of):
     if isinstance(of, (tuple, list)):
         return [values(one) for one in of]
     return of
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", method_names())
-def test_a_copy_of_a_used_extractor_is_fresh(name):
-    for given in (name, get_method(name)):
-        used, fresh = Extractor(given, noise=0.01), Extractor(given, noise=0.01)
-        used(WALLS[0])
-        used.batch([WALLS[0].ranges] * 3, angles=BEARINGS)
-        for copied in COPIES.values():
-            other = copied(used)
-            for scan in WALLS:
-                found = other(scan)
-                assert same(found, fresh(scan))
-                assert len(found.segments) == (not name.startswith("pdbs"))
-                assert same(used(WALLS[0]), fresh(WALLS[0]))
-            assert repr(other) == repr(used)
 
 
 def test_a_copy_traces_and_takes_batches():

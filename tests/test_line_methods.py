@@ -1,7 +1,6 @@
 """What every method of lines must do, whatever its way: scenes whose features are known."""
 
 import math
-from itertools import chain
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from worlds import (
     STEP,
     fan,
     full_circle,
-    random_scan,
     room,
     scan_of,
     vertex,
@@ -19,7 +17,6 @@ from worlds import (
 )
 
 from lineament import Extractor, LaserScan
-from lineament.features import TABLES
 from lineament.methods import get_method
 
 NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing"]
@@ -233,28 +230,6 @@ def test_covariances_of_corners_have_the_lever_arm(name):
         nees.append(error @ np.linalg.solve(corner["covariance"], error))
     assert np.median(nees) == pytest.approx(2 * math.log(2), rel=0.2)
     assert 1.7 < np.mean(nees) < 2.6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [None, NOISE], ids=["estimated", "given"])
-@pytest.mark.parametrize("name", [*NAMES, "liu", "pdbs", "optimal", "maps"])
-def test_features_do_not_depend_on_how_they_are_asked_for(name, noise):
-    """What a block held before, the order of scans and the number of threads change nothing."""
-    method = get_method("optimal", max_vertices=12) if name == "maps" else get_method(name)
-    extractor, rng = Extractor(method, noise=noise), np.random.default_rng(1)
-    rows = room(full_circle(360), BOX) + 0.02 * rng.normal(size=(12, 360))
-    rows[rng.random(rows.shape) < 0.03] = np.nan
-    rows[7], rows[8], rows[9] = rng.uniform(0, 5, 360), np.nan, random_scan(1, 360).ranges
-    bearings = {"angle_min": -math.pi, "angle_increment": 2 * math.pi / 360}
-    scans = [LaserScan(row, **bearings) for row in rows]
-    alone = [Extractor(method, noise=noise)(scan) for scan in scans]
-    ways = [list(map(extractor, scans)), list(map(extractor, scans[::-1]))[::-1]]
-    ways += [list(extractor.batch(rows, **bearings, workers=k)) for k in (1, 2, 3)]
-    ways += [list(extractor.batch(rows[::-1], **bearings))[::-1]]
-    for one, other in zip(alone * len(ways), chain(*ways), strict=True):
-        np.testing.assert_equal(other.noise, one.noise)
-        for table in (*TABLES, "clusters"):
-            assert getattr(other, table).tobytes() == getattr(one, table).tobytes()
 
 
 def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):

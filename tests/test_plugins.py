@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import tomllib
 from pathlib import Path
 
@@ -13,29 +12,10 @@ import pytest
 import lineament
 from lineament import plugins as module
 from lineament.cli import cli, run
-from lineament.plugins import COMMANDS, LABORATORY, METHODS, plugins
+from lineament.plugins import COMMANDS, LABORATORY, METHODS
 
 ROOT = Path(__file__).parents[1]
 LAB = tomllib.loads((ROOT / "lab" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-
-
-@pytest.fixture
-def install(tmp_path, monkeypatch):
-    """Install a package of one module, with entry points, for a test."""
-
-    def made(code: str, entries: str, name: str = "stranger") -> None:
-        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
-        about = tmp_path / f"{name}-1.0.dist-info"
-        about.mkdir()
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-        (about / "entry_points.txt").write_text(entries, encoding="utf-8")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(sys.modules, name, raising=False)
-        plugins.cache_clear()
-
-    yield made
-    sys.modules.pop("stranger", None)
-    plugins.cache_clear()
 
 
 def test_a_command_of_another_package(install, capsys):

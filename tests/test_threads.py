@@ -45,19 +45,6 @@ def in_threads(work, count=8):
         return list(pool.map(begin, range(count)))
 
 
-@pytest.mark.parametrize("name", ["optimal", "liu", "hough"])
-def test_threads_share_an_extractor(name):
-    scans = [*WALLS, *OTHERS]
-    extractor, expected = Extractor(name), [Extractor(name)(scan) for scan in scans]
-    for count in (len(WALLS), len(scans)):  # of the same bearings, and of others
-
-        def work(k, count=count):
-            order = np.random.default_rng(k).integers(0, count, 100)
-            return all(same(extractor(scans[i]), expected[i]) for i in order)
-
-        assert all(in_threads(work))
-
-
 def test_threads_share_an_extractor_in_batches_and_traces():
     rows = np.array([scan.ranges for scan in WALLS])
     fields = {"angles": BEARINGS, "range_max": 30.0}

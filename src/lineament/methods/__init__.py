@@ -99,9 +99,18 @@ def get_method(name: str, /, **parameters: Any) -> Method:
 
 
 def made(name: str, make: Any, cls: Any, parameters: dict[str, Any]) -> Method:
-    """Make a method of a class, by itself or by one of its presets; name what it has not."""
+    """Make a method of a class, by itself or by one of its presets, or of a function of a scan.
+
+    A ValueError names a parameter that it does not have.
+    """
     from .parameters import unknown
 
+    is_class = isinstance(cls, type)
+    if parameters and not is_class:
+        raise ValueError(
+            f"method {name!r} is a function, expected no parameters: {', '.join(parameters)} "
+            "(a class with fields and a __call__ has some)"
+        )
     if is_dataclass(cls):
         known = [field.name for field in fields(cls)]
         for parameter in parameters:
@@ -109,7 +118,7 @@ def made(name: str, make: Any, cls: Any, parameters: dict[str, Any]) -> Method:
                 base, _, last = name.partition(":")
                 owner = base if last in _presets(cls) or not last else name
                 raise ValueError(unknown(f"method {owner!r}", parameter, known))
-    method = make(**parameters)
+    method = make(**parameters) if is_class else cls
     if hasattr(method, "run"):
         return cast(Method, method)
     from .functions import as_method

@@ -128,15 +128,7 @@ def from_file(name: str, parameters: dict[str, Any]) -> Method:
     if not callable(found):
         raise ValueError(f"method {name!r}: {path} has no function or class {inner!r}")
     short = f"{Path(path).name}:{inner}"
-    if isinstance(found, type):
-        method = made(short, found, found, parameters)
-    elif parameters:
-        raise ValueError(
-            f"method {name!r} is a function, expected no parameters: {', '.join(parameters)} "
-            "(a class with fields and a __call__ has some)"
-        )
-    else:
-        method = as_method(found, short)
+    method = made(short, found, found, parameters)
     if isinstance(method, FunctionMethod):
         source = str(Path(path).absolute()) + f":{inner}", tuple(parameters.items())
         object.__setattr__(method, "source", source)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import warn
 from ..features.records import CORNER, CORNERS, SEGMENT, SEGMENTS
+from ..kernels import LARGEST
 from ..kernels import layout as at
 from ..scan import LaserScan, RangeNoise
 from .workspace import Block
@@ -81,13 +82,15 @@ def _of_beams(scan: LaserScan, first: int, last: int, noise: Array) -> Records |
 
 
 def _fitted(scan: LaserScan, beams: NDArray[np.int64], noise: Array) -> Records | None:
-    """Return the record of the best line through measurements; None of fewer than two."""
+    """Return the record of the best line through measurements; None of fewer than two places."""
     from .stages import fit_line
 
     points = scan.points[beams]
     if len(beams) < 2 or not np.ptp(points, axis=0).any():
         return None
     record: Any = fit_line(points, noise=RangeNoise(*noise[:4]), fit="weighted").copy()
+    if not record["length"] > 0.0:  # Of ranges of 1e-300 m, whose squares are 0.
+        return None
     record["first_beam"], record["last_beam"], record["cluster"] = beams[0], beams[-1], -1
     return record  # type: ignore[no-any-return]
 
@@ -146,7 +149,8 @@ def corner_records(given: Any, segments: Records, scan: LaserScan, noise: Array)
         raise ValueError(
             f"corners of shape {rows.shape} and type {rows.dtype}, expected {expected}"
         )
-    found = np.array([_corner(place, segments, scan, noise) for place in places], CORNER)
+    near = [place for place in places if np.hypot(*place) < LARGEST]  # Squares are finite there.
+    found = np.array([_corner(place, segments, scan, noise) for place in near], CORNER)
     return found[np.argsort(found["beam"], kind="stable")]
 
 

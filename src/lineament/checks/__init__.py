@@ -1,0 +1,22 @@
+"""Checks of what others add: a method, a writer, a reader, a message, each as ours are checked.
+
+Each is a function that returns nothing, or raises an AssertionError of one line that names what
+broke: in a test of yours, ``check_method("mine")`` is all of it.
+"""
+
+from typing import TYPE_CHECKING
+
+from .._lazy import lazily
+
+if TYPE_CHECKING:
+    from .methods import check_method as check_method
+
+_HOME = {"check_method": "methods"}
+
+__all__ = [*_HOME]
+
+__getattr__ = lazily(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__

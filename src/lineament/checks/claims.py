@@ -1,0 +1,61 @@
+"""How a check says what broke: one line, by an AssertionError, also under ``python -O``."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import LineamentWarning, one_line, shortened
+
+
+def claim(holds: object, problem: str) -> None:
+    """Raise an AssertionError of one line unless something holds."""
+    if not holds:
+        raise AssertionError(one_line(shortened(problem)))
+
+
+@contextmanager
+def during(doing: str) -> Iterator[None]:
+    """Put what was being done before what is claimed within; whatever is raised breaks a claim.
+
+    Examples
+    --------
+    >>> with during("cut"), during("one beam"):
+    ...     claim(False, "nothing is found")
+    Traceback (most recent call last):
+    AssertionError: cut: one beam: nothing is found
+    """
+    try:
+        yield
+    except AssertionError as error:
+        raise AssertionError(f"{doing}: {error}") from error
+    except Exception as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).name}:{frame.lineno}"
+        problem = f"{doing}: raised {type(error).__name__}: {error} ({where})"
+        raise AssertionError(one_line(shortened(problem))) from error
+
+
+@contextmanager
+def without_warnings(*, of_scans: bool = False) -> Iterator[None]:
+    """Make warnings errors within; those of scans that can hardly be meant only if `of_scans`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        if not of_scans:
+            warnings.simplefilter("ignore", LineamentWarning)
+        yield
+
+
+@contextmanager
+def taking_turns() -> Iterator[None]:
+    """Let threads take turns as often as they can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
