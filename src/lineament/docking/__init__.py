@@ -1,5 +1,7 @@
 """Where a thing of a known shape is, that a robot docks to: a V, a recess, a pallet's feet.
 
+Examples
+--------
 >>> import numpy as np
 >>> import lineament as ln
 >>> from lineament.docking import Shape, find_shape
