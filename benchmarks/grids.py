@@ -3,7 +3,8 @@
 Storeys are turned by any angle, as a robot's map is that begins where the robot did; beams from all
 rooms and corridors say what is free. The walls that `LineMap.from_grid` finds are compared with
 those that were drawn. With ``--locate`` local maps are looked for on the grid of their storey, of
-that with walls moved, mirrored, and of another, beside the drawing itself.
+that with walls moved, mirrored, and of another, beside the drawing itself; with ``--plans FOLDER``
+scans in the cells of real maps are looked for on their walls.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from __future__ import annotations
 import argparse
 import math
 import os
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from locating import RIGHT, places, storey
 
+import lineament as ln
 from lineament.mapping import LineMap, locate
 from lineament.mapping.grids import Grid
 from lineament.simulation import SENSORS, World
@@ -150,15 +153,75 @@ def located(storeys: int, seed: int, most: int, sigmas: list[float]) -> None:
         )
 
 
+def scan_of(grid: Grid, pose: tuple[float, float, float], rng: np.random.Generator) -> ln.LaserScan:
+    """Follow beams of a laser of 20 m through the cells of a grid, in its frame of cells."""
+    angles = np.radians(np.arange(-180, 180, 0.5))
+    way = np.arange(0.05, 20.0, grid.resolution / 4)
+    x, y, theta = pose
+    at = np.stack((np.cos(angles + theta), np.sin(angles + theta)), axis=-1)[:, None] * way[:, None]
+    column, row = np.moveaxis(
+        np.floor((at + np.array((x, y))) / grid.resolution).astype(int), -1, 0
+    )
+    rows, columns = grid.cells.shape
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    hit = inside & grid.occupied[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+    ranges = np.where(hit.any(axis=1), way[hit.argmax(axis=1)], np.nan)
+    return ln.LaserScan(ranges + rng.normal(0, 0.01, len(ranges)), angles=angles)
+
+
+def on_plans(folder: Path, most: int) -> None:
+    """Print how often single scans in the cells of maps of robots are found on their walls."""
+    extract, rng = ln.Extractor(), np.random.default_rng(0)
+    for path in sorted(folder.glob("*.yaml")):
+        try:
+            grid, plan = Grid.read(path), LineMap.read(path)
+        except ln.LineamentError as error:
+            print(error)
+            continue
+        image = plan.walls.copy()  # the plan mirrored: nothing is on it
+        for name in ("start", "end"):
+            image[{"start": "end", "end": "start"}[name]] = plan.walls[name] * (-1, 1)
+        image["centroid"] = plan.walls["centroid"] * (-1, 1)
+        image["angle"] = np.arctan2(*(image["end"] - image["start"]).T[::-1])
+        mirrored, clear = LineMap(image), grid.free.copy()
+        reach = round(0.3 / grid.resolution)
+        for axis in (0, 1):
+            clear &= np.all([np.roll(grid.free, k, axis) for k in range(-reach, reach + 1)], axis=0)
+        free = np.argwhere(clear)
+        counts, errors, tried = np.zeros(3, int), [], 0
+        while tried < most:
+            row, column = free[rng.integers(len(free))]
+            x, y, theta = (column + 0.5) * grid.resolution, (row + 0.5) * grid.resolution, 0.3
+            scan = scan_of(grid, (x, y, theta), rng)
+            if scan.valid.sum() < 200:
+                continue
+            tried += 1
+            features = extract(scan)
+            where, wrong = locate(features, plan), locate(features, mirrored)
+            at = grid.placed(np.array((x, y)) / grid.resolution)
+            turn = math.remainder(where.pose[2] - theta - grid.origin[2], 2 * math.pi)
+            off = math.dist(where.pose[:2], at)
+            right = bool(where) and off < RIGHT[0] and abs(turn) < RIGHT[1]
+            counts += (right, bool(where) and not right, bool(wrong))
+            errors += [off] * right
+        middle = 1000 * np.median(errors) if errors else math.nan
+        print(
+            f"| {path.stem} | {tried} | {counts[0]} | {counts[1]} | {counts[2]} | {middle:.0f} mm |"
+        )
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--storeys", type=int, default=6)
     parser.add_argument("--seed", type=int, default=900)
     parser.add_argument("--most", type=int, default=40, help="places of a storey, for --locate")
     parser.add_argument("--locate", action="store_true", help="look for places on grids instead")
+    parser.add_argument("--plans", type=Path, help="look for scans in the maps of a folder instead")
     parser.add_argument("--sigma", type=float, nargs="+", default=[0.0])
     options = parser.parse_args()
-    if options.locate:
+    if options.plans is not None:
+        on_plans(options.plans, options.most)
+    elif options.locate:
         located(options.storeys, options.seed, options.most, options.sigma)
     else:
         walls(options.storeys, options.seed)

@@ -24,6 +24,8 @@ _TRUE, _FALSE = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 #: Shade of white: 255 for each of one, two, three or four channels is a part of it.
 WHITE = 255 * 12
 _FORMATS = ("PNG", "PPM")
+#: Farther away, coordinates are too coarse to be believed [m].
+_FARTHEST = 1e8
 _FIELD = re.compile(r"""(["']?)([\w-]+)\1\s*:(\s.*)?""")
 
 
@@ -107,6 +109,8 @@ def _checked(fields: dict[str, str]) -> About:
     origin = [_number("origin", value) for value in fields["origin"].split(",")]
     if len(origin) != 3:
         raise ValueError(f"origin has {len(origin)} numbers, expected 3: x, y, yaw")
+    if (far := max(map(abs, origin))) > _FARTHEST:
+        raise ValueError(f"origin is {far:g} m away, expected a building")
     resolution, occupied, free = (
         _number(name, fields[name]) for name in ("resolution", "occupied_thresh", "free_thresh")
     )

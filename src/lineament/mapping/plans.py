@@ -77,6 +77,8 @@ def check_file(path: str | os.PathLike[str], limits: Limits, name: str = "") -> 
         status = Path(path).stat()
     except OSError as problem:
         raise error(problem.strerror or "cannot be read") from None
+    except ValueError as problem:  # a null byte in a name that a file holds
+        raise error(f"is no name of a file: {problem}") from None
     # Pipes and devices may never end.
     if not stat.S_ISREG(status.st_mode):
         raise error("is no regular file, expected a plan")
