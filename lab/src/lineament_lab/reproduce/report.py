@@ -31,7 +31,7 @@ from .seeds import Spread
 #: Names of the files.
 _PAGE, _NUMBERS = "index.html", "figures.json"
 #: Colours of a picture: those of ten methods, and what is between them and the paper.
-_COLORS = 64
+_COLORS = 32
 _INTRODUCTION = (
     "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
     "The values of its tables and of its Figure 12 are not available: where one stands only there, "
