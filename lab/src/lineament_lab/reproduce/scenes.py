@@ -95,8 +95,8 @@ def run(setting: Setting, progress: Progress) -> Findings:
             "paper’s method does so within its clusters. By the letter of equation 22 it misses "
             "corners nearer than some 3 m; by the reading of liu:figure9 it also cuts at points "
             "beside corners, and at noise on near walls. Its results with better last steps (liu), "
-            "and with the numbers that it was tuned to, are shown beside. The further methods are, of "
-            "recordings, in the tables alone.",
+            "and with the numbers that it was tuned to, are shown beside. Of recordings, "
+            "further methods are in the tables alone.",
         ),
         tuple(tables),
         tuple(figures),
