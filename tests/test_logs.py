@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -172,28 +171,6 @@ def test_a_gigabyte_without_a_scan(tmp_path, name, beginning, problem):
 
 
 # Damage
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", scan_texts())
-@pytest.mark.parametrize("pack", [bytes, gzip.compress])
-def test_cut_off_anywhere(write, name, pack):
-    data = pack(scan_texts()[name].encode())
-    whole = [str(scan.ranges) for scan in open_log(write(data))]
-    counts = []
-    for cut in np.linspace(1, len(data) - 1, 100).astype(int):
-        scans = []
-        with suppress(LogError):
-            log = open_log(write(data[:cut]), keep_going=True)
-            scans.extend(log)
-            assert len(log) >= len(scans)
-        if pack is gzip.compress and name != "csv_beams":  # A line that breaks off is no scan.
-            assert [str(scan.ranges) for scan in scans] == whole[: len(scans)]
-        counts.append(len(scans))
-    assert max(counts) <= len(whole)
-    if name not in ("rplidar", "csv_beams"):  # One object, and one scan, of all.
-        assert counts[-1] >= len(whole) - 2
-        assert all(b >= a for a, b in pairwise(counts))
 
 
 def test_a_wrong_or_missing_end_costs_no_scan(write):

@@ -66,27 +66,6 @@ def changed(data, at, form, value):
 # --- cut off, flipped, overwritten
 
 
-@pytest.mark.slow
-@every_kind
-def test_cut_off_anywhere(altered, kind):
-    """What comes before the cut is read; nothing else is made up."""
-    most = 0
-    for share in np.linspace(0.001, 0.999, 100):
-        path = altered(kind, lambda data, share=share: data[: int(share * len(data))])
-        scans, problem = read(path)
-        assert all(map(is_whole, scans))
-        assert stamps_of(scans) == STAMPS[: len(scans)]
-        # A part of the index may go without any loss.
-        assert problem or len(scans) == N
-        kept, problem = read(path, keep_going=True)
-        assert problem is None or not kept
-        assert stamps_of(kept[: len(scans)]) == stamps_of(scans)
-        # Of a database the page at the cut is read as if it ended with zeros, if at all.
-        assert sum(not is_whole(scan) for scan in kept) <= kind.startswith("sqlite3")
-        most = max(most, len(kept))
-    assert most > 0.8 * N
-
-
 @pytest.mark.parametrize("kind", ["mcap", "mcap-lz4", "mcap-zstd", "mcap-ros1"])
 def test_a_scan_from_a_chunk_with_a_checksum_is_the_one_that_was_written(altered, kind):
     chance, harmed = random.Random(5), 0

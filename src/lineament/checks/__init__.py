@@ -9,9 +9,17 @@ from typing import TYPE_CHECKING
 from .._lazy import lazily
 
 if TYPE_CHECKING:
+    from .logs import check_log as check_log
+    from .messages import check_message as check_message
+    from .messages import message_kinds as message_kinds
     from .methods import check_method as check_method
 
-_HOME = {"check_method": "methods"}
+_HOME = {
+    "check_log": "logs",
+    "check_message": "messages",
+    "check_method": "methods",
+    "message_kinds": "messages",
+}
 
 __all__ = [*_HOME]
 
