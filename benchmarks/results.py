@@ -100,6 +100,13 @@ def two_digits(value: Any) -> str:
     return "–" if value is None or math.isnan(value) else f"{value:.2f}"
 
 
+def two_lines(interval: Any) -> str | None:
+    """Write a number, and its interval below it."""
+    from lineament_lab.reproduce.findings import cell_text
+
+    return None if interval is None else cell_text(interval).replace(" (", "<br>(")
+
+
 def without_ranges(text: str) -> str:
     """Leave out the ranges of what stands beside what is judged.
 
@@ -199,10 +206,10 @@ class Results:
             rows.append(
                 (
                     method,
-                    pools["phantom_in_100m"],
-                    Interval(*(100 * value for value in pools["covered"])),
-                    *(pools.get(f"{kind}_nees") for kind in ("segments", "corners")),
-                    *(of if of.value else None for of in repeated),
+                    two_lines(pools["phantom_in_100m"]),
+                    two_lines(Interval(*(100 * value for value in pools["covered"]))),
+                    *(two_lines(pools.get(f"{kind}_nees")) for kind in ("segments", "corners")),
+                    *(two_lines(of) if of.value else None for of in repeated),
                 )
             )
         columns = (

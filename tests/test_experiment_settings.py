@@ -12,7 +12,7 @@ from lineament_lab.reproduce import EXPERIMENTS, controls, experiment_names
 SETTINGS = {
     "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
               "FACE_FROM": 0.1, "FACE_TO": 0.6},
-    "claims": {"FLAT": 0.03},
+    "claims": {"FLAT": 0.03, "CLEAR": 2.0},
     "compare": {"_TIMED": 50},
     "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISY": 263, "_NOISE": 3.7,
                     "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75)),

@@ -422,8 +422,8 @@ class TestVerdicts:
                 "iepf:paper": of(0, 0.6),
                 "iepf:paper, in clusters": of(0, 0.7),
                 "ratios": {
-                    "partition: liu ÷ PDBS": (0.5, 0.4, Spread([0.6, 0.65])),
-                    "corners: liu ÷ IEPF": (0.75, 0.73, 0.8),
+                    "partition: liu ÷ PDBS": (0.3, 0.2, Spread([0.3, 0.35])),
+                    "corners: liu ÷ IEPF": (1.75, 1.5, 1.8),
                 },
             },
             "sensitivity": {
@@ -438,12 +438,12 @@ class TestVerdicts:
         assert bands(found)["Table 3: partition"] == "70–95 %"
         assert bands({}) == {}
         assert judged["Table 3: corners"][1] == "in part"
-        assert judged["Table 3: time"] == ("0.50 of PDBS, 0.75 of IEPF", "in part")
-        # Rounds on both sides of the paper's ratio decide nothing.
-        for low, word in ((0.71, "holds"), (0.73, "in part")):
-            numbers["success"]["ratios"]["corners: liu ÷ IEPF"] = (0.75, low, 0.8)
+        assert judged["Table 3: time"] == ("0.30 of PDBS, 1.75 of IEPF", "in part")
+        # Rounds within a factor of two of the paper's ratio decide nothing.
+        for low, word in ((1.43, "holds"), (1.45, "in part")):
+            numbers["success"]["ratios"]["corners: liu ÷ IEPF"] = (1.75, low, 1.8)
             assert self.judged(numbers)["Table 3: time"][1] == word
-        numbers["success"]["ratios"]["partition: liu ÷ PDBS"] = (0.6, Spread([0.5, 0.6]), 0.9)
+        numbers["success"]["ratios"]["partition: liu ÷ PDBS"] = (0.3, Spread([0.3, 0.3]), 0.36)
         numbers["success"]["ratios"]["corners: liu ÷ IEPF"] = (0.75, 0.71, 0.8)
         assert self.judged(numbers)["Table 3: time"][1] == "undecided"
 
