@@ -1,5 +1,6 @@
 """check_log: every reader passes, and what is broken in one is named in a line."""
 
+import gzip
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,10 @@ KINDS = (*scan_texts(), "npz", "gzip", *ros_bags.KINDS)
 WHOLE = ("rplidar", "csv_beams", "npz")
 
 
+def claims(kind):
+    return {"streams": kind not in WHOLE, "marked": kind not in scan_texts()}
+
+
 @pytest.fixture(scope="module")
 def samples(tmp_path_factory):
     """A log of each kind, in a folder; of the last of a kind."""
@@ -36,13 +41,20 @@ def samples(tmp_path_factory):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_reader(samples, kind):
-    check_log(open_log, samples[kind], streams=kind not in WHOLE, tries=12)
+    check_log(open_log, samples[kind], **claims(kind), tries=12)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_reader_by_many_cuts(samples, kind):
-    check_log(open_log, samples[kind], streams=kind not in WHOLE, tries=300)
+    check_log(open_log, samples[kind], **claims(kind), tries=300)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", scan_texts())
+def test_every_text_packed(write, kind):
+    path = write(scan_texts()[kind], "log.gz", gzip.compress)
+    check_log(open_log, path, streams=kind not in WHOLE, marked=True, tries=100)
 
 
 def test_each_reader_has_a_sample(samples):
@@ -155,13 +167,14 @@ def test_a_reader_of_somebody(plain):
         (Raises, "with bytes .* changed: raised ValueError: could not convert string to float"),
         (Silent, "keep_going counts no fault, and without it: .*six.plain:"),
         (Several, "the error does not begin with the path: a file: "),
+        (Plain, "cut off after .* of 78 bytes: . of 6 scans, and no error"),
         (MakesUp, "cut off after .* of 78 bytes: scan . is not that of the whole log"),
         (lambda path, **_: open_log(path), "raised LogError: .*six.plain: is no log"),
     ],
 )
 def test_what_is_broken_is_named(plain, reader, line):
     with pytest.raises(AssertionError, match=rf"^six.plain: .*{line}") as caught:
-        check_log(reader, plain)
+        check_log(reader, plain, marked=reader is Plain)
     assert str(caught.value).isprintable()
 
 

@@ -21,7 +21,6 @@ from lineament.mapping.drive_map import Drive
 from lineament.mapping.following import Follower
 from lineament.methods import get_method
 from lineament.motion import Dock, Odometer
-from lineament.output import open_writer
 from lineament.simulation import SENSORS, drive, room
 
 COPIES = {
@@ -246,10 +245,3 @@ def test_iterations_at_the_same_time_count_their_own_faults(write):
     assert (log.skipped, len(log.faults)) == (3, 3)
     assert len(list(first)) == 3
     assert (log.skipped, len(log.faults)) == (3, 3)
-
-
-def test_an_open_writer_is_not_copied(tmp_path):
-    with open_writer(tmp_path / "a.jsonl") as writer:
-        for copied in COPIES.values():
-            with pytest.raises(TypeError, match=r"^the writer of .*a\.jsonl cannot be copied: .*$"):
-                copied(writer)

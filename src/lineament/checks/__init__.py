@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from .messages import check_message as check_message
     from .messages import message_kinds as message_kinds
     from .methods import check_method as check_method
+    from .writers import check_writer as check_writer
 
 _HOME = {
     "check_log": "logs",
     "check_message": "messages",
     "check_method": "methods",
+    "check_writer": "writers",
     "message_kinds": "messages",
 }
 

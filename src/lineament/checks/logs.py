@@ -32,7 +32,9 @@ Words = list[tuple[object, ...]]
 _THREADS = 4
 
 
-def check_log(reader: Reader, sample: StrPath, *, streams: bool = True, tries: int = 40) -> None:
+def check_log(
+    reader: Reader, sample: StrPath, *, streams: bool = True, marked: bool = False, tries: int = 40
+) -> None:
     """Check a reader: what its log offers, and that damage ends in one line or in fewer scans.
 
     A log has as many scans as it says, the same at each reading, by index, by slice, by threads and
@@ -51,6 +53,9 @@ def check_log(reader: Reader, sample: StrPath, *, streams: bool = True, tries: i
     streams : bool
         Whether what comes before a cut is read by `keep_going`, of some cut 0.7 of the scans; not
         where all of a log is one object, or its index is at its end.
+    marked : bool
+        Whether such a log says where it ends, as bags do and archives: without its end there is an
+        error, or every scan.
     tries : int
         Cuts, and copies with bytes changed, that are tried; always the same.
 
@@ -78,7 +83,9 @@ def check_log(reader: Reader, sample: StrPath, *, streams: bool = True, tries: i
         for size in np.linspace(0, len(data) - 1, tries).astype(int).tolist():
             part.write_bytes(data[:size])
             with during(f"cut off after {size} of {len(data)} bytes"):
-                scans, kept = _damaged(reader, path)
+                scans, kept, error = _damaged(reader, path)
+                is_said = error or not marked or len(scans) == len(whole)
+                claim(is_said, f"{len(scans)} of {len(whole)} scans, and no error")
                 _claim_beginning(scans, whole)
                 _claim_beginning(kept, whole)
             most = max(most, len(kept))
@@ -170,14 +177,14 @@ def _problem(scan: object) -> str:
     return ""
 
 
-def _damaged(reader: Reader, path: Path) -> tuple[Words, Words]:
-    """Return the scans of a damaged log up to the first error, and those by `keep_going`."""
+def _damaged(reader: Reader, path: Path) -> tuple[Words, Words, str]:
+    """Return the scans of a damaged log up to the first error, those by `keep_going`, the error."""
     scans, error, _ = _until_error(reader, path, False)
     kept, broken, skipped = _until_error(reader, path, True)
     claim(len(kept) >= len(scans), f"keep_going gives {len(kept)} scans, and without {len(scans)}")
     claim(kept[: len(scans)] == scans, "keep_going gives other scans before the first fault")
     claim(broken or skipped or not error, f"keep_going counts no fault, and without it: {error}")
-    return scans, kept
+    return scans, kept, error
 
 
 def _until_error(reader: Reader, path: Path, keep: bool) -> tuple[Words, str, int]:
