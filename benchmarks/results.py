@@ -163,13 +163,21 @@ class Results:
         return self.simulation(SOME)
 
     def sensors(self) -> str:
-        """F1 of corners of some methods with each sensor."""
+        """F1 of corners of some methods with each sensor, and on plans that others made."""
         found = self.numbers("all_methods")
+        plans = self.numbers("plans").get("methods", {})
+        keys = "corner_f1_0.10", "corner_least", "corner_greatest"
         rows = [
-            (method, *(two_digits(of[method].get("corner_f1_0.10")) for of in found.values()))
+            (
+                method,
+                *(two_digits(of[method].get(keys[0])) for of in found.values()),
+                "{:.2f} ({:.2f}–{:.2f})".format(*(plans[method][key] for key in keys))
+                if plans
+                else None,
+            )
             for method in SOME
         ]
-        return markdown(("method", *found), rows)
+        return markdown(("method", *found, "others’ plans"), rows)
 
     def optimal(self) -> str:
         """More numbers of the default method, by sensor."""

@@ -10,6 +10,7 @@ from lineament_lab.reproduce import (
     Setting,
     contenders,
     museum,
+    plans,
     real,
     scans,
     tracking,
@@ -21,8 +22,11 @@ from small_experiments import silent, small  # noqa: F401
 import lineament as ln
 from lineament import LineamentError
 from lineament.logs import save_npz
+from lineament.mapping import LineMap
+from lineament.mapping.grids import Grid
 from lineament.scan.poses import relative
-from lineament.simulation import SENSORS, drive, room
+from lineament.simulation import SENSORS, World, drive, room
+from lineament.simulation.surfaces import View
 
 
 class TestMuseum:
@@ -246,3 +250,55 @@ class TestReal:
         assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
         assert list(findings.numbers["arena"]) == list(real.ARENAS)
         json.dumps(findings.to_dict(), allow_nan=False)
+
+
+class TestPlans:
+    """Scenes that are not ours."""
+
+    @pytest.fixture
+    def folder(self, tmp_path, monkeypatch):
+        (tmp_path / "plans").mkdir()
+        (tmp_path / "data").mkdir()
+        LineMap.from_lines(room().segments).write(tmp_path / "plans" / "room.yaml")
+        cells = Grid.read(tmp_path / "plans" / "room.yaml")
+        # A plan without a drive does not know what is free: here, what is within the room.
+        inside = np.where(cells.occupied, 100, 0).astype(np.int8)
+        Grid(inside, cells.resolution, cells.origin).write(tmp_path / "plans" / "room.yaml")
+        monkeypatch.setattr(plans, "PLANS", ("room",))
+        return tmp_path
+
+    def test_every_method_is_scored_by_plan(self, folder):
+        found = plans.run(Setting(2, 0, folder / "data"), silent)
+        numbers = found.numbers["methods"]
+        assert {"optimal", "liu:paper", "iepf", "blind cut, shared steps"} <= set(numbers)
+        best = numbers["optimal"]
+        assert best["corner_least"] == best["corner_greatest"] == best["corner_f1_0.10"] > 0.6
+        assert best["segment_f1"] > numbers["liu:paper"]["segment_f1"]
+        (table,) = found.tables
+        assert [row[0] for row in table.rows] == list(numbers)
+
+    def test_scans_stand_free_and_walls_bow(self, folder):
+        path = folder / "plans" / "room.yaml"
+        frames = list(plans.frames_on(path, 3))
+        again = list(plans.frames_on(path, 3))
+        for frame, same in zip(frames, again, strict=True):
+            assert frame.scan.ranges.tobytes() == same.scan.ranges.tobytes()
+            assert np.nanmin(frame.scan.ranges) > plans.CLEAR - 0.1
+        walls = [[-3.0, 2.0, 3.0, 2.0], [3.0, 2.0, 3.0, 1.5]]
+        world, sensor, rng = World(walls), SENSORS["utm30lx"], np.random.default_rng(1)
+        scan = sensor.scan(world, (0.0, 0.0, 0.0), rng)
+        view = View(world, (0.0, 0.0, 0.0), sensor)
+        longer = plans._bows(view, scan, rng)
+        # In the middle of the long wall, met squarely, it is the bow; the short wall has none.
+        middle = np.argmin(abs(scan.angles - math.pi / 2))
+        assert 0 < abs(longer[middle]) <= plans.BOW
+        assert abs(longer[middle]) == pytest.approx(
+            np.abs(longer * np.sin(scan.angles)).max(), rel=1e-3
+        )
+        assert not longer[view.surface == 1].any()
+
+    def test_without_plans_nothing_is_measured(self, tmp_path):
+        for data in (None, tmp_path):
+            found = plans.run(Setting(1, 0, data), silent)
+            assert "not at hand" in found.text[0]
+            assert found.tables == ()

@@ -28,12 +28,13 @@ EXPERIMENTS: dict[str, tuple[str, ...]] = {
     "sensitivity": ("open",),
     "success": ("table3",),
     "all_methods": ("methods",),
+    "plans": (),
     "tracking": (),
     "real": ("repeatability",),
     "museum": (),
 }
 #: Experiments that are run once: on recordings, or on nothing random.
-ONCE = ("definitions", "tracking", "real", "museum")
+ONCE = ("definitions", "plans", "tracking", "real", "museum")
 
 
 def experiment_names(names: Iterable[str]) -> list[str]:

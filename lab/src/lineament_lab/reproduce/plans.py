@@ -1,0 +1,145 @@
+"""Scenes that are not ours: scans simulated on plans that others made, of real storeys."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lineament.mapping import LineMap
+from lineament.mapping.grids import Grid
+from lineament.scan import Array, LaserScan
+from lineament.simulation import SENSORS, World, truth
+from lineament.simulation.surfaces import View
+
+from ..evaluation.scores import Scores, evaluate
+from .contenders import RIVALS_NOTE, feature_methods
+from .findings import Columns, Findings, Progress, Setting, Table, each
+from .scans import Frame, batch_of
+
+#: Occupancy grids, in a folder beside that of the recordings.
+PLANS = ("stata_basement", "building_31", "depot", "warehouse", "tb3_sandbox")
+#: Scans in each for each frame of the setting, and how far from walls they are at least [m].
+SCANS_A_FRAME, CLEAR = 4, 0.4
+#: Walls bow by up to so much [m] if they are so long [m]: the arena's by 13 to 23 mm.
+BOW, LONG = 0.02, 1.0
+#: A person stands on each so many square metres, a round thing of this radius [m].
+AREA, RADIUS = 20.0, 0.2
+SENSOR = "utm30lx"
+TITLE = "Scenes that are not ours"
+_COLUMNS: Columns = {
+    "corner F1": ("corner_f1_0.10", 1),
+    "least": ("corner_least", 1),
+    "greatest": ("corner_greatest", 1),
+    "precision": ("corner_precision_0.10", 1),
+    "recall": ("corner_recall_0.10", 1),
+    "median error [mm]": ("corner_median_error", 1e3),
+    "segment F1": ("segment_f1", 1),
+    "segment F1, least": ("segment_least", 1),
+    "greatest segment F1": ("segment_greatest", 1),
+}
+
+
+def run(setting: Setting, progress: Progress) -> Findings:
+    """Score all methods on scans simulated in each of the plans."""
+    folder = None if setting.data is None else setting.data / ".." / "plans"
+    if folder is None or not all((folder / f"{name}.yaml").exists() for name in PLANS):
+        return Findings(TITLE, (_MISSING,))
+    methods = feature_methods(setting.methods)
+    by_plan: dict[str, dict[str, Scores]] = {}
+    for plan in PLANS:
+        progress(f"{plan}: simulating")
+        frames = list(frames_on(folder / f"{plan}.yaml", SCANS_A_FRAME * setting.frames))
+        scans = [frame.scan for frame in frames]
+        by_plan[plan] = {
+            name: Scores.total(
+                map(evaluate, batch_of(extract, scans), (frame.truth for frame in frames))
+            )
+            for name, extract in each(methods, progress, plan)
+        }
+    numbers = {name: _over_plans([of[name] for of in by_plan.values()]) for name in methods}
+    title = f"{len(PLANS)} plans, {SCANS_A_FRAME * setting.frames} scans in each"
+    return Findings(
+        TITLE,
+        (_ABOUT, RIVALS_NOTE),
+        (Table.of_numbers(title, numbers, _COLUMNS, _NOTE),),
+        (),
+        {"methods": numbers},
+    )
+
+
+def frames_on(path: Path, count: int) -> Iterator[Frame]:
+    """Simulate scans at free places of a plan, among people, with walls that bow."""
+    plan, grid, sensor = LineMap.read(path), Grid.read(path), SENSORS[SENSOR]
+    ends = np.hstack((plan.walls["start"], plan.walls["end"]))
+    rng = np.random.default_rng([len(ends), count])
+    free = grid.placed(np.argwhere(grid.free)[:, ::-1].astype(np.float64) + 0.5)
+    anywhere = free[rng.integers(len(free), size=round(len(free) * grid.resolution**2 / AREA))]
+    people = [one for one in anywhere if _distances(one, ends).min() > 2.0 * RADIUS]
+    world, found = World(ends, [(*person, RADIUS) for person in people]), 0
+    while found < count:
+        place = free[rng.integers(len(free))]
+        near = [math.dist(person, place) for person in people]
+        if min(_distances(place, ends).min(), min(near, default=math.inf) - RADIUS) < CLEAR:
+            continue
+        pose = (float(place[0]), float(place[1]), float(rng.uniform(-math.pi, math.pi)))
+        scan = sensor.scan(world, pose, rng)
+        if scan.valid.sum() < len(scan) // 2:
+            continue  # of a hall that the plan leaves open
+        found += 1
+        bowed = scan.ranges + _bows(View(world, pose, sensor), scan, rng)
+        yield Frame(
+            LaserScan(bowed, scan.angle_min, scan.angle_increment, range_max=scan.range_max),
+            truth(world, pose, sensor),
+        )
+
+
+def _distances(place: Array, ends: Array) -> Array:
+    """Return how far walls are from a place [m]."""
+    start, along = ends[:, :2], ends[:, 2:] - ends[:, :2]
+    part = ((place - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+    nearest = start + np.clip(part, 0.0, 1.0)[:, None] * along
+    distances: Array = np.hypot(*(place - nearest).T)
+    return distances
+
+
+def _bows(view: View, scan: LaserScan, rng: np.random.Generator) -> Array:
+    """Return what ranges are longer by, as long walls bow between their ends [m]."""
+    longer = np.zeros(len(scan))
+    for k, (start, end) in enumerate(view.walls):
+        length = math.dist(start, end)
+        on = np.flatnonzero((view.surface == k) & scan.valid)
+        bow = rng.uniform(-BOW, BOW)
+        if length < LONG or not len(on):
+            continue
+        along, beams = (end - start) / length, view.bearings[on]
+        toward = np.stack((np.cos(beams), np.sin(beams)), axis=1)
+        part = (view.ranges[on, None] * toward - start) @ along / length
+        normal = abs(toward[:, 0] * along[1] - toward[:, 1] * along[0])
+        longer[on] = 4.0 * bow * part * (1.0 - part) / np.maximum(normal, 0.1)
+    return longer
+
+
+def _over_plans(scores: list[Scores]) -> dict[str, Any]:
+    """Return the summary of all plans, with the least and the greatest F1 of one."""
+    summary = Scores.total(scores).summary()
+    for kind, key in (("corner", "corner_f1_0.10"), ("segment", "segment_f1")):
+        of = [one.summary().get(key, math.nan) for one in scores]
+        if np.isfinite(of).all():
+            summary |= {f"{kind}_least": min(of), f"{kind}_greatest": max(of)}
+    return summary
+
+
+_MISSING = (
+    "The plans are not at hand: occupancy grids in a folder “plans” beside that of the recordings."
+)
+_ABOUT = (
+    "All other scenes here are of one generator, by the authors of `optimal`. These are of plans "
+    "that others made: two storeys at MIT, mapped by a robot, and three maps that come with nav2. "
+    "Their walls are broken, stepped by the cells of the grid and full of niches. A scanner "
+    f"{SENSOR} stands at free places, among people (one on {AREA:g} m²); walls of over {LONG:g} m "
+    f"bow by up to {1e3 * BOW:g} mm, as in the arena, which the truth does not know. What it "
+    "calls a corner may be a step of a few centimetres."
+)
+_NOTE = "Least and greatest: of one plan."
