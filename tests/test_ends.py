@@ -23,9 +23,11 @@ from lineament import LogError, files
 from lineament.cli import cli, run
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
-from lineament.logs import open_log
+from lineament.logs import open_log, save_npz
 from lineament.logs.opening import readers
 from lineament.output import ENDINGS, open_writer
+from lineament.simulation import SENSORS, drive
+from lineament.simulation import room as small_room
 from lineament.tasks.bulk import extract_logs
 from lineament.view import ViewServer
 
@@ -41,6 +43,7 @@ RUNS = {
     "map room.npz -o plan.dxf": "plan.dxf",
     "map room.npz -o plan.svg --poses drive.tum": "drive.tum",
     "plan walls.parquet -o drawn.svg": "drawn.svg",
+    "calibrate drive.npz --no-deskew -o left.png": "left.png",
     "locate room.npz --map walls.parquet -o where.csv": "where.csv",
     "live --from wall.npz --ros 0 --rate 0 -m iepf": "",
     "demo wall.npz -o demo": "demo",
@@ -64,6 +67,8 @@ def plan(tmp_path_factory):
     log, walls = str(folder / "room.npz"), str(folder / "walls.parquet")
     assert run(["simulate", "room", "--scans", "4", "--sensor", "lms181", "-o", log, "-q"]) == 0
     assert run(["map", log, "-o", walls, "-q"]) == 0
+    way = [(-2, -1), (0.5, -1), (0.5, 0.5), (-1, 0.5)]
+    save_npz(folder / "drive.npz", drive(small_room(), way, SENSORS["lms181"], speed=1, rate=6))
     return folder
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import lineament as ln
 from lineament.motion import Motion, Odometer, Tracker
-from lineament.motion.odometry import _twist_covariance, compose_jacobians
+from lineament.motion.odometry import compose_jacobians, covariance_of_twist
 from lineament.scan.poses import compose, relative, twist_between
 from lineament.simulation import SENSORS, drive, room
 
@@ -40,7 +40,9 @@ def test_derivatives_are_those_of_differences(motion):
     np.testing.assert_allclose(of_motion, found, atol=1e-8)
     by = derivative(lambda at: twist_between((0, 0, 0), tuple(at), 0.1), np.array(motion))
     expected = by @ SPREAD @ by.T
-    np.testing.assert_allclose(_twist_covariance(Motion(*motion, SPREAD), 0.1), expected, rtol=1e-6)
+    np.testing.assert_allclose(
+        covariance_of_twist(Motion(*motion, SPREAD), 0.1), expected, rtol=1e-6
+    )
 
 
 @pytest.mark.slow

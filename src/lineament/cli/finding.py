@@ -11,6 +11,7 @@ from ..plugins import COMMANDS, missing, plugins
 
 #: Where each of our own commands is.
 OWN = {
+    "calibrate": "calibrate:calibrate",
     "demo": "simulating:demo",
     "extract": "extract:extract",
     "info": "commands:info",

@@ -42,8 +42,7 @@ def read_svg(path: str | os.PathLike[str], limits: Limits) -> Drawn:
         circles = [_circle(row) for row in layers["arcs"]]
     except (KeyError, ValueError, TypeError) as problem:
         raise error(f"is no plan that lineament wrote: {problem!r}") from None
-    is_ours = any(row.attrib.get("data-views", "1") != "1" for row in layers["walls"])
-    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0, is_ours)
+    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0)
 
 
 def _circle(row: ElementTree.Element) -> list[float]:

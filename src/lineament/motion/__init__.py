@@ -15,6 +15,7 @@ Examples
 
 from ..scan.poses import Twist, compose, inverse, poses_along, relative, twist_between
 from .association import Matches, associate
+from .calibration import Calibration, calibrate
 from .deskew import beam_times, deskew
 from .docking import CornerPose, Dock, corner_pose
 from .estimate import Motion, estimate_motion
@@ -22,6 +23,7 @@ from .odometry import Odometer, Travel
 from .tracker import Tracker, Tracks
 
 __all__ = [
+    "Calibration",
     "CornerPose",
     "Dock",
     "Matches",
@@ -33,6 +35,7 @@ __all__ = [
     "Twist",
     "associate",
     "beam_times",
+    "calibrate",
     "compose",
     "corner_pose",
     "deskew",

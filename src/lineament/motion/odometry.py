@@ -83,7 +83,7 @@ class Odometer(InTurn):
             if duration > 0:
                 found = motion.twist(duration)
                 if all(abs(speed) <= FASTEST for speed in found):
-                    twist, twist_covariance = found, _twist_covariance(motion, duration)
+                    twist, twist_covariance = found, covariance_of_twist(motion, duration)
                     twist_covariance += np.outer(skew, skew) / duration**2
         covariance = self._covariance + np.outer(self._skew, self._skew)
         return Travel(self._pose, covariance, twist, twist_covariance)
@@ -97,7 +97,7 @@ def compose_jacobians(pose: Pose, motion: Pose) -> tuple[Array, Array]:
     return of_pose, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _twist_covariance(motion: Motion, duration: float) -> Array:
+def covariance_of_twist(motion: Motion, duration: float) -> Array:
     """Covariance of the twist of a motion, by the derivative of `twist_between`.
 
     With h half the turn, v = (k x + h y, k y - h x) / duration and k = h cot h.

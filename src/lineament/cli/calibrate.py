@@ -1,0 +1,68 @@
+"""The command that finds where a scanner is on its robot."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import LOG, METHOD, NOISE, PATH, QUIET, SET, check_ending, make_extractor
+from .options import reading_odometry as reading
+
+
+@click.command()
+@LOG
+@click.option("-o", "--output", type=PATH, help="A picture of what is left: .png, .svg or .pdf.")
+@click.option("--json", "as_json", is_flag=True, help="Print all numbers as JSON.")
+@click.option(
+    "--track",
+    "track_width",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="METRES",
+    help="Distance between the wheels by which the odometry was computed: radii and track are "
+    "found instead of scales.",
+)
+@click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
+@METHOD
+@SET
+@NOISE
+@reading
+@QUIET
+def calibrate(
+    log: Path | str,
+    output: Path | None,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    track_width: float | None,
+    as_json: bool,
+    no_deskew: bool,
+    quiet: bool,
+    reading: dict[str, Any],
+) -> None:
+    """Find where the scanner of LOG is on its robot, and the radii and track of its wheels.
+
+    Poses of the log are taken as odometry. What the drive does not show is named, and has no
+    number: it takes turns and ways, in any order.
+    """
+    from ..files import strict_json
+    from ..output.canvas import PICTURE_ENDINGS
+    from ..tasks.calibrate import calibrate_log
+    from .progress import tracker
+
+    if output is not None:
+        check_ending(output, PICTURE_ENDINGS)
+    if reading.pop("laser_pose") is not None:
+        raise click.UsageError("--laser-pose: is what calibrate finds, expected no such option")
+    done = calibrate_log(
+        log,
+        output,
+        make_extractor(method, settings, noise),
+        track_width=track_width or 0.0,
+        deskewed=not no_deskew,
+        track=tracker(quiet),
+        **reading,
+    )
+    if as_json:
+        click.echo(strict_json(done.as_dict()))
+    elif not quiet:
+        click.echo(str(done))

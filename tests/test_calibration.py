@@ -1,0 +1,200 @@
+"""Mounting and wheels by motions: by hand, what a drive does not show, slips, whole logs."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from lineament.cli import run
+from lineament.errors import LineamentError
+from lineament.logs import save_npz
+from lineament.motion import Motion, calibrate
+from lineament.scan.poses import compose, inverse, poses_along
+from lineament.simulation import SENSORS, drive, room
+from lineament.tasks import calibrate as task
+from lineament.tasks.calibrate import calibrate_log
+
+SPREAD = np.diag((2e-3, 2e-3, 1e-3)) ** 2
+MOUNTING = (0.25, -0.08, 0.3)
+#: Way and turn of steps: ahead, turns on the spot to either side, an arc.
+AHEAD, LEFT, RIGHT, ARC = (0.3, 0.0), (0.0, 0.35), (0.0, -0.35), (0.3, 0.2)
+SHAPES = [AHEAD, AHEAD, LEFT, ARC, RIGHT, LEFT] * 6
+
+
+def seen(step, mounting=MOUNTING):
+    """Motion of a scanner on a robot that makes a step."""
+    return compose(inverse(mounting), compose(tuple(step), mounting))
+
+
+def drive_of(shapes, counts=(1.0, 1.0), track=0.4, believed=0.4, noise=(0, 0, 0), seed=0):
+    """Odometry and motions of steps, by wheels that count so many times their way."""
+    rng, odometry, motions = np.random.default_rng(seed), [], []
+    for way, turn in shapes:
+        left = (way - track / 2 * turn) * counts[0]
+        right = (way + track / 2 * turn) * counts[1]
+        size = max(abs(way), track / 2 * abs(turn))
+        twist = np.array([(left + right) / 2, 0.0, (right - left) / believed])
+        twist += rng.standard_normal(3) * np.sqrt(size) * noise
+        odometry.append(poses_along(tuple(twist.tolist()), [0.0, 1.0]))
+        step = seen(poses_along((way, 0.0, turn), [1.0])[0].tolist())
+        off = rng.standard_normal(3) * np.sqrt(np.diag(SPREAD)) * (max(noise) > 0)
+        motions.append(Motion(*(np.array(step) + off).tolist(), SPREAD))
+    return odometry, motions
+
+
+def test_mounting_radii_and_track_are_exact_without_noise():
+    odometry, motions = drive_of(SHAPES, (1.01, 0.98), track=0.42)
+    found = calibrate(odometry, motions, track=0.4)
+    assert found.names == ("x", "y", "theta", "left", "right", "track")
+    expected = (*MOUNTING, 1 / 1.01, 1 / 0.98, 0.42)
+    np.testing.assert_allclose(list(found.values.values()), expected, atol=1e-5)
+    assert not found.is_slip.any()
+    assert not found.unknown
+    np.testing.assert_allclose(found.mounting, MOUNTING, atol=1e-5)
+
+
+def test_without_a_track_ways_and_turns_have_scales():
+    odometry, motions = drive_of(SHAPES, (1.02, 1.02), track=0.42)
+    found = calibrate(odometry, motions)
+    scales = [found.values[name] for name in ("way", "turn", "drift")]
+    # Ticks of 1.02 of the way; turns by a track that is too small.
+    np.testing.assert_allclose(scales, (1 / 1.02, 0.4 / 0.42 / 1.02, 0.0), atol=1e-5)
+
+
+def test_a_mounting_that_looks_back_is_found():
+    shapes, mounting = SHAPES, (-0.3, 0.1, 3.0)
+    odometry, _ = drive_of(shapes)
+    motions = [Motion(*seen(way[1].tolist(), mounting), SPREAD) for way in odometry]
+    found = calibrate(odometry, motions, wheels=False)
+    assert found.names == ("x", "y", "theta")
+    np.testing.assert_allclose(found.mounting, mounting, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_errors_are_as_large_as_the_deviations_say():
+    squares = []
+    for seed in range(30):
+        given = drive_of(SHAPES * 2, noise=(4e-3, 1e-3, 0.02), seed=seed)
+        found = calibrate(*given, track=0.4)
+        error = np.array(list(found.values.values())) - (*MOUNTING, 1.0, 1.0, 0.4)
+        squares.append(error @ np.linalg.solve(found.covariance, error) / 6)
+    assert 0.75 < np.mean(squares) < 1.3
+
+
+@pytest.mark.parametrize(
+    ("shapes", "unknown"),
+    [
+        ([AHEAD] * 40, {"x", "y", "turn"}),
+        ([LEFT, RIGHT] * 20, {"theta", "way", "drift"}),
+        # On one circle, a wheel that is larger is a turn that counts more.
+        ([ARC] * 40, {"turn", "drift"}),
+    ],
+)
+def test_what_a_drive_does_not_show_has_no_number(shapes, unknown):
+    found = calibrate(*drive_of(shapes, noise=(2e-3, 5e-4, 5e-3)))
+    assert unknown <= set(found.unknown)
+    assert not set(found.unknown) & set(found.values)
+    assert len(found.covariance) == len(found.values) == 6 - len(found.unknown)
+    assert all("hardly" in why or "only" in why for why in found.unknown.values())
+
+
+def test_without_turns_the_radii_are_known_and_the_track_is_not():
+    found = calibrate(*drive_of([AHEAD] * 60, noise=(2e-3, 5e-4, 5e-3)), track=0.4)
+    assert set(found.unknown) == {"x", "y", "track"}
+    assert found.mounting is None
+    assert found.values["left"] == pytest.approx(1.0, abs=0.005)
+
+
+def test_slips_are_left_out():
+    odometry, motions = drive_of(SHAPES, noise=(1e-3, 5e-4, 3e-3))
+    for k in (3, 9, 17, 30):
+        odometry[k][1] += (0.04, 0.0, 0.2)
+    found = calibrate(odometry, motions, track=0.4)
+    assert set(np.flatnonzero(found.is_slip)) >= {3, 9, 17, 30}
+    assert found.is_slip.sum() <= 6
+    np.testing.assert_allclose(found.mounting, MOUNTING, atol=0.004)
+    assert found.values["track"] == pytest.approx(0.4, rel=0.01)
+
+
+def test_odometry_that_does_not_belong_is_refused():
+    odometry, motions = drive_of(SHAPES, noise=(1e-3, 5e-4, 3e-3))
+    rng = np.random.default_rng(3)
+    others = [odometry[k] for k in rng.permutation(len(odometry))]
+    with pytest.raises(ValueError, match="another robot"):
+        calibrate(others, motions)
+    millimetres = [way * (1000, 1000, 1) for way in odometry]
+    with pytest.raises(ValueError, match="in other units"):
+        calibrate(millimetres, motions)
+    with pytest.raises(ValueError, match="stands still while"):
+        calibrate([0 * way for way in odometry], motions)
+    with pytest.raises(ValueError, match="7 motions, expected at least 8"):
+        calibrate(odometry[:7], motions[:7])
+    with pytest.raises(ValueError, match="odometry has 3 steps, expected 36"):
+        calibrate(odometry[:3], motions)
+    with pytest.raises(ValueError, match=r"a step of .*nan"):
+        calibrate([odometry[0] * math.nan, *odometry[1:]], motions)
+    with pytest.raises(ValueError, match="track is -1"):
+        calibrate(odometry, motions, track=-1.0)
+
+
+# Logs
+
+
+WAY = [(-2, -1), (2, -1), (2, 1), (-2, 1), (-2, -0.5), (1.5, -0.5)]
+
+
+@pytest.fixture(scope="module")
+def scans():
+    """Scans with the poses of a robot that carries the scanner 0.3 m behind its axle."""
+    taken = drive(room(), WAY, SENSORS["lms181"], speed=1.0, rate=8)
+    return [scan.with_pose(compose(scan.pose, (0.3, 0.0, 0.0))) for scan in taken]
+
+
+def test_a_log_gives_the_option_to_paste(scans, tmp_path, capsys, monkeypatch):
+    log, picture, done = str(tmp_path / "log.npz"), tmp_path / "left.png", []
+    save_npz(log, scans)
+    monkeypatch.setattr(
+        task,
+        "calibrate_log",
+        lambda *given, **options: keep(done, calibrate_log(*given, **options)),
+    )
+    assert run(["calibrate", log, "--no-deskew", "--track", "0.5", "-o", str(picture)]) == 0
+    text = capsys.readouterr().out
+    assert "--laser-pose -0." in text
+    assert "left wheel, times" in text
+    assert picture.stat().st_size > 10_000
+    monkeypatch.setattr(task, "calibrate_log", lambda *_, **__: done[0])
+    assert run(["calibrate", log, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(found["laser_pose"], (-0.3, 0.0, 0.0), atol=0.01)
+    assert found["values"].keys() == found["deviations"].keys()
+
+
+def keep(kept, value):
+    kept.append(value)
+    return value
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda scan: scan.with_pose(None), "has no poses, expected odometry"),
+        (lambda scan: scan.stamped("first", 5 * 10**9), "all stamps are 5.0, expected stamps that"),
+        (lambda scan: scan.with_pose((1.0, 2.0, 0.0)), "stands still while the"),
+    ],
+)
+def test_logs_that_cannot_be_used_are_one_line(scans, tmp_path, change, problem):
+    save_npz(tmp_path / "log.npz", map(change, scans))
+    with pytest.raises(LineamentError, match=problem):
+        calibrate_log(tmp_path / "log.npz", deskewed=False)
+
+
+def test_a_scanner_that_stands_is_one_line(scans, tmp_path, capsys):
+    stands = [scans[0].stamped("first", k * 10**8) for k in range(10)]
+    save_npz(tmp_path / "log.npz", stands)
+    log = str(tmp_path / "log.npz")
+    assert run(["calibrate", log]) == 1
+    assert "moves too little: 0 steps" in capsys.readouterr().err
+    assert run(["calibrate", log, "--laser-pose", "0", "0", "0"]) == 2
+    assert "is what calibrate finds" in capsys.readouterr().err
