@@ -5,13 +5,14 @@ import math
 
 import numpy as np
 import pytest
+import ros_bags
 
 from lineament.cli import run
 from lineament.errors import LineamentError
 from lineament.logs import save_npz
 from lineament.motion import Motion, calibrate
 from lineament.scan.poses import compose, inverse, poses_along
-from lineament.simulation import SENSORS, drive, room
+from lineament.simulation import SENSORS, drive, drive_poses, room
 from lineament.tasks import calibrate as task
 from lineament.tasks.calibrate import calibrate_log
 
@@ -198,3 +199,27 @@ def test_a_scanner_that_stands_is_one_line(scans, tmp_path, capsys):
     assert "moves too little: 0 steps" in capsys.readouterr().err
     assert run(["calibrate", log, "--laser-pose", "0", "0", "0"]) == 2
     assert "is what calibrate finds" in capsys.readouterr().err
+
+
+def test_one_scanner_against_another_by_the_motions_of_both(tmp_path, capsys):
+    messages, sensor, items = ros_bags.Messages(2), SENSORS["lms181"], []
+    mounting, (stamps, poses) = (-0.4, 0.2, 2.0), drive_poses(WAY, 1.0, 1.0, 8.0)
+    for i, (stamp, pose) in enumerate(zip(stamps.tolist(), poses.tolist(), strict=True)):
+        for topic, at in (("/front", tuple(pose)), ("/rear", compose(tuple(pose), mounting))):
+            rng = np.random.default_rng([i, topic == "/rear"])
+            ranges = sensor.scan(room(), at, rng).ranges
+            fields = {"angle_min": sensor.angle_min, "angle_increment": sensor.angle_increment}
+            scan = messages.scan(stamp, ranges, frame=topic[1:], scan_time=0.0, **fields)
+            items.append((topic, int(stamp * 1e9), scan))
+    log = str(ros_bags.write(tmp_path, "mcap", items))
+    given = ["calibrate", log, "--against", "/front"]
+    assert run([*given, "--topic", "/rear", "--json", "-q"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["values"].keys() == {"x", "y", "theta"}
+    error = np.array(found["laser_pose"]) - mounting
+    assert (abs(error) < (0.02, 0.02, 0.01)).all(), error
+    assert error @ np.linalg.solve(found["covariance"], error) < 16
+    assert run(given) == 2
+    assert "expected --topic, too" in capsys.readouterr().err
+    assert run([*given, "--topic", "/front"]) == 1
+    assert "is the scanner itself" in capsys.readouterr().err

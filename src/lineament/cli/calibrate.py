@@ -21,6 +21,7 @@ from .options import reading_odometry as reading
     help="Distance between the wheels by which the odometry was computed: radii and track are "
     "found instead of scales.",
 )
+@click.option("--against", metavar="TOPIC", help="Another scanner, in place of the wheels.")
 @click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
 @METHOD
 @SET
@@ -33,6 +34,7 @@ def calibrate(
     method: str | None,
     settings: tuple[str, ...],
     noise: float | None,
+    against: str | None,
     track_width: float | None,
     as_json: bool,
     no_deskew: bool,
@@ -41,6 +43,7 @@ def calibrate(
 ) -> None:
     """Find where the scanner of LOG is on its robot, and the radii and track of its wheels.
 
+    Or where it is in the frame of another scanner, the one that --topic names in that of --against.
     Poses of the log are taken as odometry. What the drive does not show is named, and has no
     number: it takes turns and ways, in any order.
     """
@@ -51,12 +54,15 @@ def calibrate(
 
     if output is not None:
         check_ending(output, PICTURE_ENDINGS)
+    if against is not None and reading["topic"] is None:
+        raise click.UsageError("--against: expected --topic, too: that whose mounting is found")
     if reading.pop("laser_pose") is not None:
         raise click.UsageError("--laser-pose: is what calibrate finds, expected no such option")
     done = calibrate_log(
         log,
         output,
         make_extractor(method, settings, noise),
+        against=against,
         track_width=track_width or 0.0,
         deskewed=not no_deskew,
         track=tracker(quiet),

@@ -1,14 +1,16 @@
 """Motions of a scanner and of its odometry over the same steps, as `calibrate` takes them."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
 from ..features import Features
 from ..scan import Array, Pose
-from ..scan.poses import compose
+from ..scan.poses import compose, poses_along, twist_between
 from .association import associate
 from .estimate import Motion, estimate_motion
 from .tracker import Tracker
@@ -20,6 +22,8 @@ _NEAR, _GROWS = (0.03, 0.02), (0.1, 0.1)
 #: How well it is known beside what the scans show: directions that they do not have no weight.
 _WIDE = np.diag((0.5, 0.5, 0.3)) ** 2
 _ROUNDS = 3
+#: Between scans that are farther apart, a motion is not even [s].
+_LONGEST = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +67,44 @@ def steps_of(
             steps.motions.append(motion)
         first, moved = i, (0.0, 0.0, 0.0)
     return steps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """Where a scanner was between its own scans, in the frame of its first one.
+
+    `poses` are those at its stamps [s]; `is_lost` is whether the motion to each is not known.
+    """
+
+    stamps: list[float]
+    poses: list[Pose]
+    is_lost: list[bool]
+
+    @classmethod
+    def of(cls, features: Sequence[Features], roughness: float = 0.01) -> Self:
+        """Add up the motions from scan to scan."""
+        tracker, is_lost = Tracker(roughness=roughness), []
+        poses: list[Pose] = []
+        for seen in features:
+            motion = tracker(seen).motion
+            is_lost.append(motion is None or not motion.observable)
+            before = poses[-1] if poses else (0.0, 0.0, 0.0)
+            poses.append(before if motion is None else compose(before, motion.pose))
+        return cls([seen.stamp for seen in features], poses, is_lost)
+
+    def at(self, stamp: float) -> Pose | None:
+        """Return the pose at a time; None if it is not known."""
+        i = bisect_right(self.stamps, stamp)
+        if i > 0 and self.stamps[i - 1] == stamp:
+            return None if self.is_lost[i - 1] else self.poses[i - 1]
+        if not 0 < i < len(self.stamps) or self.is_lost[i]:
+            return None
+        duration = self.stamps[i] - self.stamps[i - 1]
+        if duration > _LONGEST:
+            return None
+        twist = twist_between(self.poses[i - 1], self.poses[i], duration)
+        x, y, theta = poses_along(twist, [stamp - self.stamps[i - 1]])[0].tolist()
+        return compose(self.poses[i - 1], (x, y, theta))
 
 
 def _matched(before: Features, now: Features, guess: Pose, roughness: float) -> Motion:

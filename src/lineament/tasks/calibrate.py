@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,10 @@ from ..errors import LogError
 from ..extractor import Extractor, load_kernels
 from ..features import Features
 from ..files import check_outputs
-from ..logs import open_log
+from ..logs import Log, open_log
 from ..motion import Calibration, Tracker, beam_times, calibrate, deskew
 from ..motion.calibration import FEWEST
-from ..motion.steps import Steps, steps_of
+from ..motion.steps import Carried, Steps, steps_of
 from ..output.calibrations import plot_calibration
 from ..output.canvas import check_ending
 from ..progress import Track, untracked
@@ -89,12 +90,15 @@ def calibrate_log(
     output: str | os.PathLike[str] | None = None,
     extractor: Extractor | None = None,
     *,
+    against: str | None = None,
     track_width: float = 0.0,
     deskewed: bool = True,
     track: Track = untracked,
     **reading: Any,
 ) -> Calibrated:
     """Find where the scanner of a log is on its robot, and what is wrong with its wheels.
+
+    Or, with `against`, where it is in the frame of another scanner.
 
     Parameters
     ----------
@@ -105,6 +109,9 @@ def calibrate_log(
         A picture of what is left of each step.
     extractor : Extractor, optional
         The method.
+    against : str, optional
+        Topic of another scanner of the same robot: its motions, by its own scans, are taken in
+        place of odometry, and of the log's poses none.
     track_width : float
         Distance between the wheels by which the odometry was computed [m]; 0 if it is not known.
     deskewed : bool
@@ -135,17 +142,24 @@ def calibrate_log(
     if output is not None:
         check_ending(output)
         check_outputs([output], [path])
-    log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
-    if log.topic is None and len(log.topics) > 1:
-        raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
+    log, scans = _read(path, reading)
     extractor = Extractor() if extractor is None else extractor
     load_kernels([extractor])
-    scans = [scan for _, scan in log.measured()]
-    _check(log.name, scans)
-    shown = list(track(scans, Path(log.name).name, len(scans)))
+    poses = [scan.pose for scan in scans]
+    if against is not None:
+        if against == log.topic:
+            raise LogError(log.name, f"--against {against} is the scanner itself")
+        _, others = _read(path, {**reading, "topic": against})
+        carried = Carried.of(_features(others, extractor, deskewed=deskewed))
+        poses = [carried.at(scan.stamp) for scan in scans]
+        if not any(poses):
+            raise LogError(log.name, f"{against} has no scans around those of {log.topic}")
+    elif not any(pose is not None for pose in poses):
+        raise LogError(log.name, "has no poses, expected odometry (--odometry names its topic)")
+    shown = track(scans, Path(log.name).name, len(scans))
     features = _features(shown, extractor, deskewed=deskewed)
     try:
-        steps, found = _calibrated(features, [scan.pose for scan in scans], track_width)
+        steps, found = _calibrated(features, poses, track_width, wheels=against is None)
     except ValueError as error:
         raise LogError(log.name, str(error)) from None
     if output is not None:
@@ -161,15 +175,21 @@ def calibrate_log(
     )
 
 
-def _check(name: str, scans: list[LaserScan]) -> None:
-    if not any(scan.pose is not None for scan in scans):
-        raise LogError(name, "has no poses, expected odometry (--odometry names its topic)")
-    stamps = {scan.stamp for scan in scans}
-    if len(stamps) == 1 and len(scans) > 1:
-        raise LogError(name, f"all stamps are {stamps.pop()}, expected stamps that increase")
+def _read(path: str | os.PathLike[str], reading: dict[str, Any]) -> tuple[Log, list[LaserScan]]:
+    """Read the scans of a topic, with poses as the log has them."""
+    log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
+    if log.topic is None and len(log.topics) > 1:
+        raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
+    scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
+    if len(scans) > 1 and len({scan.stamp for scan in scans}) == 1:
+        stamp = scans[0].stamp
+        raise LogError(log.name, f"all stamps are {stamp}, expected stamps that increase")
+    return log, scans
 
 
-def _features(scans: list[LaserScan], extractor: Extractor, *, deskewed: bool) -> list[Features]:
+def _features(
+    scans: Iterable[LaserScan], extractor: Extractor, *, deskewed: bool
+) -> list[Features]:
     """Extract the features of each scan, as if all beams had been taken at once."""
     tracker, found = Tracker(), []
     for scan in scans:
@@ -181,7 +201,7 @@ def _features(scans: list[LaserScan], extractor: Extractor, *, deskewed: bool) -
 
 
 def _calibrated(
-    features: list[Features], odometry: list[Pose | None], track_width: float
+    features: list[Features], odometry: list[Pose | None], track_width: float, *, wheels: bool
 ) -> tuple[Steps, Calibration]:
     """Find the mounting by the scans alone; then again, looking for the walls by odometry."""
     steps = steps_of(features, odometry)
@@ -189,10 +209,10 @@ def _calibrated(
         raise ValueError(
             f"the scanner moves too little: {len(steps)} steps of 0.3 m or 20°, expected {FEWEST}"
         )
-    found = calibrate(steps.odometry, steps.motions, track=track_width)
+    found = calibrate(steps.odometry, steps.motions, track=track_width, wheels=wheels)
     if found.mounting is not None:
         again = steps_of(features, odometry, found.mounting)
         if len(again) >= len(steps) // 2:
             steps = again
-            found = calibrate(steps.odometry, steps.motions, track=track_width)
+            found = calibrate(steps.odometry, steps.motions, track=track_width, wheels=wheels)
     return steps, found
