@@ -201,9 +201,10 @@ def test_a_scanner_that_stands_is_one_line(scans, tmp_path, capsys):
     assert "is what calibrate finds" in capsys.readouterr().err
 
 
-def test_one_scanner_against_another_by_the_motions_of_both(tmp_path, capsys):
+@pytest.mark.parametrize(("mounting", "same"), [((-0.4, 0.2, 2.0), False), ((0.1, 0.2, 0.4), True)])
+def test_one_scanner_against_another_by_motions_and_shared_walls(tmp_path, capsys, mounting, same):
     messages, sensor, items = ros_bags.Messages(2), SENSORS["lms181"], []
-    mounting, (stamps, poses) = (-0.4, 0.2, 2.0), drive_poses(WAY, 1.0, 1.0, 8.0)
+    stamps, poses = drive_poses(WAY, 1.0, 1.0, 8.0)
     for i, (stamp, pose) in enumerate(zip(stamps.tolist(), poses.tolist(), strict=True)):
         for topic, at in (("/front", tuple(pose)), ("/rear", compose(tuple(pose), mounting))):
             rng = np.random.default_rng([i, topic == "/rear"])
@@ -217,8 +218,11 @@ def test_one_scanner_against_another_by_the_motions_of_both(tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["values"].keys() == {"x", "y", "theta"}
     error = np.array(found["laser_pose"]) - mounting
-    assert (abs(error) < (0.02, 0.02, 0.01)).all(), error
+    near = (0.004, 0.004, 0.002) if same else (0.02, 0.02, 0.01)
+
+    assert (abs(error) < near).all(), error
     assert error @ np.linalg.solve(found["covariance"], error) < 16
+    assert found["shared"] > 20 * same
     assert run(given) == 2
     assert "expected --topic, too" in capsys.readouterr().err
     assert run([*given, "--topic", "/front"]) == 1

@@ -9,13 +9,14 @@ round, as noise of what explains makes each scale too small.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..scan import Array, Pose
+from .association import chi_square
 from .estimate import Motion
 from .mounting import HINT, Fit, Model, fitted, heading_of
 
@@ -28,6 +29,8 @@ _KNOWN |= {"left": 0.03, "right": 0.03, "track": 0.03}
 _COUPLED = 0.9
 #: Odometry of less than this share of the scanner's motions stands still.
 _STANDS = 0.05
+#: Rounds in which shared walls are joined; median of χ² of three degrees.
+_JOINING, _MEDIAN = 10, 2.366
 #: Steps that are needed.
 FEWEST = 8
 
@@ -140,6 +143,39 @@ def calibrate(
     fit = fitted(model, 6 if wheels else 3)
     _check(model, fit)
     return _named(model, fit)
+
+
+def joined(found: Calibration, sights: Sequence[Motion]) -> tuple[Calibration, int]:
+    """Improve a mounting by sights of walls that both scanners see, each a mounting by itself.
+
+    Returns what both say, and how many sights agree with it. Their covariances grow by what they
+    differ more than they say.
+    """
+    pose, before = np.array(found.mounting), np.linalg.inv(found.covariance)
+    values, information, kept = pose, before, np.zeros(len(sights), bool)
+    if not sights:
+        return found, 0
+    measured = np.array([sight.pose for sight in sights])
+    spread = np.array([sight.covariance for sight in sights])
+    degrees, weights = np.array([3 - len(s.unobserved) for s in sights]), np.linalg.inv(spread)
+    for _ in range(_JOINING):
+        off = measured - values
+        off[:, 2] = np.remainder(off[:, 2] + math.pi, 2 * math.pi) - math.pi
+        square = np.einsum("ni,nij,nj->n", off, weights, off)
+        kept = square < chi_square(0.999, 3) * max(1.0, float(np.median(square)) / _MEDIAN)
+        factor = max(1.0, float(square[kept].sum() / max(degrees[kept].sum() - 3, 1)))
+        information = before + weights[kept].sum(axis=0) / factor
+        pull = np.einsum("nij,nj->i", weights[kept], off[kept]) / factor
+        values = values + np.linalg.solve(information, pull + before @ (pose - values))
+    covariance: Array = np.asarray(np.linalg.inv(information))
+    deviations = np.sqrt(np.diag(covariance)).tolist()
+    new = replace(
+        found,
+        values=dict(zip(found.names, values.tolist(), strict=True)),
+        deviations=dict(zip(found.names, deviations, strict=True)),
+        covariance=covariance,
+    )
+    return new, int(kept.sum())
 
 
 def _check(model: Model, fit: Fit) -> None:

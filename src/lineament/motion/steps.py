@@ -10,7 +10,7 @@ import numpy as np
 
 from ..features import Features
 from ..scan import Array, Pose
-from ..scan.poses import compose, poses_along, twist_between
+from ..scan.poses import compose, poses_along, relative, twist_between
 from .association import associate
 from .estimate import Motion, estimate_motion
 from .tracker import Tracker
@@ -19,6 +19,8 @@ from .tracker import Tracker
 WAY, TURN = 0.3, 0.35
 #: How well the motion of a step is known by those from scan to scan [m, rad], with way and turn.
 _NEAR, _GROWS = (0.03, 0.02), (0.1, 0.1)
+#: How well a mounting is known by the motions, where shared walls are looked for.
+_MOUNTED = np.diag((0.05, 0.05, 0.02)) ** 2
 #: How well it is known beside what the scans show: directions that they do not have no weight.
 _WIDE = np.diag((0.5, 0.5, 0.3)) ** 2
 _ROUNDS = 3
@@ -60,7 +62,7 @@ def steps_of(
         moved = compose(moved, motion.pose)
         if math.hypot(moved[0], moved[1]) < WAY and abs(moved[2]) < TURN:
             continue
-        motion = _matched(features[first], seen, moved, roughness)
+        motion = _matched(features[first], seen, moved, _near(moved), roughness)
         if len(motion.unobserved) < 3:
             steps.ends.append((first, i))
             steps.odometry.append(np.array(odometry[first : i + 1]))
@@ -107,11 +109,42 @@ class Carried:
         return compose(self.poses[i - 1], (x, y, theta))
 
 
-def _matched(before: Features, now: Features, guess: Pose, roughness: float) -> Motion:
-    """Match two scans near a guess of the motion, which then has hardly any weight."""
+def shared_walls(
+    others: Sequence[Features],
+    carried: Carried,
+    features: Sequence[Features],
+    mounting: Pose,
+    roughness: float = 0.01,
+) -> list[Motion]:
+    """Match what two scanners see at once: each is the mounting of the later, as a motion.
+
+    `mounting` is a guess, within 5 cm and 1° or so; sights without a shared wall are left out.
+    """
+    sights = []
+    for seen in features:
+        pose, i = carried.at(seen.stamp), bisect_right(carried.stamps, seen.stamp) - 1
+        if pose is None:
+            continue
+        if i + 1 < len(others) and carried.stamps[i + 1] + carried.stamps[i] < 2 * seen.stamp:
+            i += 1
+        other = others[i].transform(*relative(pose, carried.poses[i]))
+        sight = _matched(other, seen, mounting, _MOUNTED, roughness)
+        if len(sight.unobserved) < 3:
+            sights.append(sight)
+    return sights
+
+
+def _near(guess: Pose) -> Array:
+    """Covariance of a step that was added up from scan to scan."""
     (way, turn), (by_way, by_turn) = _NEAR, _GROWS
     way, turn = way + by_way * math.hypot(guess[0], guess[1]), turn + by_turn * abs(guess[2])
-    spread = np.diag((way, way, turn)) ** 2
+    return np.diag((way, way, turn)) ** 2
+
+
+def _matched(
+    before: Features, now: Features, guess: Pose, spread: Array, roughness: float
+) -> Motion:
+    """Match two scans near a guess of the motion, which then has hardly any weight."""
     motion = Motion(*guess, spread)
     for _ in range(_ROUNDS):
         matches = associate(before, now, motion.pose, motion.covariance, roughness=roughness)

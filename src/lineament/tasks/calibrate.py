@@ -15,8 +15,8 @@ from ..features import Features
 from ..files import check_outputs
 from ..logs import Log, open_log
 from ..motion import Calibration, Tracker, beam_times, calibrate, deskew
-from ..motion.calibration import FEWEST
-from ..motion.steps import Carried, Steps, steps_of
+from ..motion.calibration import FEWEST, joined
+from ..motion.steps import Carried, Steps, shared_walls, steps_of
 from ..output.calibrations import plot_calibration
 from ..output.canvas import check_ending
 from ..progress import Track, untracked
@@ -34,11 +34,16 @@ _LABELS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibrated:
-    """What was found in a log; numbers of scans and steps, way of the scanner [m], turns [rad]."""
+    """What was found in a log.
+
+    Numbers of scans, of steps, of those at whose ends another scanner sees the same walls; way of
+    the scanner [m], its turns [rad].
+    """
 
     log: str
     scans: int
     steps: int
+    shared: int
     way: float
     turns: float
     found: Calibration
@@ -52,9 +57,10 @@ class Calibrated:
     def __str__(self) -> str:
         found, slips = self.found, int(self.found.is_slip.sum())
         left_out = f", {slips} left out as slips" if slips else ""
+        shared = f", {self.shared} times the same walls" if self.shared else ""
         lines = [
             f"{self.log}: {self.scans} scans, {self.steps} steps{left_out}, {self.way:.0f} m, "
-            f"{math.degrees(self.turns):.0f}° of turns"
+            f"{math.degrees(self.turns):.0f}° of turns{shared}"
         ]
         for name in found.names:
             label = _LABELS.get(name, name)
@@ -74,6 +80,7 @@ class Calibrated:
             "log": self.log,
             "scans": self.scans,
             "steps": self.steps,
+            "shared": self.shared,
             "slips": int(found.is_slip.sum()),
             "way": self.way,
             "turns": self.turns,
@@ -93,6 +100,7 @@ def calibrate_log(
     against: str | None = None,
     track_width: float = 0.0,
     deskewed: bool = True,
+    roughness: float = 0.01,
     track: Track = untracked,
     **reading: Any,
 ) -> Calibrated:
@@ -116,6 +124,8 @@ def calibrate_log(
         Distance between the wheels by which the odometry was computed [m]; 0 if it is not known.
     deskewed : bool
         Whether scans are deskewed that say how long their sweep takes.
+    roughness : float
+        How far walls are from straight [m]; 0 in a simulation.
     track : callable
         ``track(items, name, total)`` yields the scans and shows the progress.
     **reading
@@ -150,7 +160,8 @@ def calibrate_log(
         if against == log.topic:
             raise LogError(log.name, f"--against {against} is the scanner itself")
         _, others = _read(path, {**reading, "topic": against})
-        carried = Carried.of(_features(others, extractor, deskewed=deskewed))
+        other_features = _features(others, extractor, deskewed=deskewed)
+        carried = Carried.of(other_features, roughness)
         poses = [carried.at(scan.stamp) for scan in scans]
         if not any(poses):
             raise LogError(log.name, f"{against} has no scans around those of {log.topic}")
@@ -159,9 +170,16 @@ def calibrate_log(
     shown = track(scans, Path(log.name).name, len(scans))
     features = _features(shown, extractor, deskewed=deskewed)
     try:
-        steps, found = _calibrated(features, poses, track_width, wheels=against is None)
+        steps, found = _calibrated(
+            features, poses, roughness, track=track_width, wheels=against is None
+        )
     except ValueError as error:
         raise LogError(log.name, str(error)) from None
+    shared = 0
+    if against is not None and found.mounting is not None:
+        ends = [features[last] for _, last in steps.ends]
+        sights = shared_walls(other_features, carried, ends, found.mounting, roughness)
+        found, shared = joined(found, sights)
     if output is not None:
         stamps = np.array([scans[last].stamp for _, last in steps.ends])
         plot_calibration(found, stamps, output, title=Path(log.name).name)
@@ -169,6 +187,7 @@ def calibrate_log(
         log=log.name,
         scans=len(scans),
         steps=len(steps),
+        shared=shared,
         way=sum(math.hypot(motion.x, motion.y) for motion in steps.motions),
         turns=sum(abs(motion.theta) for motion in steps.motions),
         found=found,
@@ -201,18 +220,18 @@ def _features(
 
 
 def _calibrated(
-    features: list[Features], odometry: list[Pose | None], track_width: float, *, wheels: bool
+    features: list[Features], odometry: list[Pose | None], roughness: float, **given: Any
 ) -> tuple[Steps, Calibration]:
     """Find the mounting by the scans alone; then again, looking for the walls by odometry."""
-    steps = steps_of(features, odometry)
+    steps = steps_of(features, odometry, None, roughness)
     if len(steps) < FEWEST:
         raise ValueError(
             f"the scanner moves too little: {len(steps)} steps of 0.3 m or 20°, expected {FEWEST}"
         )
-    found = calibrate(steps.odometry, steps.motions, track=track_width, wheels=wheels)
+    found = calibrate(steps.odometry, steps.motions, **given)
     if found.mounting is not None:
-        again = steps_of(features, odometry, found.mounting)
+        again = steps_of(features, odometry, found.mounting, roughness)
         if len(again) >= len(steps) // 2:
             steps = again
-            found = calibrate(steps.odometry, steps.motions, track=track_width, wheels=wheels)
+            found = calibrate(steps.odometry, steps.motions, **given)
     return steps, found
