@@ -12,6 +12,7 @@ import argparse
 import itertools
 import math
 import os
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -132,9 +133,14 @@ def main() -> None:
             seeds = range(first, first + options.workers)
             for one in pool.map(judged, seeds, [options.sensor] * options.workers):
                 found += one
+            print(f"{sum(one.seconds for one in found) / 3600:.2f} h", file=sys.stderr)
             if sum(one.seconds for one in found) > 3600 * options.hours:
                 break
-    print(f"seeds {options.seed} to {first + options.workers - 1}, {options.sensor}")
+    report(found)
+
+
+def report(found: list[Found]) -> None:
+    """Print a row for each plan."""
     print("| plan | hours | right | wrong alarms | a day | kidnapped | not right in .5 s | wrong |")
     print("|---|--:|--:|--:|--:|--:|--:|--:|")
     for name in dict.fromkeys(one.plan for one in found):

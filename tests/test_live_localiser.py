@@ -502,6 +502,13 @@ def test_over_dds_as_nav2_has_it(peer, domain, plan):
     assert not any("sense" in line for line in node.lines)
 
 
+def test_a_map_that_is_not_latched_is_a_line(peer, domain):
+    peer.publish("/map", "OccupancyGrid")
+    with Running(domain=domain, map="/map") as node:
+        line = "/map is published with another QoS policy 2, expected transient local (latched)"
+        eventually(lambda: line in node.lines)
+
+
 # A map on a topic.
 
 

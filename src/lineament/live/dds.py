@@ -111,10 +111,11 @@ class _Subscription:
         ]
         status = self.reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
+            expected = "transient local (latched)" if self._wanted.is_latched else "the default"
             why = (
                 "as best effort, expected reliable"
                 if status.last_policy_id == _RELIABILITY
-                else f"with another QoS policy {status.last_policy_id}, expected the default"
+                else f"with another QoS policy {status.last_policy_id}, expected {expected}"
             )
             lines.append(f"{self._topic} is published {why}")
         return lines

@@ -23,9 +23,10 @@ REACH = 0.5, math.radians(15)
 _NEAR = np.diag((0.2, 0.2, math.radians(5))) ** 2
 #: A scan that is likelier by less at our pose is looked for at the other one as well [nats].
 _PLAIN = 8.0
-#: A scan denies a pose below such log-odds of the best pose near it [nats]. Below 0 chance does as
-#: well: so it is too where a room is full of things that the plan does not have.
-DENIED = -8.0
+#: A scan denies a pose below such log-odds of the best pose near it [nats], where that explains no
+#: more of the beams. Below 0 chance does as well: so it is too among things that the plan does not
+#: have, or has elsewhere.
+DENIED, LEAST = -8.0, 0.4
 #: So many scans in a row that deny a pose are enough; one, where we are somewhere else.
 ENOUGH = 2
 
@@ -106,7 +107,8 @@ class Judge(InTurn):
             self._denied = 0
             return Judgement(RIGHT, pose, off, where.evidence)
         found = self._near(features, pose)
-        self._denied = self._denied + 1 if found.evidence.log_odds < DENIED else 0
+        is_denied = found.evidence.log_odds < DENIED and found.evidence.explained < LEAST
+        self._denied = self._denied + 1 if is_denied else 0
         verdict = UNSURE
         if self._denied >= (1 if off is not None and not is_near else ENOUGH):
             verdict = WRONG
