@@ -11,7 +11,8 @@ from lineament.cli import run
 from lineament.errors import LineamentError
 from lineament.logs import save_npz
 from lineament.motion import Motion, calibrate
-from lineament.scan.poses import compose, inverse, poses_along
+from lineament.motion.mounting import Model
+from lineament.scan.poses import compose, inverse, poses_along, twist_between
 from lineament.simulation import SENSORS, drive, drive_poses, room
 from lineament.tasks import calibrate as task
 from lineament.tasks.calibrate import calibrate_log
@@ -137,6 +138,45 @@ def test_odometry_that_does_not_belong_is_refused():
         calibrate([odometry[0] * math.nan, *odometry[1:]], motions)
     with pytest.raises(ValueError, match="track is -1"):
         calibrate(odometry, motions, track=-1.0)
+
+
+def test_slopes_of_the_prediction_are_its_differences():
+    odometry, motions = drive_of([AHEAD, ARC, LEFT])
+    model = Model.of(odometry, motions, track=0.4)
+    model.values[:] = 0.3, -0.1, 0.4, 1.02, 0.97, 0.03
+    _, slopes, by_sensor = model.predicted()
+    for k in range(6):
+        model.values[k] += 1e-6
+        more = model.predicted()[0]
+        model.values[k] -= 2e-6
+        less = model.predicted()[0]
+        model.values[k] += 1e-6
+        np.testing.assert_allclose((more - less) / 2e-6, slopes[:, :, k], atol=1e-7)
+    before = model.predicted()[0]
+    for k in range(3):
+        model.sensor[:, k] += 1e-6
+        np.testing.assert_allclose(
+            (model.predicted()[0] - before)[0] / 1e-6, by_sensor[:, k], atol=1e-7
+        )
+        model.sensor[:, k] -= 1e-6
+
+
+def test_noise_of_a_step_is_that_of_many_like_it():
+    """A turn, and then a way: what the turn is off by leads aside, as noise drawn by hand does."""
+    rng, n = np.random.default_rng(5), 20
+    turns, ways = np.repeat((0.35, 0.0), n) / n, np.repeat((0.0, 0.3), n) / n
+    size = np.maximum(ways, 0.2 * turns)
+    drawn = []
+    for _ in range(1000):
+        pose, noise = (0.0, 0.0, 0.0), rng.standard_normal((2, 2 * n)) * np.sqrt(size) * 0.02
+        for way, turn in zip(ways + noise[0], turns + noise[1], strict=True):
+            pose = compose(pose, tuple(poses_along((way, 0.0, turn), [1.0])[0].tolist()))
+        drawn.append(twist_between((0.0, 0.0, 0.0), pose, 1.0))
+    poses = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.35), (0.3 * math.cos(0.35), 0.3 * math.sin(0.35), 0.35)]
+    model = Model.of([np.array(poses)], [Motion(0.0, 0.0, 0.0, SPREAD)], track=0.4)
+    expected = 0.02**2 * (model.walks[0, 0] + model.walks[2, 0])
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(np.cov(np.transpose(drawn)) / scale, expected / scale, atol=0.16)
 
 
 # Logs

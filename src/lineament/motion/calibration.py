@@ -244,6 +244,8 @@ def _unknown(
     for name, deviation in deviations.items():
         if deviation > _KNOWN[name] and name not in why:
             why[name] = f"the drive shows it to ± {deviation:.2g} only"
+    if "theta" in why:  # They turn with it.
+        why = dict.fromkeys(("x", "y"), "the drive shows it only together with theta") | why
     names = list(deviations)
     for name, other in permutations(names, 2):
         if other in why and name not in why and coupled[names.index(name), names.index(other)]:
