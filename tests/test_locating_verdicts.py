@@ -11,7 +11,8 @@ from lineament import LaserScan
 from lineament.mapping import LineMap, Query, locate
 from lineament.mapping.following import follow
 from lineament.mapping.hypotheses import BOX, TURN
-from lineament.mapping.locate import VERDICTS, _judged, _near, distinct, squares_off
+from lineament.mapping.index import MAPPED
+from lineament.mapping.locate import LEAD, VERDICTS, _judged, _near, distinct, squares_off
 from lineament.mapping.refine import adjusted
 
 POSE, PLAN = (0.3, -0.2, 0.7), plan_of(RING)
@@ -98,6 +99,29 @@ def test_chance_is_one_in_the_poses_that_a_plan_has_room_for(monkeypatch):
     where = locate(query_at(POSE, PLAN), PLAN)
     room = 7.0 * 5.0 / BOX**2 * 2 * math.pi / TURN
     assert where.evidence.log_odds == pytest.approx(60 - math.log(room))
+
+
+def test_on_a_map_of_scans_more_beams_may_pass_through_walls(monkeypatch):
+    """Not as on a drawing; other poses and the mirror image have to be farther behind."""
+    drawn, mapped = PLAN, LineMap(PLAN.walls, sigma=MAPPED)
+    assert (drawn.is_mapped, mapped.is_mapped) == (False, True)
+    query, poses = query_at(POSE, PLAN), np.array([POSE, (1.5, 0.5, 0.7)])
+    shares = 0.75, 0.1, 0.15
+    for plan, behind, verdict in (
+        (drawn, 99.0, LOST),
+        (mapped, 99.0, LOCATED),
+        (mapped, LEAD + 0.1, LOCATED),
+        (mapped, LEAD - 0.1, AMBIGUOUS),
+    ):
+        found = np.array([(99.0, *shares), (99.0 - behind, 0.5, 0.4, 0.1)])
+        assert _judged(poses, found, query, plan, ROOM).verdict == verdict
+    # The best pose on the map of another building is like that.
+    found = np.array([(99.0, 0.35, 0.35, 0.3), (0.0, 0.1, 0.4, 0.5)])
+    assert _judged(poses, found, query, mapped, 1e6).verdict == LOST
+    for control, verdict in ((-LEAD - 0.1, LOCATED), (-LEAD + 0.1, AMBIGUOUS)):
+        rows = iter([np.array([(60.0, *shares)]), np.array([(60.0 + control, 0.9, 0.1, 0.0)])])
+        monkeypatch.setattr(MODULE, "_searched", lambda *_, of=rows: (poses[:1], next(of)))
+        assert locate(query, mapped).verdict == verdict
 
 
 def test_poses_around_a_guess():

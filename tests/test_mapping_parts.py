@@ -229,8 +229,8 @@ def test_parts_of_a_wall_are_known_where_they_are():
 class Frame:
     """As much of a key frame as its place needs."""
 
-    def __init__(self, is_lost=False):
-        self.is_lost = is_lost
+    def __init__(self, is_torn=False):
+        self.is_torn = is_torn
 
 
 def test_where_a_way_was_passed_before():

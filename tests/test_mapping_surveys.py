@@ -23,7 +23,7 @@ def survey():
     extract, x = Extractor(), np.abs(np.remainder(0.5 * np.arange(25) + 4, 8) - 4) - 2
     frames, seen = [], []
     for scan in scans_on(x):
-        frames.append(SimpleNamespace(scan=scan, features=extract(scan), is_lost=False))
+        frames.append(SimpleNamespace(scan=scan, features=extract(scan), is_torn=False))
         seen.append((segments_of(query_at(scan.pose, PLAN).walls), np.arange(len(RING))))
     poses = np.array([frame.scan.pose for frame in frames])
     sights = sights_of(seen)

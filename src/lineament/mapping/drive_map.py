@@ -25,8 +25,10 @@ from .walls import Numbers, as_walls, segments_of, wrapped
 _ROUGHNESS = 0.01
 #: Bins of turns, and how many of them are tried.
 _BINS, _TURNS = 120, 12
-#: What a beam that passes through a wall says [nats], and what it takes off those explained.
+#: What a beam that passes through a wall says [nats], and what it takes off those explained; with
+#: it, what one says that is explained, and one that is short.
 _MILD, _PASSED = -0.8, 0.5
+_SAYS = math.log(7 / 3) + 0.5, math.log(0.7), _MILD
 #: A key frame is taken after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, math.radians(15.0)
 #: Key frames through which a wall is remembered that is not seen.
@@ -60,7 +62,8 @@ class KeyFrame:
     """A scan that stands for those around it: number `index` of the log.
 
     `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
-    first key frame, `motion` that since the one before: a guess where the way is lost.
+    first key frame, `motion` that since the one before: a guess where the way is lost, unless it
+    `has_odometry`. `expected` is the covariance of the motion before walls say anything of it.
     """
 
     index: int
@@ -69,7 +72,14 @@ class KeyFrame:
     walls: Numbers
     pose: Pose
     motion: Motion
+    expected: Array
     is_lost: bool
+    has_odometry: bool
+
+    @property
+    def is_torn(self) -> bool:
+        """Whether nothing says where it is to the one before."""
+        return self.is_lost and not self.has_odometry
 
 
 class Drive(InTurn):
@@ -90,6 +100,8 @@ class Drive(InTurn):
         #: Stamp, odometry and pose in the frame of the last key frame of the last scan; its step.
         self._last: tuple[float, Pose | None, Pose] = (math.nan, None, (0.0, 0.0, 0.0))
         self._step: Pose = (0.0, 0.0, 0.0)
+        #: Covariance of the motion since the last key frame, without what walls say.
+        self._spread = np.zeros((3, 3))
         #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
         self._pace = 1.0
 
@@ -97,13 +109,19 @@ class Drive(InTurn):
     def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
         """Add the next scan."""
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
+        has_odometry = odometry is not None and self._last[1] is not None
         if self.frames:
-            motion, is_lost = self._place(scan, features, *self._expected(scan.stamp, odometry))
+            prior, spread = self._expected(scan.stamp, odometry)
+            motion, is_lost = self._place(scan, features, prior, spread)
+            if is_lost and has_odometry:
+                motion = Motion(*prior, spread)
+            self._spread = self._spread + spread
             way, turn = math.hypot(motion.x, motion.y), abs(motion.theta)
             is_key = way >= SPACING or turn >= TURN or is_lost
             self._go_on(scan.stamp, motion.pose)
         if is_key:
-            self._key(features, motion, scan, is_lost)
+            self._key(features, motion, scan, is_lost, has_odometry)
+            self._spread = np.zeros((3, 3))
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
         self._last = scan.stamp, odometry, pose
@@ -148,7 +166,7 @@ class Drive(InTurn):
             few = some(beams, count)
             share = len(few) / max(len(beams), 1)
             known = -0.5 * share * squares_off(poses, prior, spread)
-            found = evidence_of(poses, few, self._index, wide, _MILD, before=known, apart=apart)
+            found = evidence_of(poses, few, self._index, wide, _SAYS, before=known, apart=apart)
             return np.asarray(found[:, 0])
 
         for count, most in _SIFTED:
@@ -162,9 +180,11 @@ class Drive(InTurn):
         fine_scores = scores(poses, _BEAMS, _TIGHT, apart=0.5)
         fine_scores[-1] += 0.5
         x, y, theta = poses[fine_scores.argmax()].tolist()
-        best = Motion(x, y, theta, _NEAR)
+        best = Motion(x, y, theta, spread)
         if best.pose != motion.pose:
             motion = self._match(features, best.pose, _NEAR)
+            walls_say = np.linalg.inv(motion.covariance) - np.linalg.inv(_NEAR)
+            motion = replace(motion, covariance=np.linalg.inv(walls_say + np.linalg.inv(spread)))
         matched, found = scores(np.array([motion.pose, best.pose]), _BEAMS, _TIGHT)
         if found > matched + 1.0:
             motion = best
@@ -195,7 +215,14 @@ class Drive(InTurn):
             motion = estimate_motion(matches, prior, spread, roughness=_ROUGHNESS)
         return motion
 
-    def _key(self, features: Features, motion: Motion, scan: LaserScan, is_lost: bool) -> None:
+    def _key(
+        self,
+        features: Features,
+        motion: Motion,
+        scan: LaserScan,
+        is_lost: bool,
+        has_odometry: bool,
+    ) -> None:
         """Take a key frame; its segments are walls that are known, or new ones."""
         here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
@@ -211,7 +238,8 @@ class Drive(InTurn):
         is_unknown = walls < 0
         walls[is_unknown] = self._next + np.arange(is_unknown.sum())
         self._next += int(is_unknown.sum())
-        key = KeyFrame(len(self.scans), scan, features, walls, here, motion, is_lost)
+        at, known = len(self.scans), (motion, self._spread, is_lost, has_odometry)
+        key = KeyFrame(at, scan, features, walls, here, *known)
         self.frames.append(key)
         self._look_around()
 

@@ -16,10 +16,10 @@ from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
-from .evidence import Evidence, evidence_of
+from .evidence import Evidence, evidence_of, over_chance
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
+from .locate import GUESS, LOCATED, LOST, SURE, SURE_ON_MAP, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -32,8 +32,9 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: So many looks at the plan that say that the sensor is not there are too many; each that says
 #: otherwise takes back a part of one.
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
-#: A scan that is contradicted by a larger share of its beams is not where the pose says.
-DENIED = 0.12
+#: A scan that is contradicted by a larger share of its beams is not where the pose says: on a
+#: drawing; on a map, through whose walls more beams pass where the pose is right.
+DENIED, DENIED_ON_MAP = 0.12, 0.3
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -106,6 +107,7 @@ class Follower(InTurn):
 
     def __init__(self, plan: LineMap, way: float = 5.0) -> None:
         self.plan, self.way = plan, way
+        self._most = DENIED_ON_MAP if plan.is_mapped else DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
         self._restart()
@@ -176,11 +178,11 @@ class Follower(InTurn):
         location = None
         is_due = self._since > STEP or self._turned > TURN
         is_due |= features.stamp - self._looked > PERIOD
-        if is_due or (self.is_known and evidence.contradicted > DENIED):
+        if is_due or (self.is_known and evidence.contradicted > self._most):
             location = self._look(blurred)
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
-        is_wrong = self.is_known and evidence.contradicted > DENIED
+        is_wrong = self.is_known and evidence.contradicted > self._most
         verdict = LOST if is_wrong else self._verdict
         return Whereabouts(verdict, self._pose, self._covariance + blurred, evidence, location)
 
@@ -222,6 +224,8 @@ class Follower(InTurn):
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
         odds, explained, short, contradicted = found[0].tolist()
+        if self.plan.is_mapped:
+            odds = over_chance((explained, short, contradicted), len(beams))
         return Evidence(odds, explained, short, contradicted, len(beams))
 
     def _look(self, blurred: Array) -> Location:
@@ -239,7 +243,8 @@ class Follower(InTurn):
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
         # It takes more to leave a place than to believe it at first.
         odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
-        is_missed = found.verdict == LOST and (odds < SURE or contradicted > DENIED)
+        least = SURE_ON_MAP if self.plan.is_mapped else SURE
+        is_missed = found.verdict == LOST and (odds < least or contradicted > self._most)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         return self._found(found, blurred)
 

@@ -10,6 +10,12 @@ from ..kernels.mapping.layout import list_walls
 from ..scan import Array
 from .walls import rows_of, walls_of
 
+#: Longer walls are in no building: the plan is in other units [m].
+LONGEST = 2000.0
+#: Farther from the origin, coordinates are too coarse to be believed [m].
+FARTHEST = 1e8
+#: How far the walls of a map are from where they are seen later [m]: real ones bow, and move.
+MAPPED = 0.045
 #: Size of the cells by which walls are found [m], how far around a wall they reach; most cells, and
 #: most in the boxes around all walls.
 _CELL, _AROUND, _MOST_CELLS, _MOST_LISTED = 0.75, 0.3, 4_000_000, 20_000_000
@@ -30,6 +36,8 @@ def make_index(walls: NDArray[np.void], columns: NDArray[np.void], sigma: float)
     """List the walls by cells, with round columns as short walls behind them."""
     every = np.concatenate((walls, walls_of(rings(columns), side=1)))
     table, ends = rows_of(every), np.stack((every["start"], every["end"]), axis=1)
+    if sigma >= MAPPED:  # a pose is one beside the walls around it: what all are off counts not
+        table[:, 6:9] *= np.minimum(1.0, sigma**2 / np.maximum(table[:, 6], 1e-18))[:, None]
     table[:, 6] += sigma**2
     along = ends[:, 1] - ends[:, 0]
     low, high = ends.min(axis=(0, 1)) - 1.0, ends.max(axis=(0, 1)) + 1.0

@@ -19,17 +19,12 @@ from ..scan import Array, LaserScan, Pose
 from .drawings import read_drawing
 from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
-from .index import Index, make_index, rings
+from .index import FARTHEST, LONGEST, MAPPED, Index, make_index, rings
 from .outlines import walls_of_grid
 from .plans import doubts, plan_error, read_table, unknown_plan
 from .sights import columns_shown, walls_shown
 from .svg_plans import read_svg
 from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned_back, walls_of
-
-#: Longer walls are in no building: the plan is in other units [m].
-LONGEST = 2000.0
-#: Farther from the origin, coordinates are too coarse to be believed [m].
-FARTHEST = 1e8
 
 
 class LineMap(ReadOnly):
@@ -138,6 +133,11 @@ class LineMap(ReadOnly):
         """The directions of the walls, see `hypotheses.spectrum`."""
         return spectrum(self.walls)
 
+    @property
+    def is_mapped(self) -> bool:
+        """Whether scans made it: walls have covariances, or are off by as much."""
+        return self.sigma >= MAPPED or bool(self.walls["covariance"].any())
+
     @cached_property
     def index(self) -> Index:
         """What the kernels need."""
@@ -238,7 +238,7 @@ class LineMap(ReadOnly):
         layers: Sequence[str] | None = None,
         *,
         units: str | None = None,
-        sigma: float = 0.0,
+        sigma: float | None = None,
         limits: Mapping[str, int] | None = None,
     ) -> Self:
         """Read a plan: DXF, an occupancy grid, or a table of features in the world's frame.
@@ -255,8 +255,9 @@ class LineMap(ReadOnly):
             "wall" in their name, or all if there are none.
         units : str, optional
             Those of a DXF: m, dm, cm, mm, ft or in; by default those that it names, or metres.
-        sigma : float
-            How far the drawn walls are from where they stand [m].
+        sigma : float, optional
+            How far the walls are from where they stand [m]: by default `MAPPED` for those of scans,
+            in a grid, a table, or a drawing that lineament made of them, and 0 for others.
         limits : mapping, optional
             Limits that differ from those of ``lineament.limits.Limits``: of the plan's bytes
             (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``, ``cells``.
@@ -267,18 +268,18 @@ class LineMap(ReadOnly):
             If the file cannot be read, is beyond a limit, or has no walls.
         """
         ending, most = Path(path).suffix.lower(), Limits.of(limits)
+        seen = MAPPED if sigma is None else sigma
         try:
-            if ending == ".dxf":
-                lines, circles, left_out = read_drawing(path, layers, units, most)
-                plan = cls.from_lines(lines, circles, sigma=sigma)
+            if ending in (".dxf", ".svg"):
+                is_dxf = ending == ".dxf"
+                drawn = read_drawing(path, layers, units, most) if is_dxf else read_svg(path, most)
+                lines, circles, left_out, is_ours = drawn
+                plan = cls.from_lines(lines, circles, sigma=seen if is_ours else sigma or 0.0)
             elif ending == ".parquet":
                 features, left_out = read_table(path, most)
-                plan = cls.from_features([features], sigma=sigma)
-            elif ending == ".svg":
-                lines, circles, left_out = read_svg(path, most)
-                plan = cls.from_lines(lines, circles, sigma=sigma)
+                plan = cls.from_features([features], sigma=seen)
             elif ending in GRID_ENDINGS:
-                plan, left_out = cls.from_grid(Grid.read(path, most), sigma=sigma, limits=most), 0
+                plan, left_out = cls.from_grid(Grid.read(path, most), sigma=seen, limits=most), 0
             else:
                 raise unknown_plan(ending)
             plan.left_out += left_out

@@ -115,6 +115,12 @@ class LocalMap(InTurn):
         return f"LocalMap({len(self._sights)} scans, {self._way:.1f} m)"
 
     @property
+    @in_turn
+    def way_seen(self) -> float:
+        """Length of the way that it shows [m]."""
+        return self._way
+
+    @property
     def _way(self) -> float:
         return sum(sight.way for sight in self._sights[1:])
 

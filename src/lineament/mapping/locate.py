@@ -10,7 +10,7 @@ from ..features import Features
 from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
-from .evidence import Evidence, evidence_of
+from .evidence import ON_DRAWING, Evidence, evidence_of, on_map, over_chance
 from .hypotheses import BOX, TURN, agreement, hypotheses, image_of, spectrum
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan, some
@@ -25,8 +25,9 @@ LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (
     "not on this map",
 )
 
-#: Poses that are tried by few beams, refined, and judged by all beams.
-TRIED, SIFTED, REFINED, JUDGED = 800, 60, 24, 12
+#: Poses that are tried by few beams, refined, and judged by all beams; on a map, those with the
+#: most votes are refined in any case.
+TRIED, SIFTED, REFINED, JUDGED, VOTED = 800, 60, 24, 12, 16
 _FEWEST_BEAMS, _FEW_BEAMS = 12, 40
 #: The best is compared with poses so far off [m].
 _SLIDES = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
@@ -37,6 +38,9 @@ _NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 SURE = math.log(1000)
 #: The same over the best pose of the mirror image.
 NOT_MIRRORED = 3.0
+#: On maps that scans made: over the best pose on another's map, and over other poses of this one
+#: and of its mirror image; nearer to the best than `FAR` [m], over these as on a drawing.
+SURE_ON_MAP, LEAD, FAR = math.log(100), 12.0, 0.5
 #: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
 MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
 #: A direction in which the pose is known no better is unobserved [m].
@@ -144,19 +148,19 @@ def locate(
     poses, found = _searched(tried, query, plan)
     if not len(poses):
         return Location(LOST, guess or (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
-    room = len(tried) if guess else plan.area / BOX**2 * 2 * math.pi / TURN
+    room = len(tried) if guess else poses_on(plan)
     odds, where = found[0, 0], _judged(poses, found, query, plan, room)
     if where.verdict != LOCATED or guess is not None:
         return where
-    if where.evidence.contradicted > LESS_CONTRADICTED:
+    if not plan.is_mapped and where.evidence.contradicted > LESS_CONTRADICTED:
         return replace(where, verdict=LOST)
     # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
     image = query.mirrored()
     _, feigned = _searched(_tried(image_of(query.anchors), image, plan), image, plan, 0.0)
-    control = feigned[:, 0].max(initial=-math.inf)
+    control, ahead = feigned[:, 0].max(initial=-math.inf), LEAD if plan.is_mapped else NOT_MIRRORED
     if control > odds + SURE:
         return replace(where, verdict=LOST)
-    return replace(where, verdict=AMBIGUOUS) if control > odds - NOT_MIRRORED else where
+    return replace(where, verdict=AMBIGUOUS) if control > odds - ahead else where
 
 
 #: Covariance of a pose of which nothing is known, and of a guess for which none is given.
@@ -191,7 +195,7 @@ def squares_off(poses: Array, guess: Pose, covariance: Array) -> Array:
 
 
 def _searched(
-    tried: Array, query: Query, plan: LineMap, apart: float = SURE
+    tried: Array, query: Query, plan: LineMap, apart: float = LEAD
 ) -> tuple[Array, Array]:
     """Try poses by few beams, refine the best, and judge them by all; the best come first.
 
@@ -199,13 +203,16 @@ def _searched(
     """
     if not len(tried):
         return tried, np.zeros((0, 4))
+    wide, tight = (on_map(s) if plan.is_mapped else ON_DRAWING for s in (_WIDE, _TIGHT))
+    voted = tried[: VOTED if plan.is_mapped else 0]
     for count, most in ((_FEWEST_BEAMS, SIFTED), (_FEW_BEAMS, REFINED)):
-        found = evidence_of(tried, some(query.beams, count), plan.index, _WIDE)
+        found = evidence_of(tried, some(query.beams, count), plan.index, _WIDE, wide)
         tried = tried[distinct(tried, found[:, 0], _NEAR, most)]
+    tried = np.concatenate((tried, voted))
     # What is near enough may be moved away by a wrong pair of walls that is looked for far off.
     starts = np.concatenate((tried, refined(tried, query, plan.index, COARSE)[0]))
     poses, _, _ = refined(starts, query, plan.index, FINE)
-    found = evidence_of(poses, query.beams, plan.index, _TIGHT, apart=apart)
+    found = evidence_of(poses, query.beams, plan.index, _TIGHT, tight, apart=apart)
     # Poses some way off along both axes of the local map may look alike.
     best = poses[found[:, 0].argmax()]
     main = np.angle((lengths_of(query.walls) * np.exp(4j * query.walls["angle"])).sum()) / 4
@@ -214,7 +221,8 @@ def _searched(
     slid[:, :2] += np.kron(axes.T, _SLIDES).T
     slid, _, _ = refined(slid, query, plan.index, FINE)
     best_odds = found[:, 0].max()
-    of_slid = evidence_of(slid, query.beams, plan.index, _TIGHT, best=best_odds, apart=apart)
+    limits = {"best": best_odds, "apart": apart}
+    of_slid = evidence_of(slid, query.beams, plan.index, _TIGHT, tight, **limits)
     found = np.concatenate((found, of_slid))
     poses = np.concatenate((poses, slid))
     kept = distinct(poses, found[:, 0], _SAME, JUDGED)
@@ -234,15 +242,23 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     """Give the verdict on the best of some poses."""
     (refit, *_), (pairs, *_), (information, *_) = refined(poses[:1], query, plan.index, FINE)
     chance, n = math.log(max(room, 1.0)), len(query.beams)
-    first, *rest = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
-    if first.log_odds < SURE or first.contradicted > MOST_CONTRADICTED:
+    every = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
+    is_lost = every[0].log_odds < SURE or every[0].contradicted > MOST_CONTRADICTED
+    if plan.is_mapped:
+        # Near a guess, chance has fewer poses to choose the best from than on the whole map.
+        fewer = max(math.log(max(poses_on(plan), 1.0)) - chance, 0.0)
+        shares = found[:, 1:].tolist()
+        every = [Evidence(over_chance((a, b, c), n) + fewer, a, b, c, n) for a, b, c in shares]
+        is_lost = every[0].log_odds < SURE_ON_MAP
+    first, *rest = every
+    if is_lost:
         return Location(LOST, _pose(refit), np.linalg.inv(information + WEAK), first)
     best, information = adjusted(poses[0], pairs, query, plan.index)
     covariance = np.asarray(np.linalg.inv(information + WEAK), np.float64)
     others = [
         (_pose(pose), other)
-        for pose, other in zip(poses[1:], rest, strict=True)
-        if first.log_odds - other.log_odds < SURE
+        for pose, other, behind in zip(poses[1:], rest, found[0, 0] - found[1:, 0], strict=True)
+        if behind < (LEAD if plan.is_mapped and math.dist(pose[:2], poses[0, :2]) > FAR else SURE)
     ]
     if len(distinct(np.stack((best, poses[0])), np.zeros(2), _SAME, 2)) == 2:
         others.insert(0, (_pose(poses[0]), first))  # walls that depend on each other disagree
@@ -251,6 +267,11 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     if values[1] > UNSURE**2:
         return Location(UNOBSERVED, _pose(best), covariance, first, (x, y), others)
     return Location(AMBIGUOUS if others else LOCATED, _pose(best), covariance, first, None, others)
+
+
+def poses_on(plan: LineMap) -> float:
+    """Return the number of poses that a plan has room for."""
+    return plan.area / BOX**2 * 2 * math.pi / TURN
 
 
 def _pose(row: Array) -> Pose:

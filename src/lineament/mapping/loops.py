@@ -39,7 +39,7 @@ class Survey:
     def way(self) -> Array:
         """Way to each key frame [m]; where it was lost, what was seen before is far."""
         steps = np.hypot(*np.diff(self.poses[:, :2], axis=0, prepend=self.poses[:1, :2]).T)
-        steps[[frame.is_lost for frame in self.frames]] = _BEFORE
+        steps[[frame.is_torn for frame in self.frames]] = _BEFORE
         return np.cumsum(steps)
 
     def pose(self, k: int) -> Pose:

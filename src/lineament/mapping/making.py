@@ -11,6 +11,7 @@ from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
 from .adjust import Adjusted, edges_of, optimise
 from .drive_map import KeyFrame
+from .index import MAPPED
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey
@@ -21,10 +22,10 @@ from .walls import SHORTEST, Records, cut, lengths_of, moved, unit, wrapped
 _ROUGH = 0.01
 #: Walls that were seen so often show how rough surfaces are, between these [m]; median of χ².
 _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
-#: What walls say of a motion is known by the walls already: of motions and loops, a 25th counts,
-#: and nothing of motions below these deviations [m, m, rad].
+#: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
+#: nothing of motions below these deviations [m, m, rad].
 _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
-#: Covariance of the motion to a key frame that was lost [m, m, rad].
+#: Covariance of the motion to a key frame of which nothing is known [m, m, rad].
 _UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
@@ -59,10 +60,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     Key frames and scans are those of `Drive`. NothingFoundError if there are no walls.
     """
     pairs = [(k, k + 1) for k in range(len(frames) - 1)]
-    spreads = [
-        _UNKNOWN if frame.is_lost else _TWICE * frame.motion.covariance + _LEAST
-        for frame in frames[1:]
-    ]
+    spreads = [spread_of(frame) for frame in frames[1:]]
     chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
@@ -89,7 +87,19 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     if not len(walls):
         raise NothingFoundError(f"no wall is seen by {least} of {len(frames)} key frames")
     every = [compose(survey.pose(k), pose) for k, pose in scans]
-    return DriveMap(LineMap(walls), every, survey, loops, refused)
+    return DriveMap(LineMap(walls, sigma=MAPPED), every, survey, loops, refused)
+
+
+def spread_of(frame: KeyFrame) -> Array:
+    """Return the covariance of the motion to a key frame, of which walls say nothing twice.
+
+    What was expected before counts whole: odometry, or that the motion goes on. In a direction that
+    no wall shows nothing else holds the pose.
+    """
+    if frame.is_lost:
+        return frame.expected + _LEAST if frame.has_odometry else _UNKNOWN
+    known = np.linalg.inv(frame.motion.covariance) / _TWICE + np.linalg.inv(frame.expected)
+    return np.asarray(np.linalg.inv(known) + _LEAST)
 
 
 def closed(
@@ -179,7 +189,7 @@ def roughness(sights: Records, poses: Array, before: float) -> float:
 def joined(survey: Survey) -> Array:
     """Return the poses, with what follows each lost key frame put where it was seen before."""
     frames, poses, sights = survey.frames, survey.poses.copy(), survey.sights
-    lost = [k for k, frame in enumerate(frames) if frame.is_lost]
+    lost = [k for k, frame in enumerate(frames) if frame.is_torn]
     for first, last in pairwise([*lost, len(frames)]):
         lines = lines_of(sights, poses, _count(sights))
         before = Survey(frames, poses, sights, lines).walls((0.0, 0.0, 0.0), np.arange(first))
@@ -220,4 +230,6 @@ def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
     if best is None:
         raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
     poses = [compose(best, pose) for pose in made.poses]
-    return replace(made, map=LineMap(moved(made.map.walls, inverse(best))), poses=poses)
+    return replace(
+        made, map=LineMap(moved(made.map.walls, inverse(best)), sigma=MAPPED), poses=poses
+    )

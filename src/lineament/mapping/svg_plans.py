@@ -42,7 +42,8 @@ def read_svg(path: str | os.PathLike[str], limits: Limits) -> Drawn:
         circles = [_circle(row) for row in layers["arcs"]]
     except (KeyError, ValueError, TypeError) as problem:
         raise error(f"is no plan that lineament wrote: {problem!r}") from None
-    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0)
+    is_ours = any(row.attrib.get("data-views", "1") != "1" for row in layers["walls"])
+    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0, is_ours)
 
 
 def _circle(row: ElementTree.Element) -> list[float]:
