@@ -60,10 +60,10 @@ def recorded_scans(data_dir: Path) -> list[LaserScan]:
     return list(islice(log, 0, None, 60))
 
 
-def packages(name: str = "lineament") -> dict[str, ModuleType]:
-    """Modules of a package that are loaded."""
-    inside = name + "."
-    return {key: m for key, m in sys.modules.items() if key == name or key.startswith(inside)}
+def packages() -> dict[str, ModuleType]:
+    """Modules of both packages that are loaded."""
+    both = "lineament", "lineament_lab"
+    return {key: m for key, m in sys.modules.items() if key.partition(".")[0] in both}
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,7 @@ def sparse(path: Path) -> None:
 
 def table(path: Path, rows: int = 0, change: Any = None, **options: Any) -> None:
     """Write a table of a room, so many times or changed."""
-    LineMap.from_lines(ROOM).write(path)
+    LineMap.from_lines(ROOM, side=1).write(path)  # a row a wall
     written = pq.read_table(path)
     if rows:
         written = written.filter(pa.compute.equal(written["kind"], "segment"))

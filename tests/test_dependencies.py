@@ -113,7 +113,6 @@ assert run(["map", log, "-o", "a.svg", "-q"]) == 1
     assert [re.search(r"lineament\[\w+\]", line)[0] for line in lines] == [
         "lineament[cad]",
         "lineament[mapping]",
-        "lineament[mapping]",
     ]
     assert not (tmp_path / "a.dxf").exists()
     assert (tmp_path / "demo" / "index.html").exists()

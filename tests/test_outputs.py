@@ -75,6 +75,7 @@ def idle(files, monkeypatch):  # noqa: ARG001  (they are made first)
 #: What each command reads and writes, by the names of its parameters.
 READ_AND_WRITTEN = {
     "bench ple": ("data", "output"),
+    "calibrate": ("log", "output"),
     "compare": ("log", "output"),
     "demo": ("log", "output"),
     "extract": ("logs", "output"),
@@ -91,6 +92,7 @@ READ_AND_WRITTEN = {
 #: Each of what is read with each of what is written; {} is another name of what is read.
 SAME = {
     "bench ple data output": "bench ple --data bench.npz -m iepf --json {}.json",
+    "calibrate log output": "calibrate log.npz -o {}.png",
     "compare log output": "compare log.npz -o {}.html",
     "demo log output": "demo log.npz -o out",
     "extract logs output": "extract log.npz -o {}.parquet",

@@ -148,7 +148,7 @@ def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys):
     said = "a.parquet: 1 walls or columns have impossible numbers, left out"
     with pytest.warns(ln.LineamentWarning, match=said):
         plan = LineMap.read(path)
-    assert (len(plan.walls), plan.left_out) == (7, 1)  # a row for each side
+    assert (len(plan.walls), plan.left_out) == (3, 1)
     run(["locate", log, "--map", path, "-o", poses, "-q"])
     assert "1 walls or columns have impossible numbers" in capsys.readouterr().err
     found = str(tmp_path / "found.parquet")
