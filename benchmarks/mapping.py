@@ -1,5 +1,6 @@
-"""Maps of logs, without odometry, beside ICP with the same loops: ``python benchmarks/mapping.py``.
+"""Maps of logs, without odometry or with, beside ICP: ``python benchmarks/mapping.py``.
 
+ICP has the same loops.
 Recordings are looked for in ``LINEAMENT_DATA``. ``--storey SEED`` is a simulated storey instead,
 with odometry and without; ``--storeys 12 --storey 61`` many smaller ones, with odometry.
 """
@@ -37,6 +38,7 @@ LOGS = {
     "fr079": ("truth/fr079_graph.npz", "../relations/fr079.relations"),
     "ACES": ("carmen/aces-corrected.log.gz", None),
     "CSAIL": ("carmen/csail-corrected.log.gz", None),
+    "Killian": ("graph/killian.g2o.zip", None),
 }
 COLUMNS = (
     "log",
@@ -221,6 +223,7 @@ def main() -> None:
     parser.add_argument("--storeys", type=int, help="so many of 30 m x 20 m, the seed is the first")
     parser.add_argument("--rate", type=float, default=5.0, help="scans of it in a second")
     parser.add_argument("--log", choices=LOGS, help="this log alone")
+    parser.add_argument("--odometry", action="store_true", help="the poses of the log are it")
     parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
     chosen = parser.parse_args()
     if chosen.storeys is not None:
@@ -238,7 +241,7 @@ def main() -> None:
         verified = relations and read_relations(DATA / relations, stamps)
         truth = [scan.pose for scan in scans]
         judged(name, "the log’s corrected poses", truth, truth, verified)
-        found, made = rows(name, scans, truth, verified)
+        found, made = rows(name, scans, truth, verified, chosen.odometry)
         if chosen.pictures:
             path = chosen.pictures / f"map_{name.split()[0].lower()}.png"
             draw(path, made, corrected(found, truth), "walls at the log’s corrected poses")
