@@ -60,10 +60,10 @@ def recorded_scans(data_dir: Path) -> list[LaserScan]:
     return list(islice(log, 0, None, 60))
 
 
-def packages() -> dict[str, ModuleType]:
-    """Modules of both packages that are loaded."""
-    both = "lineament", "lineament_lab"
-    return {key: m for key, m in sys.modules.items() if key.partition(".")[0] in both}
+def packages(*names: str) -> dict[str, ModuleType]:
+    """Modules of these packages that are loaded; of both of ours, if none is named."""
+    inside = tuple(f"{name}." for name in names or ("lineament", "lineament_lab"))
+    return {key: module for key, module in sys.modules.items() if f"{key}.".startswith(inside)}
 
 
 @pytest.fixture(scope="module")
