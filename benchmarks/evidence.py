@@ -99,12 +99,14 @@ def report(logs: dict[str, tuple[LineMap, LineMap, list[Place]]]) -> None:
     print("|---|---|--:|--:|--:|--:|--:|", flush=True)
     names = list(logs)
     for k, (name, (whole, half, found)) in enumerate(logs.items()):
-        other = logs[names[(k + 1) % len(names)]][0]
-        for about, plan, truths in (
+        maps = [
             ("the whole log", whole, [p.whole for p in found]),
             ("its even scans", half, [p.half for p in found]),
-            (f"of {names[(k + 1) % len(names)]}", other, [None] * len(found)),
-        ):
+        ]
+        if len(names) > 1:
+            other = names[(k + 1) % len(names)]
+            maps.append((f"of {other}", logs[other][0], [None] * len(found)))
+        for about, plan, truths in maps:
             rows = judged(found, truths, plan)
             located, right = rows[:, 0] == 0, rows[:, 1] > 0
             shares = (right, located & right, rows[:, 0] == 1)
