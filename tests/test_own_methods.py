@@ -13,6 +13,7 @@ import lineament as ln
 from lineament.cli import run
 from lineament.methods import get_method
 from lineament.methods.functions import as_method
+from lineament.tasks.bulk import extract_logs
 
 BEARINGS = np.linspace(-0.6, 0.6, 121)
 #: A wall at x = 2, seen with noise of 1 cm.
@@ -285,3 +286,30 @@ def test_compare_takes_it(mine):
     words = ["compare", "wall.npz", "-m", "optimal", "-m", "my.py:Cut", "-o", "c.html", "-q"]
     assert run(words) == 0
     assert "my.py:Cut" in (mine / "c.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("workers", [["--threads", "1"], ["--processes", "2"]])
+def test_many_logs_are_made_again_where_the_code_has_changed(mine, workers):
+    ln.logs.save_npz(mine / "other.npz", [SCAN, SCAN])
+    words = ["extract", "wall.npz", "other.npz", "-m", "my.py:Cut", "--set", "at=20", "-o", "many/"]
+
+    def parts():
+        assert run([*words, *workers, "--resume", "-q"]) == 0
+        return {path.parent.name: path.stat().st_mtime_ns for path in mine.rglob("*.parquet")}
+
+    first = parts()
+    assert len(first) == 2
+    assert parts() == first  # nothing has changed
+    code = (mine / "my.py").read_text(encoding="utf-8")
+    (mine / "my.py").write_text(code.replace("self.at + 1", "self.at + 3"), encoding="utf-8")
+    again = parts()
+    assert again.keys() == first.keys()
+    assert all(again[name] > first[name] for name in first)
+
+
+def test_of_a_function_without_a_file_nothing_is_taken_for_done(mine):
+    made = {}
+    exec("def find(scan):\n    return [(0, 20)]", made)
+    for _ in range(2):
+        extractor = ln.Extractor(made["find"], noise=0.01)
+        assert extract_logs([mine / "wall.npz"], mine / "out", extractor, resume=True).whole == 0

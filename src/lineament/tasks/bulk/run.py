@@ -1,5 +1,6 @@
 """Many logs over an executor."""
 
+import hashlib
 import inspect
 import json
 import os
@@ -7,11 +8,12 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import nullcontext, suppress
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, cast
+from uuid import uuid4
 
 from ..._version import __version__
 from ...extractor import Extractor, load_kernels
@@ -273,13 +275,30 @@ def _settings(reading: dict[str, Any]) -> dict[str, Any]:
 def _configuration(extractor: Extractor, settings: dict[str, Any]) -> dict[str, Any]:
     """Return all that a table depends on besides its log, as JSON."""
     method = cast(Any, extractor.method)
+    own = getattr(method, "function", method)  # of somebody's function, that
     configuration = {
         "method": method.name,
-        "parameters": asdict(method),
+        "parameters": asdict(cast(Any, own)) if is_dataclass(own) else {},
         "noise": None if extractor.noise is None else asdict(extractor.noise),
         "reading": settings,
+        **_code_of(own),
     }
-    return cast(dict[str, Any], json.loads(json.dumps(configuration)))
+    return cast(dict[str, Any], json.loads(json.dumps(configuration, default=str)))
+
+
+def _code_of(method: Any) -> dict[str, str]:
+    """Return a hash of the file of a method that is not ours: it may change, our version stays.
+
+    Of one without a file nothing is known: what it made before is made again.
+    """
+    documented = method if inspect.isfunction(method) else type(method)
+    if str(documented.__module__).partition(".")[0] in ("lineament", "lineament_lab"):
+        return {}
+    try:
+        code = Path(inspect.getfile(documented)).read_bytes()
+    except (OSError, TypeError):
+        return {"code": uuid4().hex}
+    return {"code": hashlib.sha256(code).hexdigest()[:16]}
 
 
 def _unfinished(rows: list[Row], manifest: Manifest) -> list[Row]:
