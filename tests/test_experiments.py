@@ -154,11 +154,14 @@ class TestMethods:
         names = list(contenders.every_method())
         assert names[:4] == ["liu:paper", "liu:figure9", "liu", "liu:tuned"]
         assert names[4:7] == ["liu’s operator, shared steps", "optimal", "pdbs"]
-        rivals = [name for name in RIVALS if name != "pdbs"]
+        of_corners = ("pdbs", "falko", "flirt")
+        rivals = [name for name in RIVALS if name not in of_corners]
         assert names[7:-1] == [row for name in rivals for row in (f"{name}:paper", name)]
         assert names[-1] == "blind cut, shared steps"
         features = list(contenders.feature_methods())
         assert features == [name for name in names if name != "pdbs"]
+        corners = list(contenders.corner_methods())
+        assert corners == [*features, "falko:paper", "falko", "flirt"]
         fitted = list(contenders.fitted_methods())
         assert fitted == ["pdbs, fitted" if name == "pdbs" else name for name in names]
         drawn = list(filter(contenders.is_drawn, fitted))

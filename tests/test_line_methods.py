@@ -19,7 +19,7 @@ from worlds import (
 from lineament import Extractor, LaserScan
 from lineament.methods import get_method
 
-NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing"]
+NAMES = ["iepf", "split_and_merge", "line_tracking", "hough", "ransac", "region_growing", "ple"]
 #: Also the methods that have another way to part and to join.
 and_others = pytest.mark.parametrize(
     "extractor", [*NAMES, "liu", "liu:paper", "optimal"], indirect=True
@@ -68,7 +68,7 @@ def test_vertex_is_found_and_no_beam_lost(extractor, opening, convex, sigma):
     np.testing.assert_allclose(corner["position"], (3.0, 0.0), atol=1e-7 if exact else 0.02)
     assert corner["opening"] == pytest.approx(math.radians(opening), abs=1e-6 if exact else 0.05)
     sine = math.sin(math.radians(opening))
-    if extractor.method.name not in ("iepf", "split_and_merge"):
+    if extractor.method.name not in ("iepf", "split_and_merge", "ple"):
         assert corner["response"] == pytest.approx(sine, abs=1e-6 if exact else 0.05)
     assert corner["convex"] == convex
     assert corner["segments"].tolist() == [0, 1]

@@ -67,6 +67,25 @@ BOUNDS = {
     "line_tracking": MERGED | {"noise_factor": "> 0", "max_misses": 0, "min_piece": 3},
     "hough": RUNS | {"angles": 4, "distances": 4, "resolution": "> 0"},
     "ransac": RUNS | {"trials": 1, "window": 1, "seed": 1},
+    "ple": {k: v for k, v in MERGED.items() if k != "threshold"}
+    | {"rise": "> 0", "line_error": "> 0", "corner": ENDS},
+    "falko": {
+        "a": "> 0",
+        "b": "≥ 0",
+        "least_neighbours": 1,
+        "flatness": "≥ 0",
+        "sectors": 2,
+        "suppression": "> 0",
+        "least_score": "≥ 0",
+    },
+    "flirt": {
+        "scales": 1,
+        "scale": "> 0",
+        "step": "> 0",
+        "least_signal": "≥ 0",
+        "rise": "≥ 0",
+        "trees": 1,
+    },
     "region_growing": NEAR | {"s_num": 3, "p_min": 3, "l_min": "≥ 0", "delta": "≥ 0"},
 }
 ACCEPTED = {
@@ -188,7 +207,9 @@ def test_every_method_is_there():
     for name in METHODS:
         method = get_method(name)
         assert method.name == name
-        assert len(ln.extract(scan, method=name).segments) == (name != "pdbs")
+        assert len(ln.extract(scan, method=name).segments) == (
+            name not in ("pdbs", "falko", "flirt")
+        )
         for preset in method.presets:
             assert get_method(f"{name}:{preset}").name == name
 

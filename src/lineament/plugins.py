@@ -18,7 +18,7 @@ METHODS, COMMANDS = "lineament.methods", "lineament.commands"
 LABORATORY = {
     METHODS: (
         *("pdbs", "iepf", "split_and_merge", "line_tracking", "hough", "ransac"),
-        "region_growing",
+        *("region_growing", "ple", "falko", "flirt"),
     ),
     COMMANDS: ("bench", "compare", "reproduce"),
 }

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 from lineament._lazy import lazily
 
 if TYPE_CHECKING:
+    from .falko import FALKO as FALKO
+    from .flirt import FLIRT as FLIRT
     from .hough import Hough as Hough
     from .iepf import IEPF as IEPF
     from .line_tracking import LineTracking as LineTracking
     from .pdbs import PDBS as PDBS
+    from .ple import PLE as PLE
     from .ransac import Ransac as Ransac
     from .region_growing import RegionGrowing as RegionGrowing
     from .split_and_merge import SplitAndMerge as SplitAndMerge
@@ -25,6 +28,9 @@ RIVALS = {
     "hough": "Hough",
     "ransac": "Ransac",
     "region_growing": "RegionGrowing",
+    "ple": "PLE",
+    "falko": "FALKO",
+    "flirt": "FLIRT",
 }
 
 __all__ = ["RIVALS", *RIVALS.values()]

@@ -24,6 +24,8 @@ IEPF = "iepf:paper"
 PDBS_LINES = "pdbs, fitted"
 #: The method that returns clusters and breakpoints only.
 PARTITION_ONLY = "pdbs"
+#: Methods that return corners only, and are compared by how many are found again.
+KEYPOINTS = ("falko:paper", "falko", "flirt")
 
 LIU_NOTE = (
     "liu:paper has the response of equation 22, a sum of distances to the tangent, and the paper’s "
@@ -51,9 +53,10 @@ def liu_methods() -> dict[str, Extractor]:
 
 
 def every_method(more: Iterable[str] = ()) -> dict[str, Extractor]:
-    """Make all methods; rivals as published, then with the shared steps; `more`; the control."""
+    """Make all methods of lines: rivals as published, then with the shared steps; the control."""
     methods = liu_methods() | {LIU_SHARED: Extractor(OperatorCut())}
-    for name in (*METHODS, *RIVALS):
+    of_keypoints = {name.partition(":")[0] for name in KEYPOINTS}
+    for name in (*METHODS, *(rival for rival in RIVALS if rival not in of_keypoints)):
         published = hasattr(get_method(name), "published")
         names = (f"{name}:paper", name) if published else (name,)
         methods |= {one: Extractor(one) for one in names if name != LIU}
@@ -66,6 +69,11 @@ def feature_methods(more: Iterable[str] = ()) -> dict[str, Extractor]:
     methods = every_method(more)
     del methods[PARTITION_ONLY]
     return methods
+
+
+def corner_methods(more: Iterable[str] = ()) -> dict[str, Extractor]:
+    """Make all methods that return segments, and those that return corners only."""
+    return feature_methods(more) | {name: Extractor(name) for name in KEYPOINTS}
 
 
 def fitted_methods(more: Iterable[str] = ()) -> dict[str, Extract]:

@@ -12,7 +12,7 @@ from lineament.logs import find_logs
 from lineament.output import canvas
 from lineament.scan import LaserScan
 
-from ..evaluation.counts import Summable
+from ..evaluation.counts import Summable, ratio
 from ..evaluation.free_space import FreeSpaceScores, free_space_scores
 from ..evaluation.repeatability import (
     RankedRepeats,
@@ -23,7 +23,7 @@ from ..evaluation.repeatability import (
 )
 from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
 from .arena import ARENAS, arena_figure, arena_scores, load_arena
-from .contenders import feature_methods
+from .contenders import corner_methods, feature_methods
 from .findings import (
     NO_RECORDINGS,
     Columns,
@@ -86,6 +86,7 @@ REPEATS: Columns = {
     f"Corners alone: {_AT}": ("count_without_edges", 1),
     "Corners alone: in a scan": ("corners_per_scan", 1),
     "Corners alone: repeated [%]": ("corner_rate", 100),
+    "Corners alone: repeated of the fewer [%]": ("fewer_rate", 100),
     "Corners alone: distance, RMS [mm]": ("corner_rmse", 1e3),
     "Segments: repeated [%]": ("segment_rate", 100),
     "Segments: distance, RMS [mm]": ("segment_rmse", 1e3),
@@ -139,6 +140,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         lambda log, path: still_pairs(path, STILL_A_FRAME * frames, standing=log in STANDING),
         lambda pair, extract: standing_scores(map(extract, pair)),
     )
+    methods = corner_methods(setting.methods)
     repeats: dict[str, dict[str, dict[str, float]]] = {}
     ranked: dict[str, dict[str, RankedRepeats]] = {}
     for log, path in setting.recordings(LOGS | FURTHER_LOGS).items():
@@ -205,7 +207,9 @@ _TEXT = (
     f"{100 * RATE:.0f} % are. AUC: probability that a repeated corner has the higher quality. The "
     "errors of the corrected poses, some 2 to 5 cm, are part of the distances. A method that finds "
     "a corner at every other point repeats many, as there is always one near, and turns about the "
-    "sensor do not show that: see the corners per scan.",
+    "sensor do not show that: see the corners per scan. ‘Of the fewer’ is the repeatability that "
+    "keypoints are compared by (Mikolajczyk and Schmid 2005): pairs within 0.1 m over the fewer of "
+    "both scans’ corners that the other scan can see; chance is not subtracted.",
     "Arena: corners of which a scan shows both walls, found within 0.1 m. Walls and poses are "
     "known to about 1 cm, and the walls bow by 13 to 23 mm rms: smaller errors mean nothing, and "
     "where a wall bends there may be a corner that is not listed.",
@@ -269,7 +273,9 @@ def _repeats(
     """Return the ranked corners of all pairs both ways, and their numbers."""
     found = [(a, extract(a), b, extract(b)) for a, b in pairs]
     views = [view for a, fa, b, fb in found for view in ((a, fa, b, fb), (b, fb, a, fa))]
-    again = Repeatability.total(repeatability(*view) for view in views)
+    each_way = [repeatability(*view) for view in views]
+    again = Repeatability.total(each_way)
+    both_ways = list(zip(each_way[::2], each_way[1::2], strict=True))
     every, alone = (
         RankedRepeats.total(
             ranked_repeats(a, of(fa), b, of(fb), of(fb).corners["quality"])
@@ -285,10 +291,15 @@ def _repeats(
         "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
         "count_without_edges": alone.count_at(RATE),
         "auc_without_edges": alone.auc,
+        "rate_without_edges": alone.rate,
         "corners_per_scan": sum(len(features.corners) for _, features, _, _ in found) / len(found),
         "corners_expected": again.corners.expected,
         "corner_rate": again.corners.rate,
         "corner_rmse": again.corners.rmse,
+        "fewer_rate": ratio(
+            sum(min(a.corners.repeated, b.corners.repeated) for a, b in both_ways),
+            sum(min(a.corners.expected, b.corners.expected) for a, b in both_ways),
+        ),
         "segments_expected": again.segments.expected,
         "segment_rate": again.segments.rate,
         "segment_rmse": again.segments.rmse,
