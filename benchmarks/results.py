@@ -11,6 +11,7 @@ import hashlib
 import math
 import os
 import re
+import statistics
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -105,6 +106,14 @@ def two_lines(interval: Any) -> str | None:
     from lineament_lab.reproduce.findings import cell_text
 
     return None if interval is None else cell_text(interval).replace(" (", "<br>(")
+
+
+def over(values: Sequence[float]) -> str:
+    """Write the median of numbers, and the least and the greatest of them."""
+    from lineament_lab.reproduce.findings import cell_text
+
+    ends = (statistics.median(values), min(values), max(values))
+    return "{} ({}–{})".format(*(cell_text(value) for value in ends))
 
 
 def without_ranges(text: str) -> str:
@@ -225,6 +234,45 @@ class Results:
             *("corner NEES, still", "corners repeated", "of logs kept from the fit"),
         )
         return markdown(columns, rows)
+
+    def keypoints(self) -> str:
+        """Corners found again by those of methods and by detectors of keypoints, over the logs."""
+        repeats = self.numbers("real")["repeats"]
+        shown = {
+            "corners a scan": ("corners_per_scan", 1),
+            "repeated of the fewer [%]": ("fewer_rate", 100),
+            "repeated, less chance [%]": ("rate_without_edges", 100),
+        }
+        rows = [
+            (
+                method,
+                *(
+                    over([f * of[method][key] for of in repeats.values()])
+                    for key, f in shown.values()
+                ),
+            )
+            for method in FOUND_AGAIN
+        ]
+        return markdown(("method", *shown), rows)
+
+    def fits(self) -> str:
+        """Errors and covariances of line fits, given the walls, over the sensors."""
+        found = self.numbers("fits")
+        shown = {
+            "offset ÷ bound": "segment_offset_over_bound",
+            "angle ÷ bound": "segment_angle_over_bound",
+            "segment NEES": "segment_nees",
+            "corner NEES": "corner_nees",
+        }
+        names = next(iter(found.values()))
+        rows = [
+            (
+                name,
+                *(over([float(of[name][key]) for of in found.values()]) for key in shown.values()),
+            )
+            for name in names
+        ]
+        return markdown(("fit", *shown), rows)
 
     def arena(self) -> str:
         """Corners of a real arena, at rest and moving."""
@@ -383,8 +431,8 @@ class Results:
 
 
 TABLES = (
-    *("speed", "process", "maps", "relations", "tracking", "real", "arena"),
-    *("simulation", "summary", "sensors", "optimal", "similarity", "claims", "ours"),
+    *("speed", "process", "maps", "relations", "tracking", "real", "keypoints", "arena"),
+    *("simulation", "summary", "sensors", "optimal", "fits", "similarity", "claims", "ours"),
 )
 #: Methods of the shorter tables; lineament reproduce has them all.
 SOME = (
@@ -394,12 +442,15 @@ SOME = (
 #: Methods of the table of recordings: those, and the other rivals as published.
 ON_RECORDINGS = (
     *SOME,
-    *(f"{name}:paper" for name in ("line_tracking", "hough", "ransac", "region_growing")),
+    *(f"{name}:paper" for name in ("line_tracking", "hough", "ransac", "region_growing", "ple")),
+    "ple",
 )
+#: Methods of the table of keypoints.
+FOUND_AGAIN = "optimal", "iepf:paper", "split_and_merge:paper", "falko:paper", "falko", "flirt"
 #: What motions are from, in the table of relations.
 MOTIONS = "the log’s corrected poses", "features", "ICP", "features, no odometry"
 #: Tables of recordings.
-RECORDED = ("maps", "relations", "tracking", "real", "arena")
+RECORDED = ("maps", "relations", "tracking", "real", "keypoints", "arena")
 
 
 # The document ------------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ EXPERIMENTS: dict[str, tuple[str, ...]] = {
     "success": ("table3",),
     "all_methods": ("methods",),
     "plans": (),
+    "fits": (),
     "tracking": (),
     "real": ("repeatability",),
     "museum": (),
