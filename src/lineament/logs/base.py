@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
+from ..rosmsg.frames import Frames
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask, check_scale, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
@@ -187,6 +188,10 @@ class Log(Pictured, ABC):
     def contents(self) -> list[Topic]:
         """Return all kinds of messages in the log, scans and others; empty where unknown."""
         return []
+
+    def frames(self) -> Frames:
+        """Return the frames of the robot that the log says are fixed; those of most say none."""
+        return Frames()
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""

@@ -5,13 +5,14 @@ from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
-from ..rosmsg.poses import TRANSFORMS
+from ..rosmsg.frames import Frames
+from ..rosmsg.poses import TRANSFORMS, stamped_poses
 from ..rosmsg.scans import CLOUD, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Log, Topic
 from .ros_bag import Bag, Connection
-from .ros_poses import PoseFinder
+from .ros_poses import STATIC, PoseFinder
 
 #: How many topics an error lists.
 _LISTED = 20
@@ -61,6 +62,20 @@ class RosLog(Log):
         return [
             Topic(name, kind, sum(counts), len(counts)) for (name, kind), counts in kinds.items()
         ]
+
+    def frames(self) -> Frames:
+        """Return the frames of the robot that ``/tf_static`` has, at all times."""
+        frames = Frames()
+        for bag in self._bags:
+            for connection, data in bag.messages({STATIC}, self._fault):
+                if connection.type in TRANSFORMS:
+                    kind = connection.encoding, connection.type
+                    try:
+                        for found in stamped_poses(data, *kind, self.limits):
+                            frames.add(found, is_fixed=True)
+                    except ValueError as error:
+                        self._fault(LogError(bag.path, f"{STATIC}: {error}"))
+        return frames
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         finder = self._pose_finder()
