@@ -12,7 +12,7 @@ import ros_bags
 from lineament import Extractor
 from lineament.cli import run
 from lineament.logs import open_log
-from lineament.mapping.rig import Rig
+from lineament.motion.rig import Rig
 from lineament.output import ENDINGS
 from lineament.scan.poses import compose
 from lineament.simulation import SENSORS, drive_poses, room

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +50,7 @@ def merge(
     log: Path | str,
     output: Path,
     mountings: dict[str, tuple[float, float, float]],
-    unsure: tuple[float, float],
+    unsure: tuple[float, float] | None,
     base_frame: str,
     tolerance: float | None,
     method: str | None,
@@ -66,7 +65,7 @@ def merge(
     Each scan of the first --topic, with the nearest in time of the others. Poses of the log are
     those of the robot. The exit status is 3 if no scan has a feature.
     """
-    from ..mapping.rig import Rig
+    from ..motion.rig import Rig
     from ..output import ENDINGS
     from ..tasks.extract import check_found
     from ..tasks.merging import merge_log
@@ -79,9 +78,9 @@ def merge(
         raise click.UsageError(
             "--laser-pose: expected --mounting TOPIC=X,Y,DEGREES of each scanner"
         )
-    metres, degrees = unsure
+    known = {} if unsure is None else {"unsure": unsure}
     with wrong_usage():
-        rig = Rig(reading.pop("topic"), mountings, base_frame, (metres, math.radians(degrees)))
+        rig = Rig(reading.pop("topic"), mountings, base_frame, **known)
     extractor = make_extractor(method, settings, noise)
     done = merge_log(
         log,

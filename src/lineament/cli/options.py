@@ -119,9 +119,8 @@ UNSURE = click.option(
     type=click.FloatRange(min=0),
     nargs=2,
     metavar="METRES DEGREES",
-    default=(0.01, 0.5),
-    show_default=True,
-    help="How well mountings are known, a standard deviation.",
+    callback=lambda _context, _option, given: given and (given[0], math.radians(given[1])),
+    help="How well mountings are known, a standard deviation.  [default: 0.01 0.5]",
 )
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
-from ..rosmsg.frames import Frames
+from ..rosmsg.poses import StampedPose
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask, check_scale, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
@@ -189,9 +189,9 @@ class Log(Pictured, ABC):
         """Return all kinds of messages in the log, scans and others; empty where unknown."""
         return []
 
-    def frames(self) -> Frames:
-        """Return the frames of the robot that the log says are fixed; those of most say none."""
-        return Frames()
+    def mountings(self) -> list[StampedPose]:
+        """Return where frames of the robot are fixed in each other; most logs do not say."""
+        return []
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:
         """Yield each scan behind its topic, which is one of `topics`, from the start."""

@@ -5,14 +5,13 @@ from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
-from ..rosmsg.frames import Frames
-from ..rosmsg.poses import TRANSFORMS, stamped_poses
+from ..rosmsg.poses import TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.scans import CLOUD, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Log, Topic
 from .ros_bag import Bag, Connection
-from .ros_poses import STATIC, PoseFinder
+from .ros_poses import MAX_POSES, STATIC, PoseFinder
 
 #: How many topics an error lists.
 _LISTED = 20
@@ -63,19 +62,18 @@ class RosLog(Log):
             Topic(name, kind, sum(counts), len(counts)) for (name, kind), counts in kinds.items()
         ]
 
-    def frames(self) -> Frames:
-        """Return the frames of the robot that ``/tf_static`` has, at all times."""
-        frames = Frames()
+    def mountings(self) -> list[StampedPose]:
+        """Return where frames of the robot are fixed in each other, by ``/tf_static``."""
+        found: list[StampedPose] = []
         for bag in self._bags:
             for connection, data in bag.messages({STATIC}, self._fault):
-                if connection.type in TRANSFORMS:
-                    kind = connection.encoding, connection.type
-                    try:
-                        for found in stamped_poses(data, *kind, self.limits):
-                            frames.add(found, is_fixed=True)
-                    except ValueError as error:
-                        self._fault(LogError(bag.path, f"{STATIC}: {error}"))
-        return frames
+                kind = connection.type
+                try:
+                    if kind in TRANSFORMS and len(found) < MAX_POSES:
+                        found += stamped_poses(data, connection.encoding, kind, self.limits)
+                except ValueError as error:
+                    self._fault(LogError(bag.path, f"{STATIC}: {error}"))
+        return found
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         finder = self._pose_finder()

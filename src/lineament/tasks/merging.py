@@ -15,10 +15,10 @@ from ..features import TABLES, Features
 from ..files import check_outputs
 from ..logs import open_log
 from ..mapping import merge_features
-from ..mapping.rig import Rig
+from ..motion.rig import Rig
 from ..output import open_writer
 from ..progress import Track, untracked
-from ..rosmsg.frames import Place
+from ..rosmsg.frames import Frames, Place
 from ..scan import LaserScan, Pose
 from ..scan.poses import compose, relative
 from .extract import in_world
@@ -239,7 +239,9 @@ def _together(
 def _place(scanners: list[_Scanner], rig: Rig) -> None:
     """Find where each scanner is on the robot."""
     log = scanners[0].log
-    frames = log.frames()
+    frames = Frames()
+    for link in log.mountings():
+        frames.add(link, is_fixed=True)
     for scanner in scanners:
         try:
             scanner.place = rig.place(scanner.topic, scanner.frame_id, frames)
