@@ -47,6 +47,8 @@ RUNS = {
     "locate room.npz --map walls.parquet -o where.csv": "where.csv",
     "live --from wall.npz --ros 0 --rate 0 -m iepf": "",
     "demo wall.npz -o demo": "demo",
+    "merge two.log --topic FLASER --topic RLASER --mounting FLASER=.2,0,0 "
+    "--mounting RLASER=-.2,0,180 -m iepf -o m.csv": "m.csv",
     "methods": "",
     "warmup -m iepf": "",
     "compare wall.npz -m iepf -o a.html": "a.html",
@@ -68,6 +70,9 @@ def plan(tmp_path_factory):
     assert run(["simulate", "room", "--scans", "4", "--sensor", "lms181", "-o", log, "-q"]) == 0
     assert run(["map", log, "-o", walls, "-q"]) == 0
     way = [(-2, -1), (0.5, -1), (0.5, 0.5), (-1, 0.5)]
+    line = f"LASER 181{181 * ' 2'} 0 0 0 0 0 0 {{0}} robot {{0}}\n"
+    lines = (f"{kind}{line.format(t)}" for t in range(4) for kind in "FR")
+    (folder / "two.log").write_text("".join(lines))
     save_npz(folder / "drive.npz", drive(small_room(), way, SENSORS["lms181"], speed=1, rate=6))
     return folder
 

@@ -106,7 +106,7 @@ def test_the_first_and_the_last_that_are_accepted():
         ("\udcff\udcfe", "is not TOML"),
         (f"a = {'[' * 5000}", "is not TOML"),
         (f"noise = {'9' * 5000}", "is not TOML"),
-        ("tropic = '/scan'", "has 'tropic', expected one of topic, namespace"),
+        ("tropic = '/scan'", "has 'tropic', expected one of topic, merge"),
         ('from = "a.log"', "has 'from', expected one of topic"),
         (None, "cannot be read: No such file"),
     ],
@@ -132,7 +132,8 @@ def test_a_file_is_as_long_as_a_line_of_a_log_at_most(tmp_path):
 
 #: What a robot relies on: what holds where nothing is said, how long is waited, how much is kept.
 DEFAULTS = {
-    "topic": "scan", "namespace": "", "name": "lineament", "type": "LaserScan", "echo": "first",
+    "topic": "scan", "merge": (), "unsure": (0.01, math.radians(0.5)), "tolerance": 0.15,
+    "namespace": "", "name": "lineament", "type": "LaserScan", "echo": "first",
     "stamp": "first", "scale": 1.0, "ros": 2, "localhost": False, "reliability": "best-effort",
     "depth": 10, "method": "optimal", "deskew": "off", "laser_pose": (0.0, 0.0, 0.0),
     "upside_down": False, "mask": (), "track": False, "layers": "", "keep_going": False,
@@ -141,14 +142,15 @@ DEFAULTS = {
 }  # fmt: skip
 BOUNDS = {"depth": (1, 1000), "rate": (0, 1e6), "noise": (0, 1000), "scale": (1e-9, 1e9),
           "domain": (0, 232), "foxglove": (0, 65535), "dock_track": (0, 2147483647),
-          "transform_tolerance": (0, 10)}  # fmt: skip
-FRACTIONS = "rate", "noise", "transform_tolerance"
+          "transform_tolerance": (0, 10), "tolerance": (0, 10)}  # fmt: skip
+FRACTIONS = "rate", "noise", "transform_tolerance", "tolerance"
 TIMES_AND_SIZES = {
     "counters": {"_MOST": 4096},
     "dds": {"NANO": 10**9, "PATIENCE": 10**6, "MOST_PUBLISHERS": 1000},
     "foxglove": {"_BACKLOG": 64},
     "frames": {"_MOST_FRAMES": 1000, "_MOST_POSES": 1000, "GAP": 0.5, "LATE": 0.2,
                "_SET_BACK": 1.0},
+    "merging": {"_MANY": 20},
     "localiser": {"_MOST_SCANNERS": 8, "_MANY": 20, "_SENT": 50},
     "node": {"_WAIT": 0.1, "_EACH": 1.0, "_PATIENCE": 2.0, "_MOST_FAULTY": 64},
     "participant": {"LAST_DOMAIN": 232},
@@ -165,7 +167,7 @@ def test_what_holds_where_nothing_is_said():
     defaults = {f.name: f.default for f in fields(LiveConfig) if f.default is not MISSING}
     assert {name: value for name, value in defaults.items() if value is not None} == DEFAULTS
     empty = LiveConfig()
-    assert (empty.parameters, empty.limits) == ({}, {})
+    assert (empty.parameters, empty.limits, empty.mountings) == ({}, {}, {})
 
 
 @pytest.mark.parametrize("name", BOUNDS)
@@ -188,7 +190,8 @@ def test_how_long_is_waited_and_how_much_is_kept(name):
     }
     if name in extra:
         pytest.importorskip(extra[name])
-    module = importlib.import_module(f"lineament.live.{name}")
+    room = "rosmsg" if name == "frames" else "live"
+    module = importlib.import_module(f"lineament.{room}.{name}")
     kept = {key: getattr(module, key) for key in TIMES_AND_SIZES[name]}
     assert kept == TIMES_AND_SIZES[name]
     if name == "raw_dds":  # what Cyclone DDS is told of a type: a byte long at least, no key

@@ -17,7 +17,6 @@ from live_driving import Running, eventually, heard
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig, Pipeline, RosSink
-from lineament.live.frames import Frames
 from lineament.live.received import (
     GUESS,
     JUDGED,
@@ -31,6 +30,7 @@ from lineament.live.received import (
 from lineament.live.sinks import Publisher
 from lineament.mapping import LineMap
 from lineament.output.ros_messages import RosMessages
+from lineament.rosmsg.frames import Frames
 from lineament.rosmsg.grids import OccupancyGrid
 from lineament.rosmsg.poses import Odometry, StampedPose, stamped_poses
 from lineament.scan import Pose

@@ -83,6 +83,7 @@ READ_AND_WRITTEN = {
     "live": ("config map dock_shape log", ""),
     "locate": ("log plan", "output"),
     "map": ("log onto", "output poses"),
+    "merge": ("log", "output"),
     "plan": ("plan", "output"),
     "plot": ("log", "output"),
     "reproduce": ("data museum", "output"),
@@ -102,6 +103,7 @@ SAME = {
     "map log poses": "map log.npz -o m.svg --poses {}.tum",
     "map onto output": "map log.npz --onto plan.dxf -o {}.dxf",
     "map onto poses": "map log.npz --onto plan.dxf -o m.svg --poses {}.tum",
+    "merge log output": "merge log.npz --topic /front --topic /rear -o {}.csv",
     "plan plan output": "plan plan.dxf -o {}.dxf",
     "plot log output": "plot log.npz -o {}.png",
     # It reads recordings by their names in that folder, and writes none of them.

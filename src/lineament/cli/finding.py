@@ -19,6 +19,7 @@ OWN = {
     "locate": "mapping:locate",
     "map": "mapping:map_command",
     "plan": "mapping:plan",
+    "merge": "merging:merge",
     "methods": "commands:methods",
     "plot": "commands:plot",
     "simulate": "simulating:simulate",

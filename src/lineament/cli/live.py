@@ -16,12 +16,14 @@ from .options import (
     LIMITS,
     MASK,
     METHOD,
+    MOUNTINGS,
     NOISE,
     PATH,
     QUIET,
     SCALE_HELP,
     SET,
     TEXT_PATH,
+    UNSURE,
     complain,
     settings_of,
     wrong_usage,
@@ -39,7 +41,16 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 
 @click.command()
 @click.option("--config", type=PATH, help="TOML file of the options below; flags go before it.")
-@click.option("--topic", help="Topic of the scans.  [default: scan]")
+@click.option(
+    "--topic",
+    "topics",
+    multiple=True,
+    help="Topic of the scans; of several scanners, which are merged, given for each."
+    "  [default: scan]",
+)
+@MOUNTINGS
+@UNSURE
+@click.option("--tolerance", type=float, help="Longest time between such scans.  [default: 0.15]")
 @click.option("--namespace", help="Put before topics that do not begin with /.")
 @click.option("--name", help="Name of the node.  [default: lineament]")
 @click.option("--type", type=_TYPES, help="Type of the messages.  [default: LaserScan]")
@@ -153,7 +164,9 @@ def _configured(
 
     options = {} if path is None else read_config(path)
     limits = given.pop("limits") or {}
-    options.update({name: value for name, value in given.items() if value not in (None, ())})
+    if topics := given.pop("topics"):
+        options["topic"], *options["merge"] = topics
+    options.update({name: value for name, value in given.items() if value not in (None, (), {})})
     for argument in remappings:  # Those of roslaunch are for rospy, which finds them by itself.
         if options.get("ros") != 1 or ":=" not in argument:
             raise click.UsageError(f"got an unexpected argument {argument!r}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
@@ -85,6 +86,42 @@ MASK = click.option(
     help="Leave out the beams from one bearing counter-clockwise to another [rad], such as those "
     "that see the robot itself; may be given again.",
 )
+
+
+def _mountings(
+    context: click.Context,  # noqa: ARG001
+    parameter: click.Parameter,  # noqa: ARG001
+    given: tuple[str, ...],
+) -> dict[str, tuple[float, float, float]]:
+    found = {}
+    for topic, value in map(_split, given):
+        try:
+            x, y, degrees = map(float, value.split(","))
+        except ValueError:
+            raise click.UsageError(
+                f"--mounting {topic}={value}: expected {topic}=X,Y,DEGREES"
+            ) from None
+        found[topic] = x, y, math.radians(degrees)
+    return found
+
+
+MOUNTINGS = click.option(
+    "--mounting",
+    "mountings",
+    multiple=True,
+    metavar="TOPIC=X,Y,DEGREES",
+    callback=_mountings,
+    help="Where the scanner of a topic is on the robot [m, m, °]; may be given again."
+    "  [default: as in /tf_static]",
+)
+UNSURE = click.option(
+    "--unsure",
+    type=click.FloatRange(min=0),
+    nargs=2,
+    metavar="METRES DEGREES",
+    callback=lambda _context, _option, given: given and (given[0], math.radians(given[1])),
+    help="How well mountings are known, a standard deviation.  [default: 0.01 0.5]",
+)
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
@@ -141,7 +178,9 @@ _READING = (
 )  # fmt: skip
 
 
-def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def _reading(
+    poses: Callable[[Any], Any], topic: Callable[[Any], Any] = TOPIC
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     def adding(command: Callable[..., None]) -> Callable[..., None]:
         """Add the options of a log; the command gets them as ``open_log(log, **reading)``."""
 
@@ -156,7 +195,7 @@ def _reading(poses: Callable[[Any], Any]) -> Callable[[Callable[..., None]], Cal
                     checked_mounting(given["laser_pose"])
             command(reading={name: given.pop(name) for name in _READING}, **given)
 
-        for option in (LIMITS, KEEP_GOING, SCALE, MASK, LASER_POSE, poses, _RING, _ECHO, TOPIC):
+        for option in (LIMITS, KEEP_GOING, SCALE, MASK, LASER_POSE, poses, _RING, _ECHO, topic):
             collecting = option(collecting)
         return collecting
 
@@ -167,6 +206,14 @@ reading = _reading(_POSES)
 #: The same where the poses are odometry, and others are made.
 reading_odometry = _reading(
     click.option("--odometry", "pose_topic", metavar="TOPIC", help="Topic of the odometry.")
+)
+
+#: The same for scans of several topics.
+reading_topics = _reading(
+    _POSES,
+    click.option(
+        "--topic", multiple=True, help="Scans of one scanner: given once for each, two at least."
+    ),
 )
 
 

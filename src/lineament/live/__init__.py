@@ -10,9 +10,9 @@ from .._lazy import lazily
 if TYPE_CHECKING:
     from ..rosmsg.poses import Odometry as Odometry
     from .config import LiveConfig as LiveConfig
-    from .config import read_config as read_config
     from .counters import Counts as Counts
     from .counters import Report as Report
+    from .merging import MergingPipeline as MergingPipeline
     from .node import Node as Node
     from .pipeline import Frame as Frame
     from .pipeline import Pipeline as Pipeline
@@ -23,16 +23,19 @@ if TYPE_CHECKING:
     from .sinks import FoxgloveSink as FoxgloveSink
     from .sinks import RosSink as RosSink
     from .sinks import Sink as Sink
+    from .toml import read_config as read_config
 
 _HOMES = {
-    "config": "LiveConfig read_config",
+    "config": "LiveConfig",
     "counters": "Counts Report",
+    "merging": "MergingPipeline",
     "node": "Node",
     "pipeline": "Frame Pipeline",
     "received": "Odometry Received Source",
     "replay": "ReplaySource",
     "running": "run_live",
     "sinks": "FoxgloveSink RosSink Sink",
+    "toml": "read_config",
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 

@@ -1,7 +1,7 @@
 """What the parameters of a live node may be: their types, choices and bounds."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..scan.fields import STAMPS
@@ -23,9 +23,10 @@ _BOUNDS: dict[str, tuple[float, float]] = {
     "foxglove": (0, 65535),
     "dock_track": (0, 2**31 - 1),
     "transform_tolerance": (0, 10),
+    "tolerance": (0, 10),
 }
 FRAMES = ("map_frame", "odom_frame", "base_frame")
-_NAMES = ("topic", "namespace", "name", "deskew", "odometry", "judge", *FRAMES)
+_NAMES = ("topic", "merge", "namespace", "name", "deskew", "odometry", "judge", *FRAMES)
 #: What each annotation accepts, and how it is called in a message.
 _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "str": (str, "a text"),
@@ -35,10 +36,12 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "Pose": ((tuple, list), "three numbers"),
     "Mask": ((tuple, list), "pairs of bearings"),
     "Point": ((tuple, list), "two numbers"),
+    "Names": ((tuple, list), "names"),
     "Mapping[str, Any]": (Mapping, "a table"),
 }
-#: x, y [m].
+#: x, y [m]; and names of topics.
 Point = tuple[float, float]
+Names = Sequence[str]
 
 
 def check(name: str, annotation: str, value: Any) -> None:
@@ -55,6 +58,12 @@ def check(name: str, annotation: str, value: Any) -> None:
         raise ValueError(f"{name} is {value!r}, expected one of {wanted}")
     if name in _BOUNDS and not _BOUNDS[name][0] <= value <= _BOUNDS[name][1]:
         raise ValueError(f"{name} is {value}, expected {_BOUNDS[name][0]} to {_BOUNDS[name][1]}")
-    text = value.strip("/") or "none" if name == "namespace" else value
-    if name in _NAMES and not re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII):
+    texts = value if name == "merge" else [value]
+    if name == "namespace":
+        texts = [value.strip("/") or "none"]
+    if name in _NAMES and not all(_is_name(text) for text in texts):
         raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
+
+
+def _is_name(text: Any) -> bool:
+    return isinstance(text, str) and bool(re.fullmatch(r"/?\w+(/\w+)*", text, re.ASCII))

@@ -1,21 +1,19 @@
-"""The configuration of a live node: from flags, from a TOML file, or from both."""
+"""The configuration of a live node."""
 
 from __future__ import annotations
 
-import os
 import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from ..errors import LineamentError
-from ..limits import LIMITS, Limits
+from ..limits import Limits
+from ..motion.rig import UNSURE, Rig
 from ..scan import Pose
 from ..scan.changes import Mask, checked_mask
 from ..scan.fields import checked_mounting
-from .checking import FRAMES, Point, check
+from .checking import FRAMES, Names, Point, check
 
 #: Values of `LiveConfig.deskew` that are not topics.
 _NOT_TOPICS = ("off", "scans", "poses")
@@ -29,6 +27,15 @@ class LiveConfig:
     ----------
     topic : str
         Topic of the scans. Features go to topics below it: ``TOPIC/features`` and others.
+    merge : sequence of str
+        Topics of further scanners of the robot: what they see is merged with what that of `topic`
+        does, in the frame `base_frame`; see `lineament.mapping.merge_features`.
+    mountings : dict
+        Where a scanner is on the robot [m, m, rad] by its topic, where ``/tf_static`` has it not.
+    unsure : (float, float)
+        Standard deviations of the mountings [m, rad].
+    tolerance : float
+        Scans farther apart in time are not merged [s].
     namespace : str
         Put before topics that do not begin with ``/``.
     name : str
@@ -88,7 +95,7 @@ class LiveConfig:
         With a plan, a topic of ``nav_msgs/Odometry`` that says where the robot has come to; by
         default that of `deskew`, or ``/tf``.
     map_frame, odom_frame, base_frame : str
-        With a plan, frames of it, of the odometry, and of the robot.
+        With a plan, frames of it, of the odometry, and of the robot; what is merged is in the last.
     transform_tolerance : float
         For so long after a scan the transform from `map_frame` to `odom_frame` holds [s].
     broadcast : bool
@@ -129,6 +136,10 @@ class LiveConfig:
     """
 
     topic: str = "scan"
+    merge: Names = ()
+    mountings: Mapping[str, Any] = field(default_factory=dict)
+    unsure: Point = UNSURE
+    tolerance: float = 0.15
     namespace: str = ""
     name: str = "lineament"
     type: str = "LaserScan"
@@ -181,6 +192,7 @@ class LiveConfig:
         for name, values, n, many in (
             ("laser_pose", self.laser_pose, 3, "three"),
             ("dock", (0, 0) if self.dock is None else self.dock, 2, "two"),
+            ("unsure", self.unsure, 2, "two"),
         ):
             if len(values) != n or not all(
                 isinstance(value, int | float) and abs(value) <= sys.float_info.max
@@ -190,6 +202,7 @@ class LiveConfig:
         checked_mounting(self.laser_pose)
         object.__setattr__(self, "mask", checked_mask(self.mask))
         self._check_together()
+        self._check_merged()
 
     def _check_together(self) -> None:
         """Check what has to fit together."""
@@ -215,6 +228,27 @@ class LiveConfig:
             raise ValueError("two of map_frame, odom_frame and base_frame are one, expected three")
         if self.log is None and self.ros == 0:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
+
+    def _check_merged(self) -> None:
+        """Check what several scanners leave no room for."""
+        if not self.merge:
+            if self.mountings:
+                raise ValueError("mountings are given, expected several topics as well")
+            return
+        _ = self.rig  # Its own errors say what is wrong with it.
+        for name in ("laser_pose", "upside_down", "log_topic"):
+            if getattr(self, name) not in ((0, 0, 0), False, None):
+                raise ValueError(f"{name} is of one scanner, expected none with several topics")
+        if self.deskew == "scans":
+            raise ValueError("deskew is 'scans', expected odometry or poses with several topics")
+
+    @property
+    def rig(self) -> Rig:
+        """The scanners that are merged, by their full topics, or those of the log."""
+        named = self.resolved if self.log is None else str
+        mountings = {named(topic): pose for topic, pose in self.mountings.items()}
+        topics = tuple(map(named, (self.topic, *self.merge)))
+        return Rig(topics, mountings, self.base_frame, self.unsure)
 
     @property
     def scan_topic(self) -> str:
@@ -267,37 +301,3 @@ class LiveConfig:
         if topic.startswith("/"):
             return topic
         return "/" + "/".join([*filter(None, self.namespace.split("/")), topic])
-
-
-def read_config(path: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read a `LiveConfig` from a TOML file: a flat table, ``[parameters]`` and ``[limits]``.
-
-    Raises
-    ------
-    LineamentError
-        If the file cannot be read, is not TOML, is longer than a line of a log may be, or has an
-        unknown key.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> path = Path(tempfile.mkdtemp(), "live.toml")
-    >>> _ = path.write_text('topic = "/front/scan"\n[parameters]\nevidence = 12\n')
-    >>> read_config(path)
-    {'topic': '/front/scan', 'parameters': {'evidence': 12}}
-    """
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(LIMITS.line + 1)
-        if len(data) > LIMITS.line:
-            raise ValueError(f"it has more than {LIMITS.line} bytes")
-        found = tomllib.loads(data.decode())
-    except OSError as error:
-        raise LineamentError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise LineamentError(f"{path}: is not TOML: {error}") from None
-    known = [parameter.name for parameter in fields(LiveConfig)]
-    for name in found:
-        if name not in known:
-            raise LineamentError(f"{path}: has {name!r}, expected one of {', '.join(known)}")
-    return {k: tuple(value) if isinstance(value, list) else value for k, value in found.items()}

@@ -36,9 +36,9 @@ class DdsSource:
         topics = [
             _Subscription(participant, one, config.reliability, depth) for one in wanted(config)
         ]
-        self._scans = topics[0]
-        # The scans come last, which need what came with them.
-        self._topics = [*topics[1:], self._scans]
+        self._scans = [one for one in topics if one.is_scan]
+        # The scans come last, which need what came with them; of several, those of the first.
+        self._topics = [*(one for one in topics if not one.is_scan), *self._scans[::-1]]
         self._arrivals = WaitSet(participant.entity)
         for subscription in self._topics:
             self._arrivals.attach(subscription.condition)
@@ -50,15 +50,18 @@ class DdsSource:
 
         One that is killed counts until its lease ends, 10 s unless it is configured otherwise.
         """
-        return int(self._scans.reader.get_subscription_matched_status().current_count)
+        status = [one.reader.get_subscription_matched_status() for one in self._scans]
+        return sum(int(one.current_count) for one in status)
 
     @property
     def lost(self) -> int:
         """Scans that came when the depth was used up. Losses of the network are not known."""
-        reader = self._scans.reader
-        return int(
-            reader.get_sample_rejected_status().total_count
-            + reader.get_sample_lost_status().total_count
+        return sum(
+            int(
+                one.reader.get_sample_rejected_status().total_count
+                + one.reader.get_sample_lost_status().total_count
+            )
+            for one in self._scans
         )
 
     def receive(self, timeout: float) -> list[Received]:
@@ -82,6 +85,7 @@ class _Subscription:
         self, participant: Participant, wanted: Wanted, reliability: str, depth: int
     ) -> None:
         self._wanted, self._topic = wanted, wanted.topic
+        self.is_scan = wanted.what == SCAN
         self._kind = kind = wanted.kind.replace("/", "/msg/")
         # Not to keep all of what is reliable: that would make the publisher wait.
         policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]

@@ -14,12 +14,12 @@ from ..mapping.following import Follower, Whereabouts
 from ..mapping.grids import Grid
 from ..mapping.judging import Judge, Judgement
 from ..motion.deskew import beam_times
+from ..rosmsg.frames import Frames, Place, frame_of
 from ..rosmsg.grids import OccupancyGrid
 from ..rosmsg.poses import Odometry, StampedPose
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist, carried, compose, inverse, relative
 from .config import LiveConfig
-from .frames import Frames, Place, frame_of
 from .received import GUESS, JUDGED, MOUNTINGS, RELOCATE, Heard
 
 #: Scanners that are followed; a robot has fewer, unless names are made up.

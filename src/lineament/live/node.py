@@ -103,14 +103,15 @@ class Node:
                 self._pipeline.hear(message, received.what)
                 return
             # What can be read may still make no sense: a robot that turns a million times a sweep.
-            frame = self._pipeline(received.publisher, message)
+            frames = self._pipeline.frames(received.publisher, message)
         except ValueError as error:
             counters.malformed += 1
             self._write_fault(received, error)
             return
-        for sink in self._sinks:
-            sink.publish(frame)
-        counters.add(message, frame.features, time.monotonic() - received.arrived)
+        for frame in frames:
+            for sink in self._sinks:
+                sink.publish(frame)
+            counters.add(frame.scan, frame.features, time.monotonic() - received.arrived)
 
     def _write_fault(self, received: Received, error: ValueError) -> None:
         if received.publisher not in self._faulty and len(self._faulty) < _MOST_FAULTY:

@@ -128,16 +128,32 @@ class Pipeline(InTurn):
 
         ValueError for a scan without beams, or with more than the limit.
         """
+        kept = self._publisher(publisher)
+        return self._followed(kept, *self._found(kept, scan))
+
+    def frames(self, publisher: str, scan: LaserScan) -> tuple[Frame, ...]:
+        """Return what is to be published now that a scan of a publisher has come."""
+        return (self(publisher, scan),)
+
+    def _found(
+        self, kept: _Publisher, scan: LaserScan, mounting: Pose | None = None
+    ) -> tuple[Frame, Twist | None]:
+        """Find the features of a scan; and the twist: of the robot, where the mounting is given."""
         if not len(scan):
             raise ValueError("has no beams")
         self._limits.check("beams", len(scan))
-        kept = self._publisher(publisher)
         scan = self._as_configured(scan)
         twist, kept.last = self._twist(kept, scan), scan
         self._note(scan, twist)
-        straight = deskew(scan, twist)
-        features = kept.extractor(straight)
-        tracks, travel, dock = None, None, None
+        own = twist
+        if twist is not None and mounting is not None:
+            own = twist_of_laser(twist, mounting)
+        straight = deskew(scan, own)
+        return Frame(scan, straight, kept.extractor(straight), None), twist
+
+    def _followed(self, kept: _Publisher, frame: Frame, twist: Twist | None) -> Frame:
+        """Track the features of a frame, and find where they show the scanner to be."""
+        scan, straight, features, tracks, travel, dock, *_ = frame
         if kept.tracker is not None:
             tracks = kept.tracker(features)
             # A circle of a time that is not known takes as long as from scan to scan.

@@ -61,6 +61,8 @@ class Wanted(NamedTuple):
         Decodes a serialised message of an encoding; ValueError, in one line, if it is malformed.
     is_latched : bool
         Whether the last message of each publisher is wanted that was sent before.
+    publisher : str
+        Who sent it, as whoever receives it is told; "" for the publisher's own name.
     """
 
     topic: str
@@ -68,6 +70,7 @@ class Wanted(NamedTuple):
     what: str
     read: Callable[[Buffer, str], Heard]
     is_latched: bool = False
+    publisher: str = ""
 
     @property
     def is_command(self) -> bool:
@@ -77,21 +80,26 @@ class Wanted(NamedTuple):
     def received(self, publisher: str, data: Buffer, encoding: str) -> Received:
         """Return what a source gives of a serialised message that has just arrived."""
         read = partial(self.read, data, encoding)
-        return Received(publisher, read, time.monotonic(), self.what)
+        return Received(self.publisher or publisher, read, time.monotonic(), self.what)
 
 
 def wanted(config: LiveConfig) -> list[Wanted]:
     """Return the topics that a node listens to: the scans, then what has to be known before."""
     kind, limits = f"sensor_msgs/{config.type}", Limits.of(config.limits)
-    scans = Wanted(config.scan_topic, kind, SCAN, _decoder(kind, config.echo, limits))
-    found = [scans]
+    decoder = _decoder(kind, config.echo, limits)
+    found = [Wanted(config.scan_topic, kind, SCAN, decoder)]
+    if config.merge:  # A scanner is known by its topic, whoever sends.
+        names = config.rig.topics
+        found = [Wanted(name, kind, SCAN, decoder, publisher=name) for name in names]
     if (topic := config.odometry_topic) is not None:
         found.append(Wanted(topic, "nav_msgs/Odometry", ODOMETRY, odometry))
+    links, placed = "tf2_msgs/TFMessage", "geometry_msgs/PoseWithCovarianceStamped"
+    read = partial(_poses, limits=limits)
+    if config.is_localiser or config.merge:
+        mountings = partial(read, kind=links)
+        found.append(Wanted("/tf_static", links, MOUNTINGS, mountings, is_latched=True))
     if config.is_localiser:
-        links, placed = "tf2_msgs/TFMessage", "geometry_msgs/PoseWithCovarianceStamped"
-        read = partial(_poses, limits=limits)
         found += [
-            Wanted("/tf_static", links, MOUNTINGS, partial(read, kind=links), is_latched=True),
             Wanted("/tf", links, LINKS, partial(read, kind=links)),
             Wanted(config.resolved("initialpose"), placed, GUESS, partial(read, kind=placed)),
             Wanted(f"{config.scan_topic}/relocate", "std_msgs/Empty", RELOCATE, _nothing),

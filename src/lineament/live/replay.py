@@ -3,12 +3,13 @@
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from heapq import merge as merged
 from typing import Any
 
 from ..logs import open_log
 from ..scan import LaserScan
-from .received import Received
+from .received import MOUNTINGS, Received
 
 #: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
 _LEAP, _STEP = 10.0, 0.1
@@ -33,6 +34,10 @@ class ReplaySource:
         Factor on the speed; 0 for one scan at each call of `receive`.
     loop : bool
         Whether to start again at the end, with the same stamps.
+    topic : str, optional
+        Which scans are played.
+    merge : sequence of str
+        In place of it, the topics of several scanners, with the mountings that the log has.
     clock : callable
         Returns the time [s].
     **reading
@@ -66,15 +71,21 @@ class ReplaySource:
         rate: float = 1.0,
         *,
         loop: bool = False,
+        topic: str | None = None,
+        merge: Sequence[str] = (),
         clock: Callable[[], float] = time.monotonic,
         **reading: Any,
     ) -> None:
-        self._log = open_log(path, **reading)
+        # Of scans of one time the first scanner's comes last: it is merged with the others.
+        names = merge[::-1] or (topic,)
+        self._logs = [open_log(path, name, **reading) for name in names]
         self._rate, self._loop, self._clock = rate, loop, clock
-        self._items = iter(self._log.measured())
+        # Of several scanners it is to be known where they are, before their scans.
+        self._before = [self._mountings()] if merge else []
+        self._items = self._measured()
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
         # The first scan is due when it is first asked for.
-        self._has_begun, self._due, self._stamp = False, 0.0, math.nan
+        self._has_begun, self._due, self._topic, self._stamp = False, 0.0, "", math.nan
         #: Whether the log is at its end.
         self.ended = False
 
@@ -85,7 +96,7 @@ class ReplaySource:
 
     def receive(self, timeout: float) -> list[Received]:
         """Wait until the next scan is due, up to `timeout` [s]; return those that are."""
-        came: list[Received] = []
+        came, self._before = self._before, []
         if self._read_ahead():
             time.sleep(max(min(self._due - self._clock(), timeout), 0.0))
         now = self._clock()
@@ -98,16 +109,24 @@ class ReplaySource:
 
     def problems(self) -> list[str]:
         """Return what was skipped in the log."""
-        return [f"skipped: {fault}" for fault in self._log.faults]
+        return [f"skipped: {fault}" for log in self._logs for fault in log.faults]
 
     def close(self) -> None:
         """Stop reading."""
         self._items, self._next, self._loop = iter(()), None, False
 
+    def _measured(self) -> Iterator[tuple[str, LaserScan]]:
+        """Read all logs from the start, by the stamps of their scans."""
+        return merged(*(log.measured() for log in self._logs), key=lambda item: item[1].stamp)
+
+    def _mountings(self) -> Received:
+        links = self._logs[0].mountings()
+        return Received(self._logs[0].name, lambda: links, self._clock(), MOUNTINGS)
+
     def _take(self) -> Received:
         assert self._next is not None
         (topic, scan), self._next = self._next, None
-        self._stamp = scan.stamp
+        self._topic, self._stamp = topic, scan.stamp
         # Latency counts from when the scan was due.
         return Received(topic, lambda: scan, self._due if self._rate else self._clock())
 
@@ -118,8 +137,9 @@ class ReplaySource:
             if self._next is None:
                 self.ended = True
                 return False
-            step = self._next[1].stamp - self._stamp
-            self._due += (step if 0 < step <= _LEAP else _STEP) / (self._rate or math.inf)
+            topic, step = self._next[0], self._next[1].stamp - self._stamp
+            is_next = 0 < step <= _LEAP or (step == 0 and topic != self._topic)
+            self._due += (step if is_next else _STEP) / (self._rate or math.inf)
         if not self._has_begun:
             self._has_begun, self._due = True, self._clock()
         return True
@@ -127,6 +147,6 @@ class ReplaySource:
     def _following(self) -> tuple[str, LaserScan] | None:
         following = next(self._items, None)
         if following is None and self._loop:
-            self._items = iter(self._log.measured())
+            self._items = self._measured()
             following = next(self._items, None)
         return following

@@ -86,7 +86,8 @@ class Ros1Source:
             one.topic: (one.kind, node.subscribe(one.topic, one.kind, partial(self._put, one)))
             for one in wanted(config)
         }
-        _, self._scans = self._subscribed[config.scan_topic]
+        scans = [one.topic for one in wanted(config) if one.what == SCAN]
+        self._scans = [self._subscribed[topic][1] for topic in scans]
 
     @property
     def lost(self) -> int:
@@ -101,7 +102,7 @@ class Ros1Source:
     @property
     def publishers(self) -> int:
         """Number of publishers of scans that are connected."""
-        return int(self._scans.get_num_connections())
+        return sum(int(one.get_num_connections()) for one in self._scans)
 
     def receive(self, timeout: float) -> list[Received]:
         """Wait up to `timeout` seconds, and return all messages that came, oldest first."""

@@ -13,6 +13,7 @@ from ..output.ros_messages import RosMessages
 from ..progress import compiling
 from .config import LiveConfig
 from .counters import Report
+from .merging import MergingPipeline
 from .node import Node
 from .pipeline import Pipeline
 from .received import Source
@@ -55,13 +56,14 @@ def run_live(
         with _loading(stack):
             # Other nodes are discovered while the kernels are loaded.
             source, sinks = _ends(config, stack, write)
-            pipeline = Pipeline(config)
+            pipeline = MergingPipeline(config) if config.merge else Pipeline(config)
             # The motion of tracks is estimated from the second scan on.
             with compiling():
                 for frame in (pipeline("", WALL), pipeline("", WALL)):
                     feature_points(frame.features, frame.tracks)
         is_stopped()  # From here on a signal ends a node that runs, and not a start.
-        write(f"{config.name} finds features on {config.scan_topic} by {config.method}")
+        topics = ", ".join(config.rig.topics) if config.merge else config.scan_topic
+        write(f"{config.name} finds features on {topics} by {config.method}")
         return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
 
 
@@ -92,12 +94,14 @@ def _ends(
             config.rate,
             loop=config.loop,
             topic=config.log_topic,
+            merge=config.rig.topics if config.merge else (),
             pose_topic=config.poses,
             echo=config.echo,
             ring=config.ring,
             keep_going=config.keep_going,
             limits=config.limits,
-            laser_pose=config.laser_pose if any(config.laser_pose) else None,
+            # Poses of what is merged stay those of the robot.
+            laser_pose=config.laser_pose if any(config.laser_pose) or config.merge else None,
         )
         stack.enter_context(closing(source))
     if config.ros == 1:

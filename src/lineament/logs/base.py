@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
+from ..rosmsg.poses import StampedPose
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask, check_scale, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
@@ -186,6 +187,10 @@ class Log(Pictured, ABC):
 
     def contents(self) -> list[Topic]:
         """Return all kinds of messages in the log, scans and others; empty where unknown."""
+        return []
+
+    def mountings(self) -> list[StampedPose]:
+        """Return where frames of the robot are fixed in each other; most logs do not say."""
         return []
 
     def items(self) -> Iterator[tuple[str, LaserScan]]:

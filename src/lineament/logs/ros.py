@@ -5,13 +5,13 @@ from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 
 from ..errors import LogError
-from ..rosmsg.poses import TRANSFORMS
+from ..rosmsg.poses import TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.scans import CLOUD, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Log, Topic
 from .ros_bag import Bag, Connection
-from .ros_poses import PoseFinder
+from .ros_poses import MAX_POSES, STATIC, PoseFinder
 
 #: How many topics an error lists.
 _LISTED = 20
@@ -61,6 +61,19 @@ class RosLog(Log):
         return [
             Topic(name, kind, sum(counts), len(counts)) for (name, kind), counts in kinds.items()
         ]
+
+    def mountings(self) -> list[StampedPose]:
+        """Return where frames of the robot are fixed in each other, by ``/tf_static``."""
+        found: list[StampedPose] = []
+        for bag in self._bags:
+            for connection, data in bag.messages({STATIC}, self._fault):
+                kind = connection.type
+                try:
+                    if kind in TRANSFORMS and len(found) < MAX_POSES:
+                        found += stamped_poses(data, connection.encoding, kind, self.limits)
+                except ValueError as error:
+                    self._fault(LogError(bag.path, f"{STATIC}: {error}"))
+        return found
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         finder = self._pose_finder()

@@ -10,12 +10,15 @@ import numpy as np
 
 from ..errors import warn
 from ..limits import LIMITS, Limits
+from ..rosmsg.frames import frame_of
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.wire import Buffer
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import carried, compose
 from .ros_bag import Connection
 
+#: The topic of the frames that do not move in each other.
+STATIC = "/tf_static"
 #: Poses that are held of each track, and scans that wait for a pose after theirs.
 MAX_POSES = 4096
 MAX_WAITING = 64
@@ -52,12 +55,12 @@ class PoseFinder:
     ) -> None:
         self._limits, self._is_given = limits, is_given
         self.topic, _, chain = wanted.partition(":")
-        frames = [_frame(name) for name in chain.split("->")] if chain else []
+        frames = [frame_of(name) for name in chain.split("->")] if chain else []
         if chain and (len(frames) < 2 or not all(frames)):
             raise ValueError(
                 f"pose topic is {wanted!r}, expected frames as in {self.topic}:odom->base_link"
             )
-        static = f"{self.topic}_static" if chain else "/tf_static"
+        static = f"{self.topic}_static" if chain else STATIC
         #: Whether links that hold at all times may still come.
         self._is_static_ahead = static in mountings
         self.topics = (self.topic, static) if chain or static in mountings else (self.topic,)
@@ -79,7 +82,7 @@ class PoseFinder:
         """Take a message with poses, and return the scans, by topic, that waited for it."""
         is_static = connection.topic != self.topic
         for found in stamped_poses(data, connection.encoding, connection.type, self._limits):
-            frame, child = _frame(found.frame), _frame(found.child_frame)
+            frame, child = frame_of(found.frame), frame_of(found.child_frame)
             if is_static and len(self._links) < MAX_POSES:
                 self._links[child] = found._replace(frame=frame)
             elif not self._is_chain:
@@ -105,7 +108,7 @@ class PoseFinder:
         while self._waiting:
             topic, scan = self._waiting[0]
             is_covered = all(track.covers(scan.stamp) for track in self._tracks.values())
-            mounting = self._mounting(_frame(scan.frame_id))
+            mounting = self._mounting(frame_of(scan.frame_id))
             if mounting is None and self._is_static_ahead and not self._links:
                 is_covered = False
             if len(self._waiting) <= most and not is_covered:
@@ -205,8 +208,3 @@ class _Track:
 
 def _between(covariance: Array, following: Array, share: float) -> Array:
     return np.asarray(covariance + share * (following - covariance))
-
-
-def _frame(name: str) -> str:
-    # Frames of ROS 1 may begin with a slash, in part of the messages.
-    return name.strip().removeprefix("/")

@@ -15,6 +15,7 @@ from .grids import Grid
 from .line_map import LineMap
 from .local_map import LocalMap, Query
 from .locate import VERDICTS, Location, locate
+from .scanners import merge_features
 from .walls import COLUMN, WALL
 
 __all__ = [
@@ -28,4 +29,5 @@ __all__ = [
     "Location",
     "Query",
     "locate",
+    "merge_features",
 ]

@@ -5,9 +5,9 @@ from bisect import bisect_left
 from collections import deque
 from typing import NamedTuple
 
-from ..rosmsg.poses import StampedPose
 from ..scan import Pose
 from ..scan.poses import compose, poses_along, twist_between
+from .poses import StampedPose
 
 #: Frames that are known; a robot has fewer, unless names are made up.
 _MOST_FRAMES = 1000

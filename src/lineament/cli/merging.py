@@ -1,0 +1,97 @@
+"""The command that makes one set of features of several scanners."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import (
+    LOG,
+    METHOD,
+    MOUNTINGS,
+    NOISE,
+    PATH,
+    QUIET,
+    SET,
+    UNSURE,
+    check_ending,
+    make_extractor,
+    wrong_usage,
+)
+from .options import reading_topics as reading
+
+#: Formats that hold features alone; the others show scans at their poses.
+_TABLES = (".parquet", ".csv", ".jsonl")
+
+
+@click.command()
+@LOG
+@click.option("-o", "--output", required=True, type=PATH, help="File to write, as for extract.")
+@MOUNTINGS
+@UNSURE
+@click.option(
+    "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
+)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(min=0),
+    metavar="SECONDS",
+    help="Longest time between scans that are merged.  [default: half a period of the slowest]",
+)
+@METHOD
+@SET
+@NOISE
+@reading
+@click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
+@QUIET
+def merge(
+    log: Path | str,
+    output: Path,
+    mountings: dict[str, tuple[float, float, float]],
+    unsure: tuple[float, float] | None,
+    base_frame: str,
+    tolerance: float | None,
+    method: str | None,
+    settings: tuple[str, ...],
+    noise: float | None,
+    reading: dict[str, Any],
+    world: bool,
+    quiet: bool,
+) -> None:
+    """Merge what several scanners of LOG see into one set of features, in the frame of the robot.
+
+    Each scan of the first --topic, with the nearest in time of the others. Poses of the log are
+    those of the robot. The exit status is 3 if no scan has a feature.
+    """
+    from ..motion.rig import Rig
+    from ..output import ENDINGS
+    from ..tasks.extract import check_found
+    from ..tasks.merging import merge_log
+    from .progress import tracker
+
+    check_ending(output, ENDINGS)
+    if world and output.suffix.lower() not in _TABLES:
+        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}")
+    if reading.pop("laser_pose") is not None:
+        raise click.UsageError(
+            "--laser-pose: expected --mounting TOPIC=X,Y,DEGREES of each scanner"
+        )
+    known = {} if unsure is None else {"unsure": unsure}
+    with wrong_usage():
+        rig = Rig(reading.pop("topic"), mountings, base_frame, **known)
+    extractor = make_extractor(method, settings, noise)
+    done = merge_log(
+        log,
+        output,
+        rig,
+        extractor,
+        tolerance=tolerance,
+        world=world,
+        track=tracker(quiet),
+        **reading,
+    )
+    if not quiet:
+        click.echo(str(done))
+    check_found(done.log, done.scans, done.features, extractor.method)
