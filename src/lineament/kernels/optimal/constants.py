@@ -29,3 +29,8 @@ REACH = 0.3
 MOST_DEVIATION = 0.1
 #: Radius of an arc [m], at most, and the turn that it shows [rad], at least.
 ARC_RADIUS, ARC_TURN = 1.5, 0.7
+#: A face that joins two lines is seen in half a beam at least, and at most in so many more than lie
+#: between: its ends are half a beam off on either side, and so is the depth that was measured.
+FACE_LEAST, FACE_MORE = 0.5, 3.0
+#: Square of the width of a uniform distribution, over its variance.
+UNIFORM = 12.0
