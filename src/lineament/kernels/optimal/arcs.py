@@ -8,6 +8,7 @@ from .. import helper, inlined, sums
 from . import layout as at
 from .constants import ARC_RADIUS, ARC_TURN, CLUTTER, LEAST, MOST_DEVIATION, RARE, SIGMAS, TAU
 from .costs import solve
+from .geometry import distance, range_variance
 
 #: Steps of Gauss and Newton from the algebraic circle, to see whether there is one and to fit it.
 _SEED, _STEPS = np.int64(1), np.int64(3)
@@ -59,7 +60,7 @@ def _noise_cost(points, first, end, a, b, noise):
     total = 0.0
     for i in range(len(x)):
         square, off = rho[i] * rho[i], 1.0 - a * x[i] - b * y[i]
-        total += off * off * square / (noise[0] + noise[1] * square)
+        total += off * off * square / (noise[at.CONSTANT] + noise[at.GROWTH] * square)
     return total
 
 
@@ -82,10 +83,10 @@ def _looks_round(points, first, last, noise):
     if ux * ux + uy * uy > 4.0 * ARC_RADIUS * ARC_RADIUS:
         return False
     r, square = math.sqrt(ux * ux + uy * uy), mx * mx + my * my
-    near = 2.0 * SIGMAS * math.sqrt(noise[0] + noise[1] * square)
+    near = 2.0 * SIGMAS * math.sqrt(noise[at.CONSTANT] + noise[at.GROWTH] * square)
     for i in (quarter, first + last - quarter):
         dx, dy = x[i] - mx - ux, y[i] - my - uy
-        if not abs(math.sqrt(dx * dx + dy * dy) - r) <= near:
+        if not abs(distance(dx, dy) - r) <= near:
             return False
     dx, dy, least = ax - bx, ay - by, 0.5 * ARC_TURN * r
     return dx * dx + dy * dy >= least * least
@@ -152,8 +153,8 @@ def _follow(points, broken, arc, i, stop, way, noise):
 def is_on(points, arc, i, noise, scale):
     """Whether a measurement is as near to an arc as by chance, at a scale of its surface [m]."""
     dx, dy = points[at.X, i] - arc[at.CX], points[at.Y, i] - arc[at.CY]
-    off = math.sqrt(dx * dx + dy * dy) - arc[at.RADIUS]
-    variance = noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i] + scale * scale
+    off = distance(dx, dy) - arc[at.RADIUS]
+    variance = range_variance(points, i, noise) + scale * scale
     return off * off <= SIGMAS * SIGMAS * variance
 
 
@@ -167,7 +168,7 @@ def fit_arc(points, first, last, noise, steps, piece):
     """
     end = last + 1
     x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
-    n, mx, my, constant, growth = len(x), 0.0, 0.0, noise[0], noise[1]
+    n, mx, my, constant, growth = len(x), 0.0, 0.0, noise[at.CONSTANT], noise[at.GROWTH]
     for i in range(n):
         mx, my = mx + x[i], my + y[i]
     mx, my = mx / n, my / n

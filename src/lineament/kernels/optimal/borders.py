@@ -26,7 +26,7 @@ def soften_borders(work, surfaces, evidence):
         if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
             continue
         ends = spans[at.FIRST, k - 1], border, spans[at.LAST, k] + 1
-        variance = work.noise[0] + work.noise[1] * rho[border - 1] * rho[border]
+        variance = work.noise[at.CONSTANT] + work.noise[at.GROWTH] * rho[border - 1] * rho[border]
         share = variance / (variance + TAU * TAU)
         spare = rise_if_one(work, k) - RARE * evidence
         _soften(work.sums, ends, share, spare, pieces[k - 1], pieces[k])
@@ -84,7 +84,11 @@ def _odds(rise, square):
 def _apart(sums, i, j, line, other):
     """Sum of the squares by which two lines differ at the measurements i … j - 1."""
     a, b = other[0] - line[0], other[1] - line[1]
-    xx, xy, yy = sums[0, j] - sums[0, i], sums[1, j] - sums[1, i], sums[2, j] - sums[2, i]
+    xx, xy, yy = (
+        sums[at.WXX, j] - sums[at.WXX, i],
+        sums[at.WXY, j] - sums[at.WXY, i],
+        sums[at.WYY, j] - sums[at.WYY, i],
+    )
     return a * a * xx + 2.0 * a * b * xy + b * b * yy
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
 from . import layout as at
 from .constants import SIGMAS, STEEPEST
+from .geometry import around
 
 #: Fewer measurements are no cluster.
 _LEAST_CLUSTER = 3
@@ -34,7 +35,7 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
     near, far = min(rho0, rho1), max(rho0, rho1)
     # Times the farther range, so that nothing is divided, and no root is taken.
     square, beyond = far * far, far * (far - near) - STEEPEST * abs(x0 * y1 - y0 * x1)
-    allowed = 4.0 * SIGMAS * SIGMAS * square * (noise[0] + noise[1] * square)
+    allowed = 4.0 * SIGMAS * SIGMAS * square * (noise[at.CONSTANT] + noise[at.GROWTH] * square)
     return (beyond > 0.0) & (beyond * beyond > allowed)
 
 
@@ -75,7 +76,7 @@ def _mark_spikes(work, count, n, circular, most_missing):
         pairs, spikes[0], spikes[last] = pairs - spikes[0], 0, 0
     for i in range(count if pairs > 0 else 0):
         if spikes[i]:
-            before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+            before, after = around(i - 1, count), around(i + 1, count)
             if _is_broken(work, before, after, n, most_missing):
                 spikes[i], pairs = 0, pairs - 1
     return pairs
@@ -96,7 +97,7 @@ def cluster(work, count, n, circular, most_missing):
     if _mark_spikes(work, count, n, circular, most_missing) == 0:
         return count
     for i in range(count):
-        before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+        before, after = around(i - 1, count), around(i + 1, count)
         if spikes[i] and not spikes[before] and not spikes[after]:
             broken[after] = 0
             continue
@@ -117,7 +118,7 @@ def opening(work, count):
     rho, broken, begin = work.points[at.RHO], work.beams[at.BROKEN], 0
     largest, closed = -1.0, True
     for i in range(count):
-        step = abs(rho[i] - rho[i - 1 if i > 0 else count - 1])
+        step = abs(rho[i] - rho[around(i - 1, count)])
         if broken[i] and step > largest:
             begin, largest, closed = i, step, False
         if closed and rho[i] > rho[begin]:

@@ -70,7 +70,7 @@ def extract_rows(
             if start > 0:
                 count = list_points(work, ranges[row], start, limits, bearings)
                 count = cluster(work, count, n, circular, missing)
-            fill_sums(work.points, count, work.noise[0], work.noise[1], work.sums)
+            fill_sums(work.points, count, work.noise[at.CONSTANT], work.noise[at.GROWTH], work.sums)
             lines = partition(work, count, evidence)
             clearest = clearest_border(work, lines) if closed else np.int64(0)
             start = beams[at.BEAM, spans[at.FIRST, clearest]] if clearest > 0 else start
@@ -85,8 +85,11 @@ def extract_rows(
         for part in range(5):
             noises[row, part] = 0.0 if estimated else given[part]
         if estimated:
-            noises[row, 0] = math.sqrt(work.noise[0]) if count > 0 else math.nan
-            noises[row, 1], noises[row, 4] = math.sqrt(work.noise[1]), work.noise[3]
+            noises[row, 0] = math.sqrt(work.noise[at.CONSTANT]) if count > 0 else math.nan
+            noises[row, 1], noises[row, 4] = (
+                math.sqrt(work.noise[at.GROWTH]),
+                work.noise[at.UNCERTAINTY],
+            )
         counts[0], counts[1], counts[2] = count, lines, surfaces
 
 
@@ -95,13 +98,15 @@ def _estimate_noise(work, count, given):
     """Step 1: write the noise as (constant, growth, variance of a bearing, uncertainty)."""
     noise = work.noise
     if math.isnan(given[0]):
-        noise[0], noise[1], noise[3], _ = fit_noise(
-            work.points, work.beams[at.BEAM], count, at.KEY, at.SCRATCH
+        noise[at.CONSTANT], noise[at.GROWTH], noise[at.UNCERTAINTY], _ = fit_noise(
+            work.points, work.beams[at.BEAM], count, at.TRIPLE, at.HALVES
         )
-        noise[2] = 0.0
+        noise[at.BEARING] = 0.0
         return
-    noise[0] = max(given[0] * given[0] + given[3] * given[3] / 12.0, LEAST_SIGMA * LEAST_SIGMA)
-    noise[1], noise[2] = given[1] * given[1], given[2] * given[2]
+    noise[at.CONSTANT] = max(
+        given[0] * given[0] + given[3] * given[3] / 12.0, LEAST_SIGMA * LEAST_SIGMA
+    )
+    noise[at.GROWTH], noise[at.BEARING] = given[1] * given[1], given[2] * given[2]
 
 
 @inlined

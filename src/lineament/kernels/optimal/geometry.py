@@ -1,9 +1,10 @@
-"""Places about the line a x + b y = 1 of a piece, and beams about a full circle."""
+"""Places about the line a x + b y = 1 of a piece; variances; beams around a full circle."""
 
 import math
 
 from .. import helper
 from . import layout as at
+from .constants import TAU
 
 
 @helper
@@ -18,6 +19,20 @@ def around(i, n):
     if i < 0:
         return i + n
     return i - n if i >= n else i
+
+
+@helper
+def range_variance(points, i, noise):
+    """Variance of the range of a measurement."""
+    rho = points[at.RHO, i]
+    return noise[at.CONSTANT] + noise[at.GROWTH] * rho * rho
+
+
+@helper
+def surface_variance(points, i, noise):
+    """Variance of a measurement about the line of its surface."""
+    rho = points[at.RHO, i]
+    return TAU * TAU + noise[at.CONSTANT] + noise[at.GROWTH] * rho * rho
 
 
 @helper

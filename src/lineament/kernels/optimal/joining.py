@@ -4,15 +4,23 @@ import math
 
 import numpy as np
 
-from .. import helper, inlined
+from .. import inlined
 from ...features import records as to
 from ..writing import grade_corner, write_edge, write_end, write_opening, write_place
 from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU, UNIFORM
-from .geometry import along, around, crossing, distance, over, variance_at
+from .geometry import (
+    along,
+    around,
+    crossing,
+    distance,
+    over,
+    range_variance,
+    surface_variance,
+    variance_at,
+)
 from .meeting import NO_CORNER, meet, response
-from .merging import surface_variance
 
 
 @inlined
@@ -136,7 +144,7 @@ def _add_edge(work, tables, scan, k, way):
     sine = (ux * x[i] + uy * y[i]) / rho[i]
     px, py = p[at.CX] + beyond * ux, p[at.CY] + beyond * uy
     across, lengthwise = variance_at(p, px, py), spacing * spacing / UNIFORM
-    lengthwise += (noise[0] + noise[1] * rho[i] * rho[i]) * sine * sine
+    lengthwise += range_variance(points, i, noise) * sine * sine
     if across + lengthwise > MOST_DEVIATION * MOST_DEVIATION:
         return
     edges, segment, row = tables.edges, spans[at.SEGMENT, k], tables.offsets[scan.row + 1, to.EDGES]

@@ -9,8 +9,7 @@ from ...features import records as to
 from . import layout as at
 from .constants import BEND, FACE_LEAST, FACE_MORE, LEAST, REACH, SIGMAS, TAU
 from .costs import joint_cost
-from .geometry import along, around, crossing, distance, gap, over
-from .merging import surface_variance
+from .geometry import along, around, crossing, distance, gap, over, surface_variance
 
 #: Kind of the corner of two surfaces that have none.
 NO_CORNER = -1

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from .. import helper, inlined
+from .. import inlined
 from . import layout as at
-from .constants import BEND, RARE, SIGMAS, TAU
+from .constants import BEND, RARE, SIGMAS
 from .costs import joint_cost, solve
-from .geometry import gap
+from .geometry import gap, surface_variance
 
 
 @inlined
@@ -28,7 +28,7 @@ def merge_lines(work, lines, evidence):
 
     Returns how many lines are left.
     """
-    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.KEY]
+    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.RISE]
     for k in range(1, lines):
         rises[k] = rise_if_one(work, k)
     while lines > 1:
@@ -64,9 +64,3 @@ def rise_if_one(work, k):
     if step * step > SIGMAS * SIGMAS * surface_variance(points, border, work.noise):
         return math.inf
     return joint_cost(sums, start, border, border, end)
-
-
-@helper
-def surface_variance(points, i, noise):
-    """Variance of a measurement about the line of its surface."""
-    return TAU * TAU + noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i]

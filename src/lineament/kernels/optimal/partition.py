@@ -154,8 +154,8 @@ def _raise_bounds(points, sums, low, high, oldest, groups, most):
     while oldest < groups and points[at.BOUND, oldest] > most:
         oldest += 1
     one, two = points[at.AHEAD, low:high], points[at.AHEAD + 1, low:high]
-    own, largest = points[at.SCRATCH, low:high], np.int64(0)
-    costs_on(sums, low - 1, low, high, 0.0, points[at.SCRATCH])
+    own, largest = points[at.OWN, low:high], np.int64(0)
+    costs_on(sums, low - 1, low, high, 0.0, points[at.OWN])
     for k in range(len(own)):
         own[k] = own[k] if own[k] < math.inf else 0.0
     for k in range(len(own)):
