@@ -4,12 +4,9 @@ import math
 
 from .. import helper, inlined
 from . import layout as at
-from .constants import LEAST, RARE, TAU
+from .constants import FARTHER, LEAST, LEAST_ODDS, ODDS_A, ODDS_B, RARE, TAU
 from .costs import cost, solve
 from .merging import rise_if_one
-
-#: Borders are looked for elsewhere as far as the odds are at least these.
-_LEAST_ODDS = 1e-6
 
 
 @inlined
@@ -52,7 +49,7 @@ def _soften(sums, ends, share, spare, before, after):
         total += odds
     for way in (-1, 1):
         step, odds = 1, 1.0
-        while odds > _LEAST_ODDS:
+        while odds > LEAST_ODDS:
             i = border + way * step
             if i - start < LEAST or end - i < LEAST:
                 break
@@ -66,7 +63,7 @@ def _soften(sums, ends, share, spare, before, after):
             of_one = _changed(of_one, before, one, first, odds)
             of_other = _changed(of_other, after, other, second, odds)
             total += odds
-            step *= 4
+            step *= FARTHER
     _add(before, of_one, 1.0 / total)
     _add(after, of_other, 1.0 / total)
 
@@ -77,7 +74,7 @@ def _odds(rise, square):
     if not square > 0.0:
         return 0.0
     z = 0.5 * max(rise, 0.0) / math.sqrt(square)
-    return math.exp(-1.6 * z - 0.07 * z * z * z)
+    return math.exp(-ODDS_A * z - ODDS_B * z * z * z)
 
 
 @helper

@@ -4,11 +4,8 @@ import numpy as np
 
 from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
 from . import layout as at
-from .constants import SIGMAS, STEEPEST
+from .constants import LEAST_CLUSTER, STEEPEST, STEP_SIGMAS
 from .geometry import around
-
-#: Fewer measurements are no cluster.
-_LEAST_CLUSTER = 3
 
 
 @inlined
@@ -35,7 +32,7 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
     near, far = min(rho0, rho1), max(rho0, rho1)
     # Times the farther range, so that nothing is divided, and no root is taken.
     square, beyond = far * far, far * (far - near) - STEEPEST * abs(x0 * y1 - y0 * x1)
-    allowed = 4.0 * SIGMAS * SIGMAS * square * (noise[at.CONSTANT] + noise[at.GROWTH] * square)
+    allowed = STEP_SIGMAS * STEP_SIGMAS * square * (noise[at.CONSTANT] + noise[at.GROWTH] * square)
     return (beyond > 0.0) & (beyond * beyond > allowed)
 
 
@@ -146,7 +143,7 @@ def list_clusters(beams, count, clusters):
             continue
         # What is before the first break belongs to the last cluster.
         end, seam = begin + 1 + k, begin if k == len(ahead) else 0
-        if end - start + seam >= _LEAST_CLUSTER:
+        if end - start + seam >= LEAST_CLUSTER:
             _label(clusters, beam[start:end], found)
             _label(clusters, beam[:seam], found)
             beams[at.CLUSTER_FIRST, found] = start

@@ -6,12 +6,7 @@ import numpy as np
 
 from .. import contracted, helper
 from . import layout as at
-from .constants import TAU
-
-#: Candidates that are evaluated at once, a power of two.
-GROUP = 32
-#: Of whole numbers.
-_LARGEST = 2**63 - 1
+from .constants import GROUP, LARGEST, SINGULAR, TAU
 
 
 @contracted
@@ -57,7 +52,7 @@ def solve(sums, i, j):
     """Return the line a x + b y = 1 of least squares of measurements i … j - 1; 0, 0 if none."""
     xx, xy, yy, x, y, _ = _between(sums, i, j)
     determinant = xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
+    if not determinant > SINGULAR * xx * yy:
         return 0.0, 0.0
     return (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant
 
@@ -66,7 +61,7 @@ def solve(sums, i, j):
 def chi_square(xx, xy, yy, x, y, s):
     """χ² of the line of least squares, by sums; inf where they determine none."""
     determinant = xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
+    if not determinant > SINGULAR * xx * yy:
         return math.inf
     return max(s - (x * (x * yy - y * xy) + y * (y * xx - x * xy)) / determinant, 0.0)
 
@@ -106,7 +101,7 @@ def least_from(sums, low, high, j, energy):
         sums[at.W, low:high],
         energy[low:high],
     )
-    least = np.int64(_LARGEST)
+    least = np.int64(LARGEST)
     for k in range(len(energy)):
         value = energy[k] + chi_square(
             xx1 - xx[k], xy1 - xy[k], yy1 - yy[k], x1 - x[k], y1 - y[k], s1 - s[k]

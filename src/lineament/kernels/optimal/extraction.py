@@ -13,6 +13,7 @@ from ..layout import Tables
 from . import layout as at
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
+from .constants import UNIFORM
 from .fits import measure
 from .joining import join_all
 from .costs import fill_sums
@@ -103,10 +104,10 @@ def _estimate_noise(work, count, given):
         )
         noise[at.BEARING] = 0.0
         return
-    noise[at.CONSTANT] = max(
-        given[0] * given[0] + given[3] * given[3] / 12.0, LEAST_SIGMA * LEAST_SIGMA
-    )
-    noise[at.GROWTH], noise[at.BEARING] = given[1] * given[1], given[2] * given[2]
+    sigma, proportional, bearing, quantum = given[0], given[1], given[2], given[3]
+    constant = sigma * sigma + quantum * quantum / UNIFORM
+    noise[at.CONSTANT] = max(constant, LEAST_SIGMA * LEAST_SIGMA)
+    noise[at.GROWTH], noise[at.BEARING] = proportional * proportional, bearing * bearing
 
 
 @inlined

@@ -3,18 +3,13 @@
 import math
 
 from .. import helper, inlined, sums
-from ..line_fit import direction_along_beams, second_order
+from ..line_fit import GRAZING, direction_along_beams, second_order
 from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
 from .borders import soften_borders
-from .constants import LEAST, SIGMAS, TAU
+from .constants import LEAST, OVERLAP, SIGMAS, TAU, TOGETHER
 from .costs import solve
 from .geometry import along, surface_variance
-
-#: Measurements whose errors are averaged to see whether neighbours are off alike.
-_TOGETHER = 4
-#: Of overlapping second differences of their means, so many count as one.
-_OVERLAP = 3.4
 
 
 @inlined
@@ -106,7 +101,7 @@ def fit_line(points, first, end, a, b, noise, piece):
     for i in range(len(x)):
         across, square = nx * x[i] + ny * y[i], rho[i] * rho[i]
         # The variance and its scale times ρ², so that one number is divided.
-        off, near = across - distance, max(across * across, 1e-6 * square)
+        off, near = across - distance, max(across * across, GRAZING * square)
         spread = (constant + growth * square) * near + bearing * square * (square - near)
         counts = off * off * square <= SIGMAS * SIGMAS * (spread + TAU * TAU * near)
         w, dx, dy = square / spread if counts else 0.0, x[i] - x0, y[i] - y0
@@ -145,20 +140,18 @@ def _scatter_of_means(work, surfaces):
         first, end = work.spans[at.FIRST, k], work.spans[at.LAST, k] + 1
         if work.spans[at.KIND, k] != at.LINE:
             continue
-        if end - first < 3 * _TOGETHER:
+        if end - first < 3 * TOGETHER:
             short += end - first
         else:
             long += end - first
             a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.ERROR]
             _second_differences(points, first, end, a, b, work.noise, error, squares[used:])
-            used += end - first + 1 - 3 * _TOGETHER
+            used += end - first + 1 - 3 * TOGETHER
     if long <= short:
         return 1.0
-    mean, limit = 1.0, math.inf
-    for _ in range(2):
-        mean = _mean_within(squares, used, limit)
-        limit = SIGMAS * SIGMAS * mean
-    mean, _ = expected_variance(mean, used / _OVERLAP, 1.0)
+    mean = _mean_within(squares, used, math.inf)
+    mean = _mean_within(squares, used, SIGMAS * SIGMAS * mean)
+    mean, _ = expected_variance(mean, used / OVERLAP, 1.0)
     # Nothing is known better than the best scanner measures it.
     return max(mean, LEAST_SIGMA * LEAST_SIGMA / work.noise[at.CONSTANT])
 
@@ -184,9 +177,9 @@ def _second_differences(points, first, end, a, b, noise, error, squares):
         error[i] = rho[i] * (across - 1.0) / (across * deviation)
     # In place: the sum of four from each one on.
     error1, error2, error3 = error[1:], error[2:], error[3:]
-    for i in range(len(x) + 1 - _TOGETHER):
+    for i in range(len(x) + 1 - TOGETHER):
         error[i] = error[i] + error1[i] + error2[i] + error3[i]
-    second, third = error[_TOGETHER:], error[2 * _TOGETHER :]
-    for i in range(len(x) + 1 - 3 * _TOGETHER):
+    second, third = error[TOGETHER:], error[2 * TOGETHER :]
+    for i in range(len(x) + 1 - 3 * TOGETHER):
         difference = error[i] - 2.0 * second[i] + third[i]
-        squares[i] = difference * difference / (6.0 * _TOGETHER)
+        squares[i] = difference * difference / (6.0 * TOGETHER)

@@ -11,15 +11,8 @@ from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU, UNIFORM
 from .geometry import (
-    along,
-    around,
-    crossing,
-    distance,
-    over,
-    range_variance,
-    surface_variance,
-    variance_at,
-)
+    along, around, crossing, distance, over, range_variance, surface_variance, variance_at,
+)  # fmt: skip
 from .meeting import NO_CORNER, meet, response
 
 
