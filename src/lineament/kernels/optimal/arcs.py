@@ -113,8 +113,8 @@ def _replace(work, scan, first, last, free, after, arc):
         low += 1
     while low < high and not is_on(points, arc, high, noise, 0.0):
         high -= 1
-    low = _follow(points, broken, arc, low, free - 1, -1, noise) if low <= first else low
-    high = _follow(points, broken, arc, high, after, 1, noise) if high >= last else high
+    low = _follow(points, broken, arc, low, free - 1, -1, noise)
+    high = _follow(points, broken, arc, high, after, 1, noise)
     free_of = high - low - 2.0
     if free_of < LEAST - 1:
         return -math.inf, low, high

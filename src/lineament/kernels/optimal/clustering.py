@@ -5,7 +5,7 @@ import numpy as np
 from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
 from . import layout as at
 from .constants import LEAST_CLUSTER, STEEPEST, STEP_SIGMAS
-from .geometry import around
+from .geometry import around, missing
 
 
 @inlined
@@ -40,8 +40,8 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
 def _is_broken(work, i, j, n, most_missing):
     """Whether no surface goes on from measurement i to j, the next one of a scan of n beams."""
     x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
-    missing = (work.beams[at.BEAM, j] - work.beams[at.BEAM, i]) % n - 1 > most_missing
-    return missing or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], work.noise)
+    is_gap = missing(work.beams[at.BEAM, i], work.beams[at.BEAM, j], n) > most_missing
+    return is_gap or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], work.noise)
 
 
 @sums
@@ -52,8 +52,8 @@ def _mark_breaks(points, beams, count, noise, n, most_missing):
     x1, y1, rho1, beam1, broken1 = x[1:], y[1:], rho[1:], beam[1:], broken[1:]
     for i in range(len(x1)):
         apart = beam1[i] - beam[i]
-        missing = apart + (n if apart < 0 else 0) - 1 > most_missing
-        broken1[i] = missing | _steps_out(x[i], y[i], rho[i], x1[i], y1[i], rho1[i], noise)
+        is_gap = apart + (n if apart < 0 else 0) - 1 > most_missing
+        broken1[i] = is_gap | _steps_out(x[i], y[i], rho[i], x1[i], y1[i], rho1[i], noise)
 
 
 @inlined
@@ -98,10 +98,9 @@ def cluster(work, count, n, circular, most_missing):
         if spikes[i] and not spikes[before] and not spikes[after]:
             broken[after] = 0
             continue
-        if kept < i:
-            for row in (at.X, at.Y, at.RHO):
-                points[row, kept] = points[row, i]
-            beam[kept], broken[kept] = beam[i], broken[i]
+        for row in (at.X, at.Y, at.RHO):
+            points[row, kept] = points[row, i]
+        beam[kept], broken[kept] = beam[i], broken[i]
         kept += 1
     return kept
 

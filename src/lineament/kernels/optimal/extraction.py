@@ -62,7 +62,7 @@ def extract_rows(
     for row in range(rows[0]):
         start, closed, lines = np.int64(0), False, np.int64(0)
         count = list_points(work, ranges[row], start, limits, bearings)
-        _estimate_noise(work, count, given)
+        _estimate_noise(work, count, given, noises[row])
         count = cluster(work, count, n, circular, missing)
         if circular and count > 0:
             start, closed = opening(work, count)
@@ -83,26 +83,22 @@ def extract_rows(
         _write_surfaces(work, tables, scan, surfaces)
         join_all(work, tables, scan, surfaces)
         _write_clusters(work, tables, scan, surfaces)
-        for part in range(5):
-            noises[row, part] = 0.0 if estimated else given[part]
-        if estimated:
-            noises[row, 0] = math.sqrt(work.noise[at.CONSTANT]) if count > 0 else math.nan
-            noises[row, 1], noises[row, 4] = (
-                math.sqrt(work.noise[at.GROWTH]),
-                work.noise[at.UNCERTAINTY],
-            )
         counts[0], counts[1], counts[2] = count, lines, surfaces
 
 
 @inlined
-def _estimate_noise(work, count, given):
-    """Step 1: write the noise as (constant, growth, variance of a bearing, uncertainty)."""
+def _estimate_noise(work, count, given, found):
+    """Step 1: the noise, as given or estimated, in variances; and as it is `found`."""
     noise = work.noise
+    for part in range(len(given)):
+        found[part] = given[part]
     if math.isnan(given[0]):
-        noise[at.CONSTANT], noise[at.GROWTH], noise[at.UNCERTAINTY], _ = fit_noise(
+        constant, growth, uncertainty, _ = fit_noise(
             work.points, work.beams[at.BEAM], count, at.TRIPLE, at.HALVES
         )
-        noise[at.BEARING] = 0.0
+        noise[at.CONSTANT], noise[at.GROWTH], noise[at.BEARING] = constant, growth, 0.0
+        found[0] = math.sqrt(constant) if count > 0 else math.nan
+        found[1], found[2], found[3], found[4] = math.sqrt(growth), 0.0, 0.0, uncertainty
         return
     sigma, proportional, bearing, quantum = given[0], given[1], given[2], given[3]
     constant = sigma * sigma + quantum * quantum / UNIFORM

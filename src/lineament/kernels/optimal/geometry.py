@@ -22,6 +22,12 @@ def around(i, n):
 
 
 @helper
+def missing(before, after, n):
+    """Return how many beams are between two in this order, of n that may go around."""
+    return around(after - before, n) - 1
+
+
+@helper
 def range_variance(points, i, noise):
     """Variance of the range of a measurement."""
     rho = points[at.RHO, i]

@@ -11,7 +11,7 @@ from . import layout as at
 from .arcs import is_on
 from .constants import LEAST, MOST_DEVIATION, REACH, SIGMAS, TAU, UNIFORM
 from .geometry import (
-    along, around, crossing, distance, over, range_variance, surface_variance, variance_at,
+    along, around, crossing, distance, missing, over, range_variance, surface_variance, variance_at,
 )  # fmt: skip
 from .meeting import NO_CORNER, meet, response
 
@@ -49,7 +49,7 @@ def _join(work, scan, k, m):
     points, beam, broken = work.points, work.beams[at.BEAM], work.beams[at.BROKEN]
     kinds, pieces = work.spans[at.KIND], work.pieces
     i, j = work.spans[at.LAST, k], work.spans[at.FIRST, m]
-    joined = around(beam[j] - beam[i], scan.beams) - 1 <= scan.missing
+    joined = missing(beam[i], beam[j], scan.beams) <= scan.missing
     if joined and kinds[k] == at.ARC:
         joined = kinds[m] == at.LINE and is_on(points, pieces[k], j, work.noise, TAU)
     elif joined and kinds[m] == at.ARC:

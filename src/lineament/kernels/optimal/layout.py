@@ -37,9 +37,9 @@ LINE, ARC = 0, 1
 WXX, WXY, WYY, WX, WY, W = range(6)
 SUMS = 6
 #: Of `noise`: the variance of a range that is constant, and what grows with its square; that of a
-#: bearing; relative deviation of the noise as it is known.
-CONSTANT, GROWTH, BEARING, UNCERTAINTY = range(4)
-NOISE = 4
+#: bearing.
+CONSTANT, GROWTH, BEARING = range(3)
+NOISE = 3
 
 
 class Work(NamedTuple):

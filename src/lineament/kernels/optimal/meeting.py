@@ -34,7 +34,7 @@ def meet(work, scan, k, m):
     reach_i = max(min(REACH, length), _apart(points, i - 1, i) + error_i)
     reach_j = max(min(REACH, length_too), _apart(points, j, j + 1) + error_j)
     crosses = _is_cross(points, i, j, p, q, reach_i, reach_j)
-    joined = meets and (crosses or _apart(points, i, j) <= reach_i + reach_j)
+    joined = meets and _apart(points, i, j) <= reach_i + reach_j
     if not (joined or hole):
         joined = _is_face(points, broken, scan.count, i, j, p, q, between)
     kind = np.int64(NO_CORNER)
