@@ -29,7 +29,9 @@ import numpy as np
 from constants_sample import DATA, figures, measure, resampled, take_sample
 
 from lineament import Extractor
-from lineament.kernels import helper, optimal
+from lineament.features.records import SLIT
+from lineament.kernels import helper, inlined, optimal
+from lineament.kernels.optimal.meeting import NO_CORNER
 from lineament.methods.optimal import Optimal
 from lineament.simulation import SENSORS
 
@@ -84,9 +86,9 @@ def variants() -> Iterator[Variant]:
             yield Variant(f"`{name}` {how}", {}, {name: type(value)(factor * value)})
     yield Variant("no merging of bends", {"BEND": 2.0})
     yield Variant("no arcs", {"ARC_RADIUS": 0.0})
-    yield Variant("borders not softened", {"_WITHIN": 0.0})
-    yield Variant("no growth of noise", {"_OVERLAP": math.inf})
-    yield Variant("noise taken as white", {"_TOGETHER": 10**6})
+    yield Variant("borders not softened", replaced=_keep_borders)
+    yield Variant("no growth of noise", replaced=_no_growth)
+    yield Variant("noise taken as white", {"TOGETHER": 10**6})
     yield Variant("spikes kept", replaced=_keep_spikes)
     yield Variant("no corners over slits", replaced=_no_slits)
     yield Variant("no faces joined", replaced=_no_faces)
@@ -100,36 +102,52 @@ LEFT_OUT = (
 )
 
 
-def _keep_spikes(modules: Mapping[str, Any]) -> None:
-    real = modules["clustering"].is_broken
+def _keep_borders(modules: Mapping[str, Any]) -> None:
+    @inlined
+    def soften_borders(*_):  # type: ignore[no-untyped-def]
+        return
+
+    modules["fits"].soften_borders = soften_borders
+
+
+def _no_growth(modules: Mapping[str, Any]) -> None:
+    real = modules["extraction"].fit_noise
 
     @helper
-    def is_broken(points, beams, i, j, n, noise, most_missing):  # type: ignore[no-untyped-def]
-        return j - i == 2 or real(points, beams, i, j, n, noise, most_missing)
+    def fit_noise(points, beam, count, row, spare):  # type: ignore[no-untyped-def]
+        constant, _, uncertainty, square = real(points, beam, count, row, spare)
+        return constant, 0.0, uncertainty, square
 
-    modules["clustering"].is_broken = is_broken
+    modules["extraction"].fit_noise = fit_noise
+
+
+def _keep_spikes(modules: Mapping[str, Any]) -> None:
+    real = modules["clustering"]._is_broken
+
+    @inlined
+    def is_broken(work, i, j, n, most_missing):  # type: ignore[no-untyped-def]
+        return j - i == 2 or real(work, i, j, n, most_missing)
+
+    modules["clustering"]._is_broken = is_broken
 
 
 def _no_slits(modules: Mapping[str, Any]) -> None:
-    real = modules["joining"]._meet
+    real = modules["joining"].meet
 
-    @helper
-    def meet(points, beams, spans, pieces, k, m, count, noise):  # type: ignore[no-untyped-def]
-        joined, meets, x, y = real(points, beams, spans, pieces, k, m, count, noise)
-        return joined, meets, x if meets else math.nan, y
+    @inlined
+    def meet(work, scan, k, m):  # type: ignore[no-untyped-def]
+        joined, kind = real(work, scan, k, m)
+        return joined, np.int64(NO_CORNER) if kind == SLIT else kind
 
-    modules["joining"]._meet = meet
+    modules["joining"].meet = meet
 
 
 def _no_faces(modules: Mapping[str, Any]) -> None:
-    real = modules["joining"]._meet
-
     @helper
-    def meet(points, beams, spans, pieces, k, m, count, noise):  # type: ignore[no-untyped-def]
-        joined, meets, x, y = real(points, beams, spans, pieces, k, m, count, noise)
-        return joined and meets, meets, x, y
+    def is_face(*_):  # type: ignore[no-untyped-def]
+        return False
 
-    modules["joining"]._meet = meet
+    modules["meeting"]._is_face = is_face
 
 
 def _no_edges(modules: Mapping[str, Any]) -> None:

@@ -16,15 +16,14 @@ from .options import (
     LIMITS,
     MASK,
     METHOD,
-    MOUNTINGS,
     NOISE,
     PATH,
     QUIET,
     SCALE_HELP,
     SET,
     TEXT_PATH,
-    UNSURE,
     complain,
+    mountings,
     settings_of,
     wrong_usage,
 )
@@ -48,8 +47,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Topic of the scans; of several scanners, which are merged, given for each."
     "  [default: scan]",
 )
-@MOUNTINGS
-@UNSURE
+@mountings
 @click.option("--tolerance", type=float, help="Longest time between such scans.  [default: 0.15]")
 @click.option("--namespace", help="Put before topics that do not begin with /.")
 @click.option("--name", help="Name of the node.  [default: lineament]")

@@ -10,14 +10,13 @@ import click
 from .options import (
     LOG,
     METHOD,
-    MOUNTINGS,
     NOISE,
     PATH,
     QUIET,
     SET,
-    UNSURE,
     check_ending,
     make_extractor,
+    mountings,
     wrong_usage,
 )
 from .options import reading_topics as reading
@@ -29,8 +28,7 @@ _TABLES = (".parquet", ".csv", ".jsonl")
 @click.command()
 @LOG
 @click.option("-o", "--output", required=True, type=PATH, help="File to write, as for extract.")
-@MOUNTINGS
-@UNSURE
+@mountings
 @click.option(
     "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
 )

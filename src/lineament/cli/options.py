@@ -105,7 +105,7 @@ def _mountings(
     return found
 
 
-MOUNTINGS = click.option(
+_MOUNTINGS = click.option(
     "--mounting",
     "mountings",
     multiple=True,
@@ -114,7 +114,7 @@ MOUNTINGS = click.option(
     help="Where the scanner of a topic is on the robot [m, m, °]; may be given again."
     "  [default: as in /tf_static]",
 )
-UNSURE = click.option(
+_UNSURE = click.option(
     "--unsure",
     type=click.FloatRange(min=0),
     nargs=2,
@@ -122,6 +122,13 @@ UNSURE = click.option(
     callback=lambda _context, _option, given: given and (given[0], math.radians(given[1])),
     help="How well mountings are known, a standard deviation.  [default: 0.01 0.5]",
 )
+
+
+def mountings(command: F) -> F:
+    """Add the options of several scanners on one robot."""
+    return _MOUNTINGS(_UNSURE(command))
+
+
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 

@@ -22,7 +22,7 @@ FITS = {
 #: Least normal, over what points in all directions have: less is rounding, of points on one beam.
 _ALONG = 1e-9
 #: Least square of the cosine of an incidence.
-_GRAZING = 1e-6
+GRAZING = 1e-6
 #: Variance of an angle that may be any [rad²].
 _ANY_ANGLE = math.pi**2 / 12.0
 
@@ -157,7 +157,7 @@ def second_order(first_order, cx, cy, c, s):
     """
     var_offset, covariance, v = first_order
     square, distance = cx * cx + cy * cy, c * cy - s * cx
-    steep = square / max(distance * distance, _GRAZING * square)  # 1 + m²
+    steep = square / max(distance * distance, GRAZING * square)  # 1 + m²
     var_offset, var_angle = var_offset * (1.0 + steep * v), v * (1.0 + (1.0 + 3.0 * steep) * v)
     var_angle = min(var_angle, _ANY_ANGLE)
     return var_offset, as_covariance(covariance, var_offset, var_angle), var_angle
@@ -171,7 +171,7 @@ def normal_variance(distance, rho, noise):
     grazing so that no point gets all the weight.
     """
     square = max(rho * rho, 1e-300)  # Not 0 for the least of ranges.
-    near = max(distance * distance, _GRAZING * square)
+    near = max(distance * distance, GRAZING * square)
     return range_variance(rho, noise) * near / square + noise[2] * noise[2] * (square - near)
 
 

@@ -62,7 +62,7 @@ class Wanted(NamedTuple):
     is_latched : bool
         Whether the last message of each publisher is wanted that was sent before.
     publisher : str
-        Who sent it, as whoever receives it is told; "" for the publisher's own name.
+        What receivers call the sender; "" for the publisher's own name.
     """
 
     topic: str

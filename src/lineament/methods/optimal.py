@@ -15,7 +15,7 @@ from ..kernels import bind
 from ..kernels.breakpoints import BORGES_ALDON
 from ..kernels.line_fit import WEIGHTED
 from ..kernels.optimal import layout as at
-from ..kernels.optimal.constants import SIGMAS, STEEPEST, TAU
+from ..kernels.optimal.constants import STEEPEST, STEP_SIGMAS, TAU
 from ..kernels.optimal.extraction import extract_rows
 from ..kernels.polylines import PLANES, fit_polylines
 from ..kernels.vertices import hold_together
@@ -91,7 +91,7 @@ class Optimal(MethodBase):
             np.zeros((at.SPANS, n), np.int64),
             np.zeros((n, at.PIECES)),
             np.zeros((at.SUMS, n)),
-            np.zeros(4),
+            np.zeros(at.NOISE),
         )
         return arrays, np.empty((PLANES, n, vertices)), np.empty((n, vertices), np.int64)
 
@@ -160,7 +160,9 @@ def _largest_spacing(xy: Array, rho: Array, before: NDArray[np.intp], noise: Arr
     near, far = np.minimum(rho, rho[before]), np.maximum(rho, rho[before])
     cross = np.abs(xy[0, before] * xy[1] - xy[1, before] * xy[0])
     dot = xy[0, before] * xy[0] + xy[1, before] * xy[1]
-    step = STEEPEST * cross / far + 2 * SIGMAS * np.sqrt(noise[0] + noise[1] * far**2)
+    step = STEEPEST * cross / far + STEP_SIGMAS * np.sqrt(
+        noise[at.CONSTANT] + noise[at.GROWTH] * far**2
+    )
     return np.asarray(np.sqrt(step**2 + 2 * np.maximum(near * far - dot, 0)))
 
 

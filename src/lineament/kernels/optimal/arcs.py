@@ -6,13 +6,12 @@ import numpy as np
 
 from .. import helper, inlined, sums
 from . import layout as at
-from .constants import ARC_RADIUS, ARC_TURN, CLUTTER, LEAST, MOST_DEVIATION, RARE, SIGMAS, TAU
+from .constants import (
+    ARC_PRICE, ARC_RADIUS, ARC_STEPS, ARC_TURN, CLUTTER, LEAST, LEAST_CHORD, MOST_DEVIATION,
+    MOST_LINES, RARE, SEED_STEPS, SIGMAS, SINGULAR, STEP_SIGMAS, STRAIGHT, TAU,
+)  # fmt: skip
 from .costs import solve
-
-#: Steps of Gauss and Newton from the algebraic circle, to see whether there is one and to fit it.
-_SEED, _STEPS = np.int64(1), np.int64(3)
-#: Lines that a half circle of the largest radius is cut into: each is off by τ.
-_MOST_LINES = 8
+from .geometry import distance, range_variance
 
 
 @inlined
@@ -27,7 +26,7 @@ def find_arcs(work, scan, lines):
     kept, k, free = 0, 0, np.int64(0)
     while k < lines:
         price, gain, end, i, j = 0.0, 0.0, k, first[k], last[k]
-        for m in range(k, min(k + _MOST_LINES, lines)):
+        for m in range(k, min(k + MOST_LINES, lines)):
             if m > k and work.beams[at.BROKEN, first[m]]:
                 break
             hidden = first[m] - last[m - 1] - 1 if m > k else 0
@@ -46,7 +45,7 @@ def find_arcs(work, scan, lines):
                     gain, end, i, j = better, m, low, high
         first[kept], last[kept], kind[kept] = i, j, at.ARC if gain > 0.0 else at.LINE
         if gain > 0.0:
-            fit_arc(points, i, j, noise, _STEPS, pieces[kept])
+            fit_arc(points, i, j, noise, ARC_STEPS, pieces[kept])
             spans[at.COUNT, kept], pieces[kept, at.GAIN] = j - i + 1, gain
         free, k, kept = j + 1, end + 1, kept + 1
     return kept
@@ -59,7 +58,7 @@ def _noise_cost(points, first, end, a, b, noise):
     total = 0.0
     for i in range(len(x)):
         square, off = rho[i] * rho[i], 1.0 - a * x[i] - b * y[i]
-        total += off * off * square / (noise[0] + noise[1] * square)
+        total += off * off * square / (noise[at.CONSTANT] + noise[at.GROWTH] * square)
     return total
 
 
@@ -82,12 +81,12 @@ def _looks_round(points, first, last, noise):
     if ux * ux + uy * uy > 4.0 * ARC_RADIUS * ARC_RADIUS:
         return False
     r, square = math.sqrt(ux * ux + uy * uy), mx * mx + my * my
-    near = 2.0 * SIGMAS * math.sqrt(noise[0] + noise[1] * square)
+    near = STEP_SIGMAS * math.sqrt(noise[at.CONSTANT] + noise[at.GROWTH] * square)
     for i in (quarter, first + last - quarter):
         dx, dy = x[i] - mx - ux, y[i] - my - uy
-        if not abs(math.sqrt(dx * dx + dy * dy) - r) <= near:
+        if not abs(distance(dx, dy) - r) <= near:
             return False
-    dx, dy, least = ax - bx, ay - by, 0.5 * ARC_TURN * r
+    dx, dy, least = ax - bx, ay - by, LEAST_CHORD * ARC_TURN * r
     return dx * dx + dy * dy >= least * least
 
 
@@ -108,18 +107,18 @@ def _replace(work, scan, first, last, free, after, arc):
     much; much more where another surface goes on from it, for what is round mostly stands free.
     """
     points, broken, noise, low, high = work.points, work.beams[at.BROKEN], work.noise, first, last
-    if not fit_arc(points, low, high, noise, _SEED, arc) < math.inf:
+    if not fit_arc(points, low, high, noise, SEED_STEPS, arc) < math.inf:
         return -math.inf, low, high
     while low < high and not is_on(points, arc, low, noise, 0.0):
         low += 1
     while low < high and not is_on(points, arc, high, noise, 0.0):
         high -= 1
-    low = _follow(points, broken, arc, low, free - 1, -1, noise) if low <= first else low
-    high = _follow(points, broken, arc, high, after, 1, noise) if high >= last else high
+    low = _follow(points, broken, arc, low, free - 1, -1, noise)
+    high = _follow(points, broken, arc, high, after, 1, noise)
     free_of = high - low - 2.0
     if free_of < LEAST - 1:
         return -math.inf, low, high
-    chi_square = fit_arc(points, low, high, noise, _STEPS, arc)
+    chi_square = fit_arc(points, low, high, noise, ARC_STEPS, arc)
     ax, ay = points[at.X, low] - arc[at.CX], points[at.Y, low] - arc[at.CY]
     bx, by = points[at.X, high] - arc[at.CX], points[at.Y, high] - arc[at.CY]
     turn = math.atan2(bx * ay - by * ax, ax * bx + ay * by) % (2.0 * math.pi)
@@ -129,7 +128,7 @@ def _replace(work, scan, first, last, free, after, arc):
     vague = arc[at.RR] > MOST_DEVIATION * MOST_DEVIATION
     if not likely or vague or turn < ARC_TURN or not bulges:
         return -math.inf, low, high
-    price = 1.5
+    price = ARC_PRICE
     if low > 0 and not broken[low] and is_on(points, arc, low - 1, noise, TAU):
         price += RARE
     if high + 1 < scan.count and not broken[high + 1] and is_on(points, arc, high + 1, noise, TAU):
@@ -152,8 +151,8 @@ def _follow(points, broken, arc, i, stop, way, noise):
 def is_on(points, arc, i, noise, scale):
     """Whether a measurement is as near to an arc as by chance, at a scale of its surface [m]."""
     dx, dy = points[at.X, i] - arc[at.CX], points[at.Y, i] - arc[at.CY]
-    off = math.sqrt(dx * dx + dy * dy) - arc[at.RADIUS]
-    variance = noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i] + scale * scale
+    off = distance(dx, dy) - arc[at.RADIUS]
+    variance = range_variance(points, i, noise) + scale * scale
     return off * off <= SIGMAS * SIGMAS * variance
 
 
@@ -167,7 +166,7 @@ def fit_arc(points, first, last, noise, steps, piece):
     """
     end = last + 1
     x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
-    n, mx, my, constant, growth = len(x), 0.0, 0.0, noise[0], noise[1]
+    n, mx, my, constant, growth = len(x), 0.0, 0.0, noise[at.CONSTANT], noise[at.GROWTH]
     for i in range(n):
         mx, my = mx + x[i], my + y[i]
     mx, my = mx / n, my / n
@@ -178,7 +177,7 @@ def fit_arc(points, first, last, noise, steps, piece):
         xx, xy, yy = xx + dx * dx, xy + dx * dy, yy + dy * dy
         xz, yz, z = xz + dx * square, yz + dy * square, z + square
     determinant = xx * yy - xy * xy
-    if not determinant > 1e-9 * xx * yy:
+    if not determinant > STRAIGHT * xx * yy:
         return math.inf
     ux, uy = 0.5 * (xz * yy - yz * xy) / determinant, 0.5 * (yz * xx - xz * xy) / determinant
     cx, cy, r = mx + ux, my + uy, math.sqrt(ux * ux + uy * uy + z / n)
@@ -205,7 +204,7 @@ def fit_arc(points, first, last, noise, steps, piece):
         ixx, ixy, ixr = hyy * hrr - hyr * hyr, hxr * hyr - hxy * hrr, hxy * hyr - hxr * hyy
         iyy, iyr, irr = hxx * hrr - hxr * hxr, hxy * hxr - hxx * hyr, hxx * hyy - hxy * hxy
         determinant = hxx * ixx + hxy * ixy + hxr * ixr
-        if not determinant > 1e-12 * hxx * hyy * hrr:
+        if not determinant > SINGULAR * hxx * hyy * hrr:
             return math.inf
         if step < steps:
             cx += (ixx * gx + ixy * gy + ixr * gr) / determinant

@@ -4,12 +4,9 @@ import math
 
 from .. import helper, inlined
 from . import layout as at
-from .constants import LEAST, RARE, TAU
+from .constants import FARTHER, LEAST, LEAST_ODDS, ODDS_A, ODDS_B, RARE, TAU
 from .costs import cost, solve
 from .merging import rise_if_one
-
-#: Borders are looked for elsewhere as far as the odds are at least these.
-_LEAST_ODDS = 1e-6
 
 
 @inlined
@@ -26,7 +23,7 @@ def soften_borders(work, surfaces, evidence):
         if work.beams[at.BROKEN, border] or border > spans[at.LAST, k - 1] + 1:
             continue
         ends = spans[at.FIRST, k - 1], border, spans[at.LAST, k] + 1
-        variance = work.noise[0] + work.noise[1] * rho[border - 1] * rho[border]
+        variance = work.noise[at.CONSTANT] + work.noise[at.GROWTH] * rho[border - 1] * rho[border]
         share = variance / (variance + TAU * TAU)
         spare = rise_if_one(work, k) - RARE * evidence
         _soften(work.sums, ends, share, spare, pieces[k - 1], pieces[k])
@@ -52,7 +49,7 @@ def _soften(sums, ends, share, spare, before, after):
         total += odds
     for way in (-1, 1):
         step, odds = 1, 1.0
-        while odds > _LEAST_ODDS:
+        while odds > LEAST_ODDS:
             i = border + way * step
             if i - start < LEAST or end - i < LEAST:
                 break
@@ -66,7 +63,7 @@ def _soften(sums, ends, share, spare, before, after):
             of_one = _changed(of_one, before, one, first, odds)
             of_other = _changed(of_other, after, other, second, odds)
             total += odds
-            step *= 4
+            step *= FARTHER
     _add(before, of_one, 1.0 / total)
     _add(after, of_other, 1.0 / total)
 
@@ -77,14 +74,18 @@ def _odds(rise, square):
     if not square > 0.0:
         return 0.0
     z = 0.5 * max(rise, 0.0) / math.sqrt(square)
-    return math.exp(-1.6 * z - 0.07 * z * z * z)
+    return math.exp(-ODDS_A * z - ODDS_B * z * z * z)
 
 
 @helper
 def _apart(sums, i, j, line, other):
     """Sum of the squares by which two lines differ at the measurements i … j - 1."""
     a, b = other[0] - line[0], other[1] - line[1]
-    xx, xy, yy = sums[0, j] - sums[0, i], sums[1, j] - sums[1, i], sums[2, j] - sums[2, i]
+    xx, xy, yy = (
+        sums[at.WXX, j] - sums[at.WXX, i],
+        sums[at.WXY, j] - sums[at.WXY, i],
+        sums[at.WYY, j] - sums[at.WYY, i],
+    )
     return a * a * xx + 2.0 * a * b * xy + b * b * yy
 
 

@@ -4,10 +4,8 @@ import numpy as np
 
 from .. import FARTHEST, NEAREST, helper, inlined, sums, usable
 from . import layout as at
-from .constants import SIGMAS, STEEPEST
-
-#: Fewer measurements are no cluster.
-_LEAST_CLUSTER = 3
+from .constants import LEAST_CLUSTER, STEEPEST, STEP_SIGMAS
+from .geometry import around, missing
 
 
 @inlined
@@ -34,7 +32,7 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
     near, far = min(rho0, rho1), max(rho0, rho1)
     # Times the farther range, so that nothing is divided, and no root is taken.
     square, beyond = far * far, far * (far - near) - STEEPEST * abs(x0 * y1 - y0 * x1)
-    allowed = 4.0 * SIGMAS * SIGMAS * square * (noise[0] + noise[1] * square)
+    allowed = STEP_SIGMAS * STEP_SIGMAS * square * (noise[at.CONSTANT] + noise[at.GROWTH] * square)
     return (beyond > 0.0) & (beyond * beyond > allowed)
 
 
@@ -42,8 +40,8 @@ def _steps_out(x0, y0, rho0, x1, y1, rho1, noise):
 def _is_broken(work, i, j, n, most_missing):
     """Whether no surface goes on from measurement i to j, the next one of a scan of n beams."""
     x, y, rho = work.points[at.X], work.points[at.Y], work.points[at.RHO]
-    missing = (work.beams[at.BEAM, j] - work.beams[at.BEAM, i]) % n - 1 > most_missing
-    return missing or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], work.noise)
+    is_gap = missing(work.beams[at.BEAM, i], work.beams[at.BEAM, j], n) > most_missing
+    return is_gap or _steps_out(x[i], y[i], rho[i], x[j], y[j], rho[j], work.noise)
 
 
 @sums
@@ -54,8 +52,8 @@ def _mark_breaks(points, beams, count, noise, n, most_missing):
     x1, y1, rho1, beam1, broken1 = x[1:], y[1:], rho[1:], beam[1:], broken[1:]
     for i in range(len(x1)):
         apart = beam1[i] - beam[i]
-        missing = apart + (n if apart < 0 else 0) - 1 > most_missing
-        broken1[i] = missing | _steps_out(x[i], y[i], rho[i], x1[i], y1[i], rho1[i], noise)
+        is_gap = apart + (n if apart < 0 else 0) - 1 > most_missing
+        broken1[i] = is_gap | _steps_out(x[i], y[i], rho[i], x1[i], y1[i], rho1[i], noise)
 
 
 @inlined
@@ -75,7 +73,7 @@ def _mark_spikes(work, count, n, circular, most_missing):
         pairs, spikes[0], spikes[last] = pairs - spikes[0], 0, 0
     for i in range(count if pairs > 0 else 0):
         if spikes[i]:
-            before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+            before, after = around(i - 1, count), around(i + 1, count)
             if _is_broken(work, before, after, n, most_missing):
                 spikes[i], pairs = 0, pairs - 1
     return pairs
@@ -96,14 +94,13 @@ def cluster(work, count, n, circular, most_missing):
     if _mark_spikes(work, count, n, circular, most_missing) == 0:
         return count
     for i in range(count):
-        before, after = i - 1 if i > 0 else last, i + 1 if i < last else 0
+        before, after = around(i - 1, count), around(i + 1, count)
         if spikes[i] and not spikes[before] and not spikes[after]:
             broken[after] = 0
             continue
-        if kept < i:
-            for row in (at.X, at.Y, at.RHO):
-                points[row, kept] = points[row, i]
-            beam[kept], broken[kept] = beam[i], broken[i]
+        for row in (at.X, at.Y, at.RHO):
+            points[row, kept] = points[row, i]
+        beam[kept], broken[kept] = beam[i], broken[i]
         kept += 1
     return kept
 
@@ -117,7 +114,7 @@ def opening(work, count):
     rho, broken, begin = work.points[at.RHO], work.beams[at.BROKEN], 0
     largest, closed = -1.0, True
     for i in range(count):
-        step = abs(rho[i] - rho[i - 1 if i > 0 else count - 1])
+        step = abs(rho[i] - rho[around(i - 1, count)])
         if broken[i] and step > largest:
             begin, largest, closed = i, step, False
         if closed and rho[i] > rho[begin]:
@@ -145,7 +142,7 @@ def list_clusters(beams, count, clusters):
             continue
         # What is before the first break belongs to the last cluster.
         end, seam = begin + 1 + k, begin if k == len(ahead) else 0
-        if end - start + seam >= _LEAST_CLUSTER:
+        if end - start + seam >= LEAST_CLUSTER:
             _label(clusters, beam[start:end], found)
             _label(clusters, beam[:seam], found)
             beams[at.CLUSTER_FIRST, found] = start

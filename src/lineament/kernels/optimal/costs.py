@@ -6,12 +6,7 @@ import numpy as np
 
 from .. import contracted, helper
 from . import layout as at
-from .constants import TAU
-
-#: Candidates that are evaluated at once, a power of two.
-GROUP = 32
-#: Of whole numbers.
-_LARGEST = 2**63 - 1
+from .constants import GROUP, LARGEST, SINGULAR, TAU
 
 
 @contracted
@@ -32,17 +27,24 @@ def fill_sums(points, count, constant, growth, sums):
         wx, wy = w * x[i], w * y[i]
         xx, xy, yy = xx + wx * x[i], xy + wx * y[i], yy + wy * y[i]
         sx, sy, s = sx + wx, sy + wy, s + w
-        sums[0, i + 1], sums[1, i + 1], sums[2, i + 1] = xx, xy, yy
-        sums[3, i + 1], sums[4, i + 1], sums[5, i + 1] = sx, sy, s
+        sums[at.WXX, i + 1], sums[at.WXY, i + 1], sums[at.WYY, i + 1] = xx, xy, yy
+        sums[at.WX, i + 1], sums[at.WY, i + 1], sums[at.W, i + 1] = sx, sy, s
+
+
+@helper
+def _before(sums, i):
+    """Return the sums over the measurements before i."""
+    return (
+        sums[at.WXX, i], sums[at.WXY, i], sums[at.WYY, i],
+        sums[at.WX, i], sums[at.WY, i], sums[at.W, i],
+    )  # fmt: skip
 
 
 @helper
 def _between(sums, i, j):
     """Return the sums over the measurements i … j - 1."""
-    return (
-        sums[0, j] - sums[0, i], sums[1, j] - sums[1, i], sums[2, j] - sums[2, i],
-        sums[3, j] - sums[3, i], sums[4, j] - sums[4, i], sums[5, j] - sums[5, i],
-    )  # fmt: skip
+    (xx, xy, yy, x, y, s), (xx1, xy1, yy1, x1, y1, s1) = _before(sums, i), _before(sums, j)
+    return xx1 - xx, xy1 - xy, yy1 - yy, x1 - x, y1 - y, s1 - s
 
 
 @contracted
@@ -50,7 +52,7 @@ def solve(sums, i, j):
     """Return the line a x + b y = 1 of least squares of measurements i … j - 1; 0, 0 if none."""
     xx, xy, yy, x, y, _ = _between(sums, i, j)
     determinant = xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
+    if not determinant > SINGULAR * xx * yy:
         return 0.0, 0.0
     return (x * yy - y * xy) / determinant, (y * xx - x * xy) / determinant
 
@@ -59,7 +61,7 @@ def solve(sums, i, j):
 def chi_square(xx, xy, yy, x, y, s):
     """χ² of the line of least squares, by sums; inf where they determine none."""
     determinant = xx * yy - xy * xy
-    if not determinant > 1e-12 * xx * yy:
+    if not determinant > SINGULAR * xx * yy:
         return math.inf
     return max(s - (x * (x * yy - y * xy) + y * (y * xx - x * xy)) / determinant, 0.0)
 
@@ -74,12 +76,12 @@ def cost(sums, i, j):
 @contracted
 def costs_on(sums, i, low, high, energy, out):
     """Write the energy, with that before it, of a line from measurement i to each of low … high."""
-    p0, p1, p2, p3, p4, p5 = sums[0, i], sums[1, i], sums[2, i], sums[3, i], sums[4, i], sums[5, i]
-    xx, xy, yy = sums[0, low:high], sums[1, low:high], sums[2, low:high]
-    x, y, s, out = sums[3, low:high], sums[4, low:high], sums[5, low:high], out[low:high]
+    xx0, xy0, yy0, x0, y0, s0 = _before(sums, i)
+    xx, xy, yy = sums[at.WXX, low:high], sums[at.WXY, low:high], sums[at.WYY, low:high]
+    x, y, s, out = sums[at.WX, low:high], sums[at.WY, low:high], sums[at.W, low:high], out[low:high]
     for k in range(len(out)):
         out[k] = energy + chi_square(
-            xx[k] - p0, xy[k] - p1, yy[k] - p2, x[k] - p3, y[k] - p4, s[k] - p5
+            xx[k] - xx0, xy[k] - xy0, yy[k] - yy0, x[k] - x0, y[k] - y0, s[k] - s0
         )
 
 
@@ -91,13 +93,18 @@ def least_from(sums, low, high, j, energy):
     with its place in the last five, the least whole number says both. Nothing is written, so that
     no arrays are compared for overlap, and four lines are evaluated at once.
     """
-    q0, q1, q2, q3, q4, q5 = sums[0, j], sums[1, j], sums[2, j], sums[3, j], sums[4, j], sums[5, j]
-    xx, xy, yy = sums[0, low:high], sums[1, low:high], sums[2, low:high]
-    x, y, s, energy = sums[3, low:high], sums[4, low:high], sums[5, low:high], energy[low:high]
-    least = np.int64(_LARGEST)
+    xx1, xy1, yy1, x1, y1, s1 = _before(sums, j)
+    xx, xy, yy = sums[at.WXX, low:high], sums[at.WXY, low:high], sums[at.WYY, low:high]
+    x, y, s, energy = (
+        sums[at.WX, low:high],
+        sums[at.WY, low:high],
+        sums[at.W, low:high],
+        energy[low:high],
+    )
+    least = np.int64(LARGEST)
     for k in range(len(energy)):
         value = energy[k] + chi_square(
-            q0 - xx[k], q1 - xy[k], q2 - yy[k], q3 - x[k], q4 - y[k], q5 - s[k]
+            xx1 - xx[k], xy1 - xy[k], yy1 - yy[k], x1 - x[k], y1 - y[k], s1 - s[k]
         )
         least = min(least, (np.float64(value).view(np.int64) & -GROUP) | k)
     return np.int64(least & -GROUP).view(np.float64), low + (least & (GROUP - 1))
@@ -106,12 +113,10 @@ def least_from(sums, low, high, j, energy):
 @helper
 def joint_cost(sums, i, j, k, m):
     """Rise of χ² if the measurements i … j - 1 and k … m - 1 are on one line, not on two."""
+    xx0, xy0, yy0, x0, y0, s0 = _between(sums, i, j)
+    xx, xy, yy, x, y, s = _before(sums, m)
+    xx1, xy1, yy1, x1, y1, s1 = _before(sums, k)
     joint = chi_square(
-        sums[0, j] - sums[0, i] + sums[0, m] - sums[0, k],
-        sums[1, j] - sums[1, i] + sums[1, m] - sums[1, k],
-        sums[2, j] - sums[2, i] + sums[2, m] - sums[2, k],
-        sums[3, j] - sums[3, i] + sums[3, m] - sums[3, k],
-        sums[4, j] - sums[4, i] + sums[4, m] - sums[4, k],
-        sums[5, j] - sums[5, i] + sums[5, m] - sums[5, k],
+        xx0 + xx - xx1, xy0 + xy - xy1, yy0 + yy - yy1, x0 + x - x1, y0 + y - y1, s0 + s - s1
     )
     return joint - cost(sums, i, j) - cost(sums, k, m)

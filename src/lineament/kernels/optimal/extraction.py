@@ -13,6 +13,7 @@ from ..layout import Tables
 from . import layout as at
 from .arcs import find_arcs
 from .clustering import cluster, list_clusters, list_points, opening
+from .constants import UNIFORM
 from .fits import measure
 from .joining import join_all
 from .costs import fill_sums
@@ -61,7 +62,7 @@ def extract_rows(
     for row in range(rows[0]):
         start, closed, lines = np.int64(0), False, np.int64(0)
         count = list_points(work, ranges[row], start, limits, bearings)
-        _estimate_noise(work, count, given)
+        _estimate_noise(work, count, given, noises[row])
         count = cluster(work, count, n, circular, missing)
         if circular and count > 0:
             start, closed = opening(work, count)
@@ -70,7 +71,7 @@ def extract_rows(
             if start > 0:
                 count = list_points(work, ranges[row], start, limits, bearings)
                 count = cluster(work, count, n, circular, missing)
-            fill_sums(work.points, count, work.noise[0], work.noise[1], work.sums)
+            fill_sums(work.points, count, work.noise[at.CONSTANT], work.noise[at.GROWTH], work.sums)
             lines = partition(work, count, evidence)
             clearest = clearest_border(work, lines) if closed else np.int64(0)
             start = beams[at.BEAM, spans[at.FIRST, clearest]] if clearest > 0 else start
@@ -82,26 +83,27 @@ def extract_rows(
         _write_surfaces(work, tables, scan, surfaces)
         join_all(work, tables, scan, surfaces)
         _write_clusters(work, tables, scan, surfaces)
-        for part in range(5):
-            noises[row, part] = 0.0 if estimated else given[part]
-        if estimated:
-            noises[row, 0] = math.sqrt(work.noise[0]) if count > 0 else math.nan
-            noises[row, 1], noises[row, 4] = math.sqrt(work.noise[1]), work.noise[3]
         counts[0], counts[1], counts[2] = count, lines, surfaces
 
 
 @inlined
-def _estimate_noise(work, count, given):
-    """Step 1: write the noise as (constant, growth, variance of a bearing, uncertainty)."""
+def _estimate_noise(work, count, given, found):
+    """Step 1: the noise, as given or estimated, in variances; and as it is `found`."""
     noise = work.noise
+    for part in range(len(given)):
+        found[part] = given[part]
     if math.isnan(given[0]):
-        noise[0], noise[1], noise[3], _ = fit_noise(
-            work.points, work.beams[at.BEAM], count, at.KEY, at.SCRATCH
+        constant, growth, uncertainty, _ = fit_noise(
+            work.points, work.beams[at.BEAM], count, at.TRIPLE, at.HALVES
         )
-        noise[2] = 0.0
+        noise[at.CONSTANT], noise[at.GROWTH], noise[at.BEARING] = constant, growth, 0.0
+        found[0] = math.sqrt(constant) if count > 0 else math.nan
+        found[1], found[2], found[3], found[4] = math.sqrt(growth), 0.0, 0.0, uncertainty
         return
-    noise[0] = max(given[0] * given[0] + given[3] * given[3] / 12.0, LEAST_SIGMA * LEAST_SIGMA)
-    noise[1], noise[2] = given[1] * given[1], given[2] * given[2]
+    sigma, proportional, bearing, quantum = given[0], given[1], given[2], given[3]
+    constant = sigma * sigma + quantum * quantum / UNIFORM
+    noise[at.CONSTANT] = max(constant, LEAST_SIGMA * LEAST_SIGMA)
+    noise[at.GROWTH], noise[at.BEARING] = proportional * proportional, bearing * bearing
 
 
 @inlined

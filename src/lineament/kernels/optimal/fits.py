@@ -3,18 +3,13 @@
 import math
 
 from .. import helper, inlined, sums
-from ..line_fit import direction_along_beams, second_order
+from ..line_fit import GRAZING, direction_along_beams, second_order
 from ..noise import LEAST_SIGMA, expected_variance
 from . import layout as at
 from .borders import soften_borders
-from .constants import LEAST, SIGMAS, TAU
+from .constants import LEAST, OVERLAP, SIGMAS, TAU, TOGETHER
 from .costs import solve
-from .merging import surface_variance
-
-#: Measurements whose errors are averaged to see whether neighbours are off alike.
-_TOGETHER = 4
-#: Of overlapping second differences of their means, so many count as one.
-_OVERLAP = 3.4
+from .geometry import along, surface_variance
 
 
 @inlined
@@ -33,8 +28,7 @@ def measure(work, surfaces, estimated, evidence):
         if spans[at.KIND, k] == at.LINE:
             first, last, count = _fit_between(work, first, last, p)
             spans[at.FIRST, kept], spans[at.LAST, kept], spans[at.COUNT, kept] = first, last, count
-            begins = p[at.UX] * (x[first] - p[at.CX]) + p[at.UY] * (y[first] - p[at.CY])
-            ends = p[at.UX] * (x[last] - p[at.CX]) + p[at.UY] * (y[last] - p[at.CY])
+            begins, ends = along(p, x[first], y[first]), along(p, x[last], y[last])
             spacing = abs(x[first] * y[first + 1] - y[first] * x[first + 1]) / rho[first]
             long = begins < 0.0 < ends and ends - begins > spacing
             if not (long and count > 1 and last - first + 1 >= LEAST):
@@ -100,14 +94,14 @@ def fit_line(points, first, end, a, b, noise, piece):
     does not count. The covariance is that of the noise alone. Returns how many count.
     """
     x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
-    constant, growth, bearing = noise[0], noise[1], noise[2]
+    constant, growth, bearing = noise[at.CONSTANT], noise[at.GROWTH], noise[at.BEARING]
     norm = math.sqrt(a * a + b * b)
     distance, nx, ny, x0, y0 = 1.0 / norm, a / norm, b / norm, x[0], y[0]
     total, sx, sy, sxx, sxy, syy, used = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(x)):
         across, square = nx * x[i] + ny * y[i], rho[i] * rho[i]
         # The variance and its scale times ρ², so that one number is divided.
-        off, near = across - distance, max(across * across, 1e-6 * square)
+        off, near = across - distance, max(across * across, GRAZING * square)
         spread = (constant + growth * square) * near + bearing * square * (square - near)
         counts = off * off * square <= SIGMAS * SIGMAS * (spread + TAU * TAU * near)
         w, dx, dy = square / spread if counts else 0.0, x[i] - x0, y[i] - y0
@@ -119,14 +113,14 @@ def fit_line(points, first, end, a, b, noise, piece):
     ux, uy = direction_along_beams(sxx, sxy, syy, cx, cy)
     if ux * (x[len(x) - 1] - x0) + uy * (y[len(y) - 1] - y0) < 0.0:
         ux, uy = -ux, -uy
-    along = ux * ux * sxx + 2.0 * ux * uy * sxy + uy * uy * syy
-    mean_square = max(sxx + syy - along, 0.0) / total
+    lengthwise = ux * ux * sxx + 2.0 * ux * uy * sxy + uy * uy * syy
+    mean_square = max(sxx + syy - lengthwise, 0.0) / total
     distance = ux * cy - uy * cx
     piece[at.A], piece[at.B], piece[at.CX], piece[at.CY] = a, b, cx, cy
     if abs(distance) > 0.0:
         piece[at.A], piece[at.B] = -uy / distance, ux / distance
     piece[at.UX], piece[at.UY] = ux, uy
-    piece[at.OO], piece[at.OA], piece[at.AA] = 1.0 / total, 0.0, 1.0 / along
+    piece[at.OO], piece[at.OA], piece[at.AA] = 1.0 / total, 0.0, 1.0 / lengthwise
     piece[at.RMS] = math.sqrt(mean_square)
     piece[at.MISFIT] = math.sqrt(max(mean_square - (used - 2.0) / total, 0.0))
     return used
@@ -140,28 +134,26 @@ def _scatter_of_means(work, surfaces):
     taken from second differences of means of four, which a wall that bows does not change. Where
     most lines are too short for these, the others may be corners that pass for lines.
     """
-    points, pieces, squares, used = work.points, work.pieces, work.points[at.KEY], 0
+    points, pieces, squares, used = work.points, work.pieces, work.points[at.SQUARE], 0
     long, short = 0, 0
     for k in range(surfaces):
         first, end = work.spans[at.FIRST, k], work.spans[at.LAST, k] + 1
         if work.spans[at.KIND, k] != at.LINE:
             continue
-        if end - first < 3 * _TOGETHER:
+        if end - first < 3 * TOGETHER:
             short += end - first
         else:
             long += end - first
-            a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.SCRATCH]
+            a, b, error = pieces[k, at.A], pieces[k, at.B], points[at.ERROR]
             _second_differences(points, first, end, a, b, work.noise, error, squares[used:])
-            used += end - first + 1 - 3 * _TOGETHER
+            used += end - first + 1 - 3 * TOGETHER
     if long <= short:
         return 1.0
-    mean, limit = 1.0, math.inf
-    for _ in range(2):
-        mean = _mean_within(squares, used, limit)
-        limit = SIGMAS * SIGMAS * mean
-    mean, _ = expected_variance(mean, used / _OVERLAP, 1.0)
+    mean = _mean_within(squares, used, math.inf)
+    mean = _mean_within(squares, used, SIGMAS * SIGMAS * mean)
+    mean, _ = expected_variance(mean, used / OVERLAP, 1.0)
     # Nothing is known better than the best scanner measures it.
-    return max(mean, LEAST_SIGMA * LEAST_SIGMA / work.noise[0])
+    return max(mean, LEAST_SIGMA * LEAST_SIGMA / work.noise[at.CONSTANT])
 
 
 @sums
@@ -179,15 +171,15 @@ def _mean_within(squares, count, limit):
 def _second_differences(points, first, end, a, b, noise, error, squares):
     """Square the second differences of means of four errors, in units of those of white noise."""
     x, y, rho = points[at.X, first:end], points[at.Y, first:end], points[at.RHO, first:end]
-    constant, growth = noise[0], noise[1]
+    constant, growth = noise[at.CONSTANT], noise[at.GROWTH]
     for i in range(len(x)):
         across, deviation = a * x[i] + b * y[i], math.sqrt(constant + growth * rho[i] * rho[i])
         error[i] = rho[i] * (across - 1.0) / (across * deviation)
     # In place: the sum of four from each one on.
     error1, error2, error3 = error[1:], error[2:], error[3:]
-    for i in range(len(x) + 1 - _TOGETHER):
+    for i in range(len(x) + 1 - TOGETHER):
         error[i] = error[i] + error1[i] + error2[i] + error3[i]
-    second, third = error[_TOGETHER:], error[2 * _TOGETHER :]
-    for i in range(len(x) + 1 - 3 * _TOGETHER):
+    second, third = error[TOGETHER:], error[2 * TOGETHER :]
+    for i in range(len(x) + 1 - 3 * TOGETHER):
         difference = error[i] - 2.0 * second[i] + third[i]
-        squares[i] = difference * difference / (6.0 * _TOGETHER)
+        squares[i] = difference * difference / (6.0 * TOGETHER)

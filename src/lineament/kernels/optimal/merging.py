@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
-from .. import helper, inlined
+from .. import inlined
 from . import layout as at
-from .constants import BEND, RARE, SIGMAS, TAU
+from .constants import BEND, RARE, SIGMAS
 from .costs import joint_cost, solve
+from .geometry import gap, surface_variance
 
 
 @inlined
@@ -27,7 +28,7 @@ def merge_lines(work, lines, evidence):
 
     Returns how many lines are left.
     """
-    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.KEY]
+    first, last, rises = work.spans[at.FIRST], work.spans[at.LAST], work.points[at.RISE]
     for k in range(1, lines):
         rises[k] = rise_if_one(work, k)
     while lines > 1:
@@ -63,23 +64,3 @@ def rise_if_one(work, k):
     if step * step > SIGMAS * SIGMAS * surface_variance(points, border, work.noise):
         return math.inf
     return joint_cost(sums, start, border, border, end)
-
-
-@helper
-def surface_variance(points, i, noise):
-    """Variance of a measurement about the line of its surface."""
-    return TAU * TAU + noise[0] + noise[1] * points[at.RHO, i] * points[at.RHO, i]
-
-
-@helper
-def gap(points, i, j, a, b):
-    """Range by which one line is before another at the beams of i and j, the lesser of both [m].
-
-    The lines differ by a x + b y in ρ over their ranges; 0 where they cross between those beams,
-    less than 0 where the first is behind.
-    """
-    here = (a * points[at.X, i] + b * points[at.Y, i]) * points[at.RHO, i]
-    there = (a * points[at.X, j] + b * points[at.Y, j]) * points[at.RHO, j]
-    if here * there <= 0.0:
-        return 0.0
-    return here if abs(here) < abs(there) else there

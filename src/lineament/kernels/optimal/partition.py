@@ -13,14 +13,8 @@ import numpy as np
 
 from .. import contracted, helper, inlined
 from . import layout as at
-from .constants import CLUTTER, LEAST
-from .costs import GROUP, costs_on, least_from
-
-#: Candidates that run along. As many as in a `GROUP`, they change the time, not the result;
-#: `_part_block` names both.
-RUNNERS = 2
-#: As a whole number.
-_BITS_OF_INFINITY = 0x7FF0000000000000
+from .constants import BITS_OF_INFINITY, CLUTTER, GROUP, LEAST, RUNNERS
+from .costs import costs_on, least_from
 
 
 @inlined
@@ -154,8 +148,8 @@ def _raise_bounds(points, sums, low, high, oldest, groups, most):
     while oldest < groups and points[at.BOUND, oldest] > most:
         oldest += 1
     one, two = points[at.AHEAD, low:high], points[at.AHEAD + 1, low:high]
-    own, largest = points[at.SCRATCH, low:high], np.int64(0)
-    costs_on(sums, low - 1, low, high, 0.0, points[at.SCRATCH])
+    own, largest = points[at.OWN, low:high], np.int64(0)
+    costs_on(sums, low - 1, low, high, 0.0, points[at.OWN])
     for k in range(len(own)):
         own[k] = own[k] if own[k] < math.inf else 0.0
     for k in range(len(own)):
@@ -209,7 +203,7 @@ def _open_groups(points, beams, sums, first, j, end, oldest, newest, evidence, t
 @helper
 def _least(values):
     """Return the least of some positive values: their bits have their order."""
-    bits, least = values.view(np.int64), np.int64(_BITS_OF_INFINITY)
+    bits, least = values.view(np.int64), np.int64(BITS_OF_INFINITY)
     for k in range(len(bits)):
         least = min(least, bits[k])
     return np.int64(least).view(np.float64)
