@@ -113,7 +113,7 @@ def over(values: Sequence[float]) -> str:
     from lineament_lab.reproduce.findings import cell_text
 
     ends = (statistics.median(values), min(values), max(values))
-    return "{} ({}–{})".format(*(cell_text(value) for value in ends))
+    return "{}<br>({}–{})".format(*(cell_text(value) for value in ends))
 
 
 def without_ranges(text: str) -> str:
