@@ -364,14 +364,17 @@ class Results:
 
     def times(self) -> dict[str, dict[str, Any]]:
         """Time methods in turns, once: by sensor and method the rounds and scans [s]."""
+        from lineament_lab.methods import RIVALS
         from lineament_lab.reproduce import scans as recorded
+        from lineament_lab.reproduce.contenders import KEYPOINTS
 
         from lineament import Extractor
-        from lineament.methods import method_names
+        from lineament.methods import METHODS
         from lineament.simulation import SENSORS
 
         if not self.timed:
-            methods = {name: Extractor(name) for name in method_names(presets=False)}
+            compiled = [name for name in (*METHODS, *RIVALS) if name not in KEYPOINTS]
+            methods = {name: Extractor(name) for name in compiled}
             for sensor in ("paper", "utm30lx"):
                 scenes = recorded.scene_numbers(30, 0)
                 frames = recorded.simulated_frames(SENSORS[sensor], recorded.INDOORS, scenes)
