@@ -121,6 +121,10 @@ def assert_sound(features, scan, method):
     assert first_problem(features, scan) == ""
     segments, corners, n = features.segments, features.corners, len(scan)
     assert np.isfinite(corners["response"]).all()
+    if method.name in ("falko", "flirt"):  # Keypoints are of no segment.
+        assert len(segments) == 0
+        assert (corners["segments"] == -1).all()
+        return
     assert (segments["n_points"] >= (method.min_points if method.name == "liu" else 2)).all()
     # What is farther than any scanner sees, or nearer, is missing, as beams are that are not valid.
     usable = scan.valid & (scan.ranges >= 1 / LARGEST) & (scan.ranges < LARGEST)

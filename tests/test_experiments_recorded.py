@@ -188,6 +188,7 @@ class TestReal:
         np.savez(tmp_path / "other.npz", azimuth=np.zeros(3))
         methods = {name: ln.Extractor(name) for name in ("optimal", "iepf")}
         monkeypatch.setattr(real, "feature_methods", lambda *_: methods)
+        monkeypatch.setattr(real, "corner_methods", lambda *_: methods)
         monkeypatch.setattr(real, "LOGS", {"Wedge": "wedge.npz", "Missing": "missing.npz"})
         for name, value in (("SCANS", 1), ("PAIRS", 4), ("ARENA", 3), ("STILL", 4)):
             monkeypatch.setattr(real, f"{name}_A_FRAME", value)

@@ -34,6 +34,15 @@ class FLIRT(KeypointMethod):
        two scales of the ends of the scan.
 
     The defaults are those of the authors' implementation.
+
+    Examples
+    --------
+    >>> import lineament as ln
+    >>> from lineament.simulation import SENSORS, room
+    >>> scan = SENSORS["paper"].scan(room(), (0.0, 0.0, 0.0), np.random.default_rng(7))
+    >>> keypoints = ln.extract(scan, method="flirt").corners["position"]
+    >>> bool(np.hypot(*(keypoints - (3.0, 2.0)).T).min() < 0.2)  # where two walls meet
+    True
     """
 
     name = "flirt"

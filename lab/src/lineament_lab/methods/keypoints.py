@@ -45,7 +45,7 @@ class KeypointMethod(MethodBase):
         found = [np.zeros(0, CORNER)]
         for place, score in zip(*self.keypoints(scan), strict=True):
             corner = corner_records(place[np.newaxis], none, scan, noise)
-            corner["quality"] = score
+            corner["response"] = corner["quality"] = score
             found.append(corner)
         corners = np.concatenate(found)
         in_order = np.argsort(corners["beam"], kind="stable")
