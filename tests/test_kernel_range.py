@@ -26,7 +26,9 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::lineament.LineamentWarning"),
 ]
 
-NAMES = [*method_names(), "maps"]
+#: Keypoints have no kernels, and corners without an opening: tests/test_keypoints.py.
+WITH_KERNELS = [name for name in method_names() if not name.startswith(("falko", "flirt"))]
+NAMES = [*WITH_KERNELS, "maps"]
 every_name = pytest.mark.parametrize("name", NAMES)
 #: Ranges of the scans of up to 5 beams that are all tried, and of those of up to 8: what is not
 #: valid is left out by one function, `usable`, so that one such range stands for all.
@@ -124,7 +126,7 @@ def ends_of(bounds):
 
 
 def at_their_ends():
-    for name in method_names(presets=False):
+    for name in [name for name in WITH_KERNELS if ":" not in name]:
         for field in fields(type(get_method(name))):
             for value in ends_of(field.metadata["bounds"]):
                 yield pytest.param(name, {field.name: value}, id=f"{name}-{field.name}={value}")

@@ -45,7 +45,7 @@ def remove_vertices(
         Vertices are removed, whatever the rise, until no more are left; 0: any number.
     """
     work = at.named(floats, ints)
-    points, links, count = work.points, work.waiting, work.counts[at.POINTS]
+    points, links, count = work.points, work.waiting, _count(work)
     for i in range(count):
         points[_WEIGHT, i] = 1.0 / range_variance(points[at.RHO, i], noise)
     left = _link_all(work, line_error)
@@ -58,10 +58,16 @@ def remove_vertices(
 
 
 @helper
+def _count(work):
+    """Return the number of points; that of a ring at its end is its first again."""
+    return work.counts[at.POINTS] - (1 if work.counts[at.CLOSED] else 0)
+
+
+@helper
 def _link_all(work, line_error):
     """Make each point a vertex, linked to its neighbours. Returns how many vertices there are."""
     points, links, counts = work.points, work.waiting, work.counts
-    count, left = counts[at.POINTS], 0
+    count, left = _count(work), 0
     for i in range(count + 1):
         points[_RISE, i], points[_COST, i] = math.inf, 0.0
         links[_BEFORE, i] = links[_AFTER, i] = -1
@@ -160,7 +166,7 @@ def _list_pieces(work, most_rise):
     The point at which a ring was opened is a vertex if the cost rises by too much without it.
     """
     points, links, pieces, counts = work.points, work.waiting, work.pieces, work.counts
-    n, count = 0, counts[at.POINTS]
+    n, count = 0, _count(work)
     for i in range(count):
         if links[_AFTER, i] < 0:
             continue

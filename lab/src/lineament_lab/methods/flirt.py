@@ -47,12 +47,12 @@ class FLIRT(KeypointMethod):
 
     name = "flirt"
 
-    scales: int = parameter(5, "number of scales", low=1)
+    scales: int = parameter(5, "number of scales", low=1, below=65)
     scale: float = parameter(0.2, "the smallest scale", above=0, unit="m")
     step: float = parameter(1.4, "ratio of a scale to the one before", above=0)
     least_signal: float = parameter(0.34, "least signal of a maximum", low=0)
     rise: float = parameter(0.001, "by which it is above those of its neighbours", low=0)
-    trees: int = parameter(3, "spanning trees of the graph", low=1)
+    trees: int = parameter(3, "spanning trees of the graph", low=1, below=65)
 
     def keypoints(self, scan: LaserScan) -> Keypoints:
         """Find the keypoints of a scan."""
