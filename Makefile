@@ -91,8 +91,7 @@ kernels: library
 	@touch $@
 
 docs: .venv/docs library
-	mkdir -p build
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	$(BIN)/python benchmarks/site.py
 	@echo "the site is in build/site: open build/site/index.html"
 
 # The wheel has the compiled kernels, and runs in an environment that has nothing else. It is for this machine's

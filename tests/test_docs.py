@@ -3,13 +3,13 @@
 import doctest
 import pkgutil
 import re
+import tomllib
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 
 import lineament_lab
 import pytest
-import yaml  # which distributed needs
 
 import lineament as ln
 from lineament.cli import cli
@@ -29,7 +29,7 @@ def listed(nav):
 
 
 def test_site_has_each_page_and_each_public_package_once():
-    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    site = tomllib.loads((ROOT / "zensical.toml").read_text(encoding="utf-8"))["project"]
     docs, documents = ROOT / "docs", site["extra"]["documents"]
     written = [p.relative_to(docs).with_suffix(".md").as_posix() for p in docs.rglob("*.[mp][dy]")]
     for source in documents.values():
