@@ -50,9 +50,9 @@ browser:
 	else echo "no chromium: the tests of the page will be skipped"; fi
 
 # The tests of ROS 1 run against Debian's own; without it they skip, and say so.
-ROS1 := rospy rosmaster sensor-msgs nav-msgs visualization-msgs diagnostic-msgs tf2-msgs
+ROS1 := rospy rosmaster sensor-msgs nav-msgs std-srvs visualization-msgs diagnostic-msgs tf2-msgs
 ros1:
-	@command -v rosmaster >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -qq && \
+	@dpkg -s $(ROS1:%=python3-%) >/dev/null 2>&1 || { [ "$$(id -u)" = 0 ] && apt-get update -qq && \
 	apt-get install -y -qq --no-install-recommends $(ROS1:%=python3-%) >/dev/null; } || echo "no ROS 1: its tests will be skipped"
 
 # The kernels as a library for this machine; where they change, numba compiles them until this is made.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import genpy
 import rospy
-from roslib.message import get_message_class
+from roslib.message import get_message_class, get_service_class
 
 
 class Peer:
@@ -18,7 +18,7 @@ class Peer:
         self._publishers: dict[str, rospy.Publisher] = {}
         self._heard: dict[str, list] = {}
 
-    def publish(self, topic: str, kind: str, raw: bool = False) -> None:
+    def publish(self, topic: str, kind: str, raw: bool = False, latch: bool = False) -> None:
         """Begin to publish; `raw` for messages of any bytes."""
         sent = get_message_class(kind)
         if raw:
@@ -27,7 +27,9 @@ class Peer:
                 _type, _md5sum, _full_text = sent._type, sent._md5sum, sent._full_text
 
             sent = Garbage
-        self._publishers[topic] = rospy.Publisher(topic, sent, queue_size=1000, tcp_nodelay=True)
+        self._publishers[topic] = rospy.Publisher(
+            topic, sent, queue_size=1000, tcp_nodelay=True, latch=latch
+        )
 
     def listeners(self, topic: str) -> int:
         return self._publishers[topic].get_num_connections()
@@ -40,6 +42,11 @@ class Peer:
             else:
                 _fill(message, given)
             self._publishers[topic].publish(message)
+
+    def call(self, service: str, kind: str) -> None:
+        """Call a service that takes nothing, once it is there."""
+        rospy.wait_for_service(service, timeout=10)
+        rospy.ServiceProxy(service, get_service_class(kind))()
 
     def listen(self, topic: str, kind: str) -> None:
         heard = self._heard[topic] = []

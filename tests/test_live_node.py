@@ -4,7 +4,9 @@ import math
 import struct
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from itertools import islice
 from random import Random
 
 import numpy as np
@@ -28,7 +30,7 @@ from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
 from lineament.scan.poses import compose, poses_along, twist_between
-from lineament.simulation import SENSORS, cast_rays, drive, room
+from lineament.simulation import SENSORS, building, cast_rays, drive, room
 
 BEARINGS = np.linspace(-0.5, 0.5, 101)
 WALL = 2.0 / np.cos(BEARINGS)
@@ -585,3 +587,27 @@ def test_deskewed_features_are_those_of_a_scanner_at_rest_whichever_way_it_turns
 
     assert off(found) < 0.002
     assert off(skewed) > 0.02
+
+
+def test_a_method_changes_while_the_node_runs_and_tracks_stay():
+    """What is read once, at the start, cannot change; and what is refused changes nothing."""
+    config = LiveConfig(track=True)
+    pipeline = Pipeline(config)
+    scans = list(islice(drive(*building(), SENSORS["utm30lx"], rate=4.0, seed=3), 4))
+    before = [pipeline("front", scan).tracks.segments for scan in scans[:2]]
+    pipeline.change(replace(config, noise=0.02, scale=1.0, parameters={"evidence": 14.0}))
+    frame = pipeline("front", scans[2])
+    known = ln.Extractor("optimal", noise=0.02, evidence=14.0)(scans[2])
+    assert frame.features.segments.tobytes() == known.segments.tobytes()
+    assert set(frame.tracks.segments) & set(before[1])
+    for other, why in (
+        (replace(config, topic="other"), "topic is read at the start, expected a change of one of"),
+        (replace(config, method="nonsense"), "method 'nonsense' is unknown"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            pipeline.change(other)
+    again = pipeline("front", scans[3]).features
+    assert (
+        again.segments.tobytes()
+        == ln.Extractor("optimal", noise=0.02, evidence=14.0)(scans[3]).segments.tobytes()
+    )

@@ -32,7 +32,7 @@ from live_driving import (
 import lineament as ln
 from lineament import LineamentError
 from lineament.live import LiveConfig, Pipeline, RosSink
-from lineament.live.received import ODOMETRY
+from lineament.live.received import GUESS, MAP, ODOMETRY, RELOCATE
 from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.feature_points import feature_points
@@ -220,6 +220,32 @@ def test_a_publisher_that_is_killed_is_waited_for(node, topic):
     assert source.lost == 0
 
 
+def test_a_map_a_guess_and_a_call_as_map_server_rviz_and_amcl_have_them(node, scanner, topic):
+    """The map was sent before the node came: it is latched, as map_server's is."""
+    info = {"resolution": 0.5, "width": 3, "height": 2, "origin": {"position": {"x": -1.0}}}
+    scanner.publish(f"{topic}/map", "nav_msgs/OccupancyGrid", False, True)
+    scanner.write(f"{topic}/map", {"info": info, "data": [0, 100, -1, 0, 0, 0]})
+    config = LiveConfig(topic=topic, map=f"{topic}/map", namespace=topic)
+    source = Ros1Source(node, config)
+    (came,) = received(source, 1)
+    assert (came.what, came.read().cells.tolist()) == (MAP, [[0, 100, -1], [0, 0, 0]])
+    assert came.read().resolution == 0.5
+    placed = "geometry_msgs/PoseWithCovarianceStamped"
+    guess = f"{topic}/initialpose"
+    scanner.publish(guess, placed)
+    eventually(lambda: scanner.listeners(guess))
+    scanner.write(
+        guess, {"header": {"frame_id": "map"}, "pose": {"pose": {"position": {"x": 2.0}}}}
+    )
+    (came,) = received(source, 1)
+    assert came.what == GUESS
+    (pose,) = came.read()
+    assert pose.pose[:2] == (2.0, 0.0)
+    scanner.call(f"{topic}/global_localization", "std_srvs/Empty")
+    (came,) = received(source, 1)
+    assert (came.what, came.read()) == (RELOCATE, None)
+
+
 def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):
     scanner.publish(topic, "sensor_msgs/PointCloud2")
     source = Ros1Source(node, LiveConfig(topic=topic))
@@ -318,7 +344,7 @@ def test_without_rospy(monkeypatch):
 #: listener or to be ended, then for a line of input.
 NODE = """
 from lineament.live import LiveConfig
-from lineament.live.received import ODOMETRY
+from lineament.live.received import GUESS, MAP, ODOMETRY, RELOCATE
 from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.scene import Message

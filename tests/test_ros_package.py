@@ -9,7 +9,8 @@ import runpy
 import signal
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -19,8 +20,8 @@ import pytest
 from ruamel.yaml import YAML
 
 import lineament as ln
-from lineament import LineamentError
 from lineament.live import LiveConfig, RosSink
+from lineament.live.received import RELOCATE
 from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment, layers_of
@@ -29,16 +30,21 @@ ROS = Path(__file__).parents[1] / "ros"
 SCAN = ln.LaserScan([2.0, 2.0, 2.0], -0.01, 0.01, stamp=5.5, frame_id="laser")
 MOMENT = Moment(5, 500_000_000, "laser", "map")
 DATA = RosMessages("cdr").scan("/scan", MOMENT, SCAN).data
-MODULES = "rclpy event_handler executors node qos signals"
+MODULES = "rclpy event_handler executors node lifecycle qos signals"
+DONE = SimpleNamespace(SUCCESS="success", FAILURE="failure")
 
 
 class Node(MagicMock):
     """A node with parameters, whose publishers and subscriptions are kept by topic."""
 
+    overrides: Mapping[str, object] = {}
+
     def __init__(self, *_: object, **given: object) -> None:
         super().__init__()
         assert given.get("automatically_declare_parameters_from_overrides", True)
-        self.parameters: dict[str, object] = {}
+        assert given.get("allow_undeclared_parameters", True)
+        self.parameters: dict[str, object] = dict(self.overrides)
+        self.services: dict[str, Callable] = {}
         self.callbacks: dict[str, Callable] = {}
         self.published: dict[str, list[bytes]] = {}
         self.kinds: dict[str, str] = {}
@@ -51,8 +57,14 @@ class Node(MagicMock):
     def _get_child_mock(self, **given: object) -> MagicMock:
         return MagicMock(**given)
 
-    def declare_parameter(self, name: str, value: object) -> None:
+    def declare_parameter(self, name: str, value: object, about: object = None) -> None:  # noqa: ARG002
+        assert value != ()
         assert self.parameters.setdefault(name, value) is value
+
+    def create_service(self, kind: object, name: str, callback: Callable) -> str:
+        assert kind is std_srvs_srv.Empty
+        self.services[name] = callback
+        return name
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, object]:
         start, found = f"{prefix}." if prefix else "", self.parameters.items()
@@ -79,6 +91,24 @@ class Node(MagicMock):
         return MagicMock(publish=kept.append, get_subscription_count=lambda: 1)
 
 
+class LifecycleNode(Node):
+    """Goes from state to state as it is asked to."""
+
+    def on_configure(self, _: object) -> str:
+        return DONE.SUCCESS
+
+    on_activate = on_deactivate = on_cleanup = on_shutdown = on_configure
+
+    def trigger_configure(self) -> str:
+        return self.on_configure(None)
+
+    def trigger_activate(self) -> str:
+        return self.on_activate(None)
+
+
+std_srvs_srv = MagicMock()
+
+
 class Executor:
     """Does one of the things that wait: each is a call."""
 
@@ -98,13 +128,20 @@ def package(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
     monkeypatch.syspath_prepend(ROS)
     first, *below = MODULES.split()
     utilities = MagicMock(get_message=lambda kind: kind)
-    for name in (first, *(f"{first}.{one}" for one in below), "rosidl_runtime_py"):
+    names = first, *(f"{first}.{one}" for one in below), "rosidl_runtime_py", "std_srvs"
+    for name in (*names, "rcl_interfaces", "rcl_interfaces.msg"):
         monkeypatch.setitem(sys.modules, name, MagicMock())
+    sys.modules["rclpy.node"].Node = Node
+    sys.modules["rclpy.lifecycle"].LifecycleNode = LifecycleNode
+    sys.modules["rclpy.lifecycle"].TransitionCallbackReturn = DONE
+    sys.modules["rcl_interfaces.msg"].SetParametersResult = SimpleNamespace
+    monkeypatch.setitem(sys.modules, "std_srvs.srv", std_srvs_srv)
     monkeypatch.setitem(sys.modules, "rosidl_runtime_py.utilities", utilities)
     bridge = importlib.import_module("lineament_ros.bridge")
     node = importlib.import_module("lineament_ros.node")
-    yield SimpleNamespace(bridge=bridge, node=node)
-    for name in ("lineament_ros.node", "lineament_ros.bridge", "lineament_ros"):
+    parameters = importlib.import_module("lineament_ros.parameters")
+    yield SimpleNamespace(bridge=bridge, node=node, parameters=parameters)
+    for name in [name for name in sys.modules if name.startswith("lineament_ros")]:
         del sys.modules[name]
 
 
@@ -152,12 +189,11 @@ def test_launch_file_starts_the_node_and_rviz_on_its_topics(monkeypatch, package
 
     names = {
         "launch": "LaunchDescription",
-        "launch.actions": "DeclareLaunchArgument",
+        "launch.actions": "DeclareLaunchArgument OpaqueFunction",
         "launch.conditions": "IfCondition",
         "launch.substitutions": "LaunchConfiguration PathJoinSubstitution",
         "launch_ros": "",
-        "launch_ros.actions": "Node",
-        "launch_ros.parameter_descriptions": "ParameterValue",
+        "launch_ros.actions": "LifecycleNode Node",
         "launch_ros.substitutions": "FindPackageShare",
     }
     for module, classes in names.items():
@@ -165,15 +201,25 @@ def test_launch_file_starts_the_node_and_rviz_on_its_topics(monkeypatch, package
         monkeypatch.setitem(sys.modules, module, made)
     launch = runpy.run_path(str(ROS / "launch" / "lineament.launch.py"))
     (entities,) = launch["generate_launch_description"]().values
-    *arguments, node, rviz = entities
+    *arguments, opaque, rviz = entities
     declared = {argument.values[0]: argument.default_value for argument in arguments}
-    (parameters,) = node.parameters
-    assert set(parameters) <= set(package.node.KNOWN)
-    assert set(declared) == {*parameters, "rviz", "frame"}
-    for name, value in parameters.items():
-        default = getattr(LiveConfig(), name)
-        assert value.value_type is type(default)
-        assert declared[name] == str(default).lower()
+    assert set(declared) == {*package.parameters.FIELDS, *launch["OTHERS"]}
+
+    def started(**given: str) -> list[object]:
+        (node,) = opaque.function(SimpleNamespace(launch_configurations=declared | given))
+        assert (node.kind, node.executable) == ("LifecycleNode", "lineament")
+        return node.parameters
+
+    assert started() == [{"autostart": True}]
+    *files, parameters = started(
+        topic="/front/scan", deskew="off", laser_pose="[0.1, 0, 0.5]", dock="[1, 2]", noise="0.02",
+        track="true", params_file="of.yaml", autostart="False",
+    )  # fmt: skip
+    assert files == ["of.yaml"]
+    assert parameters.pop("autostart") is False
+    assert package.parameters.config_of(parameters) == LiveConfig(
+        topic="/front/scan", laser_pose=(0.1, 0, 0.5), dock=(1, 2), noise=0.02, track=True
+    )
     text = (ROS / "rviz" / "lineament.rviz").read_text(encoding="utf-8")
     topics = re.findall("Value: (/.*)", text)
     assert sorted(topic for topic, _ in rviz.remappings) == sorted(topics)
@@ -185,17 +231,28 @@ def test_launch_file_starts_the_node_and_rviz_on_its_topics(monkeypatch, package
             assert f'(f"share/{{NAME}}/{folder}", ["{folder}/{file.name}"])' in setup
 
 
+def test_each_option_of_the_node_is_a_parameter_or_of_ros_itself(package):
+    """A new option is a parameter unless somebody says that it is not."""
+    others = {"name", "namespace", "domain", "localhost", "ros", "mountings", "foxglove", "host"}
+    of_logs = {"log", "log_topic", "poses", "ring", "keep_going", "rate", "loop"}
+    every = {field.name for field in fields(LiveConfig)}
+    assert every == {*package.parameters.FIELDS, *package.parameters.TABLES} | others | of_logs
+    assert all(package.parameters.DESCRIPTIONS[name] for name in package.parameters.FIELDS)
+    readme = (ROS / "README.md").read_text(encoding="utf-8")
+    for name in (*package.parameters.FIELDS, "autostart"):
+        assert f"`{name}`" in readme
+
+
 def test_parameters_that_were_not_given_are_declared(package):
-    node = Node()
-    assert package.node.config_of(node) == LiveConfig(name="scanner")
-    assert "noise" not in node.parameters  # has no default that ROS could hold
+    node = package.node.Scanner()
+    assert node._asked() == LiveConfig(name="scanner")
+    assert node.parameters["noise"] is None  # has no default that ROS could hold
     assert node.parameters["method"] == "optimal"
+    assert node.parameters["track"] is False
 
 
 def test_parameters_are_those_of_live(package):
-    node = Node()
-    node.parameters |= {
-        "use_sim_time": False,
+    given = {
         "topic": "/front/scan",
         "noise": 0.02,
         "deskew": False,  # what YAML makes of off
@@ -203,16 +260,98 @@ def test_parameters_are_those_of_live(package):
         "upside_down": True,
         "stamp": "last",
         "dock": [5.3, 1.8],
+        "mask": [1.0, 1.2, -0.1, 0.1],
+        "merge": ["/rear/scan"],
+        "map": None,
         "parameters.evidence": 12,
+        "limits.beams": 5000,
     }
-    config = package.node.config_of(node)
+    config = package.parameters.config_of(given | {"laser_pose": None, "upside_down": None})
     assert (config.topic, config.noise, config.deskew) == ("/front/scan", 0.02, "off")
-    assert (config.laser_pose, config.dock) == ((0.1, 0.0, 0.5), (5.3, 1.8))
-    assert (config.upside_down, config.stamp) == (True, "last")
-    assert config.parameters == {"evidence": 12}
-    node.parameters["methd"] = "liu"
-    with pytest.raises(LineamentError, match="parameter methd is not known, expected one of topic"):
-        package.node.config_of(node)
+    assert (config.dock, config.stamp, config.merge) == ((5.3, 1.8), "last", ("/rear/scan",))
+    assert config.mask == ((1.0, 1.2), (-0.1, 0.1))
+    assert (config.parameters, config.limits) == ({"evidence": 12}, {"beams": 5000})
+    config = package.parameters.config_of(given | {"merge": None})
+    assert (config.laser_pose, config.upside_down) == ((0.1, 0.0, 0.5), True)
+
+
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ({"methd": "liu"}, "parameter methd is not known, expected one of topic, merge"),
+        ({"parameters": 1}, "parameter parameters is not known"),
+        ({"mask": [1.0, 2.0, 3.0]}, r"mask is \(1.0, 2.0, 3.0\), expected pairs of bearings"),
+        ({"noise": "much"}, "noise is 'much', expected a number"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_named(package, given, problem):
+    with pytest.raises(ValueError, match=problem):
+        package.parameters.config_of(given)
+
+
+def changed(node, **values: object) -> str:
+    """Set parameters as a service of ROS does; returns why they were refused, "" if not."""
+    named = {name.replace("__", "."): value for name, value in values.items()}
+    told = node.on_set([SimpleNamespace(name=name, value=v) for name, v in named.items()])
+    if told.successful:
+        node.parameters |= named
+        return ""
+    return told.reason
+
+
+def test_parameters_change_while_the_node_runs(package):
+    node = package.node.Scanner()
+    assert changed(node, topic="/front/scan", parameters__evidence=20.0) == ""
+    assert "not known" in changed(node, methd="liu")
+    assert node.trigger_configure() == DONE.SUCCESS
+    assert len(node._pipeline("", SCAN).features.segments) == 0
+    assert "has no parameter 'evidence'" in changed(node, method="liu")
+    assert changed(node, parameters__evidence=1.0) == ""
+    pipeline = node._pipeline
+    assert pipeline("", SCAN).scan is SCAN
+    assert changed(node, noise=0.02, scale=2.0) == ""
+    assert pipeline("", SCAN).scan.ranges.tolist() == [4.0, 4.0, 4.0]
+    assert node._pipeline is pipeline  # whose tracks and place on the plan stay
+    assert changed(node, topic="/rear/scan").startswith("topic is read at the start, expected a ch")
+    node.on_cleanup(None)
+    assert changed(node, topic="/rear/scan") == ""
+
+
+def test_a_manager_leads_the_node_from_state_to_state(package, monkeypatch):
+    node, steps = package.node.Scanner(), []
+    node.parameters["autostart"] = False
+
+    def scan() -> None:
+        node.callbacks["/ns/scan"](DATA, {})
+
+    waiting = [
+        lambda: steps.append(dict(node.callbacks)),
+        node.trigger_configure,
+        lambda: steps.append(node._pipeline is not None),
+        node.trigger_activate,
+        scan,
+        lambda: node.on_deactivate(None),
+        lambda: steps.append(node.destroy_subscription.call_count),
+        node.trigger_activate,
+        lambda: node.on_shutdown(None),
+        lambda: stopped.append(True),
+    ]
+    stopped: list[bool] = []
+    monkeypatch.setattr(package.node, "SingleThreadedExecutor", lambda: Executor(*waiting))
+    node.spin(lambda: bool(stopped))
+    assert steps == [{}, True, 1]
+    assert len(node.published["/ns/scan/features"]) == 1
+
+
+def test_a_service_has_the_robot_looked_for(package):
+    node = Node()
+    executor = Executor(lambda: node.services["reinitialize_global_localization"](None, None))
+    config = LiveConfig(map="plan.dxf")
+    source = package.bridge.RclpySource(node, executor, config)
+    (call,) = source.receive(0.1)
+    assert (call.what, call.read()) == (RELOCATE, None)
+    source.close()
+    node.destroy_service.assert_called_once()
 
 
 def test_source_takes_bytes_and_knows_publishers(package):
@@ -253,13 +392,13 @@ def test_publisher_hands_bytes_on(package):
 
 
 def test_node_runs_until_it_is_interrupted(package, monkeypatch):
-    node, handlers = Node(), {}
+    node, handlers = package.node.Scanner(), {}
 
     def scan_and_end() -> None:
         node.callbacks["/ns/scan"](DATA, {})
         handlers[signal.SIGTERM](signal.SIGTERM, None)
 
-    package.node.rclpy.create_node.return_value = node
+    monkeypatch.setattr(package.node, "Scanner", lambda: node)
     monkeypatch.setattr(package.node, "SingleThreadedExecutor", lambda: Executor(scan_and_end))
     monkeypatch.setattr(signal, "signal", handlers.__setitem__)
     assert package.node.main() == 0
@@ -272,8 +411,7 @@ def test_node_runs_until_it_is_interrupted(package, monkeypatch):
 
 
 def test_what_is_wrong_is_one_line(package, monkeypatch, capsys):
-    node = package.node.rclpy.create_node.return_value = Node()
-    node.parameters["method"] = "nonsense"
+    monkeypatch.setattr(Node, "overrides", {"method": "nonsense"})
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     assert package.node.main() == 1
     (line,) = capsys.readouterr().err.splitlines()

@@ -1,5 +1,6 @@
 """Scans from rclpy and features to rclpy, as the bytes that ROS 2 has on the wire."""
 
+import time
 from functools import partial
 from typing import Any
 
@@ -8,13 +9,17 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosidl_runtime_py.utilities import get_message
+from std_srvs.srv import Empty
 
 from lineament.live import LiveConfig
-from lineament.live.received import SCAN, Received, Wanted, wanted
+from lineament.live.received import RELOCATE, SCAN, Received, Wanted, wanted
 from lineament.live.sinks import Publisher
 from lineament.output.scene import Message
 
 __all__ = ["RclpyPublisher", "RclpySource"]
+
+#: The service by which nav2 has a robot looked for anew.
+RELOCATION = "reinitialize_global_localization"
 
 
 class RclpySource:
@@ -43,6 +48,9 @@ class RclpySource:
         self.lost = 0
         self._subscribed = {one.topic: self._subscribe(one) for one in wanted(config)}
         _, self._scans = self._subscribed[config.scan_topic]
+        self._service = None
+        if config.is_localiser:
+            self._service = node.create_service(Empty, RELOCATION, self._relocate)
 
     @property
     def ended(self) -> bool:
@@ -78,6 +86,8 @@ class RclpySource:
         """End the subscriptions."""
         for _, subscription in self._subscribed.values():
             self._node.destroy_subscription(subscription)
+        if self._service is not None:
+            self._node.destroy_service(self._service)
 
     def _subscribe(self, wanted: Wanted) -> tuple[str, Any]:
         """Subscribe to a topic; return its type, and the subscription."""
@@ -97,6 +107,12 @@ class RclpySource:
 
     def _put(self, wanted: Wanted, data: bytes, info: Any) -> None:
         self._came.append(wanted.received(_publisher(info), data, "cdr"))
+
+    def _relocate(self, _: Any, response: Any) -> Any:
+        """Answer the service: the robot is looked for on the whole plan."""
+        now = time.monotonic()
+        self._came.append(Received("the service", lambda: None, now, RELOCATE))
+        return response
 
     def _note_lost(self, status: Any) -> None:
         self.lost = int(status.total_count)

@@ -1,57 +1,33 @@
-"""The node: `lineament live`, configured by parameters of ROS."""
+"""The node: `lineament live`, configured by parameters of ROS, as a lifecycle node."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
-from contextlib import ExitStack, closing
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import replace
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.signals import SignalHandlerOptions
 
 from lineament import LineamentError
-from lineament.live import LiveConfig, Node, Pipeline, RosSink
+from lineament.live import LiveConfig, Node, Pipeline, RosSink, make_pipeline
 from lineament.output.ros_messages import RosMessages
 from lineament.tasks.warmup import warm_up
 
 from .bridge import RclpyPublisher, RclpySource
+from .parameters import DESCRIPTIONS, FIELDS, config_of
 
-__all__ = ["config_of", "main"]
+__all__ = ["Scanner", "main"]
 
-#: Parameters of `LiveConfig`; names, domain and namespace are those of ROS.
-KNOWN = (
-    "topic",
-    "type",
-    "echo",
-    "stamp",
-    "reliability",
-    "depth",
-    "method",
-    "noise",
-    "deskew",
-    "laser_pose",
-    "upside_down",
-    "track",
-    "dock",
-    "dock_track",
-    "dock_shape",
-    "map",
-    "layers",
-    "units",
-    "odometry",
-    "map_frame",
-    "odom_frame",
-    "base_frame",
-    "transform_tolerance",
-    "broadcast",
-    "judge",
-)
-#: Below this are the parameters of the method: parameters.evidence.
-OF_METHOD = "parameters"
+#: Whether the node configures and activates itself; a manager does so otherwise.
+AUTOSTART = "autostart"
 #: What any node of rclpy may have.
 OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
@@ -64,8 +40,11 @@ def main() -> int:
     # Otherwise ROS would be gone before the last report.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
-        with ExitStack() as stack:
-            _node(stack).run(stopped.is_set)
+        scanner = Scanner()
+        try:
+            scanner.spin(stopped.is_set)
+        finally:
+            scanner.destroy_node()
     except LineamentError as error:
         print(f"lineament: {error}", file=sys.stderr)
         return 1
@@ -74,63 +53,123 @@ def main() -> int:
     return 0
 
 
-def _node(stack: ExitStack) -> Node:
-    """Make the node from its parameters; `stack` closes all of it."""
-    node = rclpy.create_node("lineament", automatically_declare_parameters_from_overrides=True)
-    stack.callback(node.destroy_node)
-    try:
-        config = config_of(node)
-        pipeline = Pipeline(config)
-        # The first scan must not wait for kernels.
-        warm_up([config.method])
-    except ValueError as error:
-        raise LineamentError(str(error)) from None
-    executor = SingleThreadedExecutor()
-    stack.callback(executor.shutdown)
-    executor.add_node(node)
-    # Names as ROS resolves them: with remappings and the namespace of the node.
-    topics = {"topic": node.resolve_topic_name(config.topic)}
-    for name in ("deskew", "odometry"):
-        topic = str(getattr(config, name))
-        if config.resolved(topic) == config.odometry_topic:
-            topics[name] = node.resolve_topic_name(topic)
-    resolved = replace(config, namespace=node.get_namespace(), **topics)
-    source = stack.enter_context(closing(RclpySource(node, executor, resolved)))
-    publisher = stack.enter_context(closing(RclpyPublisher(node, config.depth)))
-    sink = RosSink(publisher, RosMessages("cdr"), resolved)
-    return Node(source, pipeline, [sink], write=node.get_logger().info)
+class Scanner(LifecycleNode):
+    """A lifecycle node that finds features while it is active.
 
-
-def config_of(node: rclpy.node.Node) -> LiveConfig:
-    """Make a configuration from the parameters of a node, and declare those that were not given.
-
-    Raises
-    ------
-    LineamentError
-        If a parameter is not known.
-    ValueError
-        If a value is out of bounds.
+    Its parameters are read when it is configured: method and plan are loaded then. It subscribes
+    and publishes while it is active. Parameters of `lineament.live.pipeline.CHANGEABLE` may be set
+    while it is; others are refused until it is cleaned up.
     """
-    for name in node.get_parameters_by_prefix(""):
-        if name.partition(".")[0] not in (*KNOWN, OF_METHOD, *OF_ROS):
-            raise LineamentError(
-                f"parameter {name} is not known, expected one of "
-                f"{', '.join(KNOWN)}, {OF_METHOD}.NAME"
-            )
-    for known in fields(LiveConfig):
-        is_given = known.name not in KNOWN or node.has_parameter(known.name)
-        if not is_given and known.default is not None:
-            node.declare_parameter(known.name, known.default)
-    given = {name: _value(node, name) for name in KNOWN if node.has_parameter(name)}
-    of_method = {
-        name: _value(node, f"{OF_METHOD}.{name}")
-        for name in node.get_parameters_by_prefix(OF_METHOD)
-    }
-    return LiveConfig(name=node.get_name(), parameters=of_method, **given)
 
+    def __init__(self) -> None:
+        super().__init__(
+            "lineament",
+            automatically_declare_parameters_from_overrides=True,
+            # Those of the method have names that depend on the method.
+            allow_undeclared_parameters=True,
+        )
+        self._config: LiveConfig | None = None
+        self._pipeline: Pipeline | None = None
+        self._is_active = False
+        self._why = ""
+        for name, field in FIELDS.items():
+            if not self.has_parameter(name):
+                about = ParameterDescriptor(description=DESCRIPTIONS[name], dynamic_typing=True)
+                # An empty list has no type in ROS.
+                self.declare_parameter(name, None if field.default == () else field.default, about)
+        if not self.has_parameter(AUTOSTART):
+            self.declare_parameter(AUTOSTART, True)
+        self.add_on_set_parameters_callback(self.on_set)
 
-def _value(node: rclpy.node.Node, name: str) -> Any:
-    value = node.get_parameter(name).value
-    if name == "deskew" and value is False:
-        return "off"  # so YAML reads it
-    return value if isinstance(value, bool | int | float | str) else tuple(value)
+    def spin(self, is_stopped: Callable[[], bool]) -> None:
+        """Do what is asked for, and find features while active, until it is stopped.
+
+        LineamentError if the node is to start by itself and cannot.
+        """
+        executor = SingleThreadedExecutor()
+        executor.add_node(self)
+        try:
+            if self.get_parameter(AUTOSTART).value:
+                done = self.trigger_configure() == TransitionCallbackReturn.SUCCESS
+                if not done:
+                    raise LineamentError(self._why)
+                self.trigger_activate()
+            while not is_stopped() and self.context.ok():
+                if self._is_active:
+                    self._work(executor, lambda: is_stopped() or not self._is_active)
+                else:
+                    executor.spin_once(timeout_sec=0.1)
+        finally:
+            executor.shutdown()
+
+    def on_configure(self, state: Any) -> TransitionCallbackReturn:
+        """Read the parameters, and load the method and the plan."""
+        try:
+            self._config = self._asked()
+            self._pipeline = make_pipeline(self._config)
+            # The first scan must not wait for kernels.
+            warm_up([self._config.method])
+        except (ValueError, LineamentError) as error:
+            self._why = str(error)
+            self.get_logger().error(self._why)
+            return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: Any) -> TransitionCallbackReturn:
+        """Begin to listen."""
+        self._is_active = True
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
+        """End listening; tracks and the place on the plan stay known."""
+        self._is_active = False
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: Any) -> TransitionCallbackReturn:
+        """Forget all that was seen."""
+        self._config = self._pipeline = None
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: Any) -> TransitionCallbackReturn:
+        """End listening for good."""
+        self._is_active = False
+        return super().on_shutdown(state)
+
+    def on_set(self, changed: Iterable[Any]) -> SetParametersResult:
+        """Take changed parameters over, or say in one line why not."""
+        try:
+            config = self._asked({one.name: one.value for one in changed})
+            if self._pipeline is not None:
+                self._pipeline.change(config)
+                self._config = config
+        except (ValueError, LineamentError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _asked(self, changed: dict[str, Any] | None = None) -> LiveConfig:
+        """Return the configuration by the parameters as they are, or will be."""
+        names = self.get_parameters_by_prefix("")
+        given = {name: self.get_parameter(name).value for name in names} | (changed or {})
+        others = (*OF_ROS, AUTOSTART)
+        own = {name: v for name, v in given.items() if name.partition(".")[0] not in others}
+        return config_of(own, name=self.get_name())
+
+    def _work(self, executor: SingleThreadedExecutor, is_stopped: Callable[[], bool]) -> None:
+        """Find features until it is stopped."""
+        assert self._config is not None
+        assert self._pipeline is not None
+        config = self._config
+        # Names as ROS resolves them: with remappings and the namespace of the node.
+        topics = {"topic": self.resolve_topic_name(config.topic)}
+        topics["merge"] = tuple(map(self.resolve_topic_name, config.merge))
+        for name in ("deskew", "odometry"):
+            topic = str(getattr(config, name))
+            if config.resolved(topic) == config.odometry_topic:
+                topics[name] = self.resolve_topic_name(topic)
+        resolved = replace(config, namespace=self.get_namespace(), **topics)
+        with (
+            closing(RclpySource(self, executor, resolved)) as source,
+            closing(RclpyPublisher(self, config.depth)) as publisher,
+        ):
+            sink = RosSink(publisher, RosMessages("cdr"), resolved)
+            Node(source, self._pipeline, [sink], write=self.get_logger().info).run(is_stopped)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .received import Received as Received
     from .received import Source as Source
     from .replay import ReplaySource as ReplaySource
+    from .running import make_pipeline as make_pipeline
     from .running import run_live as run_live
     from .sinks import FoxgloveSink as FoxgloveSink
     from .sinks import RosSink as RosSink
@@ -33,7 +34,7 @@ _HOMES = {
     "pipeline": "Frame Pipeline",
     "received": "Odometry Received Source",
     "replay": "ReplaySource",
-    "running": "run_live",
+    "running": "make_pipeline run_live",
     "sinks": "FoxgloveSink RosSink Sink",
     "toml": "read_config",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import TYPE_CHECKING, NamedTuple
 
 from .._copies import InTurn, in_turn
@@ -38,6 +39,8 @@ _OLDEST = 0.5
 _LONGEST = 1.0
 #: Scans in a row without a known motion after which this is a message: odometry may begin late.
 _MANY = 20
+#: Fields of `LiveConfig` that may change while a node runs.
+CHANGEABLE = ("method", "parameters", "noise", "scale", "stamp", "mask")
 
 
 def time_of(scan: LaserScan) -> tuple[int, int]:
@@ -112,12 +115,12 @@ class Pipeline(InTurn):
     def __init__(self, config: LiveConfig) -> None:
         self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
-        known = self._publisher("")  # An unknown method is an error at once.
+        self._publisher("")  # An unknown method is an error at once.
         self._localiser = None
         if config.map is not None:
             from .localiser import Localiser
 
-            self._localiser = Localiser(config, plan_of(config), known.extractor)
+            self._localiser = Localiser(config, plan_of(config), self._extract)
         self._odometry: Odometry | None = None
         self._unmoved = 0
         self._problems: set[str] = set()
@@ -183,6 +186,25 @@ class Pipeline(InTurn):
         return scan.masked(self._config.mask) if self._config.mask else scan
 
     @in_turn
+    def change(self, config: LiveConfig) -> None:
+        """Go on with another method, noise, scale, stamp or mask; tracks and places stay.
+
+        ValueError if the method or a parameter is unknown, or the configuration differs in what is
+        read once, at the start; then nothing changes.
+        """
+        for one in fields(config):
+            was, will = getattr(self._config, one.name), getattr(config, one.name)
+            if one.name not in CHANGEABLE and was != will:
+                raise ValueError(
+                    f"{one.name} is read at the start, expected a change of one of "
+                    f"{', '.join(CHANGEABLE)}"
+                )
+        extractors = [extractor_of(config) for _ in self._publishers]
+        self._config = config
+        for kept, extractor in zip(self._publishers.values(), extractors, strict=True):
+            kept.extractor = extractor
+
+    @in_turn
     def hear(self, message: Heard, what: str = ODOMETRY) -> None:
         """Take what was heard beside the scans, the newest odometry say; ValueError for nonsense.
 
@@ -240,6 +262,9 @@ class Pipeline(InTurn):
         twist = twist_of_laser(odometry.twist, self._config.laser_pose)
         return turned_over(twist) if self._config.upside_down else twist
 
+    def _extract(self, scan: LaserScan) -> Features:
+        return self._publisher("").extractor(scan)
+
     def _publisher(self, name: str) -> _Publisher:
         if name not in self._publishers:
             if len(self._publishers) >= _MOST_PUBLISHERS:
@@ -252,12 +277,16 @@ class _Publisher:
     """What is kept of a publisher from scan to scan."""
 
     def __init__(self, config: LiveConfig) -> None:
-        method = get_method(config.method, **config.parameters)
-        self.extractor = Extractor(method, noise=config.noise)
+        self.extractor = extractor_of(config)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
         self.dock = dock_of(config) if config.is_docking else None
         self.last: LaserScan | None = None
+
+
+def extractor_of(config: LiveConfig) -> Extractor:
+    """Make the extractor that is configured."""
+    return Extractor(get_method(config.method, **config.parameters), noise=config.noise)
 
 
 def plan_of(config: LiveConfig) -> LineMap | None:

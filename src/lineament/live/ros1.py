@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import xmlrpc.client
 from collections.abc import Callable
 from functools import cache, partial
@@ -11,7 +12,7 @@ from typing import Any
 from ..errors import LineamentError, one_line
 from ..output.scene import Message
 from .config import LiveConfig
-from .received import SCAN, Inbox, Received, Wanted, wanted
+from .received import RELOCATE, SCAN, Inbox, Received, Wanted, wanted
 from .sinks import Publisher
 
 #: How long the master may take to answer [s].
@@ -71,6 +72,20 @@ class Ros1Node:
             topic, _raw(kind), tcp_nodelay=True, latch=is_latched, queue_size=depth
         )
 
+    def serve(self, service: str, kind: str, called: Callable[[], None]) -> None:
+        """Answer the calls of a service that neither takes nor returns anything."""
+        from roslib.message import get_service_class
+
+        genuine = get_service_class(kind)
+        if genuine is None:
+            raise _no_type(kind)
+
+        def answer(_: Any) -> Any:
+            called()
+            return genuine._response_class()
+
+        self._rospy.Service(service, genuine, answer)
+
     def close(self) -> None:
         """Leave ROS, and close all topics; a process cannot come back."""
         self._rospy.signal_shutdown("closed")
@@ -88,6 +103,8 @@ class Ros1Source:
         }
         scans = [one.topic for one in wanted(config) if one.what == SCAN]
         self._scans = [self._subscribed[topic][1] for topic in scans]
+        if config.is_localiser:  # The service that AMCL has.
+            node.serve(config.resolved("global_localization"), "std_srvs/Empty", self._relocate)
 
     @property
     def lost(self) -> int:
@@ -133,6 +150,9 @@ class Ros1Source:
         missing = self._missing(publisher, message.raw) if wanted.what == SCAN else 0
         self._inbox.put(came, missing)
 
+    def _relocate(self) -> None:
+        self._inbox.put(Received("the service", lambda: None, time.monotonic(), RELOCATE), 0)
+
     def _missing(self, publisher: str, data: bytes) -> int:
         """Count the scans between the last of a publisher and this one, by their numbers."""
         number = int.from_bytes(data[:4], "little")
@@ -173,8 +193,7 @@ def _raw(kind: str) -> Any:
 
     genuine = get_message_class(kind)
     if genuine is None:
-        package = kind.partition("/")[0]
-        raise LineamentError(f"ROS 1 has no {kind}: its package {package} is not installed")
+        raise _no_type(kind)
 
     class Raw(genuine):  # type: ignore[misc, valid-type]
         __slots__ = ("raw",)
@@ -191,6 +210,11 @@ def _raw(kind: str) -> Any:
             return self
 
     return Raw
+
+
+def _no_type(kind: str) -> LineamentError:
+    package = kind.partition("/")[0]
+    return LineamentError(f"ROS 1 has no {kind}: its package {package} is not installed")
 
 
 def _publisher(message: Any) -> str:

@@ -56,7 +56,7 @@ def run_live(
         with _loading(stack):
             # Other nodes are discovered while the kernels are loaded.
             source, sinks = _ends(config, stack, write)
-            pipeline = MergingPipeline(config) if config.merge else Pipeline(config)
+            pipeline = make_pipeline(config)
             # The motion of tracks is estimated from the second scan on.
             with compiling():
                 for frame in (pipeline("", WALL), pipeline("", WALL)):
@@ -65,6 +65,11 @@ def run_live(
         topics = ", ".join(config.rig.topics) if config.merge else config.scan_topic
         write(f"{config.name} finds features on {topics} by {config.method}")
         return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
+
+
+def make_pipeline(config: LiveConfig) -> Pipeline:
+    """Make the pipeline of a configuration: of one scanner, or of several as one."""
+    return MergingPipeline(config) if config.merge else Pipeline(config)
 
 
 @contextmanager
