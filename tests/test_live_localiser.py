@@ -7,13 +7,21 @@ from __future__ import annotations
 
 import math
 import struct
-from functools import cache, partial
-from itertools import islice
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 import pytest
 from live_driving import Running, eventually, heard
+from robot_driving import (
+    MOUNTING,
+    Moment,
+    driven,
+    link_message,
+    message_of,
+    off,
+    pose_of,
+    written,
+)
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig, Pipeline, RosSink
@@ -34,47 +42,13 @@ from lineament.rosmsg.frames import Frames
 from lineament.rosmsg.grids import OccupancyGrid
 from lineament.rosmsg.poses import Odometry, StampedPose, stamped_poses
 from lineament.scan import Pose
-from lineament.scan.poses import compose, inverse, relative
-from lineament.simulation import SENSORS, Wheels, office
-
-MOUNTING = (0.25, -0.1, 0.4)
-RATE = 5.0
-
-
-class Moment(NamedTuple):
-    """A scan, where the robot believes that it has come to, and where it is."""
-
-    scan: ln.LaserScan
-    believed: Pose
-    base: Pose
-
-
-@cache
-def driven(seed: int = 1, count: int = 60) -> tuple[Moment, ...]:
-    """Drive through a storey, from the time 100 s on."""
-    storey = office(seed, (30, 20))
-    scans, truth = storey.drive(
-        SENSORS["lms181"], seed=seed, speed=0.7, rate=RATE, wheels=Wheels(), people=2
-    )
-    on_robot = inverse(MOUNTING)
-    return tuple(
-        Moment(
-            scan.with_pose(None).stamped("first", round(1e9 * (100 + scan.stamp))),
-            compose(scan.pose, on_robot),
-            compose(true, on_robot),
-        )
-        for scan, true in islice(zip(scans, truth, strict=True), count)
-    )
+from lineament.scan.poses import compose
+from lineament.simulation import office
 
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> str:
     return written(tmp_path_factory.mktemp("plan") / "own.dxf", 1)
-
-
-def written(path, seed: int) -> str:
-    LineMap.from_lines(office(seed, (30, 20)).plan.segments, side=1).write(path)
-    return str(path)
 
 
 def named(scan: ln.LaserScan, frame: str) -> ln.LaserScan:
@@ -110,11 +84,6 @@ class Robot:
             self.move(moment)
             frames.append(self.see(moment))
         return frames
-
-
-def off(pose: Pose, true: Pose) -> tuple[float, float]:
-    x, y, turn = relative(true, pose)
-    return math.hypot(x, y), abs(turn)
 
 
 def assert_right(frame: Frame, moment: Moment, most: float = 0.05) -> None:
@@ -435,20 +404,6 @@ def test_what_is_published_of_a_robot_that_is_found_and_lost(plan, broadcast):
     assert "/amcl_pose" in taken._latched
 
 
-def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:
-    sec = math.floor(stamp)
-    header = {"stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))}, "frame_id": parent}
-    x, y, theta = pose
-    turned = {"z": math.sin(theta / 2), "w": math.cos(theta / 2)}
-    transform = {"translation": {"x": x, "y": y}, "rotation": turned}
-    return {"transforms": [{"header": header, "child_frame_id": child, "transform": transform}]}
-
-
-def pose_of(link: dict) -> Pose:
-    place, turned = link["translation"], link["rotation"]
-    return place["x"], place["y"], 2 * math.atan2(turned["z"], turned["w"])
-
-
 def test_over_dds_as_nav2_has_it(peer, domain, plan):
     """A mounting that was said before the node came, and a pose for who comes after it."""
     peer.publish("/scan", "LaserScan")
@@ -458,7 +413,7 @@ def test_over_dds_as_nav2_has_it(peer, domain, plan):
     peer.publish("/scan/relocate", "Empty")
     peer.listen("/tf", "TFMessage", 100)
     peer.write("/tf_static", link_message(0.0, "base_link", "laser", MOUNTING))
-    moments, beams = driven(), driven()[0].scan
+    moments = driven()
     steps = iter(range(len(moments)))
     with Running(domain=domain, map=plan, base_frame="base_link") as node:
         told = ("/scan", "/tf", "/tf_static", "/initialpose", "/scan/relocate")
@@ -468,18 +423,7 @@ def test_over_dds_as_nav2_has_it(peer, domain, plan):
             moment = moments[k := next(steps)]
             stamp = moment.scan.stamp
             peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
-            sec = math.floor(stamp)
-            scan = {
-                "header": {
-                    "stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))},
-                    "frame_id": "laser",
-                },
-                "angle_min": beams.angle_min,
-                "angle_increment": beams.angle_increment,
-                "range_max": 30.0,
-                "ranges": moment.scan.ranges.tolist(),
-            }
-            peer.write("/scan", scan)
+            peer.write("/scan", message_of(moment.scan, stamp))
             assert k < 55
 
         def link() -> dict | None:

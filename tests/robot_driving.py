@@ -1,0 +1,82 @@
+"""A robot that drives through a simulated storey, and what nav2's nodes would send of it."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from itertools import islice
+from typing import Any, NamedTuple
+
+import lineament as ln
+from lineament.mapping import LineMap
+from lineament.scan import Pose
+from lineament.scan.poses import compose, inverse, relative
+from lineament.simulation import SENSORS, Wheels, office
+
+MOUNTING = (0.25, -0.1, 0.4)
+RATE = 5.0
+
+
+class Moment(NamedTuple):
+    """A scan, where the robot believes that it has come to, and where it is."""
+
+    scan: ln.LaserScan
+    believed: Pose
+    base: Pose
+
+
+@cache
+def driven(seed: int = 1, count: int = 60) -> tuple[Moment, ...]:
+    """Drive through a storey, from the time 100 s on."""
+    storey = office(seed, (30, 20))
+    scans, truth = storey.drive(
+        SENSORS["lms181"], seed=seed, speed=0.7, rate=RATE, wheels=Wheels(), people=2
+    )
+    on_robot = inverse(MOUNTING)
+    return tuple(
+        Moment(
+            scan.with_pose(None).stamped("first", round(1e9 * (100 + scan.stamp))),
+            compose(scan.pose, on_robot),
+            compose(true, on_robot),
+        )
+        for scan, true in islice(zip(scans, truth, strict=True), count)
+    )
+
+
+def written(path, seed: int) -> str:
+    LineMap.from_lines(office(seed, (30, 20)).plan.segments, side=1).write(path)
+    return str(path)
+
+
+def off(pose: Pose, true: Pose) -> tuple[float, float]:
+    x, y, turn = relative(true, pose)
+    return math.hypot(x, y), abs(turn)
+
+
+def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:
+    sec = math.floor(stamp)
+    header = {"stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))}, "frame_id": parent}
+    x, y, theta = pose
+    turned = {"z": math.sin(theta / 2), "w": math.cos(theta / 2)}
+    transform = {"translation": {"x": x, "y": y}, "rotation": turned}
+    return {"transforms": [{"header": header, "child_frame_id": child, "transform": transform}]}
+
+
+def pose_of(link: dict) -> Pose:
+    place, turned = link["translation"], link["rotation"]
+    return place["x"], place["y"], 2 * math.atan2(turned["z"], turned["w"])
+
+
+def message_of(scan: ln.LaserScan, stamp: float) -> dict[str, Any]:
+    """A LaserScan of the frame ``laser`` as a driver writes it, at another time."""
+    sec = math.floor(stamp)
+    return {
+        "header": {
+            "stamp": {"sec": sec, "nanosec": round(1e9 * (stamp - sec))},
+            "frame_id": "laser",
+        },
+        "angle_min": scan.angle_min,
+        "angle_increment": scan.angle_increment,
+        "range_max": 30.0,
+        "ranges": scan.ranges.tolist(),
+    }

@@ -1,0 +1,138 @@
+"""The command as nav2's localiser, beside a robot of another process, at 40 Hz.
+
+The node is killed and started again, then the robot; clocks jump an hour ahead, and back to the
+start of a bag that is played anew. A transform that places the robot wrongly is never sent.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+import pytest
+from live_driving import Remote, eventually
+from robot_driving import (
+    MOUNTING,
+    Moment,
+    driven,
+    link_message,
+    message_of,
+    off,
+    pose_of,
+    written,
+)
+
+from lineament.mapping import LineMap
+from lineament.scan.poses import compose
+from lineament.simulation import office
+
+pytestmark = pytest.mark.slow
+
+RATE = 40.0
+#: What the node listens to, and its types.
+HEARD = {
+    "/scan": "LaserScan",
+    "/tf": "TFMessage",
+    "/initialpose": "PoseWithCovarianceStamped",
+}
+
+
+class Robot:
+    """Sends scans and odometry of a drive, and checks each transform that comes back."""
+
+    def __init__(self, domain: int, map_message: dict[str, Any] | None = None) -> None:
+        self.peer = Remote("dds_peer", domain, "2s")
+        for topic, kind in HEARD.items():
+            self.peer.publish(topic, kind)
+        self.peer.publish("/tf_static", "TFMessage", True, True)
+        self.peer.write("/tf_static", link_message(0.0, "base_link", "laser", MOUNTING))
+        if map_message is not None:
+            self.peer.publish("/map", "OccupancyGrid", True, True)
+            self.peer.write("/map", map_message)
+        self.peer.listen("/tf", "TFMessage", 1000)
+        self.sent: dict[int, Moment] = {}
+        self.due = time.perf_counter()
+
+    def close(self) -> None:
+        self.peer.close()
+
+    def wait_for_the_node(self) -> None:
+        eventually(lambda: all(self.peer.listeners(topic) for topic in HEARD))
+
+    def send(self, moment: Moment, later: float) -> None:
+        """Send what a robot has at a moment, by a clock that is that much later."""
+        stamp = moment.scan.stamp + later
+        self.sent[round(1e3 * stamp)] = moment
+        self.peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
+        self.peer.write("/scan", message_of(moment.scan, stamp))
+        self.due = max(self.due + 1 / RATE, time.perf_counter() - 1.0)
+        time.sleep(max(0.0, self.due - time.perf_counter()))
+
+    def placed(self) -> int:
+        """Check the transforms that have come, and count them."""
+        count = 0
+        for message in self.peer.take("/tf"):
+            for link in message["transforms"]:
+                if link["header"]["frame_id"] != "map":
+                    continue
+                stamp = link["header"]["stamp"]
+                # They hold for a second from the scan on.
+                moment = self.sent[round(1e3 * (stamp["sec"] - 1) + stamp["nanosec"] / 1e6)]
+                way, turn = off(compose(pose_of(link["transform"]), moment.believed), moment.base)
+                assert way < 0.1, "a transform places the robot wrongly"
+                assert turn < 0.03
+                count += 1
+        return count
+
+    def until_placed(self, moments: Iterator[Moment], later: float) -> None:
+        """Drive on until the robot has been placed ten times."""
+        counts = []
+
+        def is_placed() -> bool:
+            self.send(next(moments), later)
+            counts.append(self.placed())
+            return sum(counts) >= 10
+
+        eventually(is_placed, pause=0.0)
+
+
+def map_message() -> dict[str, Any]:
+    """The storey as map_server sends it."""
+    walls = office(1, (30, 20)).plan.segments
+    grid = LineMap.from_lines(walls, side=1).to_grid(0.05)
+    cells = np.where(grid.occupied, 100, 0).astype(np.int8)
+    height, width = cells.shape
+    x, y, _ = grid.origin
+    info = {"resolution": 0.05, "width": width, "height": height}
+    info["origin"] = {"position": {"x": x, "y": y}, "orientation": {"w": 1.0}}
+    return {"header": {"frame_id": "map"}, "info": info, "data": cells.ravel().tolist()}
+
+
+@pytest.mark.parametrize("is_topic", [False, True], ids=["file", "topic"])
+def test_killed_started_again_and_with_clocks_that_jump(started, domain, tmp_path, is_topic):
+    plan = "/map" if is_topic else written(tmp_path / "own.dxf", 1)
+    message = map_message() if is_topic else None
+    moments = cycle(driven(count=300))
+    with closing(Robot(domain, message)) as robot:
+        node = started("--map", plan)
+        node.until_it_writes("finds features")
+        robot.wait_for_the_node()
+        robot.until_placed(moments, 0.0)
+        node.kill()
+        node = started("--map", plan)
+        # The mounting and the map, which were sent once, are latched.
+        node.until_it_writes("finds features")
+        robot.wait_for_the_node()
+        robot.until_placed(moments, 0.0)
+        # An hour ahead, and back to the start: a bag that is played anew.
+        robot.until_placed(moments, 3600.0)
+        robot.until_placed(moments, -90.0)
+    with closing(Robot(domain, message)) as robot:
+        robot.wait_for_the_node()
+        robot.until_placed(cycle(driven(count=300)), 7200.0)
+    assert not any("Traceback" in line for line in node.lines)
+    assert node.stop().endswith("malformed messages\n")
