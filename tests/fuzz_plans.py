@@ -17,9 +17,9 @@ from mutations import damaged
 
 import lineament as ln
 from lineament import LineamentError
+from lineament.drawings import UNITS
 from lineament.limits import LIMITS
 from lineament.mapping import LineMap, locate
-from lineament.mapping.drawings import UNITS
 from lineament.mapping.line_map import FARTHEST, LONGEST
 from lineament.simulation import SENSORS, World
 from lineament.simulation.buildings import office

@@ -53,3 +53,11 @@ def test_kernels_have_at_most_twelve_parameters():
 def test_words_are_those_of_the_field(path):
     lines = path.read_text(encoding="utf-8").splitlines()
     assert [f"{k}: {line.strip()}" for k, line in enumerate(lines, 1) if PRIVATE.search(line)] == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_no_room_reaches_for_the_roof(path):
+    """Of imports of the whole package the contracts of the floors know nothing."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    imported = [a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names]
+    assert not {"lineament", "lineament_lab"} & set(imported)

@@ -10,10 +10,10 @@ from ezdxf.units import METER_FACTOR
 
 import lineament as ln
 from lineament.cli import run
+from lineament.drawings import UNITS
 from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
 from lineament.mapping import LineMap, locate
-from lineament.mapping.drawings import UNITS
 from lineament.simulation import SENSORS, drive, office, room
 
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)

@@ -20,8 +20,8 @@ import lineament as ln
 from lineament.cli import run
 from lineament.features import TABLES, noise_row
 from lineament.methods import METHODS, method_names, stages
-from lineament.output import notebook
 from lineament.simulation import Sensor
+from lineament.view import notebook
 
 mpl.use("agg")
 RING = full_circle(360)

@@ -8,7 +8,7 @@ import pytest
 
 import lineament as ln
 from lineament.features import TABLES, FeatureBatch, Features
-from lineament.features.tables import SCHEMA, batch_table, features_table
+from lineament.features.tables import SCHEMA, features_table
 
 DOCS = Path(__file__).parents[1] / "docs" / "formats.md"
 
@@ -123,7 +123,7 @@ def test_batch_gives_the_same_table_as_its_scans():
         noises=np.zeros((5, 5)),
         frame_id="laser",
     )
-    assert batch_table(batch, 7).equals(features_table(scans, 7))
+    assert batch.to_arrow(7).equals(features_table(scans, 7))
     assert batch.to_arrow().schema.metadata == features_table(scans).schema.metadata
     views = list(batch)  # slices of one large array
     assert features_table(views).equals(features_table(scans))

@@ -13,7 +13,7 @@ Features(1 segments, 0 corners, 0 edges, 0 arcs, 2 breakpoints, 1 clusters, stam
 
 from typing import TYPE_CHECKING
 
-from ._lazy import lazily
+from ._lazy import Pictured, lazily
 from ._version import __version__
 
 if TYPE_CHECKING:
@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from .methods.trace import Trace
     from .motion.deskew import deskew
     from .motion.tracker import Tracker
-    from .output.notebook import picture as picture
-    from .output.notebook import plot as plot
     from .scan import LaserScan, RangeNoise
+    from .view.notebook import plot as plot
 
 _HOME = {
     "Extractor": "extractor",
@@ -46,15 +45,16 @@ _HOME = {
     "logs": "",
     "methods": "",
     "open_log": "logs",
-    "plot": "output.notebook",
+    "plot": "view.notebook",
     "simulation": "",
     "trace": "extractor",
 }
 
 __all__ = [*_HOME, "__version__"]
 
-
-__getattr__ = lazily(__name__, {**_HOME, "picture": "output.notebook"})
+__getattr__ = lazily(__name__, _HOME)
+# The package alone knows all floors: what is found on a low one is drawn on a high one.
+Pictured._drawn_by = f"{__name__}.view.notebook"
 
 
 def __dir__() -> list[str]:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 
 def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
@@ -30,10 +30,16 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 class Pictured:
-    """Is a picture in notebooks. Pictures are drawn on a higher floor: the package knows where."""
+    """Is a picture in notebooks, which the package's choice of module draws."""
 
     __slots__ = ()
 
+    #: Name of the module that draws: it has `picture` and `plot`.
+    _drawn_by: ClassVar[str]
+
+    def _drawing(self) -> Any:
+        return import_module(self._drawn_by)
+
     def _repr_html_(self) -> str:
-        html: str = import_module(__package__).picture(self)
+        html: str = self._drawing().picture(self)
         return html

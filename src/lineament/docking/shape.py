@@ -9,9 +9,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..drawings import read_drawing
 from ..errors import LineamentError
 from ..limits import LIMITS
-from ..mapping.drawings import read_drawing
 from ..scan import Array, Pose
 
 #: A shape is no smaller and no larger [m], and has no more straight pieces.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._copies import ReadOnly, locked
+from ..scan.fields import nanoseconds
 from .features import Features, Tabled, sizes
 from .records import TABLES
 from .written import noise_of
@@ -109,6 +110,10 @@ class FeatureBatch(Tabled, ReadOnly):
         return (self[i] for i in range(len(self)))
 
     def to_arrow(self, scan: int = 0) -> pa.Table:  # noqa: D102 (as in the base)
-        from .tables import batch_table
+        from .tables import table_of
 
-        return batch_table(self, scan)
+        parts = {name: (getattr(self, name), np.diff(self.offsets[name])) for name in TABLES}
+        m, n = self.clusters.shape
+        frames = [self.frame_id] if m else []
+        stamps = self.stamps, [nanoseconds(stamp) for stamp in self.stamps.tolist()]
+        return table_of(parts, self.clusters.ravel(), np.full(m, n), stamps, scan, frames)

@@ -14,7 +14,7 @@ from .._copies import ReadOnly
 from .._lazy import Pictured
 from ..errors import needed_by
 from ..scan import LaserScan, RangeNoise
-from ..scan.fields import checked_pose, covariance_of_pose, nanoseconds
+from ..scan.fields import checked_pose, covariance_of_pose
 from .records import TABLES
 from .written import LazyFields
 
@@ -99,14 +99,6 @@ class Features(Tabled, LazyFields, ReadOnly, Pictured):
     frame_id: str = ""
     noise: RangeNoise | None = None
     scan: LaserScan | None = None
-
-    @property
-    def stamp_ns(self) -> int:
-        """The stamp in nanoseconds [ns], exactly as the scan has it."""
-        scan = self.scan
-        if scan is not None and scan.stamp == self.stamp:
-            return scan.stamp_ns
-        return nanoseconds(self.stamp)
 
     def __len__(self) -> int:
         return sum(len(getattr(self, name)) for name in TABLES)
@@ -205,9 +197,8 @@ class Features(Tabled, LazyFields, ReadOnly, Pictured):
 
         `scan` is needed where the features do not have it themselves: those of a batch.
         """
-        import lineament
-
-        return lineament.plot(self, scan, ax=ax)
+        axes: Axes = self._drawing().plot(self, scan, ax=ax)
+        return axes
 
     def to_arrow(self, scan: int = 0) -> pa.Table:  # noqa: D102 (as in the base)
         from .tables import features_table

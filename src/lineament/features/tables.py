@@ -9,16 +9,68 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .._version import __version__
-from ..scan.fields import nanoseconds
-from .arrow import array_of, texts
 from .records import COLUMNS, FIELDS, SHARED_COLUMNS, TABLES, TEXTS, Field, numbers, text_codes
 
 if TYPE_CHECKING:
-    from .batch import FeatureBatch
-    from .features import Features
+    from .written import LazyFields
+
+# Columns by their buffers: `pyarrow.array` imports pandas, where that is installed.
+
+
+def array_of(values: ArrayLike, is_null: ArrayLike | None = None) -> pa.Array:
+    """Return numbers or booleans as an array of Arrow, null where `is_null`.
+
+    Contiguous numbers are not copied: they must not change later.
+
+    Examples
+    --------
+    >>> array_of([1.5, 2.5, 3.5], [False, True, False]).to_pylist()
+    [1.5, None, 3.5]
+    """
+    numbers = np.ascontiguousarray(values)
+    valid = None if is_null is None else _bits(~np.asarray(is_null, np.bool_))
+    data = _bits(numbers) if numbers.dtype == np.bool_ else pa.py_buffer(numbers)
+    return pa.Array.from_buffers(pa.from_numpy_dtype(numbers.dtype), len(numbers), [valid, data])
+
+
+def texts(words: Sequence[str]) -> pa.Array:
+    """Return words as an array of Arrow.
+
+    Examples
+    --------
+    >>> texts(["wall", "", "Säule"]).to_pylist()
+    ['wall', '', 'Säule']
+    """
+    raw = [word.encode() for word in words]
+    ends = np.cumsum([0, *map(len, raw)], dtype=np.int32)
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(raw))]
+    return pa.Array.from_buffers(pa.string(), len(raw), buffers)
+
+
+def numbers_of(array: pa.ChunkedArray) -> NDArray[Any]:
+    """Return the numbers of a column that has no nulls.
+
+    Examples
+    --------
+    >>> numbers_of(pa.chunked_array([array_of([1, 2, 3])])).tolist()
+    [1, 2, 3]
+    """
+    whole, dtype = array.combine_chunks(), np.dtype(array.type.to_pandas_dtype())
+    if isinstance(whole, pa.ChunkedArray):  # as older versions of pyarrow return it
+        whole = whole.chunk(0) if whole.num_chunks else array_of(np.empty(0, dtype))
+    if not len(whole):
+        return np.empty(0, dtype)
+    return np.frombuffer(whole.buffers()[1], dtype, len(whole), whole.offset * dtype.itemsize)
+
+
+def _bits(values: NDArray[np.bool_]) -> pa.Buffer:
+    return pa.py_buffer(np.packbits(values, bitorder="little"))
+
+
+# The table.
 
 #: Values of the column `kind`, in the order in which the rows of a scan come.
 _ROWS = texts([*(table[:-1] for table in TABLES), "cluster"])
@@ -50,7 +102,7 @@ def _schema() -> pa.Schema:
 SCHEMA = _schema()
 
 
-def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
+def features_table(scans: Sequence[LazyFields], first_scan: int = 0) -> pa.Table:
     """Make the table of some scans, numbered from `first_scan`; their beam counts may differ.
 
     Its schema is `SCHEMA`, its metadata name the frames of the scans, and its rows are ordered by
@@ -71,16 +123,7 @@ def features_table(scans: Sequence[Features], first_scan: int = 0) -> pa.Table:
     labels = np.frombuffer(b"".join(raw), np.int32)
     stamps = np.array([f.stamp for f in scans], dtype=np.float64), [f.stamp_ns for f in scans]
     frames = list(dict.fromkeys(f.frame_id for f in scans))
-    return _table(parts, labels, beams, stamps, first_scan, frames)
-
-
-def batch_table(batch: FeatureBatch, first_scan: int = 0) -> pa.Table:
-    """Make the table of a batch, without a loop over its scans; see `features_table`."""
-    parts = {name: (getattr(batch, name), np.diff(batch.offsets[name])) for name in TABLES}
-    m, n = batch.clusters.shape
-    frames = [batch.frame_id] if m else []
-    stamps = batch.stamps, [nanoseconds(stamp) for stamp in batch.stamps.tolist()]
-    return _table(parts, batch.clusters.ravel(), np.full(m, n), stamps, first_scan, frames)
+    return table_of(parts, labels, beams, stamps, first_scan, frames)
 
 
 def _lengths(raw: list[bytes], dtype: np.dtype[Any]) -> NDArray[np.int64]:
@@ -88,7 +131,7 @@ def _lengths(raw: list[bytes], dtype: np.dtype[Any]) -> NDArray[np.int64]:
     return np.array([*map(len, raw)], np.int64) // dtype.itemsize
 
 
-def _table(
+def table_of(
     parts: dict[str, tuple[NDArray[np.void], NDArray[np.int64]]],
     labels: NDArray[np.int32],
     beams: NDArray[np.int64],
@@ -96,7 +139,10 @@ def _table(
     first_scan: int,
     frames: list[str],
 ) -> pa.Table:
-    """Put the rows of each kind straight to where they belong: by scan, then by kind."""
+    """Make the table of records (and how many of them each scan has), labels, and beams by scan.
+
+    The rows of each kind go straight to where they belong: by scan, then by kind.
+    """
     # A scan that ends somewhere is no circle: nothing in it lies over a seam.
     breakpoints, n_breakpoints = parts["breakpoints"]
     ended = np.repeat(np.arange(len(beams)), n_breakpoints)[breakpoints["kind"] == "scan_end"]

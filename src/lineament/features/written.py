@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import LaserScan, NoiseLike, RangeNoise
+from ..scan.fields import nanoseconds
 from .records import TABLES
 
 #: The number of each part of what is written, and its type.
@@ -33,6 +34,17 @@ class LazyFields:
 
     #: Tables, clusters and the row of the noise, as bytes.
     _written: list[bytes]
+    stamp: float
+    frame_id: str
+    scan: LaserScan | None
+
+    @property
+    def stamp_ns(self) -> int:
+        """The stamp in nanoseconds [ns], exactly as the scan has it."""
+        scan = self.scan
+        if scan is not None and scan.stamp == self.stamp:
+            return scan.stamp_ns
+        return nanoseconds(self.stamp)
 
     @classmethod
     def as_written(cls, written: list[bytes], noise: RangeNoise | None, scan: LaserScan) -> Self:

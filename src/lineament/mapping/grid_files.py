@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drawings import check_file, plan_error
 from ..errors import LineamentError
 from ..limits import Limits
 from ..scan import Pose
-from .plans import check_file, plan_error
 
 #: Values of cells, as in ROS.
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1

@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._copies import ReadOnly, locked
+from ..drawings import plan_error, read_drawing
 from ..errors import LineamentError, one_line, warn
 from ..features import ARC, CORNER, Features, make_records
 from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
-from .drawings import read_drawing
 from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
 from .index import FARTHEST, LONGEST, MAPPED, Index, make_index, rings
 from .outlines import walls_of_grid
-from .plans import doubts, plan_error, read_table, unknown_plan
+from .plans import doubts, read_table, unknown_plan
 from .sights import columns_shown, walls_shown
 from .svg_plans import read_svg
 from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned_back, walls_of

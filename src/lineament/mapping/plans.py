@@ -1,7 +1,6 @@
 """Plans from files: what all have in common, and tables of features in the frame of the world."""
 
 import os
-import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LineamentError, one_line, shortened
+from ..drawings import check_file, plan_error
+from ..errors import LineamentError
 from ..features import ARC, SEGMENT, TABLES, Features, make_records
 from ..limits import Limits
 from ..scan import Array
@@ -28,15 +28,6 @@ _ENTRIES = ("00", "01", "11", "02", "12", "22")
 _VAGUE, _RIDGE = 1e3, 1e-9
 #: Buildings are so large, along the longer side [m].
 _BUILDINGS = 3.0, 500.0
-
-
-def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
-    """Return what makes an error of one line of what is wrong with a plan."""
-
-    def make(problem: str) -> LineamentError:
-        return LineamentError(one_line(f"{path}: {shortened(problem)}"))
-
-    return make
 
 
 def unknown_plan(ending: str) -> LineamentError:
@@ -68,21 +59,6 @@ def doubts(extent: tuple[float, float], left_out: int, is_grid: bool = False) ->
         )
         said.append(f"is {size}: {why}")
     return "; ".join(said)
-
-
-def check_file(path: str | os.PathLike[str], limits: Limits, name: str = "") -> None:
-    """Raise a LineamentError unless a plan is a regular file within the limit."""
-    error = plan_error(name or path)
-    try:
-        status = Path(path).stat()
-    except OSError as problem:
-        raise error(problem.strerror or "cannot be read") from None
-    except ValueError as problem:  # a null byte in a name that a file holds
-        raise error(f"is no name of a file: {problem}") from None
-    # Pipes and devices may never end.
-    if not stat.S_ISREG(status.st_mode):
-        raise error("is no regular file, expected a plan")
-    limits.check("drawing", status.st_size, error)
 
 
 def read_table(path: str | os.PathLike[str], limits: Limits) -> tuple[Features, int]:

@@ -8,9 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from ..drawings import Drawn, check_file, plan_error
 from ..limits import Limits
-from .drawings import Drawn
-from .plans import check_file, plan_error
 
 _NAME = "{http://www.w3.org/2000/svg}"
 _ENDS = ("x1", "y1", "x2", "y2")

@@ -10,8 +10,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from ..features.arrow import array_of, numbers_of, texts
-from ..features.tables import SCHEMA, features_table
+from ..features.tables import SCHEMA, array_of, features_table, numbers_of, texts
 from ..files import strict_json
 from .writer import Found, Writer
 

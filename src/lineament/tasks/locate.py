@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from ..drawings import NAMES as UNITS
 from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
-from ..mapping.drawings import NAMES as UNITS
 from ..mapping.following import Whereabouts, follow
 from ..mapping.plans import is_a_building
 from ..progress import Track, untracked
@@ -206,7 +206,7 @@ def _write_table(
     import pyarrow.csv
     import pyarrow.parquet as pq
 
-    from ..features.arrow import array_of, texts
+    from ..features.tables import array_of, texts
 
     places = [where for _, where in found]
     known = np.array([where.is_known for where in places])

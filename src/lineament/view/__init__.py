@@ -1,4 +1,4 @@
-"""Logs in the browser: a local server, its JSON answers, and the page that asks for them."""
+"""Logs in the browser, by a local server and its page, and scans and features in notebooks."""
 
 from .server import ViewServer, serve
 from .session import Session

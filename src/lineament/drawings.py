@@ -1,9 +1,10 @@
-"""Plans that are drawings: DXF of any program, with blocks, polylines and curves."""
+"""Drawings as lines and circles: DXF of any program, with blocks, polylines and curves."""
 
 import logging
 import math
 import os
 import re
+import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -12,12 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import LineamentError, needed_by
-from ..limits import Limits
-from ..scan import Array
-from .plans import check_file, plan_error
-from .walls import Numbers
+from .errors import LineamentError, needed_by, one_line, shortened
+from .limits import Limits
+from .scan import Array
 
 #: Metres of the units that $INSUNITS of a DXF names.
 UNITS = {
@@ -39,6 +39,7 @@ _BINARY = b"AutoCAD Binary DXF"
 _APPLICATION = "LINEAMENT"
 _QUIET = logging.NullHandler()
 
+Numbers = NDArray[np.int64]
 _Error = Callable[[str], LineamentError]
 
 
@@ -64,6 +65,30 @@ class _Layout:
     height: int = 0
     places: list[Array] = field(default_factory=list)
     layers: list[Numbers] = field(default_factory=list)
+
+
+def plan_error(path: str | os.PathLike[str]) -> Callable[[str], LineamentError]:
+    """Return what makes an error of one line of what is wrong with a plan."""
+
+    def make(problem: str) -> LineamentError:
+        return LineamentError(one_line(f"{path}: {shortened(problem)}"))
+
+    return make
+
+
+def check_file(path: str | os.PathLike[str], limits: Limits, name: str = "") -> None:
+    """Raise a LineamentError unless a plan is a regular file within the limit."""
+    error = plan_error(name or path)
+    try:
+        status = Path(path).stat()
+    except OSError as problem:
+        raise error(problem.strerror or "cannot be read") from None
+    except ValueError as problem:  # a null byte in a name that a file holds
+        raise error(f"is no name of a file: {problem}") from None
+    # Pipes and devices may never end.
+    if not stat.S_ISREG(status.st_mode):
+        raise error("is no regular file, expected a plan")
+    limits.check("drawing", status.st_size, error)
 
 
 def read_drawing(

@@ -14,12 +14,12 @@ from ..extractor import extract
 from ..features import Features
 from ..logs import Log, open_log
 from ..methods import DEFAULT_METHOD, Method
+from ..output import canvas, drawing
+from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
+from ..output.markers import Markers, markers_of
+from ..output.markup import escape
+from ..output.svg import ROUND
 from ..scan import Array, LaserScan, NoiseLike
-from . import canvas, drawing
-from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
-from .markers import Markers, markers_of
-from .markup import escape
-from .svg import ROUND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
