@@ -54,7 +54,7 @@ def test_our_own_commands_cannot_be_replaced(install, capsys):
 
 
 def test_without_the_laboratory_its_package_is_named(monkeypatch, capsys):
-    monkeypatch.setattr("lineament.cli.finding.plugins", lambda _: {})
+    monkeypatch.setattr("lineament.cli.plugins", lambda _: {})
     assert run(["reproduce", "-o", "x"]) == 2
     said = capsys.readouterr().err
     assert said == (

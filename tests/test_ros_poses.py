@@ -202,7 +202,7 @@ def test_a_scan_with_the_stamp_of_a_pose_does_not_wait(tmp_path, monkeypatch):
             learned.append(len(super().wait(topic, scan)))
             return []
 
-    monkeypatch.setattr("lineament.logs.ros.PoseFinder", Finder)
+    monkeypatch.setattr("lineament.logs.ros_poses.PoseFinder", Finder)
 
     def make(messages):
         yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)

@@ -17,7 +17,7 @@ from .methods.workspace import Block, Blocks, block_capacity, run_batch
 from .progress import compiling
 from .scan import LaserScan, NoiseLike, RangeNoise
 from .scan.fields import numbers
-from .scan.given import FIELDS, no_scan, scan_of
+from .scan.laser_scan import FIELDS, no_scan, scan_of
 from .scan.units import FAR, FEW, warn_of_units, warn_of_whole_numbers
 
 __all__ = ["WALL", "Extractor", "extract", "load_kernels", "trace"]

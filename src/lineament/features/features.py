@@ -116,17 +116,6 @@ class Features(Tabled, LazyFields, ReadOnly, Pictured):
         n_clusters = int(self.clusters.max(initial=-1)) + 1
         return f"Features({sizes(self)}, {n_clusters} clusters, stamp={self.stamp:.3f})"
 
-    def counts(self) -> dict[str, int]:
-        """Return how many features there are, by table.
-
-        Examples
-        --------
-        >>> import lineament as ln
-        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).counts()
-        {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
-        """
-        return {name: len(self.raw(name)) // dtype.itemsize for name, dtype in TABLES.items()}
-
     def transform(
         self,
         x: float,

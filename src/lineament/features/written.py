@@ -77,6 +77,17 @@ class LazyFields:
             return self._written[k]
         return np.asarray(made, dtype).tobytes()
 
+    def counts(self) -> dict[str, int]:
+        """Return how many features there are, by table.
+
+        Examples
+        --------
+        >>> import lineament as ln
+        >>> ln.extract(ln.LaserScan([2.0] * 5, -0.02, 0.01)).counts()
+        {'segments': 1, 'corners': 0, 'edges': 0, 'arcs': 0, 'breakpoints': 2}
+        """
+        return {name: len(self.raw(name)) // dtype.itemsize for name, dtype in TABLES.items()}
+
     def __getstate__(self) -> tuple[None, dict[str, Any]]:
         """Return all fields, made."""
         state: Any = super().__getstate__()

@@ -9,17 +9,19 @@ from functools import partial
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, ClassVar, Self, SupportsIndex, TypeVar, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Self, SupportsIndex, TypeVar, overload
 
 from .._lazy import Pictured
 from ..errors import LogError
 from ..limits import LIMITS, Limits
-from ..rosmsg.poses import StampedPose
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask, check_scale, checked_mask
 from ..scan.fields import STAMPS, checked_mounting
 from ..scan.poses import carried, compose
 from ..scan.units import why_invalid
+
+if TYPE_CHECKING:
+    from ..rosmsg.poses import StampedPose
 
 T = TypeVar("T")
 
@@ -189,7 +191,7 @@ class Log(Pictured, ABC):
         """Return all kinds of messages in the log, scans and others; empty where unknown."""
         return []
 
-    def mountings(self) -> list[StampedPose]:
+    def mountings(self) -> "list[StampedPose]":
         """Return where frames of the robot are fixed in each other; most logs do not say."""
         return []
 

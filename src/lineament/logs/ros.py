@@ -1,17 +1,22 @@
 """Scans from bags of ROS messages, whatever the container."""
 
+from __future__ import annotations
+
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from ..errors import LogError
-from ..rosmsg.poses import TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.scans import CLOUD, decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .base import Log, Topic
 from .ros_bag import Bag, Connection
-from .ros_poses import MAX_POSES, STATIC, PoseFinder
+
+if TYPE_CHECKING:
+    from ..rosmsg.poses import StampedPose
+    from .ros_poses import PoseFinder
 
 #: How many topics an error lists.
 _LISTED = 20
@@ -64,6 +69,9 @@ class RosLog(Log):
 
     def mountings(self) -> list[StampedPose]:
         """Return where frames of the robot are fixed in each other, by ``/tf_static``."""
+        from ..rosmsg.poses import TRANSFORMS, stamped_poses
+        from .ros_poses import MAX_POSES, STATIC
+
         found: list[StampedPose] = []
         for bag in self._bags:
             for connection, data in bag.messages({STATIC}, self._fault):
@@ -115,6 +123,9 @@ class RosLog(Log):
     def _pose_finder(self) -> PoseFinder | None:
         if self.options.pose_topic is None:
             return None
+        from ..rosmsg.poses import TRANSFORMS
+        from .ros_poses import PoseFinder
+
         try:
             is_given = self.options.laser_pose is not None
             mountings = () if is_given else self._topics_of(TRANSFORMS)

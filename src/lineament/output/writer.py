@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
-from .._copies import InTurn, in_turn
+from .._copies import InTurn
 from ..features import Features
 from ..files import naming_errors, written_beside
 from ..scan import LaserScan, Pose
@@ -82,7 +82,6 @@ class Writer(InTurn, ABC):
         with suppress(OSError):
             self._files.close()
 
-    @in_turn
     def write(self, features: Features, scan: LaserScan | None = None, topic: str = "") -> None:
         """Take the features of the next scan.
 
@@ -105,10 +104,12 @@ class Writer(InTurn, ABC):
             raise ValueError(f"topic is {topic!r}, expected one of {', '.join(self.topics)}")
         # Tables keep no ranges until they are written.
         pose = None if scan is None else scan.pose
-        self._waiting.append(Found(features, scan if self.needs_scan else None, topic, pose))
-        if len(self._waiting) >= self.chunk:
-            with naming_errors(self.path):
-                self._flush()
+        found = Found(features, scan if self.needs_scan else None, topic, pose)
+        with self._turn:
+            self._waiting.append(found)
+            if len(self._waiting) >= self.chunk:
+                with naming_errors(self.path):
+                    self._flush()
 
     def _flush(self) -> None:
         if self._waiting:

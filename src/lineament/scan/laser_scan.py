@@ -1,34 +1,25 @@
-"""One sweep of a 2-D laser scanner, as it is given."""
+"""One sweep of a 2-D laser scanner: what it is made of, and what it becomes."""
 
 from __future__ import annotations
 
 import math
-from operator import index
+from pathlib import Path
 from typing import Any, Self, SupportsIndex, overload
 
-from numpy import nan, ndarray, where
+from numpy import nan, where
 from numpy.typing import ArrayLike
 
 from .beams import Beams
 from .changes import Mask, checked_mask, in_mask, in_metres, in_reverse, part_of
 from .fields import (
-    FARTHEST,
-    FINEST,
-    NANO,
     Pose,
-    beam_at_stamp,
     beams_to,
-    bearings,
     checked_pose,
     covariance_of_pose,
-    finite,
     message_fields,
     range_limits,
     vector,
 )
-from .units import warn_of_whole_numbers
-
-_TURN, _INF = 2 * math.pi, math.inf
 
 
 class LaserScan(Beams):
@@ -84,65 +75,6 @@ class LaserScan(Beams):
     [1.96, 0.397]
     """
 
-    def __init__(
-        self,
-        ranges: ArrayLike,
-        angle_min: float | None = None,
-        angle_increment: float | None = None,
-        *,
-        angles: ArrayLike | None = None,
-        range_min: float = 0.0,
-        range_max: float = math.inf,
-        stamp: float = 0.0,
-        scan_time: float = 0.0,
-        time_increment: float = 0.0,
-        frame_id: str = "",
-        intensities: ArrayLike | None = None,
-        pose: Pose | None = None,
-        scale: float = 1.0,
-    ) -> None:
-        own = self.__dict__
-        own["ranges"] = copy = vector("ranges", ranges)
-        n, is_clockwise = len(copy), False
-        own["is_regular"] = angles is None
-        # Nearly all scans are like this; one by one, the checks take longer than the copy.
-        if not (
-            type(angle_min) is type(angle_increment) is type(range_min) is type(range_max) is float
-            and type(stamp) is type(scan_time) is type(time_increment) is float
-            and type(frame_id) is str
-            and angles is None
-            and angle_increment > FINEST
-            and (n - 1) * angle_increment <= _TURN
-            and -FARTHEST <= angle_min <= FARTHEST
-            and 0.0 <= range_min < range_max
-            and range_min < _INF
-            and -_INF < stamp + scan_time + time_increment < _INF
-        ):
-            irregular, angle_min, angle_increment, is_clockwise = bearings(
-                angle_min, angle_increment, angles, n
-            )
-            if irregular is not None:
-                own["angles"] = irregular
-            range_min, range_max = range_limits(range_min, range_max)
-            stamp, scan_time = finite("stamp", stamp), finite("scan_time", scan_time)
-            time_increment = finite("time_increment", time_increment)
-            frame_id = str(frame_id)
-        own["angle_min"], own["angle_increment"] = angle_min, angle_increment
-        own["range_min"], own["range_max"] = range_min, range_max
-        own["stamp"] = stamp
-        own["scan_time"], own["time_increment"] = scan_time, time_increment
-        own["frame_id"] = frame_id
-        if intensities is not None:
-            own["intensities"] = vector("intensities", intensities, n)
-        if pose is not None:
-            own["pose"] = checked_pose(pose)
-        if is_clockwise:
-            own.update(in_reverse(self))
-        if scale != 1.0:
-            own["ranges"] = in_metres(own["ranges"], scale, own["range_max"])
-        elif type(ranges) is not ndarray or ranges.dtype.kind != "f":
-            warn_of_whole_numbers(ranges)
-
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"LaserScan is read-only: {name} cannot be set")
 
@@ -161,16 +93,6 @@ class LaserScan(Beams):
         if kept.step < 0:
             raise ValueError(f"step is {kept.step}, expected > 0: beams run counter-clockwise")
         return self._changed(**part_of(self, kept))
-
-    def _changed(self, **fields: Any) -> Self:
-        """Return a copy with other fields, which are checked already."""
-        # What is made when first asked for is of the old fields; irregular bearings were given.
-        made = ("valid", "points", "angles")[: 2 + self.is_regular] if "ranges" in fields else ()
-        other = self.__class__.__new__(self.__class__)
-        other.__dict__.update(vars(self), **fields)
-        for name in made:
-            other.__dict__.pop(name, None)
-        return other
 
     def with_pose(self, pose: Pose | None, covariance: ArrayLike | None = None) -> Self:
         """Return the same scan with another pose [m, m, rad]; they share their arrays.
@@ -234,28 +156,6 @@ class LaserScan(Beams):
         ranges = where(in_mask(self.angles, checked_mask(mask)), nan, self.ranges)
         return self._changed(ranges=vector("ranges", ranges))
 
-    def stamped(self, beam: str | float, ns: int | None = None) -> Self:
-        """Return the same scan with a stamp that is the time of another beam.
-
-        Parameters
-        ----------
-        beam : str or float
-            ``first``, which is what ROS means; ``middle`` or ``last``, by which some drivers stamp;
-            in the order in which the beams are taken. Or its index, which may lie between beams.
-        ns : int, optional
-            The stamp in nanoseconds, too: as a float, a time of today is known to 0.2 µs only.
-
-        Examples
-        --------
-        >>> LaserScan([1.0, 1.0, 1.0], 0.0, 0.1, time_increment=0.01).stamped("last").stamp_beam
-        2.0
-        """
-        is_clockwise = (self.time_increment or self.scan_time) < 0
-        fields: dict[str, Any] = {"stamp_beam": beam_at_stamp(beam, len(self), is_clockwise)}
-        if ns is not None and ns != self.stamp_ns:
-            fields |= {"stamp_ns": index(ns), "stamp": ns / NANO}
-        return self._changed(**fields)
-
     @classmethod
     def from_points(cls, points: ArrayLike, **fields: Any) -> Self:
         """Make the scan that a sensor at the origin would have of some points, in any order.
@@ -318,3 +218,40 @@ class LaserScan(Beams):
         scan = cls(**fields, pose=pose)
         scan = scan.stamped(scan.stamp_beam, ns)
         return scan.stamped(stamp) if stamp != "first" else scan
+
+
+#: Fields of a scan that are not those of every scan.
+FIELDS = ("stamp", "scan_time", "time_increment", "frame_id", "intensities", "pose")
+
+
+def scan_of(
+    given: Any, bearings: tuple[Any, ...], limits: tuple[float, ...], fields: dict[str, Any]
+) -> LaserScan:
+    """Make a scan of ranges and its other fields; a scan stays as it is."""
+    is_bare = all(bearing is None for bearing in bearings)
+    if isinstance(given, LaserScan):
+        if fields or not is_bare or limits != (0.0, math.inf, 1.0):
+            raise TypeError("a LaserScan has its own bearings, limits and times: pass it alone")
+        return given
+    if is_bare or isinstance(given, str | Path):
+        raise no_scan(given)
+    (first, step, angles), (low, high, scale) = bearings, limits
+    fields |= {"angles": angles, "range_min": low, "range_max": high, "scale": scale}
+    return LaserScan(given, first, step, **fields)
+
+
+def no_scan(given: Any) -> TypeError:
+    """Return the error that says what to pass in place of something that is no scan."""
+    kind = type(given).__name__
+    if isinstance(given, str | Path):
+        hint = "open_log(path).scan(0) reads one from a log"
+    elif callable(getattr(given, "scan", None)):
+        hint = "log[i] is one of a log"
+    elif hasattr(given, "ranges"):
+        hint = "LaserScan.from_message(message) makes one of a message"
+    else:
+        hint = (
+            "extract(ranges, angle_min=..., angle_increment=...) takes ranges, "
+            "LaserScan.from_points(xy) takes points"
+        )
+    return TypeError(f"scan is of type {kind}, expected a LaserScan: {hint}")

@@ -1,14 +1,11 @@
 """What speaks against metres and radians: numbers that no 2-D scanner gives in these units."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from ..errors import warn
 from .fields import Array
-
-if TYPE_CHECKING:
-    from .beams import Beams
 
 #: Half of the ranges of a scan are never beyond this [m]. The scanners that reach farthest see a
 #: white wall at 80 to 250 m, but most of what is around them is nearer: the median of a scan is 24
@@ -25,7 +22,7 @@ _ROUND = 0.5
 
 
 def warn_of_units(
-    ranges: Array, scan: "Beams", is_empty: bool, largest: float = 0.0, equal: float = 0.0
+    ranges: Array, scan: Any, is_empty: bool, largest: float = 0.0, equal: float = 0.0
 ) -> bool:
     """Warn of a `doubt`, or of `no_return`, where there can be one; return whether there is.
 

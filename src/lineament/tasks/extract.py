@@ -16,7 +16,6 @@ from ..files import check_outputs
 from ..logs import open_log
 from ..methods import Method
 from ..output import open_writer
-from ..output.scene import WORLD_FRAME
 from ..progress import Track, untracked
 from ..scan import LaserScan
 
@@ -162,6 +161,8 @@ def check_found(name: str, scans: int, features: Mapping[str, int], method: Meth
 
 def in_world(features: Features, scan: LaserScan) -> Features:
     """Move the features of a scan to the frame of its pose; without a pose, none are left."""
+    from ..output.scene import WORLD_FRAME
+
     if scan.pose is not None:
         return features.transform(*scan.pose, scan.pose_covariance, frame_id=WORLD_FRAME)
     empty: dict[str, Any] = {name: make_records(name, []) for name in TABLES}
