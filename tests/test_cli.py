@@ -326,7 +326,9 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys
         "b",
         "d",
     ]
-    assert [progress._rate_text(rate) for rate in (9.94, 10.0)] == ["9.9/s", "10/s"]
+    assert progress._pace(994, 1000, 100.0) == "9.9/s, 1 s left"
+    assert progress._pace(1000, 900, 100.0) == "10/s, 0 s left"
+    assert progress._pace(0, 900, 100.0) == ""
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="pseudo-terminals are not everywhere")

@@ -123,7 +123,7 @@ def test_threads_that_compile_a_kernel_at_the_same_time():
             self.inner.run(block)
 
     extractor, shown = Extractor(Compiled()), []
-    with progress.compiling_shown(shown.append):
+    with progress.compiling_said(shown.append):
         found = in_threads(lambda k: extractor(WALLS[k % 4]))
     expected = [Extractor("liu")(scan) for scan in WALLS]
     assert all(same(one, expected[k % 4]) for k, one in enumerate(found))

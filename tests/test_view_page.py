@@ -250,8 +250,8 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
 @pytest.mark.slow
 def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     """A scan of a method that is being compiled."""
-    state = progress.Compiling("it is a test", 14, 9.0, is_first=False, is_last=False)
-    monkeypatch.setattr(progress._compiler, "now", state)
+    monkeypatch.setattr(progress._compiler, "reason", "it is a test")
+    monkeypatch.setattr(progress._compiler, "_is_said", True)
     with served(log, ["pdbs"]) as (session, address):
         busy, extractor = threading.Lock(), session.extractors["pdbs"]
 
@@ -263,8 +263,10 @@ def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
         with busy:
             page.driver.get(address)
             text = "document.querySelector('.panel span')?.textContent"
-            page.wait(f"{text} === 'compiling kernels (it is a test): 14 done in 9 s'")
-            monkeypatch.setattr(progress._compiler, "now", None)
+            page.wait(
+                f"{text} === 'compiling kernels (it is a test): once, for up to some minutes'"
+            )
+            monkeypatch.setattr(progress._compiler, "_is_said", False)
             page.wait(f"{text} === 'working …'")
         shown(page, 0)
         time.sleep(1.5)  # what is asked every 0.7 s came for the last time

@@ -1,4 +1,4 @@
-"""How long runs show how far they are: items through a track, kernels while they are compiled."""
+"""How long runs show how far they are: items through a track, kernels that numba compiles."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any
 
 #: ``track(items, about, total)`` gives the items, and shows how far they are.
 Track = Callable[[Any, str, int], Iterable[Any]]
+#: Takes a line about what is compiled.
+Say = Callable[[str], None]
 
-#: What is compiled in less time is not shown [s].
+#: What is compiled in less time is not worth a line [s].
 _PATIENCE = 0.5
 
 
@@ -28,84 +29,22 @@ def untracked(items: Iterable[Any], about: str, total: int) -> Iterable[Any]:  #
     return items
 
 
-@dataclass(frozen=True, slots=True)
-class Compiling:
-    """How far numba is with the kernels, where no library of them fits.
-
-    Attributes
-    ----------
-    reason : str
-        Why it compiles them.
-    done : int
-        Functions that are compiled.
-    seconds : float
-        Time since it began [s].
-    is_first, is_last : bool
-        Whether this is the first that is shown, or the end.
-
-    Examples
-    --------
-    >>> print(Compiling("LINEAMENT_JIT is set", 14, 9.7, is_first=False, is_last=False))
-    compiling kernels (LINEAMENT_JIT is set): 14 done in 10 s
-    """
-
-    reason: str
-    done: int
-    seconds: float
-    is_first: bool
-    is_last: bool
-
-    def __str__(self) -> str:
-        if self.is_last:
-            return f"compiled kernels in {self.seconds:.0f} s; they are cached for the next run"
-        return f"compiling kernels ({self.reason}): {self.done} done in {self.seconds:.0f} s"
-
-
-Show = Callable[[Compiling], None]
-
-
-def show_line(state: Compiling) -> None:
-    """Show it in the last line of a terminal, which stays at the end."""
-    sys.stderr.write(f"\r\033[K{state}" + ("\n" if state.is_last else ""))
-    sys.stderr.flush()
-
-
-def show_in_notebook(state: Compiling) -> None:
-    """Show it in the output of a cell."""
-    from IPython.display import display
-
-    global _handle
-    shown = {"text/plain": str(state)}
-    if _handle is None:
-        _handle = display(shown, raw=True, display_id=True)
-    else:
-        _handle.update(shown, raw=True)
-    if state.is_last:
-        _handle = None
-
-
-_handle: Any = None
-
-
-def show_to_person(state: Compiling) -> None:
-    """Show it in a notebook or on a terminal; a script without one stays silent."""
-    if "ipykernel" in sys.modules:
-        show_in_notebook(state)
-    elif sys.stderr is not None and sys.stderr.isatty():
-        show_line(state)
+def say_to_person(line: str) -> None:
+    """Print a line in a notebook or on a terminal; a script without one stays silent."""
+    if sys.stderr is not None and ("ipykernel" in sys.modules or sys.stderr.isatty()):
+        print(line, file=sys.stderr, flush=True)
 
 
 class _Compiler:
-    """Follows numba, which reports by an event that it compiles a function, and that it has."""
+    """Says that numba compiles kernels, and that it has: of each function it sends two events."""
 
     def __init__(self) -> None:
-        self.show: Show | None = show_to_person
-        self.seconds, self.reason = 0.0, ""
-        self.now: Compiling | None = None
+        self.say: Say | None = say_to_person
+        self.reason = ""
         self._lock = threading.RLock()
-        self._open = self._depth = self._done = 0
-        self._began = self._outer_began = 0.0
-        self._is_shown = False
+        #: Pieces of work, and functions within functions, that have begun and not ended.
+        self._open = self._depth = 0
+        self._began, self._is_said = 0.0, False
 
     def hear(self, reason: str) -> None:
         """Listen to numba from now on; it has been imported."""
@@ -122,8 +61,11 @@ class _Compiler:
 
         event.register("numba:compile", Listener())
 
+    def now(self) -> str:
+        """Return what is said while it compiles; "" where it does not."""
+        return f"compiling kernels ({self.reason}): once, for up to some minutes" * self._is_said
+
     def open(self) -> None:
-        """Take what is compiled until `close` for one piece of work."""
         with self._lock:
             self._open += 1
 
@@ -134,55 +76,46 @@ class _Compiler:
 
     def start(self) -> None:
         with self._lock:
-            if self._depth == 0:
-                self._outer_began = time.perf_counter()
-                self._began = self._began or self._outer_began
+            self._began = self._began or time.perf_counter()
             self._depth += 1
-            self._report()
+            self._begin_if_long()
 
     def end(self) -> None:
         with self._lock:
-            self._depth, self._done = self._depth - 1, self._done + 1
-            if self._depth == 0:
-                self.seconds += time.perf_counter() - self._outer_began
-            self._report()
+            self._depth -= 1
+            self._begin_if_long()
             self._end_if_idle()
+
+    def _begin_if_long(self) -> None:
+        if not self._is_said and time.perf_counter() - self._began >= _PATIENCE:
+            self._is_said = True
+            self._tell(self.now())
 
     def _end_if_idle(self) -> None:
         if self._open == self._depth == 0:
-            if self._is_shown:
-                self._report(is_last=True)
-            self._began, self._done, self._is_shown = 0.0, 0, False
+            if self._is_said:
+                seconds = time.perf_counter() - self._began
+                self._tell(f"compiled kernels in {seconds:.0f} s; they are cached for the next run")
+            self._began, self._is_said = 0.0, False
 
-    def _report(self, is_last: bool = False) -> None:
-        seconds = time.perf_counter() - self._began
-        if seconds < _PATIENCE and not self._is_shown:
-            return
-        is_first, self._is_shown = not self._is_shown, True
-        state = Compiling(self.reason, self._done, seconds, is_first, is_last)
-        self.now = None if is_last else state
-        if self.show is not None:
-            # Nobody to show it to is no reason to end the work.
+    def _tell(self, line: str) -> None:
+        if self.say is not None:
+            # Nobody to read it is no reason to end the work.
             with suppress(OSError, ValueError):
-                self.show(state)
+                self.say(line)
 
 
 _compiler = _Compiler()
 
 
-def compiled_seconds() -> float:
-    """Return the time that went into compiling kernels, in this process [s]."""
-    return _compiler.seconds
-
-
 def compiling_now() -> str:
-    """Return how far the compilation of kernels is, in this process; "" if there is none."""
-    return str(_compiler.now or "")
+    """Return a line about the compilation of kernels in this process; "" if there is none."""
+    return _compiler.now()
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Take the kernels that are compiled within for one piece of work, which is shown as such."""
+    """Take the kernels that are compiled within for one piece of work, with one line at its end."""
     _compiler.open()
     try:
         yield
@@ -191,21 +124,21 @@ def compiling() -> Iterator[None]:
 
 
 @contextmanager
-def compiling_shown(show: Show | None) -> Iterator[None]:
-    """Show compilation by another function within; None shows nothing.
+def compiling_said(say: Say | None) -> Iterator[None]:
+    """Say what is compiled by another function within; None says nothing.
 
     Examples
     --------
-    >>> with compiling_shown(None):  # as `--quiet` does
+    >>> with compiling_said(None):  # as `--quiet` does
     ...     pass
     """
-    before, _compiler.show = _compiler.show, show
+    before, _compiler.say = _compiler.say, say
     try:
         yield
     finally:
-        _compiler.show = before
+        _compiler.say = before
 
 
 def hear_compiler(reason: str) -> None:
-    """Show from now on what numba compiles, and why it does."""
+    """Say from now on what numba compiles, and why it does."""
     _compiler.hear(reason)

@@ -12,9 +12,8 @@ import click
 
 from ..errors import LineamentError, LineamentWarning, NothingFoundError
 from ..plugins import COMMANDS, missing, plugins
-from ..progress import compiling_shown
+from ..progress import compiling_said
 from .options import complain
-from .progress import show_compiling
 from .terminating import Terminated, terminating
 
 __all__ = ["cli", "main"]
@@ -110,7 +109,7 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     output = sys.stdout
     try:
-        with compiling_shown(show_compiling), warnings.catch_warnings():
+        with compiling_said(complain), warnings.catch_warnings():
             _show_warnings()
             return _run(arguments)
     except (click.Abort, KeyboardInterrupt):

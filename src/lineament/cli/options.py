@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..progress import compiling_shown
+from ..progress import compiling_said
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
@@ -170,7 +170,7 @@ def complain(message: str, *, nl: bool = True) -> None:
 
 def _hush(context: click.Context, parameter: click.Parameter, quiet: bool) -> bool:  # noqa: ARG001
     if quiet:
-        context.with_resource(compiling_shown(None))
+        context.with_resource(compiling_said(None))
     return quiet
 
 

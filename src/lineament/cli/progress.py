@@ -1,7 +1,4 @@
-"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet.
-
-Kernels that are compiled meanwhile are shown in its place, and are not counted into its speed.
-"""
+"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet."""
 
 import sys
 import time
@@ -9,36 +6,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from ..progress import Compiling, Track, compiled_seconds, show_line, untracked
+from ..progress import Track, untracked
 from .options import complain
 
 T = TypeVar("T")
 
 #: Seconds between two plain lines, and before the first.
 _PATIENCE = 2.0
-
-#: What changes the text of the bars and spinners that are on the terminal, the last in front; None
-#: is its own text.
-_fronts: list[Callable[[str | None], None]] = []
-
-
-def show_compiling(state: Compiling) -> None:
-    """Show the compilation of kernels: in place on a terminal, elsewhere its beginning and end."""
-    if _fronts:
-        _fronts[-1](None if state.is_last else str(state))
-    elif sys.stderr.isatty():
-        show_line(state)
-    elif state.is_first or state.is_last:
-        complain(str(state))
-
-
-@contextmanager
-def _in_front(set_text: Callable[[str | None], None]) -> Iterator[None]:
-    _fronts.append(set_text)
-    try:
-        yield
-    finally:
-        _fronts.remove(set_text)
 
 
 def tracker(quiet: bool) -> Track:
@@ -53,38 +27,31 @@ def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task
     from rich.text import Text
 
-    compiled = compiled_seconds()
-
     class Pace(ProgressColumn):
         def render(self, task: Task) -> Text:
-            rate = task.completed / max((task.elapsed or 0) - compiled_seconds() + compiled, 1e-9)
-            if not rate:
-                return Text()
-            left = max(total - task.completed, 0) / rate
-            return Text(f"{_rate_text(rate)}, {left:.0f} s left")
+            return Text(_pace(int(task.completed), total, task.elapsed or 0.0))
 
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Pace())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(about, total=total)
-        with _in_front(lambda text: progress.update(task, description=text or about)):
-            yield from progress.track(items, total, task_id=task)
+        yield from progress.track(items, total, description=about)
 
 
 def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
     started = last = time.monotonic()
-    compiled = compiled_seconds()
     for done, item in enumerate(items, 1):
         yield item
         now = time.monotonic()
         if now - last >= _PATIENCE:
-            last, rate = now, done / (now - started - compiled_seconds() + compiled)
-            left = max(total - done, 0) / rate
-            line = f"{about}: {done}/{total}, {_rate_text(rate)}, {left:.0f} s left"
-            complain(line)
+            last = now
+            complain(f"{about}: {done}/{total}, {_pace(done, total, now - started)}")
 
 
-def _rate_text(rate: float) -> str:
-    return f"{rate:.0f}/s" if rate >= 10 else f"{rate:.1f}/s"
+def _pace(done: int, total: int, seconds: float) -> str:
+    """Write how fast items are done, and how long the others take; "" before the first."""
+    rate = done / max(seconds, 1e-9)
+    if not rate:
+        return ""
+    return f"{rate:.{0 if rate >= 10 else 1}f}/s, {max(total - done, 0) / rate:.0f} s left"
 
 
 @contextmanager
@@ -95,16 +62,8 @@ def status(quiet: bool) -> Iterator[Callable[[str], None]]:
     elif sys.stderr.isatty():
         from rich.console import Console
 
-        own = ""
-        with Console(stderr=True).status(own) as status:
-
-            def show(about: str) -> None:
-                nonlocal own
-                own = about
-                status.update(about)
-
-            with _in_front(lambda text: status.update(own if text is None else text)):
-                yield show
+        with Console(stderr=True).status("") as spinner:
+            yield spinner.update
     else:
         yield _now_and_then(time.monotonic())
 
