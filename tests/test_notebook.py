@@ -317,10 +317,17 @@ def test_features_in_a_notebook(scan):
     features = ln.extract(scan)
     html = features._repr_html_()
     found = parsed(html)
-    colors = [element.get("stroke") for element in found["path"]]
-    assert colors.count(notebook.CORNER_COLOR) == features.counts()["corners"] == 4
-    lines = [e for e in found["path"] if e.get("stroke") == "currentColor" and "L" in e.get("d")]
-    assert len(lines) == len(features.segments)
+    layers = {group.get("class"): group for group in found["g"]}
+    assert layers["corners"].get("stroke") == notebook.CORNER_COLOR
+    assert len(layers["corners"]) == features.counts()["corners"] == 4
+    assert len(layers["walls"]) == len(found["line"]) == len(features.segments)
+    matrix = [float(x) for x in layers[None].get("transform")[7:-1].split()]
+    ends = [[float(e.get(name)) for name in ("x1", "y1", "x2", "y2")] for e in found["line"]]
+    assert np.ravel(ends) == pytest.approx(
+        np.ravel(np.hstack((features.segments["start"], features.segments["end"]))), abs=1e-6
+    )
+    assert matrix[0] == -matrix[3] > 0  # up is up, and as large as across
+    assert matrix[1:3] == [0, 0]
     dots = "".join(e.get("d") for e in found["path"] if e.get("stroke-linecap"))
     assert dots.count("h0") > 300  # some share a place
     bar = next(e.get("d") for e in found["path"] if "v4H" in e.get("d"))
@@ -334,11 +341,11 @@ def test_features_in_a_notebook(scan):
     assert rows[0][3].startswith(f"{longest['length']:.3f} m")
     assert rows[0][4] == f"{1000 * math.sqrt(longest['covariance'][0, 0]):.1f}"
     assert "4 corners" in html
-    assert "polygon" not in found  # an ellipse would be hidden by its diamond
+    assert "ellipse" not in found  # it would be hidden by its diamond
     corners = features.corners.copy()
     corners["covariance"][0] = np.eye(2)
     unsure = replace(features, corners=corners)
-    assert len(parsed(unsure._repr_html_())["polygon"]) == 1
+    assert len(parsed(unsure._repr_html_())["ellipse"]) == 1
     assert "more" not in html
 
 
@@ -372,7 +379,7 @@ def test_ellipses_that_a_diamond_hides_are_not_drawn(scan, pixels, shown):
     corners = found.corners[:1].copy()
     corners["covariance"] = (pixels / metre) ** 2 / (-2 * math.log(0.05)) * np.eye(2)
     html = notebook.svg(scan, replace(found, corners=corners))
-    assert html.count("<polygon") == shown
+    assert html.count("<ellipse") == shown
 
 
 def test_the_longest_and_best_come_first_and_the_others_are_counted(scan):

@@ -13,7 +13,6 @@ from lineament import LaserScan
 from lineament.output import open_writer
 from lineament.output.floor_plan import FloorPlan
 from lineament.output.markers import Markers
-from lineament.output.plans import Plan
 from lineament.output.walls import offsets_between
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -148,7 +147,7 @@ def test_an_arc_of_a_whole_turn_is_a_circle(first, last, is_whole):
     nothing, row = np.zeros((0, 2)), [1.0, 2.0, 0.5, first, last]
     ellipses = np.zeros((0, 5))
     markers = Markers(np.zeros((0, 2, 2)), nothing, nothing, np.array([row]), ellipses)
-    assert Plan(markers, np.zeros(0, np.int64), "").arcs() == [(row, is_whole)]
+    assert markers.arc_rows() == [(row, is_whole)]
 
 
 @pytest.mark.parametrize("ending", [".svg", ".dxf"])

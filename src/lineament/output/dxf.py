@@ -40,7 +40,7 @@ def _add(drawing: Drawing, plan: Plan) -> None:
         for point in points.tolist():
             space.add_point(point, {"layer": layer})
     on_arcs = {"layer": "ARCS"}
-    for (x, y, radius, *turn), is_whole in plan.arcs():
+    for (x, y, radius, *turn), is_whole in markers.arc_rows():
         if is_whole:
             space.add_circle((x, y), radius, on_arcs)
         else:

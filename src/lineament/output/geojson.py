@@ -23,7 +23,7 @@ class GeoJsonWriter(PlanWriter):
         rows = [feature("Polygon", list(map(_rounded, area)), kind="free") for area in self.areas]
         for ends, views in zip(marks.segments, plan.views.tolist(), strict=True):
             rows.append(feature("LineString", _rounded(ends), kind="wall", views=views))
-        for strip, (arc, is_whole) in zip(marks.arc_strips(), plan.arcs(), strict=True):
+        for strip, (arc, is_whole) in zip(marks.arc_strips(), marks.arc_rows(), strict=True):
             line, shape = _rounded(strip), "Polygon" if is_whole else "LineString"
             of = {"kind": "arc", "radius": round(arc[2], 6)}
             rows.append(feature(shape, [line] if is_whole else line, **of))

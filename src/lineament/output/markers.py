@@ -42,6 +42,10 @@ class Markers:
         circles += np.kron(self.arcs[:, 2:3], [[1, 0], [-1, 0], [0, 1], [0, -1]])
         return np.vstack([self.segments.reshape(-1, 2), self.corners, self.edges, circles])
 
+    def arc_rows(self) -> list[tuple[list[float], bool]]:
+        """Return the rows of the arcs, each with whether it is a whole circle."""
+        return [(arc, arc[4] - arc[3] >= 2 * math.pi - 1e-6) for arc in self.arcs.tolist()]
+
     def arc_strips(self) -> list[Array]:
         """Make strips of vertices (n, 2), one an arc, at least 48 to a turn."""
         strips = []

@@ -1,6 +1,5 @@
 """What plans share: one scan as it was seen, or all scans of a log in one floor plan."""
 
-import math
 import os
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -27,11 +26,6 @@ class Plan(NamedTuple):
     markers: Markers
     views: NDArray[np.int64]
     caption: str
-
-    def arcs(self) -> list[tuple[list[float], bool]]:
-        """Return the rows of the arcs, each with whether it is a whole circle."""
-        arcs = self.markers.arcs
-        return [(arc, arc[4] - arc[3] >= 2 * math.pi - 1e-6) for arc in arcs.tolist()]
 
 
 class PlanWriter(Writer):

@@ -1,13 +1,14 @@
 """SVG: a plan to scale on a sheet of A3, with its layers as groups."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..scan import Array
 from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
+from .markers import Markers
 from .markup import escape
 from .plans import Plan, PlanWriter
 
@@ -51,8 +52,16 @@ def _document(plan: Plan) -> Iterator[str]:
         f'<g transform="matrix({_n(per_metre)} 0 0 {_n(-per_metre)} {_n(left)} {_n(top)})"'
         f' fill="none" stroke-linecap="round" stroke-width="{_n(WALL_LINE / per_metre)}">'
     )
-    for name, ink, elements in _layers(plan, 1 / per_metre):
-        yield f'<g id="{name}" inkscape:groupmode="layer" inkscape:label="{name}" {ink}>'
+    thin, dot = f'stroke-width="{_n(THIN_LINE / per_metre)}"', CORNER_DOT / per_metre
+    inks = {
+        "walls": f'stroke="{INK}"',
+        "arcs": f'stroke="{ARC_COLOR}"',
+        "ellipses": f'stroke="{CORNER_COLOR}" {thin}',
+        "edges": f'fill="{EDGE_COLOR}"',
+        "corners": f'fill="{CORNER_COLOR}"',
+    }
+    for name, elements in layers(plan.markers, lambda _, x, y: _circle(x, y, dot), plan.views):
+        yield f'<g id="{name}" inkscape:groupmode="layer" inkscape:label="{name}" {inks[name]}>'
         yield from elements
         yield "</g>"
     yield "</g>"
@@ -60,25 +69,26 @@ def _document(plan: Plan) -> Iterator[str]:
     yield "</svg>"
 
 
-def _layers(plan: Plan, millimetre: float) -> Iterator[tuple[str, str, Iterator[str]]]:
-    """Name, ink and elements of each layer; a millimetre of the paper is so long in the plan."""
-    markers, dot = plan.markers, CORNER_DOT * millimetre
-    thin = f'stroke-width="{_n(THIN_LINE * millimetre)}"'
-    walls = zip(markers.segments, plan.views, strict=True)
-    yield "walls", f'stroke="{INK}"', (_line(ends, views) for ends, views in walls)
-    yield (
-        "arcs",
-        f'stroke="{ARC_COLOR}"',
-        (_circle(*arc[:3]) if is_whole else _arc(*arc) for arc, is_whole in plan.arcs()),
-    )
-    yield "ellipses", f'stroke="{CORNER_COLOR}" {thin}', (_ellipse(*e) for e in markers.ellipses)
-    yield "edges", f'fill="{EDGE_COLOR}"', (_circle(x, y, dot) for x, y in markers.edges)
-    yield "corners", f'fill="{CORNER_COLOR}"', (_circle(x, y, dot) for x, y in markers.corners)
+def layers(
+    markers: Markers, mark: Callable[[str, float, float], str], views: Iterable[int] = ()
+) -> Iterator[tuple[str, Iterator[str]]]:
+    """Yield name and elements of each layer, in metres, the lowest first.
+
+    `mark(name, x, y)` draws a point. Lines say how often they were seen, where that is given.
+    """
+    seen = [f' data-views="{number}"' for number in views] or len(markers.segments) * [""]
+    walls = zip(markers.segments, seen, strict=True)
+    arcs = (_circle(*arc[:3]) if is_whole else _arc(*arc) for arc, is_whole in markers.arc_rows())
+    yield "walls", (_line(ends, about) for ends, about in walls)
+    yield "arcs", arcs
+    yield "ellipses", (_ellipse(*ellipse) for ellipse in markers.ellipses)
+    yield "edges", (mark("edges", x, y) for x, y in markers.edges)
+    yield "corners", (mark("corners", x, y) for x, y in markers.corners)
 
 
-def _line(ends: Array, views: int) -> str:
+def _line(ends: Array, about: str) -> str:
     (x1, y1), (x2, y2) = ends
-    return f'<line x1="{_n(x1)}" y1="{_n(y1)}" x2="{_n(x2)}" y2="{_n(y2)}" data-views="{views}"/>'
+    return f'<line x1="{_n(x1)}" y1="{_n(y1)}" x2="{_n(x2)}" y2="{_n(y2)}"{about}/>'
 
 
 def _circle(x: float, y: float, r: float) -> str:

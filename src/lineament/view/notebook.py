@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..output import canvas, drawing
 from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
 from ..output.markers import Markers, markers_of
 from ..output.markup import escape
-from ..output.svg import ROUND
+from ..output.svg import ROUND, layers
 from ..scan import Array, LaserScan, NoiseLike
 
 if TYPE_CHECKING:
@@ -181,7 +182,7 @@ def svg(scan: LaserScan | None, features: Features | None = None) -> str:
         f'viewBox="0 0 {width} {height + _FOOT:.0f}" style="max-width:100%" role="img">',
         f'<svg width="{width}" height="{height}">',  # cuts off what is too far away
         *_dots(place(points[valid]), labels[valid]),
-        *_features(marks, place, scale),
+        *_features(marks, place(np.zeros(2)), scale),
     ]
     if features is not None:
         rings = features.breakpoints["position"]
@@ -207,23 +208,30 @@ def _dots(points: Array, labels: Any) -> Iterator[str]:
         )
 
 
-def _features(marks: Markers, place: Callable[[Array], Array], scale: float) -> Iterator[str]:
-    """Draw lines, arcs, ellipses and diamonds."""
-    for x1, y1, x2, y2 in place(marks.segments).reshape(-1, 4):
-        yield f'<path d="M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}" stroke="currentColor"/>'
-    for strip in marks.arc_strips():
-        line = " ".join(f"{x:.1f},{y:.1f}" for x, y in place(strip))
-        yield f'<polyline points="{line}" fill="none" stroke="{ARC_COLOR}" stroke-width="2"/>'
-    for ellipse, strip in zip(marks.ellipses, marks.ellipse_strips(), strict=True):
-        if ellipse[2] * scale > 4:  # else hidden by the diamond
-            line = " ".join(f"{x:.1f},{y:.1f}" for x, y in place(strip))
-            yield f'<polygon points="{line}" fill="{CORNER_COLOR}22" stroke="{CORNER_COLOR}"/>'
-    for points, size, color in ((marks.edges, 3, EDGE_COLOR), (marks.corners, 4.5, CORNER_COLOR)):
-        for x, y in place(points):
-            yield (
-                f'<path d="M{x:.1f} {y - size:.1f}l{size} {size}l-{size} {size}l-{size} -{size}z" '
-                f'fill="none" stroke="{color}" stroke-width="1.4"/>'
-            )
+def _features(marks: Markers, origin: Array, scale: float) -> Iterator[str]:
+    """Draw lines, arcs, ellipses, and diamonds, in metres from an origin [px]."""
+    shown = replace(marks, ellipses=marks.ellipses[marks.ellipses[:, 2] * scale > 4])
+    sizes = {"edges": 3 / scale, "corners": 4.5 / scale}  # of diamonds: they hide what is smaller
+    looks = {
+        "walls": ("currentColor", 1.0),
+        "arcs": (ARC_COLOR, 2.0),
+        "ellipses": (f'{CORNER_COLOR}" fill="{CORNER_COLOR}22', 1.0),
+        "edges": (EDGE_COLOR, 1.4),
+        "corners": (CORNER_COLOR, 1.4),
+    }
+    x, y = origin
+    yield f'<g fill="none" transform="matrix({scale:.9g} 0 0 {-scale:.9g} {x:.9g} {y:.9g})">'
+    for name, elements in layers(shown, lambda name, x, y: _diamond(x, y, sizes[name])):
+        color, width = looks[name]
+        yield f'<g class="{name}" stroke="{color}" stroke-width="{width / scale:.3g}">'
+        yield from elements
+        yield "</g>"
+    yield "</g>"
+
+
+def _diamond(x: float, y: float, size: float) -> str:
+    s = f"{size:.3g}"
+    return f'<path d="M{x:.6f} {y - size:.6f}l{s} {s}l-{s} {s}l-{s} -{s}z"/>'
 
 
 def _foot(top: float, across: float, scale: float, features: Features | None) -> Iterator[str]:
