@@ -103,7 +103,6 @@ WRONG = [
     ("extract wall.npz -o f.csv --resume", 2, "--resume: expected a"),
     ("extract wall.npz -o f.csv --format csv", 2, "--format: expected a"),
     ("extract wall.npz -o out/ --format xls", 1, "'.xls' is not known"),
-    ("extract wall.npz -o f.parquet --append", 2, "--append: a file is written whole"),
     ("extract . -o ./ --threads 1 --processes 1", 2, "one of --"),
     ("extract . -o ./ --threads 0", 2, "--threads"),
     ("extract . -o wall.npz/", 1, "wall.npz/: cannot make this folder"),

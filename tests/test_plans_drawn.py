@@ -11,9 +11,8 @@ from handmade import arc, corner, edge, features, segment
 
 from lineament import LaserScan
 from lineament.output import open_writer
-from lineament.output.floor_plan import FloorPlan
+from lineament.output.floor_plan import FloorPlan, offsets_between
 from lineament.output.markers import Markers
-from lineament.output.walls import offsets_between
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -59,7 +59,6 @@ _COUNT = click.IntRange(min=1)
 @click.option("--threads", type=_COUNT, help="Work in so many threads of one process.")
 @click.option("--dask", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
 @click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
-@click.option("--append", is_flag=True, hidden=True)
 @QUIET
 def extract(
     logs: tuple[Path | str, ...],
@@ -69,7 +68,6 @@ def extract(
     noise: float | None,
     reading: dict[str, Any],
     world: bool,
-    append: bool,
     quiet: bool,
     **bulk: Any,
 ) -> None:
@@ -80,10 +78,6 @@ def extract(
     """
     from ..output import ENDINGS
 
-    if append:
-        raise click.UsageError(
-            "--append: a file is written whole or not at all; write another one, or into a FOLDER/"
-        )
     # Not Path.is_dir, which raises where a name is too long.
     is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)  # noqa: PTH112
     if not is_folder:
