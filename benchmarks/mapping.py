@@ -28,9 +28,9 @@ from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map
-from lineament.mapping.walls import moved, walls_of, wrapped
 from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, Wheels, office
+from lineament.walls import moved, walls_of, wrapped
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 LOGS = {

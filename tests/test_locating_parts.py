@@ -16,7 +16,7 @@ from lineament.mapping.hypotheses import anchors, directions, hypotheses
 from lineament.mapping.local_map import beams_of, moved_beams, thinned
 from lineament.mapping.locate import Location, _searched
 from lineament.mapping.refine import adjusted
-from lineament.mapping.walls import walls_of
+from lineament.walls import walls_of
 
 
 def test_the_mirror_image_lies_on_the_mirrored_plan_as_the_view_does_on_the_plan():

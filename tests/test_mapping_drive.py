@@ -18,10 +18,10 @@ from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map, onto_plan, roughness, single, widened
-from lineament.mapping.sights import SIGHT, lines_of, merged, misfits, walls_along
-from lineament.mapping.walls import walls_of, wrapped
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
+from lineament.walls import walls_of, wrapped
+from lineament.walls.sights import SIGHT, lines_of, merged, misfits, walls_along
 
 
 def edges(poses, pairs, sigma=0.05, loop=False):

@@ -14,10 +14,10 @@ from lineament.mapping import LocalMap, making
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import found_on, single
-from lineament.mapping.sights import SIGHT, lines_of, merged, sights_of, walls_along
-from lineament.mapping.walls import walls_of
 from lineament.scan.poses import compose
 from lineament.simulation import World
+from lineament.walls import walls_of
+from lineament.walls.sights import SIGHT, lines_of, merged, sights_of, walls_along
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])

@@ -11,8 +11,8 @@ from small_room import RING, plan_of, query_at, scans_on
 from lineament import Extractor
 from lineament.mapping.drive_map import _likely_turns
 from lineament.mapping.loops import Survey
-from lineament.mapping.sights import lines_of, sights_of
-from lineament.mapping.walls import segments_of
+from lineament.walls import segments_of
+from lineament.walls.sights import lines_of, sights_of
 
 PLAN = plan_of(RING)
 

@@ -11,7 +11,9 @@ from lineament.features import ARC
 from lineament.mapping import LineMap
 from lineament.mapping.drive_map import _passed
 from lineament.mapping.hypotheses import anchors, beside, meetings
-from lineament.mapping.sights import (
+from lineament.scan.poses import compose, inverse
+from lineament.walls import COLUMN, as_walls, cut, moved, segments_of, walls_of, wrapped
+from lineament.walls.sights import (
     SIGHT,
     columns_shown,
     errors,
@@ -20,8 +22,6 @@ from lineament.mapping.sights import (
     move,
     walls_along,
 )
-from lineament.mapping.walls import COLUMN, as_walls, cut, moved, segments_of, walls_of, wrapped
-from lineament.scan.poses import compose, inverse
 
 PLAN = plan_of(RING)
 POSES = np.array([(0.3, -0.2, 0.7), (1.0, 0.4, -2.0), (-1.5, 0.1, 3.0)])

@@ -18,8 +18,8 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap, hypotheses
 from lineament.mapping.hypotheses import REACH, beside, meetings
 from lineament.mapping.index import make_index
-from lineament.mapping.walls import walls_of
 from lineament.simulation import SENSORS, drive, room
+from lineament.walls import walls_of
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pipes to open")
 

@@ -11,7 +11,7 @@ from handmade import arc, corner, edge, features, segment
 
 from lineament import LaserScan
 from lineament.output import open_writer
-from lineament.output.floor_plan import FloorPlan, offsets_between
+from lineament.output.floor_plan import FloorPlan
 from lineament.output.markers import Markers
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -68,37 +68,6 @@ def test_segments_that_a_plan_takes(segment, is_kept):
     plan = FloorPlan()
     plan.add(features(segments=[segment]))
     assert len(plan.walls()) == is_kept
-
-
-def beside(a, b, angle):
-    """How far a line lies beside a wall, by definition, one number at a time."""
-    (ax, ay), (bx, by) = a[1] - a[0], b[1] - b[0]
-    if abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) >= angle:
-        return math.inf
-    short, long = (a, b) if math.dist(*a) <= math.dist(*b) else (b, a)
-    u = (long[1] - long[0]) / math.dist(*long)
-    along = (a - b[0]) @ (b[1] - b[0]) / math.dist(*b)
-    if max(min(along) - math.dist(*b), -max(along)) >= 0.2:
-        return math.inf
-    return max(abs(u[0] * (p - long[0])[1] - u[1] * (p - long[0])[0]) for p in short)
-
-
-@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
-def test_offsets_between_lines_and_walls_are_those_of_their_definition(quarters):
-    """Also where all lines are few, along one axis, and the walls begin beside their ends."""
-    rng = np.random.default_rng(quarters)
-    start, turn = rng.uniform(-2, 2, (40, 2)), rng.choice((0, 0.05, 0.2, math.pi), 40)
-    length = rng.uniform(0.3, 6, (40, 1))
-    lines = np.stack((start, start + length * np.column_stack((np.cos(turn), np.sin(turn)))), 1)
-    lines = np.append(lines, [[(0, 0), (10, 0)], [(8, 0), (12, 0)], [(10.1, 0), (14, 0)]], axis=0)
-    lines = lines @ turned(quarters * math.pi / 2)
-    for count in (1, 2, 43):
-        few, angles = lines[-count:], np.linspace(0.1, 0.3, count)
-        expected = [
-            [beside(a, b, angle) for b in lines] for a, angle in zip(few, angles, strict=True)
-        ]
-        np.testing.assert_allclose(offsets_between(few, lines, angles), expected, atol=1e-9)
-        assert np.isfinite(expected).sum() > 2
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])

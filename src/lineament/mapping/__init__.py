@@ -10,13 +10,13 @@
 'located'
 """
 
+from ..walls import COLUMN, WALL
 from .evidence import Evidence
 from .grids import Grid
 from .line_map import LineMap
 from .local_map import LocalMap, Query
 from .locate import VERDICTS, Location, locate
 from .scanners import merge_features
-from .walls import COLUMN, WALL
 
 __all__ = [
     "COLUMN",

@@ -8,8 +8,18 @@ import numpy as np
 
 from ..errors import needed_by
 from ..scan import Array, Pose
-from .sights import SIGHT, WHOLE, bowed, errors, lines_of, move, robust, sights_of, walls_along
-from .walls import Numbers, Records, summed, wrapped
+from ..walls import Numbers, Records, summed, wrapped
+from ..walls.sights import (
+    SIGHT,
+    WHOLE,
+    bowed,
+    errors,
+    lines_of,
+    move,
+    robust,
+    sights_of,
+    walls_along,
+)
 
 #: A motion between two poses: their indices, the second in the frame of the first [m, m, rad], its
 #: inverse covariance, and whether it may be wrong: a loop.

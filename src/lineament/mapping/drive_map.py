@@ -13,13 +13,13 @@ from ..motion.association import associate
 from ..motion.estimate import Motion, estimate_motion
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
+from ..walls import Numbers, as_walls, segments_of, wrapped
+from ..walls.sights import WHOLE, lines_of, sights_of, walls_along
 from .evidence import evidence_of
 from .line_map import LineMap
 from .local_map import Query, beams_of, some
 from .locate import distinct, squares_off
 from .refine import COARSE, FINE, refined
-from .sights import WHOLE, lines_of, sights_of, walls_along
-from .walls import Numbers, as_walls, segments_of, wrapped
 
 #: How surfaces are off straight lines [m].
 _ROUGHNESS = 0.01

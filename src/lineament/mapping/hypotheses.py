@@ -10,7 +10,7 @@ from ..errors import LineamentError
 from ..kernels.mapping.corners import CORNER_COLUMNS, meet
 from ..kernels.mapping.votes import vote
 from ..scan import Array
-from .walls import Numbers, lengths_of, rows_of, unit
+from ..walls import Numbers, lengths_of, rows_of, unit
 
 #: Two walls that end together. `bisector` looks between them, `opening` is the angle between them
 #: there, below π; `solid` is 1 where that is inside a wall, 0 where it is free, -1 if not known.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..kernels.mapping.layout import list_walls
 from ..scan import Array
-from .walls import rows_of, walls_of
+from ..walls import rows_of, walls_of
 
 #: Longer walls are in no building: the plan is in other units [m].
 LONGEST = 2000.0

@@ -17,14 +17,14 @@ from ..features import ARC, CORNER, Features, make_records
 from ..limits import Limits
 from ..output import open_writer
 from ..scan import Array, LaserScan, Pose
+from ..walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned_back, walls_of
+from ..walls.sights import columns_shown, walls_shown
 from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
 from .index import FARTHEST, LONGEST, MAPPED, Index, make_index, rings
 from .outlines import walls_of_grid
 from .plans import doubts, read_table, unknown_plan
-from .sights import columns_shown, walls_shown
 from .svg_plans import read_svg
-from .walls import COLUMN, lengths_of, rows_shaped, segments_of, shared, turned_back, walls_of
 
 
 class LineMap(ReadOnly):

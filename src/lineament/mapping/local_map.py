@@ -15,9 +15,9 @@ from ..motion.odometry import compose_jacobians
 from ..motion.tracker import Tracks
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import compose, inverse, relative
+from ..walls import SHORTEST, unit, wrapped
 from .adjust import adjust
 from .hypotheses import anchors, meetings
-from .walls import SHORTEST, unit, wrapped
 
 #: A scan is kept after so much way, or so much turn [m, rad].
 SPACING, TURN = 0.3, 0.26

@@ -10,12 +10,12 @@ from ..features import Features
 from ..kernels.mapping.votes import choose
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
+from ..walls import lengths_of, unit, wrapped
 from .evidence import ON_DRAWING, Evidence, evidence_of, on_map, over_chance
 from .hypotheses import BOX, TURN, agreement, hypotheses, image_of, spectrum
 from .line_map import LineMap
 from .local_map import LocalMap, Query, query_of_scan, some
 from .refine import COARSE, FINE, WEAK, adjusted, refined
-from .walls import lengths_of, unit, wrapped
 
 #: What `Location.verdict` may be.
 LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS = (

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from ..scan import Array, Pose
 from ..scan.poses import relative
+from ..walls import Records, moved
+from ..walls.sights import walls_along
 from .adjust import edges_of
 from .drive_map import KeyFrame
 from .line_map import LineMap
 from .local_map import Query, beams_of, moved_beams, thinned
 from .locate import locate
-from .sights import walls_along
-from .walls import Records, moved
 
 #: What is looked for is of this way before a key frame; where, of this way around another [m].
 _QUERY, _PLAN = 5.0, 5.0

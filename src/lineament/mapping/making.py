@@ -9,14 +9,14 @@ import numpy as np
 from ..errors import NothingFoundError
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
+from ..walls import SHORTEST, Records, cut, lengths_of, moved, unit, wrapped
+from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
 from .adjust import Adjusted, edges_of, optimise
 from .drive_map import KeyFrame
 from .index import MAPPED
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey
-from .sights import errors, lines_of, merged, sights_of, walls_along
-from .walls import SHORTEST, Records, cut, lengths_of, moved, unit, wrapped
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01

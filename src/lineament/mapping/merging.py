@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan import Array
-from .sights import GAP, SIGHT, lines_of
-from .walls import Numbers, Records, bent, covariance_at, lengths_of, shared, summed, unit, wrapped
+from ..walls import Numbers, Records, bent, covariance_at, lengths_of, shared, summed, unit, wrapped
+from ..walls.sights import GAP, SIGHT, lines_of
 
 #: Lines whose directions differ by more are never one: they are not of one side of a wall [rad].
 _TURN = 0.35

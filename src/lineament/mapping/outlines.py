@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from ..errors import LineamentError
 from ..limits import Limits
 from ..scan import Array
+from ..walls import Numbers, Records, bent, unit, walls_of
 from .grids import Grid
-from .walls import Numbers, Records, bent, unit, walls_of
 
 #: Variance of a place that is anywhere within a cell, and of cells that noise moves [cells²].
 _UNIFORM, _NOISE = 1 / 12, 0.04

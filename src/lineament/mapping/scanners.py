@@ -12,6 +12,7 @@ from ..features import TABLES, Features
 from ..motion.association import chi_square
 from ..scan import LaserScan, Pose
 from ..scan.poses import carried, compose, inverse
+from ..walls import Numbers, Records
 from .merging import (
     fused_places,
     fused_segments,
@@ -20,7 +21,6 @@ from .merging import (
     squares_of_places,
     squares_of_segments,
 )
-from .walls import Numbers, Records
 
 #: Share of the pairs of one thing that the tests keep together.
 GATE = 0.999

@@ -80,6 +80,8 @@ class PlanWriter(Writer):
         if len(markers.edges):
             found += f", {count(len(markers.edges), 'edge')} (lighter)"
         often = f", each seen {count(least, 'time')} at least" if least > 1 else ""
+        if self._floor.every > 1:
+            often += f"; walls of one scan in {self._floor.every}"
         # A map is written as features of no beams.
         is_map = self._written == 1 and not len(self._first.features.clusters)
         scans = "" if is_map else f" of {count(self._written, 'scan')}"

@@ -11,11 +11,11 @@ from ..limits import Limits
 from ..mapping import Grid, LineMap
 from ..mapping.grids import GRID_ENDINGS, all_files
 from ..mapping.outlines import areas
-from ..mapping.walls import lengths_of
 from ..output import open_writer
 from ..output.figures import plot_walls
 from ..output.geojson import GeoJsonWriter
 from ..scan import LaserScan
+from ..walls import lengths_of
 
 #: Formats that a plan is written in: pictures, and those that are read again or go on elsewhere.
 PICTURES = (".png", ".pdf")

@@ -8,9 +8,8 @@ import numpy as np
 
 from ..features import SEGMENT
 from ..kernels.mapping.lines import SUMS, fit_lines
-from ..motion.association import chi_square
 from ..scan import Array
-from .walls import (
+from . import (
     COLUMN,
     SHORT,
     SHORTEST,
@@ -41,9 +40,13 @@ LEAST_SURE = 0.2
 _KERNEL = 3.0
 #: Where no more than this share of the most sights goes on, a wall ends.
 _SHARE = 0.2
-#: Lines whose directions differ by more are never one [rad]; share of the parts of a wall that the
-#: tests keep together.
-_TURN, _GATE = 0.35, 0.99
+#: Lines whose directions differ by more are never one [rad].
+_TURN = 0.35
+#: Quantiles of 99 % of χ² with two degrees of freedom and with three: so many of the parts of a
+#: wall, and of a column, stay together.
+_GATE, _GATE_3 = -2.0 * math.log1p(-0.99), 11.344866730144371
+#: Where sights are placed already.
+_HERE = np.zeros((1, 3))
 
 
 def sights_of(seen: Sequence[tuple[Records, Numbers]], rough: float = 0.0) -> Records:
@@ -122,12 +125,17 @@ def robust(off: Array, information: Array) -> Array:
 
 
 def walls_along(
-    sights: Records, poses: Array, lines: Records, gap: float = GAP, views: int = 1
+    sights: Records,
+    poses: Array,
+    lines: Records,
+    gap: float = GAP,
+    views: int = 1,
+    everywhere: int = 1,
 ) -> Records:
     """Return walls along their lines, as far as sights lie no farther apart than a gap [m].
 
-    Each part was seen so often. If that is more than once, a wall ends where hardly any sight goes
-    on: at a grazing angle, a few cross doorways.
+    Each part was seen so often, and so often everywhere along it. If `views` is more than 1, a wall
+    ends where hardly any sight goes on: at a grazing angle, a few cross doorways.
     """
     low, high = extents(sights, poses, lines)
     w, places = np.tile(sights["wall"], 2), np.concatenate((low, high + gap))
@@ -135,7 +143,8 @@ def walls_along(
     w, places, begins = w[order], places[order], order < len(low)
     cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(len(lines))
     np.maximum.at(most, w, cover)
-    edges = np.flatnonzero(np.diff(cover > (_SHARE * most[w] if views > 1 else 0), prepend=False))
+    least = np.maximum(_SHARE * most[w] if views > 1 else 0, everywhere - 1)
+    edges = np.flatnonzero(np.diff(cover > least, prepend=False))
     seen: Numbers = np.cumsum(begins)[edges[1::2]] - np.cumsum(~begins)[edges[::2]]
     first, last = edges.reshape(-1, 2)[seen >= views].T
     walls: Records = lines[w[first]]
@@ -191,7 +200,7 @@ def merged(sights: Records, poses: Array, lines: Records, apart: float) -> Recor
         shorter = np.minimum(last[near] - first[near], last[k] - first[k])
         spread += bent(bows[near] + bows[k], shorter)
         squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off)
-        if squares.min() < chi_square(_GATE, 2):
+        if squares.min() < _GATE:
             labels[k], kept[k] = near[squares.argmin()], False
     result = sights.copy()
     result["wall"] = np.unique(labels, return_inverse=True)[1][w]
@@ -210,6 +219,18 @@ def bowed(walls: Records, sights: Records) -> Records:
     return walls
 
 
+def joined(sights: Records, apart: float = 0.0) -> tuple[Records, Records]:
+    """Return sights with the numbers of their walls, `merged` until none are one, and the lines.
+
+    The sights, at least one, are in the frame of the walls.
+    """
+    before = -1
+    while (count := int(sights["wall"].max()) + 1) != before:
+        lines, before = lines_of(sights, _HERE, count), count
+        sights = merged(sights, _HERE, lines, apart)
+    return sights, lines
+
+
 def walls_shown(tables: Sequence[Records]) -> Records:
     """Return the walls that segments in the frame of the map show; parts of one are joined."""
     segments = np.concatenate([np.zeros(0, SEGMENT), *tables])
@@ -218,28 +239,24 @@ def walls_shown(tables: Sequence[Records]) -> Records:
     segments = segments[sure & (segments["length"] >= SHORTEST)]
     if not len(segments):
         return np.zeros(0, WALL)
-    sights, before = sights_of([(segments, np.arange(len(segments)))]), -1
-    pose = np.zeros((1, 3))
-    while (count := int(sights["wall"].max()) + 1) != before:
-        lines, before = lines_of(sights, pose, count), count
-        sights = merged(sights, pose, lines, 0.0)
-    return bowed(walls_along(sights, pose, lines, WHOLE), sights)
+    sights, lines = joined(sights_of([(segments, np.arange(len(segments)))]))
+    return bowed(walls_along(sights, _HERE, lines, WHOLE), sights)
 
 
 def columns_shown(tables: Iterable[Records]) -> Records:
     """Return the columns that arcs in the frame of the map show, by Kalman's update."""
     arcs = list(chain.from_iterable(tables))
     columns: list[Records] = []
-    places, spreads, gate = np.empty((len(arcs), 3)), np.empty(len(arcs)), chi_square(_GATE, 3)
+    places, spreads = np.empty((len(arcs), 3)), np.empty(len(arcs))
     for arc in arcs:
         place, n = np.append(arc["center"], arc["radius"]), len(columns)
         # The χ² is at least the squared distance over the trace of the covariance.
         squares = np.square(places[:n] - place).sum(axis=1)
         spread = np.trace(arc["covariance"])
-        for k in np.flatnonzero(squares < gate * (spreads[:n] + spread)).tolist():
+        for k in np.flatnonzero(squares < _GATE_3 * (spreads[:n] + spread)).tolist():
             column, e = columns[k], place - places[k]
             inverse = np.linalg.inv(column["covariance"] + arc["covariance"])
-            if e @ inverse @ e < gate:
+            if e @ inverse @ e < _GATE_3:
                 gain = column["covariance"] @ inverse
                 column["center"] += (gain @ e)[:2]
                 column["radius"] += (gain @ e)[2]
