@@ -32,12 +32,13 @@ SETTINGS = {
                "_UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_APART": 0.015, "_PLACES": 3.0,
                "_AGREE": (0.5, 0.05), "_VIEWS": 3},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
-    "sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
+    "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_settings_are_those_that_the_results_were_measured_with(name):
-    module = importlib.import_module(f"lineament.mapping.{name}")
+    home = "lineament" if "." in name else "lineament.mapping"
+    module = importlib.import_module(f"{home}.{name}")
     for key, value in SETTINGS[name].items():
         np.testing.assert_allclose(getattr(module, key), value, rtol=1e-12, err_msg=key)

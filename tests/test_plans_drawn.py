@@ -70,6 +70,24 @@ def test_segments_that_a_plan_takes(segment, is_kept):
     assert len(plan.walls()) == is_kept
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("covariance", [[1e-6, 2e-6], [2e-6, 1e-6]]),  # a correlation of 2
+        ("covariance", [[-1e-6, 0], [0, 1e-6]]),
+        ("covariance", [[math.nan, 0], [0, 1e-6]]),
+        *((name, math.nan) for name in ("angle", "misfit", "rms", "centroid")),
+    ],
+)
+def test_impossible_segments_make_no_wall(name, value):
+    good, bad = line((0, 0), (4, 0)), line((0, 1), (4, 1))
+    bad[name] = value
+    plan = FloorPlan()
+    plan.add(features(segments=[good, bad]))
+    (wall,) = plan.walls()
+    assert wall["end"].tolist() == [4, 0]
+
+
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_each_scan_is_drawn_once(tmp_path, count):
     """A wall that all scans show, one that the first shows, one that the last shows."""

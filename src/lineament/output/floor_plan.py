@@ -105,13 +105,18 @@ class FloorPlan:
 
 
 def _sure(segments: Records) -> Records:
-    """Return the segments that a plan takes: of a length to believe, and sure of their ends."""
-    ends = np.stack((segments["start"], segments["end"]), axis=1)
-    segments = segments[is_drawn(ends)]
-    length, covariance = segments["length"], segments["covariance"]
+    """Return segments that are possible, of a length to believe, and sure of their ends."""
+    ends = np.stack((segments["start"], segments["end"], segments["centroid"]), axis=1)
+    others = np.stack([segments[name] for name in ("angle", "misfit", "rms")], axis=1)
+    segments = segments[is_drawn(ends) & is_drawn(others)]
+    length, (of_offset, both, of_angle) = segments["length"], _parts(segments["covariance"])
     sure = (length >= SHORTEST) & (length <= LONGEST)  # NaN is neither
-    sure &= covariance[:, 0, 0] + (length / 2) ** 2 * covariance[:, 1, 1] <= SURE**2
-    return segments[sure]
+    sure &= (of_offset >= 0) & (of_angle >= 0) & (both**2 <= of_offset * of_angle)
+    return segments[sure & (of_offset + (length / 2) ** 2 * of_angle <= SURE**2)]
+
+
+def _parts(covariances: Array) -> tuple[Array, Array, Array]:
+    return covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
 
 
 class Averages:
