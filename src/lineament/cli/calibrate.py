@@ -1,12 +1,17 @@
 """The command that finds where a scanner is on its robot."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import LOG, METHOD, NOISE, PATH, QUIET, SET, check_ending, make_extractor
+from .options import LOG, PATH, QUIET, check_ending, extracting
 from .options import reading_odometry as reading
+
+if TYPE_CHECKING:
+    from ..extractor import Extractor
 
 
 @click.command()
@@ -23,17 +28,13 @@ from .options import reading_odometry as reading
 )
 @click.option("--against", metavar="TOPIC", help="Another scanner, in place of the wheels.")
 @click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
-@METHOD
-@SET
-@NOISE
+@extracting
 @reading
 @QUIET
 def calibrate(
     log: Path | str,
     output: Path | None,
-    method: str | None,
-    settings: tuple[str, ...],
-    noise: float | None,
+    extractor: Extractor,
     against: str | None,
     track_width: float | None,
     as_json: bool,
@@ -61,7 +62,7 @@ def calibrate(
     done = calibrate_log(
         log,
         output,
-        make_extractor(method, settings, noise),
+        extractor,
         against=against,
         track_width=track_width or 0.0,
         deskewed=not no_deskew,

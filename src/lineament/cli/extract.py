@@ -12,14 +12,11 @@ import click
 from ..errors import LineamentError
 from .options import (
     LOG_PATH,
-    METHOD,
-    NOISE,
     QUIET,
-    SET,
     TEXT_PATH,
     check_ending,
     complain,
-    make_extractor,
+    extracting,
     reading,
 )
 
@@ -42,9 +39,7 @@ _COUNT = click.IntRange(min=1)
     type=TEXT_PATH,
     help="File to write, its format by its ending; or a folder, FOLDER/, for a file a log.",
 )
-@METHOD
-@SET
-@NOISE
+@extracting
 @reading
 @click.option(
     "--format",
@@ -63,9 +58,7 @@ _COUNT = click.IntRange(min=1)
 def extract(
     logs: tuple[Path | str, ...],
     output: str,
-    method: str | None,
-    settings: tuple[str, ...],
-    noise: float | None,
+    extractor: Extractor,
     reading: dict[str, Any],
     world: bool,
     quiet: bool,
@@ -91,7 +84,6 @@ def extract(
     if world and ending not in _TABLES:
         raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
     reading = reading | {"world": world}
-    extractor = make_extractor(method, settings, noise)
     if is_folder:
         _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)
         return

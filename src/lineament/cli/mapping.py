@@ -1,23 +1,25 @@
 """The commands that make a map of a log, and that find a log on one."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import (
     LIMITS,
     LOG,
-    METHOD,
-    NOISE,
     PATH,
     QUIET,
-    SET,
     check_ending,
     complain,
-    make_extractor,
+    extracting,
 )
 from .options import reading_odometry as reading
+
+if TYPE_CHECKING:
+    from ..extractor import Extractor
 
 MAP = click.option(
     "--map",
@@ -46,9 +48,7 @@ _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
 @_NO_ODOMETRY
-@METHOD
-@SET
-@NOISE
+@extracting
 @reading
 @QUIET
 def map_command(
@@ -57,9 +57,7 @@ def map_command(
     poses: Path | None,
     onto: Path | None,
     no_odometry: bool,
-    method: str | None,
-    settings: tuple[str, ...],
-    noise: float | None,
+    extractor: Extractor,
     reading: dict[str, Any],
     quiet: bool,
 ) -> None:
@@ -77,7 +75,7 @@ def map_command(
     done = map_log(
         log,
         output,
-        make_extractor(method, settings, noise),
+        extractor,
         poses=poses,
         onto=onto,
         odometry=not no_odometry,
@@ -96,18 +94,14 @@ def map_command(
 @click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
 @_NO_ODOMETRY
 @click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
-@METHOD
-@SET
-@NOISE
+@extracting
 @reading
 @QUIET
 def locate(
     log: Path | str,
     plan: Path,
     output: Path,
-    method: str | None,
-    settings: tuple[str, ...],
-    noise: float | None,
+    extractor: Extractor,
     no_odometry: bool,
     no_deskew: bool,
     quiet: bool,
@@ -127,7 +121,7 @@ def locate(
         log,
         plan,
         output,
-        make_extractor(method, settings, noise),
+        extractor,
         odometry=not no_odometry,
         deskewed=not no_deskew,
         track=tracker(quiet),

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import (
     LOG,
-    METHOD,
-    NOISE,
     PATH,
     QUIET,
-    SET,
     check_ending,
-    make_extractor,
+    extracting,
     mountings,
     wrong_usage,
 )
 from .options import reading_topics as reading
+
+if TYPE_CHECKING:
+    from ..extractor import Extractor
 
 #: Formats that hold features alone; the others show scans at their poses.
 _TABLES = (".parquet", ".csv", ".jsonl")
@@ -38,9 +38,7 @@ _TABLES = (".parquet", ".csv", ".jsonl")
     metavar="SECONDS",
     help="Longest time between scans that are merged.  [default: half a period of the slowest]",
 )
-@METHOD
-@SET
-@NOISE
+@extracting
 @reading
 @click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
 @QUIET
@@ -51,9 +49,7 @@ def merge(
     unsure: tuple[float, float] | None,
     base_frame: str,
     tolerance: float | None,
-    method: str | None,
-    settings: tuple[str, ...],
-    noise: float | None,
+    extractor: Extractor,
     reading: dict[str, Any],
     world: bool,
     quiet: bool,
@@ -79,7 +75,6 @@ def merge(
     known = {} if unsure is None else {"unsure": unsure}
     with wrong_usage():
         rig = Rig(reading.pop("topic"), mountings, base_frame, **known)
-    extractor = make_extractor(method, settings, noise)
     done = merge_log(
         log,
         output,

@@ -279,6 +279,18 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
         )
 
 
+def extracting(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of a method; the command gets the extractor that they ask for."""
+
+    @wraps(command)
+    def making(
+        method: str | None, settings: tuple[str, ...], noise: float | None, **given: Any
+    ) -> None:
+        command(extractor=make_extractor(method, settings, noise), **given)
+
+    return METHOD(SET(NOISE(making)))
+
+
 def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
     """Return the parameters of a method that ``--set NAME=VALUE`` gives, by name."""
     return dict(_setting(text) for text in settings)
