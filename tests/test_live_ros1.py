@@ -226,24 +226,26 @@ def test_a_map_a_guess_and_a_call_as_map_server_rviz_and_amcl_have_them(node, sc
     scanner.publish(f"{topic}/map", "nav_msgs/OccupancyGrid", False, True)
     scanner.write(f"{topic}/map", {"info": info, "data": [0, 100, -1, 0, 0, 0]})
     config = LiveConfig(topic=topic, map=f"{topic}/map", namespace=topic)
-    source = Ros1Source(node, config)
-    (came,) = received(source, 1)
-    assert (came.what, came.read().cells.tolist()) == (MAP, [[0, 100, -1], [0, 0, 0]])
-    assert came.read().resolution == 0.5
-    placed = "geometry_msgs/PoseWithCovarianceStamped"
-    guess = f"{topic}/initialpose"
-    scanner.publish(guess, placed)
-    eventually(lambda: scanner.listeners(guess))
-    scanner.write(
-        guess, {"header": {"frame_id": "map"}, "pose": {"pose": {"position": {"x": 2.0}}}}
-    )
-    (came,) = received(source, 1)
-    assert came.what == GUESS
-    (pose,) = came.read()
-    assert pose.pose[:2] == (2.0, 0.0)
-    scanner.call(f"{topic}/global_localization", "std_srvs/Empty")
-    (came,) = received(source, 1)
-    assert (came.what, came.read()) == (RELOCATE, None)
+    with closing(Ros1Source(node, config)) as source:
+        (came,) = received(source, 1)
+        assert (came.what, came.read().cells.tolist()) == (MAP, [[0, 100, -1], [0, 0, 0]])
+        assert came.read().resolution == 0.5
+        placed = "geometry_msgs/PoseWithCovarianceStamped"
+        guess = f"{topic}/initialpose"
+        scanner.publish(guess, placed)
+        eventually(lambda: scanner.listeners(guess))
+        scanner.write(
+            guess, {"header": {"frame_id": "map"}, "pose": {"pose": {"position": {"x": 2.0}}}}
+        )
+        (came,) = received(source, 1)
+        assert came.what == GUESS
+        (pose,) = came.read()
+        assert pose.pose[:2] == (2.0, 0.0)
+        scanner.call(f"{topic}/global_localization", "std_srvs/Empty")
+        (came,) = received(source, 1)
+        assert (came.what, came.read()) == (RELOCATE, None)
+    assert not node.ended
+    eventually(lambda: not scanner.listeners(guess))
 
 
 def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):

@@ -72,7 +72,7 @@ class Ros1Node:
             topic, _raw(kind), tcp_nodelay=True, latch=is_latched, queue_size=depth
         )
 
-    def serve(self, service: str, kind: str, called: Callable[[], None]) -> None:
+    def serve(self, service: str, kind: str, called: Callable[[], None]) -> Any:
         """Answer the calls of a service that neither takes nor returns anything."""
         from roslib.message import get_service_class
 
@@ -84,7 +84,7 @@ class Ros1Node:
             called()
             return genuine._response_class()
 
-        self._rospy.Service(service, genuine, answer)
+        return self._rospy.Service(service, genuine, answer)
 
     def close(self) -> None:
         """Leave ROS, and close all topics; a process cannot come back."""
@@ -103,8 +103,10 @@ class Ros1Source:
         }
         scans = [one.topic for one in wanted(config) if one.what == SCAN]
         self._scans = [self._subscribed[topic][1] for topic in scans]
+        self._service = None
         if config.is_localiser:  # The service that AMCL has.
-            node.serve(config.resolved("global_localization"), "std_srvs/Empty", self._relocate)
+            name = config.resolved("global_localization")
+            self._service = node.serve(name, "std_srvs/Empty", self._relocate)
 
     @property
     def lost(self) -> int:
@@ -143,6 +145,13 @@ class Ros1Source:
             for topic, kind in silent.items()
             if published.get(topic, kind) != kind
         ]
+
+    def close(self) -> None:
+        """Stop listening."""
+        for _, subscription in self._subscribed.values():
+            subscription.unregister()
+        if self._service is not None:
+            self._service.shutdown()
 
     def _put(self, wanted: Wanted, message: Any) -> None:
         publisher = _publisher(message)
