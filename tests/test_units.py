@@ -5,7 +5,6 @@ import warnings
 
 import numpy as np
 import pytest
-import ros_bags
 
 import lineament as ln
 from lineament import Extractor, LaserScan, LineamentWarning, LogError, RangeNoise
@@ -15,7 +14,6 @@ from lineament.logs import open_log, save_npz, summarize
 from lineament.scan.units import doubt
 from lineament.tasks.bulk import Manifest, extract_logs
 from lineament.tasks.extract import extract_log
-from lineament.view import Session
 
 BEARINGS = {"angle_min": -1.0, "angle_increment": 0.01}
 WALL = 2.5 / np.cos(np.linspace(-1.0, 1.0, 201))
@@ -216,19 +214,6 @@ def test_logs_in_bulk_warn_each_for_itself(tmp_path):
     assert begun == [str(tmp_path / "a.npz"), str(tmp_path / "c.npz")]
     rows = Manifest(tmp_path / "out").rows
     assert [len(rows[str(tmp_path / f"{name}.npz")].warnings) for name in "abc"] == [1, 0, 1]
-
-
-def test_a_view_of_two_scanners_says_so(tmp_path):
-    messages = ros_bags.Messages(2)
-    items = [(f"/{at}", k, messages.scan(k, [1.0, 2.0])) for k, at in enumerate(("front", "rear"))]
-    path = ros_bags.write(tmp_path, "mcap", items)
-    with (
-        pytest.warns(LineamentWarning, match=r"shows scans of /front, /rear in turns \(--topic"),
-        Session(path, {}) as session,
-    ):
-        session.wait()
-    with Session(path, {}, topic="/rear") as session:
-        session.wait()
 
 
 # Bearings and noise

@@ -22,6 +22,7 @@ from .options import (
     reading,
     wrong_usage,
 )
+from .options import on_robot as of_scanners
 
 
 @click.command()
@@ -108,6 +109,7 @@ def plot(
 @click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
 @LAYERS
 @click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@of_scanners
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(
@@ -119,12 +121,15 @@ def view(
     host: str,
     port: int,
     plan: Path | None,
+    mountings: dict[str, tuple[float, float, float]],
+    base_frame: str,
     no_browser: bool,
     **drawing: Any,
 ) -> None:
     """Look at LOGS in the browser: scans, features, and why a segment is missing.
 
     LOGS are files, folders, patterns, archives or addresses; the page has a list of them.
+    Scanners of one log are shown over each other, where it is known how they are mounted.
     """
     from ..methods import DEFAULT_METHOD, method_names
     from ..view import Session, serve
@@ -136,7 +141,10 @@ def view(
         from ..mapping import LineMap
 
         drawn = LineMap.read(plan, **drawing, limits=reading["limits"])
-    session = Session(logs, extractors, drawn, **reading)
+    with wrong_usage():
+        session = Session(
+            logs, extractors, drawn, mountings=mountings, base_frame=base_frame, **reading
+        )
     serve(session, host, port, browser=not no_browser, write=click.echo)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .options import (
+    BASE_FRAME,
     LOG,
     PATH,
     QUIET,
@@ -29,9 +30,7 @@ _TABLES = (".parquet", ".csv", ".jsonl")
 @LOG
 @click.option("-o", "--output", required=True, type=PATH, help="File to write, as for extract.")
 @mountings
-@click.option(
-    "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
-)
+@BASE_FRAME
 @click.option(
     "--tolerance",
     type=click.FloatRange(min=0),

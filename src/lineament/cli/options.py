@@ -124,9 +124,19 @@ _UNSURE = click.option(
 )
 
 
+BASE_FRAME = click.option(
+    "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
+)
+
+
 def mountings(command: F) -> F:
     """Add the options of several scanners on one robot."""
     return _MOUNTINGS(_UNSURE(command))
+
+
+def on_robot(command: F) -> F:
+    """Add the options of where scanners are on a robot."""
+    return _MOUNTINGS(BASE_FRAME(command))
 
 
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")

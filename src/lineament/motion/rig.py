@@ -1,17 +1,22 @@
 """The scanners of a robot: the topics of their scans, and where each is mounted."""
 
 import math
-from collections.abc import Mapping
+import statistics
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from ..rosmsg.frames import Frames, Place, frame_of
+from ..rosmsg.poses import StampedPose
 from ..scan import Array, Pose
 from ..scan.fields import checked_pose
 
 #: How well mountings are known, where nothing else is said: 1 cm and 0.5°, as by a ruler.
 UNSURE = 0.01, math.radians(0.5)
+#: Scans are of one time that are no farther apart than such a share of the slowest one's period.
+TOGETHER = 0.55
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,3 +84,21 @@ class Rig:
         if topic in self.mountings:
             return Place(self.mountings[topic])
         return frames.find(frame_of(self.base_frame), frame_of(frame_id), 0.0)
+
+
+def fixed(links: Iterable[StampedPose]) -> Frames:
+    """Return the frames of a robot that ``/tf_static`` has."""
+    frames = Frames()
+    for link in links:
+        frames.add(link, is_fixed=True)
+    return frames
+
+
+def period_of(stamps: Iterable[float]) -> float:
+    """Time from scan to scan [s], of scans at these times; 0 if they do not say.
+
+    >>> period_of([0.0, 0.1, 0.2, 0.2, 0.5])
+    0.1
+    """
+    steps = [later - stamp for stamp, later in pairwise(stamps) if later > stamp]
+    return statistics.median_low(steps) if steps else 0.0

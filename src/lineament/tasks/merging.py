@@ -1,11 +1,10 @@
 """The scans of several scanners to one table of features: what `lineament merge` does."""
 
 import os
-import statistics
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,10 @@ from ..features import TABLES, Features
 from ..files import check_outputs
 from ..logs import open_log
 from ..mapping import merge_features
-from ..motion.rig import Rig
+from ..motion.rig import TOGETHER, Rig, fixed, period_of
 from ..output import open_writer
 from ..progress import Track, untracked
-from ..rosmsg.frames import Frames, Place
+from ..rosmsg.frames import Place
 from ..scan import LaserScan, Pose
 from ..scan.poses import compose, relative
 from .extract import in_world
@@ -99,10 +98,8 @@ class _Scanner:
         first = [scan for _, scan in islice(self.log.items(), _FIRST)]
         if not first:
             raise LogError(self.log.name, f"has no scan of {topic}")
-        steps = [later.stamp - scan.stamp for scan, later in pairwise(first)]
-        steps = [step for step in steps if step > 0]
         #: Time from scan to scan [s]; 0 if that is not known.
-        self.period = statistics.median(steps) if steps else 0.0
+        self.period = period_of(scan.stamp for scan in first)
         self.frame_id = first[0].frame_id
         self.nearest = Nearest(scan for _, scan in self.log.items())
         self.place = Place((0.0, 0.0, 0.0))
@@ -239,9 +236,7 @@ def _together(
 def _place(scanners: list[_Scanner], rig: Rig) -> None:
     """Find where each scanner is on the robot."""
     log = scanners[0].log
-    frames = Frames()
-    for link in log.mountings():
-        frames.add(link, is_fixed=True)
+    frames = fixed(log.mountings())
     for scanner in scanners:
         try:
             scanner.place = rig.place(scanner.topic, scanner.frame_id, frames)
@@ -257,7 +252,7 @@ def _tolerance(scanners: list[_Scanner]) -> float:
     slowest = max(scanner.period for scanner in scanners)
     if not slowest:
         raise LogError(scanners[0].log.name, "has no time from scan to scan, expected a tolerance")
-    return 0.55 * slowest
+    return TOGETHER * slowest
 
 
 def _merged(parts: list[tuple[_Scanner, LaserScan]], extractor: Extractor, rig: Rig) -> Features:

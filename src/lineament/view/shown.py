@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import LineamentError, warn
+from ..errors import LineamentError
 from ..extractor import Extractor
 from ..kernels import FARTHEST
 from ..logs import open_log, save_npz
+from ..rosmsg.frames import Place
 from ..scan import LaserScan
 from .store import Item, ScanStore
 
@@ -25,26 +26,35 @@ if TYPE_CHECKING:
 
 #: Most points of a scan that is shown behind others.
 MOST_POINTS = 360
+#: So long after another look it is seen how far a log was read [s].
+_SOON = 0.02
 
 
 class ShownLog:
     """A log as `lineament.open_log` gives it, and what has been read of it so far.
 
     Reading starts at once, in a thread, and ends with the log or when it is closed. A LogError if
-    the log cannot be read up to its first scan.
+    the log cannot be read up to its first scan. With the `place` of its scanner on the robot, the
+    poses of the log are those of the robot, and become those of the scanner.
     """
 
     def __init__(
-        self, path: str, capacity: int, reading: dict[str, Any], plan: LineMap | None = None
+        self,
+        path: str,
+        capacity: int,
+        reading: dict[str, Any],
+        plan: LineMap | None = None,
+        place: Place | None = None,
     ) -> None:
+        if place is not None:
+            reading = reading | {"laser_pose": place.pose}
         log = open_log(path, **reading)
         log.scan(0)
-        if log.topic is None and len(log.topics) > 1:
-            warn(f"{log.name}: shows scans of {', '.join(log.topics)} in turns (--topic for one)")
+        self.place = place
         self._about: dict[str, Any] = {"format": log.format, "total": None}
         self._faults = {"error": "", "skipped": 0, "faults": log.faults}
         # Another log, as each iteration counts its faults anew.
-        again = lambda: open_log(path, **reading).items()  # noqa: E731
+        again = lambda: self._upright(open_log(path, **reading).items())  # noqa: E731
         self.store = ScanStore(again, capacity=capacity)
         self._plan, self._where = plan, dict[int, dict[str, Any]]()
         # The thread alone holds the log, and a temporary copy that it may have, while it reads.
@@ -95,6 +105,20 @@ class ShownLog:
             save_npz(path, [scan])
             return path.read_bytes()
 
+    def near(self, stamp: float) -> int | None:
+        """Return which scan is nearest to a time [s], once the log was read so far; None: none."""
+        while not self.wait(_SOON):
+            last = self.store.stamps(max(len(self.store) - 1, 0), 1)
+            if last and last[0] > stamp:
+                break
+        return self.store.nearest(stamp)
+
+    def _upright(self, items: Iterable[Item]) -> Iterable[Item]:
+        """Turn the scans of a scanner over that is upside down."""
+        if self.place is None or not self.place.is_upside_down:
+            return items
+        return ((topic, scan.turned_over()) for topic, scan in items)
+
     def _located(self, items: Iterable[Item]) -> Iterator[Item]:
         """Yield scans with their poses on the plan, or none while that is not known."""
         from ..mapping.following import follow
@@ -113,7 +137,7 @@ class ShownLog:
     def _fill(self, log: Any) -> None:
         try:
             self._about["total"] = len(log)
-            items = log.measured()
+            items = self._upright(log.measured())
             self.store.fill(items if self._plan is None else self._located(items))
         except LineamentError as error:
             self._faults["error"] = str(error)

@@ -74,6 +74,11 @@ class ScanStore:
         """Return the stamps [s] of scans that were read, at most `count` from `first` on."""
         return self._stamps[first : first + count].tolist()
 
+    def nearest(self, stamp: float) -> int | None:
+        """Return which of the scans that were read is nearest to a time [s]; None if none was."""
+        stamps = np.array(self._stamps)
+        return int(abs(stamps - stamp).argmin()) if len(stamps) else None
+
     def poses(self, first: int, count: int) -> list[list[float]]:
         """Return the poses of scans that were read, NaN without one, as `stamps` does."""
         poses = self._poses[3 * first : 3 * (first + count)].tolist()

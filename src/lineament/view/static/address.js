@@ -8,6 +8,7 @@ export function readAddress() {
   const whole = (name) => (/^\d{1,9}$/.test(said.get(name) ?? "") ? Number(said.get(name)) : undefined);
   return {
     log: said.get("log") ?? undefined,
+    topics: said.get("topics")?.split(","),
     scan: whole("scan"),
     methods: [said.get("method"), said.get("with")].filter(Boolean),
     hidden: (said.get("hide") ?? "").split(","),
@@ -19,9 +20,10 @@ export function readAddress() {
 }
 
 /** The address of what is seen, without what is so by default. */
-export function addressOf({ log, scan, methods, hidden, sigmas, world, view, beam }) {
+export function addressOf({ log, topics, scan, methods, hidden, sigmas, world, view, beam }) {
   const [x, y, span] = view, said = {
     ...(log === undefined ? {} : { log }),
+    ...(topics === undefined ? {} : { topics: topics.join(",") }),
     scan,
     method: methods[0],
     ...(methods[1] ? { with: methods[1] } : {}),

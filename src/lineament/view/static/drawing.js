@@ -9,8 +9,12 @@ const NAMES = ["ink", "soft", "page", "grid", "axis", "faint", "drive", "accent"
 export function readTheme() {
   const style = getComputedStyle(document.documentElement);
   const read = (name) => style.getPropertyValue(`--${name}`).trim();
-  return { ...Object.fromEntries(NAMES.map((n) => [n, read(n)])), clusters: read("clusters").split(/\s+/) };
+  const lists = ["clusters", "scanners"].map((name) => [name, read(name).split(/\s+/)]);
+  return { ...Object.fromEntries([...NAMES.map((n) => [n, read(n)]), ...lists]), stroke: 1.2 };
 }
+
+/** The colour of a scanner, by the number of its topic. */
+export const colorOf = (number, theme) => theme.scanners[number % theme.scanners.length];
 
 /** Draws on a canvas: the world by a plane, a scan and its features by their frame in it. */
 export class Drawing {
@@ -33,6 +37,20 @@ export class Drawing {
       this.#round(point, half);
       ctx.fill();
     });
+    this.#sensor();
+  }
+
+  /** What each of several scanners sees, in its colour and its place on the robot. */
+  scanners(parts) {
+    for (const part of parts) {
+      const { ctx, plane, frame, size, theme } = this, c = colorOf(part.number, theme);
+      const own = { ...theme, soft: c, ink: c, corner: c, edge: c, arc: c, stroke: 3.5 };
+      const drawing = new Drawing(ctx, plane, frame.within(part.place), size, own);
+      drawing.measurements(part, false);
+      drawing.arcs(part);
+      drawing.segments(part);
+      drawing.corners(part, 0);
+    }
     this.#sensor();
   }
 
@@ -182,7 +200,7 @@ export class Drawing {
 
   #segment({ start, end }) {
     if (!isKnown([start, end])) return;
-    this.#pen(this.theme.ink, 1.2);
+    this.#pen(this.theme.ink, this.theme.stroke);
     this.#stroke([start, end]);
     const [p, q] = [this.at(start), this.at(end)];
     const length = Math.hypot(q[0] - p[0], q[1] - p[1]) || 1;

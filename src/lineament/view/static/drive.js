@@ -12,6 +12,7 @@ export class Drive {
   #started = false;
   #closed = false;
 
+  /** `log` are the parameters by which questions name it. */
   constructor(log) {
     this.log = log;
   }
@@ -26,16 +27,16 @@ export class Drive {
     this.#started = true;
     const { log } = this;
     for (let step = 0, first = 0; !this.#closed;) {
-      const { scans, total, complete } = await ask("log", { log });
+      const { scans, total, complete } = await ask("log", log);
       if (total !== null || complete) step ||= Math.max(1, Math.ceil((total ?? scans) / SCANS));
       while (this.poses.length < scans && !this.#closed) {
-        const { poses } = await ask("poses", { log, first: this.poses.length, count: POSES });
+        const { poses } = await ask("poses", { ...log, first: this.poses.length, count: POSES });
         if (!poses.length) break;
         this.poses.push(...poses);
       }
       while (step && first < scans && !this.#closed) {
         const count = Math.min(CHUNK, Math.ceil((scans - first) / step));
-        const more = await ask("drive", { log, first, step, count });
+        const more = await ask("drive", { ...log, first, step, count });
         this.scans.push(...more.scans);
         first += step * count;
         if (!this.#closed) grown();
@@ -65,19 +66,21 @@ export class Drive {
 export class Backdrop {
   #canvas = document.createElement("canvas");
   #key = "";
+  #drive = null;
   #painted = 0; // scans that are in the picture
 
   /** Draw the points of the scans up to one, in a colour such as #a0b0c0. */
   draw(ctx, drive, plane, size, color, last) {
     const ratio = window.devicePixelRatio || 1, canvas = this.#canvas;
     const [width, height] = [size.width, size.height].map((pixels) => Math.round(pixels * ratio));
-    const key = [plane.x, plane.y, plane.scale, width, height, color, drive.log].join();
+    const key = [plane.x, plane.y, plane.scale, width, height, color].join();
     const after = drive.scans.findIndex(({ index }) => index > last);
     const count = after < 0 ? drive.scans.length : after;
-    if (key !== this.#key || count < this.#painted) {
+    if (key !== this.#key || drive !== this.#drive || count < this.#painted) {
       Object.assign(canvas, { width, height });
       this.image = new ImageData(width, height);
       this.#key = key;
+      this.#drive = drive;
       this.#painted = 0;
     }
     if (this.#painted < count) {

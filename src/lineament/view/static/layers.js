@@ -8,7 +8,8 @@ import { element } from "./details.js";
  */
 export const LAYERS = [
   { name: "drive", draw: (on, d, s) => on && s.drive && d.drive(s.drive, s.backdrop, s.index) },
-  { name: "clusters", draw: (on, d, s) => s.scan && d.measurements(s.scan, on) },
+  { name: "scanners", draw: (on, d, s) => on && s.scan?.parts && d.scanners(s.scan.parts) },
+  { name: "clusters", draw: (on, d, s) => s.scan && !s.isByScanner && d.measurements(s.scan, on) },
   { name: "arcs", key: "arc", draw: (on, d, s) => on && s.scan && d.arcs(s.scan) },
   { name: "segments", key: "segment", draw: (on, d, s) => on && s.scan && d.segments(s.scan) },
   { name: "breakpoints", key: "break", draw: (on, d, s) => on && s.scan && d.breakpoints(s.scan) },
@@ -23,10 +24,10 @@ export class Layers {
   #boxes = {};
 
   constructor(place, changed) {
-    const chips = LAYERS.map(({ name, key }, k) => {
+    const chips = LAYERS.map(({ name, key }) => {
       const box = Object.assign(element("input"), { type: "checkbox", id: `show-${name}`, checked: true });
       const chip = element("label");
-      chip.title = `Show or hide (${k + 1})`;
+      chip.title = "Show or hide (1 … 9, in the order of the boxes)";
       chip.append(box, ...(key ? [element("i", "", `key ${key}`)] : []), name);
       box.addEventListener("change", changed);
       this.#boxes[name] = box;
@@ -47,13 +48,15 @@ export class Layers {
     for (const name of names) if (this.#boxes[name]) this.#boxes[name].checked = false;
   }
 
+  /** Switch one of the boxes that are there. */
   toggle(k) {
-    this.#boxes[LAYERS[k].name].click();
+    const there = LAYERS.filter(({ name }) => !this.#boxes[name].parentElement.hidden);
+    if (there[k]) this.#boxes[there[k].name].click();
   }
 
-  /** Whether there is a plan, and a pose on it. */
-  offerPlan(isThere) {
-    for (const name of ["plan", "pose"]) this.#boxes[name].parentElement.hidden = !isThere;
+  /** Whether these layers are there: of a plan and a pose on it, of several scanners. */
+  offer(isThere, ...names) {
+    for (const name of names) this.#boxes[name].parentElement.hidden = !isThere;
   }
 
   /** The drive is there in the world frame alone. */

@@ -12,6 +12,7 @@ import { Panel } from "./panel.js";
 import { Plane } from "./plane.js";
 import { Share } from "./share.js";
 import { Timeline } from "./timeline.js";
+import { Topics } from "./topics.js";
 
 const $ = (id) => document.getElementById(id);
 const PATIENCE = 700; // milliseconds after which the page says what it waits for
@@ -31,6 +32,7 @@ class App {
   #loader = new Latest();
   #frame = 0;
   #writing = 0;
+  #opening = null; // the log that is opened
   #wanted = {}; // of a link, until it is shown
   #fits = true; // nobody has moved the view since it was fitted
 
@@ -50,7 +52,8 @@ class App {
     this.layers.hide(wanted.hidden);
     const { walls } = await ask("plan");
     if (walls.length) this.plan = walls;
-    this.layers.offerPlan(walls.length > 0);
+    this.layers.offer(walls.length > 0, "plan", "pose");
+    this.topics = new Topics($("topics"), (names) => this.chooseTopics(names).catch(fail));
     wanted.world ||= walls.length > 0 && !location.hash;
     $("sigmas").value = wanted.sigmas ?? "3";
     if (!$("sigmas").value) $("sigmas").value = "3";
@@ -63,16 +66,21 @@ class App {
     if (number < 0) fail(new Error(`There is no log ${wanted.log} here.`));
   }
 
+  /** The parameters by which questions name the log, and its topics. */
+  get log() {
+    return { log: this.number, ...this.topics.parameters };
+  }
+
   get logName() {
     return this.logs[this.number];
   }
 
   /** Show a log, as a link wants it. */
   async open(number, wanted = {}) {
-    const drive = new Drive(number), isWorld = wanted.world ?? this.world;
+    const isWorld = wanted.world ?? this.world, opening = (this.#opening = {});
     this.drive?.close();
     this.#setWorld(false);
-    Object.assign(this, { number, drive, asked: null });
+    Object.assign(this, { number, drive: null, asked: null });
     this.#wanted = { ...wanted, view: wanted.view ?? null };
     this.#fits = true;
     delete document.body.dataset.scan;
@@ -81,10 +89,16 @@ class App {
     document.title = `${this.logName} – lineament`;
     for (const id of ["topic", "facts"]) $(id).textContent = "";
     for (const id of ["problem", "reading"]) $(id).hidden = true;
-    this.timeline.open(number);
     for (const panel of this.panels) panel.clear();
     this.#offerWorld({ posed: 0, complete: false });
+    this.topics.offer({ topics: [], chosen: [] }, this.theme);
     this.redraw();
+    const offered = await ask("topics", { log: number });
+    if (opening !== this.#opening) return; // another log was opened meanwhile
+    this.topics.offer(offered, this.theme, wanted.topics);
+    this.layers.offer(this.topics.chosen.length > 1, "scanners");
+    const drive = (this.drive = new Drive(this.log));
+    this.timeline.open(this.log);
     try {
       await this.follow(wanted.scan ?? 0, isWorld);
     } catch (error) {
@@ -96,7 +110,7 @@ class App {
   async follow(scan, isWorld) {
     const { drive } = this;
     for (let shown = false; ;) {
-      const log = await ask("log", { log: drive.log });
+      const log = await ask("log", drive.log);
       if (drive !== this.drive) return; // another log was opened
       this.timeline.grow(log.scans);
       this.#offerWorld(log);
@@ -118,6 +132,18 @@ class App {
     const skipped = log.skipped ? `; ${log.skipped} faults left out, the first: ${log.faults[0]}` : "";
     $("facts").textContent = `${log.format}, ${log.scans} scans${skipped}`;
     if (log.error) fail(new Error(`The log was read up to scan ${log.scans - 1}: ${log.error}`));
+  }
+
+  /** Show other topics of the log, at the same time as before. */
+  chooseTopics(names) {
+    const { scan, size } = this.panels[0], { plane, world } = this;
+    const part = scan?.parts?.find(({ topic }) => topic === names[0]);
+    const view = this.#fits ? undefined : [plane.x, plane.y, plane.span(size)];
+    return this.open(this.number, { topics: names, scan: part?.index ?? this.timeline.index, world, view });
+  }
+
+  turnTopics() {
+    this.topics.turn();
   }
 
   addPanel(method) {
@@ -146,18 +172,22 @@ class App {
   /** Load a scan into all panels; of several that are asked for at once, the last. */
   load(index) {
     return this.#loader.run(async () => {
-      const panels = [...this.panels], { number } = this;
+      const panels = [...this.panels], { log, drive } = this;
       let loaded = false;
       const waiting = setInterval(async () => {
-        const { compiling } = await ask("log", { log: number }).catch(() => ({}));
+        const { compiling } = await ask("log", log).catch(() => ({}));
         if (loaded) return;
         for (const panel of panels) panel.caption.textContent = compiling || WAITING;
       }, PATIENCE);
       try {
         const scans = await Promise.all(
-          panels.map((panel) => ask("scan", { log: number, i: index, method: panel.method })));
-        if (number !== this.number) return;
+          panels.map((panel) => ask("scan", { ...log, i: index, method: panel.method })));
+        if (drive !== this.drive) return;
         scans.forEach((scan, k) => {
+          for (const part of scan.parts ?? []) {
+            placeBeams(part);
+            part.number = this.topics.names.indexOf(part.topic);
+          }
           placeBeams(scan);
           panels[k].show(scan);
           panels[k].place(this.world);
@@ -175,7 +205,8 @@ class App {
     $("problem").hidden = true;
     const { where } = scan, percent = (share) => `${Math.round(100 * share)} %`;
     const verdict = where && `${where.verdict}: ${percent(where.explained)} explained, ${percent(where.contradicted)} contradicted; `;
-    $("topic").textContent = `${verdict ?? ""}${scan.topic} in `;
+    const alone = scan.missing?.length ? ` (none of ${scan.missing.join(", ")} at this time)` : "";
+    $("topic").textContent = `${verdict ?? ""}${scan.topic}${alone} in `;
     if (this.asked && this.asked.index !== index) this.asked = null;
     document.body.dataset.scan = index;
     if (view) this.look(() => this.plane.look(view, size));
@@ -254,6 +285,7 @@ class App {
     const { asked, plane, panels, logs } = this;
     return addressOf({
       log: logs.length > 1 ? this.logName : undefined,
+      topics: this.topics.names.length ? this.topics.chosenNames : undefined,
       scan: this.timeline.index,
       methods: panels.map((panel) => panel.method),
       hidden: this.layers.hidden,
@@ -274,10 +306,14 @@ class App {
   }
 
   async explain(panel, beam) {
-    const { index, method } = panel.scan, { number } = this;
+    const { index, method, parts } = panel.scan, { log, drive } = this;
+    // What is merged is not explained, but what a scanner has measured.
+    const own = parts?.find(({ numbers }) => numbers.includes(beam));
+    const which = own ? { topics: own.number, i: own.index, beam: own.numbers.indexOf(beam) } : { i: index, beam };
     try {
-      const answer = await ask("trace", { log: number, i: index, method, beam });
-      if (number !== this.number || panel.scan?.index !== index || panel.scan.method !== method) return;
+      const answer = await ask("trace", { ...log, method, ...which });
+      if (own) answer.summary = `${own.topic}, its beam ${which.beam}: ${answer.summary}`;
+      if (drive !== this.drive || panel.scan?.index !== index || panel.scan.method !== method) return;
       this.asked = { panel, beam, index };
       this.redraw();
       $("problem").hidden = true;
@@ -317,6 +353,7 @@ class App {
     }
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       this.theme = readTheme();
+      this.topics.paint(this.theme);
       this.redraw();
     });
     addEventListener("hashchange", () => location.reload());

@@ -87,7 +87,8 @@ export class Panel {
       count(scan.segments.length, "segment"), count(scan.corners.length, "corner"),
       count(scan.edges.length, "edge"), count(scan.arcs.length, "arc"), count(clusters, "cluster"),
     ].join(", ");
-    this.caption.textContent = `${found}; ${noiseOf(scan)}`;
+    const noise = (scan.parts ?? []).map((part) => `${part.topic} ${noiseOf(part)}`).join(", ") || noiseOf(scan);
+    this.caption.textContent = `${scan.parts ? "merged: " : ""}${found}; ${noise}`;
     this.canvas.setAttribute("aria-label", `Scan ${scan.index} by ${scan.method}: ${found}`);
   }
 
@@ -102,7 +103,7 @@ export class Panel {
     const scene = {
       scan: seen, index: scan?.index, sigmas: app.sigmas,
       drive: app.world && scan ? app.drive : null, backdrop: this.#backdrop,
-      plan: app.world ? app.plan : null,
+      plan: app.world ? app.plan : null, isByScanner: Boolean(seen?.parts) && shown.scanners,
     };
     drawing.grid();
     for (const layer of LAYERS) layer.draw(shown[layer.name], drawing, scene);

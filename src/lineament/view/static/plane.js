@@ -56,6 +56,11 @@ export class Frame {
     Object.assign(this, { plane, x, y, turn, cos: Math.cos(turn), sin: Math.sin(turn) });
   }
 
+  /** The frame of what is mounted in this one. */
+  within([x, y, turn]) {
+    return new Frame(this.plane, [...this.toPlane([x, y]), this.turn + turn]);
+  }
+
   toPlane([x, y]) {
     return [this.x + this.cos * x - this.sin * y, this.y + this.sin * x + this.cos * y];
   }

@@ -40,8 +40,8 @@ export class Share {
   }
 
   async #npz() {
-    const { number, panels } = this.app;
-    const answer = await fetched("npz", { log: number, i: panels[0].scan.index });
+    const { log, panels } = this.app;
+    const answer = await fetched("npz", { ...log, i: panels[0].scan.index });
     this.#save(await answer.blob(), `${this.#name}.npz`);
   }
 

@@ -19,7 +19,7 @@ class Stamps {
     let block = this.#blocks.get(first);
     // A block that was asked for while the log was being read may have grown.
     if (!block || (index - first >= block.length && index < count)) {
-      block = (await ask("stamps", { log: this.log, first, count: BLOCK })).stamps;
+      block = (await ask("stamps", { ...this.log, first, count: BLOCK })).stamps;
       if (this.#blocks.size > 64) this.#blocks.clear();
       this.#blocks.set(first, block);
     }
@@ -46,7 +46,7 @@ export class Timeline {
     play.addEventListener("click", () => this.toggle());
   }
 
-  /** Begin another log. */
+  /** Begin another log, which questions name by parameters. */
   open(log) {
     if (this.playing) this.toggle();
     this.#stamps = new Stamps(log);
