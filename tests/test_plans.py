@@ -160,7 +160,7 @@ def test_many_noisy_views_give_the_room(seed):
 
 
 def test_plans_are_bounded(monkeypatch):
-    for name, most in (("TOGETHER", 10), ("MOST", 40), ("MOST_CORNERS", 40)):
+    for name, most in (("TOGETHER", 10), ("MOST_SEGMENTS", 40), ("MOST", 40)):
         monkeypatch.setattr(f"lineament.output.floor_plan.{name}", most)
     plan, sizes = FloorPlan(), []
     for y in range(1, 300):
@@ -180,7 +180,7 @@ def test_plans_are_bounded(monkeypatch):
 
 
 def test_a_plan_of_a_part_of_the_scans_says_so(tmp_path, monkeypatch):
-    for name, most in (("TOGETHER", 2), ("MOST", 20)):
+    for name, most in (("TOGETHER", 2), ("MOST_SEGMENTS", 20)):
         monkeypatch.setattr(f"lineament.output.floor_plan.{name}", most)
     scan, found = scan_at(0, 0, 0), features(100, segments=[line(*WALL)])
     with open_writer(tmp_path / "a.svg") as writer:
@@ -189,13 +189,21 @@ def test_a_plan_of_a_part_of_the_scans_says_so(tmp_path, monkeypatch):
     assert "each seen 3 times at least; walls of one scan in 2<" in (tmp_path / "a.svg").read_text()
 
 
-def test_corners_that_are_forgotten_were_seen_least_and_not_last(monkeypatch):
-    """Corners that are seen again and again, but only behind many others."""
-    monkeypatch.setattr("lineament.output.floor_plan.MOST_CORNERS", 40)
-    plan = FloorPlan()
+def test_what_is_forgotten_was_seen_least_and_not_last(monkeypatch):
+    """Walls and corners that are seen again and again, but only behind many others."""
+    for name, most in (("TOGETHER", 5), ("MOST", 40)):
+        monkeypatch.setattr(f"lineament.output.floor_plan.{name}", most)
+    plan, counts = FloorPlan(), []
     for y in range(1, 60):
         again = y > 30
-        plan.add(features(corners=[corner(0, y), *[corner(9, 0)] * again]))
+        walls = [line((0, y), (1, y)), *[line((0, 0), (5, 0))] * again]
+        plan.add(features(segments=walls, corners=[corner(0, y), *[corner(9, 0)] * again]))
+        counts.append(len(plan._lines))
+        assert plan._sights["wall"].max(initial=-1) == counts[-1] - 1
+    assert 30 < max(counts) <= 40
+    assert 20 in counts[30:]  # half of what there may be
+    (wall,) = plan.walls(2)
+    assert (wall["start"].tolist(), wall["end"].tolist(), wall["views"]) == ([0, 0], [5, 0], 29)
     np.testing.assert_allclose(plan._corners.seen(29), [(9, 0)])
 
 

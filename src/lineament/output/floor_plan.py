@@ -22,10 +22,10 @@ SHORTEST, LONGEST, SURE = 0.2, 1000.0, 0.05
 #: What poses make of a wall that is straight: each segment is off by so much, and walls are one
 #: that are so much apart [m].
 ROUGH, APART = 0.005, 0.03
-#: Segments that are joined at a time, and kept: of more, every second scan is left out.
-TOGETHER, MOST = 2000, 100_000
-#: So many corners are kept; the least seen are forgotten first.
-MOST_CORNERS = 20_000
+#: Segments that are joined at a time, at least, and kept: of more, every second scan is left out.
+TOGETHER, MOST_SEGMENTS = 2000, 100_000
+#: So many walls, and so many corners, are kept; the least seen are forgotten first.
+MOST = 20_000
 #: How far the corners, and the centre and radius of the arcs, of one thing may differ [m].
 CORNER_RADIUS, ARC_RADIUS = 0.15, 0.1
 
@@ -38,7 +38,7 @@ class FloorPlan:
     Attributes
     ----------
     every : int
-        Walls are those of every so manieth scan: of all, but for logs of more than `MOST` segments.
+        Walls are those of every so manieth scan: of all, but for logs of more than `MOST_SEGMENTS`.
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,8 @@ class FloorPlan:
         self._corners.add(features.corners["position"])
         self._edges.add(features.edges["position"])
         self._arcs.add(np.column_stack((features.arcs["center"], features.arcs["radius"])))
-        if sum(map(len, self._new)) >= TOGETHER:
+        # Where there are many walls, more is joined at a time, as each of them is looked at.
+        if sum(map(len, self._new)) >= max(TOGETHER, len(self._lines) // 4):
             self._join()
 
     def _join(self) -> None:
@@ -67,10 +68,15 @@ class FloorPlan:
             return
         own = int(self._sights["wall"].max(initial=-1)) + 1 + np.arange(len(segments))
         sights = np.concatenate((self._sights, sights_of([(segments, own)], ROUGH)))
-        if len(sights) > MOST:
+        if len(sights) > MOST_SEGMENTS:
             sights, self.every = sights[::2], 2 * self.every
             sights["wall"] = np.unique(sights["wall"], return_inverse=True)[1]
         self._sights, self._lines = joined(sights, APART)
+        if len(self._lines) > MOST:
+            kept = most_seen(np.bincount(self._sights["wall"]))
+            self._sights = self._sights[np.isin(self._sights["wall"], kept)]
+            self._sights["wall"] = np.searchsorted(kept, self._sights["wall"])
+            self._lines = self._lines[kept]
 
     def walls(self, min_views: int = 1) -> Records:
         """Return the parts of the walls that were seen in at least so many views, as `WALL`.
@@ -119,6 +125,11 @@ def _parts(covariances: Array) -> tuple[Array, Array, Array]:
     return covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
 
 
+def most_seen(views: NDArray[np.int64]) -> NDArray[np.intp]:
+    """Return which half of `MOST` has the most views, in order."""
+    return np.sort(np.argsort(-views, kind="stable")[: MOST // 2])
+
+
 class Averages:
     """Means of the points that lie near each other.
 
@@ -141,8 +152,8 @@ class Averages:
             else:
                 self._means = np.vstack((self._means, point))
                 self._views = np.append(self._views, 1)
-        if len(self._means) > MOST_CORNERS:
-            kept = np.sort(np.argsort(-self._views, kind="stable")[: MOST_CORNERS // 2])
+        if len(self._means) > MOST:
+            kept = most_seen(self._views)
             self._means, self._views = self._means[kept], self._views[kept]
 
     def seen(self, min_views: int) -> Array:
