@@ -12,8 +12,8 @@ from ..scan.poses import relative
 from .evidence import Evidence
 from .following import Whereabouts
 from .line_map import LineMap
-from .local_map import query_of_scan
-from .locate import Location, locate
+from .local_map import Query, query_of_scan
+from .locate import locate
 
 #: What a pose may be.
 RIGHT, WRONG, UNSURE = JUDGEMENTS = ("right", "wrong", "not sure")
@@ -27,8 +27,11 @@ _PLAIN = 8.0
 #: more of the beams. Below 0 chance does as well: so it is too among things that the plan does not
 #: have, or has elsewhere.
 DENIED, LEAST = -8.0, 0.4
-#: So many scans in a row that deny a pose are enough; one, where we are somewhere else.
-ENOUGH = 2
+#: So many scans in a row that deny a pose are enough, over so long [s]: those of a fast scanner see
+#: the same. One is enough where we are somewhere else.
+ENOUGH, LASTING = 2, 0.15
+#: After so much way or turn a scan is compared with a later one [m, rad].
+_STEP, _TURN = 0.3, 0.26
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +42,8 @@ class Judgement:
     ----------
     verdict : str
         One of `JUDGEMENTS`. "right": we are there too, and the scan is; "wrong": chance explains
-        the last scans much better than this pose, or any near it; "not sure": neither.
+        the last scans much better than this pose, or any near it, and they show nothing of what was
+        seen before, or we are elsewhere; "not sure": neither.
     pose : (x, y, theta)
         Of the sensor, as it is believed [m, m, rad].
     off : (x, y, theta) or None
@@ -61,8 +65,10 @@ class Judge(InTurn):
     """Judges the poses of another localiser by the same scans, beside a `Follower`.
 
     The follower knows nothing of the other's poses. Where both are at the same place, and the scan
-    is plainly of that place, the pose is right. Else the scan alone is looked for near the pose: a
-    robot that was carried away is noticed with the next scan, long before it is found again.
+    is plainly of that place, the pose is right. Else the scan alone is looked for near the pose, on
+    the plan and in what was seen since the pose was right: a robot that was carried away sees
+    neither, and is noticed with the next scans, long before it is found again. One that is where it
+    is believed to be, among things that have moved since the plan was made, sees them again.
 
     Parameters
     ----------
@@ -86,7 +92,8 @@ class Judge(InTurn):
 
     def __init__(self, plan: LineMap) -> None:
         self.plan = plan
-        self._denied = 0
+        self._denied, self._since = 0, math.nan
+        self._seen: tuple[Features, Pose] | None = None
 
     @in_turn
     def __call__(self, features: Features, pose: Pose, where: Whereabouts) -> Judgement:
@@ -102,19 +109,44 @@ class Judge(InTurn):
             What a `Follower` on the same plan says of the same scan.
         """
         off = relative(pose, where.pose) if where else None
-        is_near = off is not None and math.hypot(*off[:2]) < REACH[0] and abs(off[2]) < REACH[1]
+        is_near = off is not None and not _is_beyond(off, *REACH)
         if is_near and where.evidence.log_odds > _PLAIN:
-            self._denied = 0
+            self._denied, self._seen = 0, (features, where.pose)
             return Judgement(RIGHT, pose, off, where.evidence)
-        found = self._near(features, pose)
+        query = query_of_scan(features)
+        found = locate(query, self.plan, pose, _NEAR)
         is_denied = found.evidence.log_odds < DENIED and found.evidence.explained < LEAST
-        self._denied = self._denied + 1 if is_denied else 0
+        goes_on = self._goes_on(features, query, pose, is_denied)
+        self._denied = self._denied + 1 if is_denied and not goes_on else 0
+        if self._denied == 1:
+            self._since = features.stamp
+        is_lasting = not 0 < features.stamp - self._since < LASTING  # no clock, or it went back
         verdict = UNSURE
-        if self._denied >= (1 if off is not None and not is_near else ENOUGH):
+        is_elsewhere = off is not None and not is_near
+        if (is_denied and is_elsewhere) or (self._denied >= ENOUGH and is_lasting):
             verdict = WRONG
         elif is_near and found.evidence.log_odds > 0:
             verdict = RIGHT
+            self._seen = features, where.pose
         return Judgement(verdict, pose, off, found.evidence)
 
-    def _near(self, features: Features, pose: Pose) -> Location:
-        return locate(query_of_scan(features), self.plan, pose, _NEAR)
+    def _goes_on(self, features: Features, query: Query, pose: Pose, is_asked: bool) -> bool:
+        """Whether a scan shows, near this pose, what was seen since the pose was right.
+
+        Things that the plan does not have, or has elsewhere, are seen again; a robot that was
+        carried away sees others.
+        """
+        if self._seen is None:
+            return False
+        seen, at = self._seen
+        if not len(seen.segments) or not (is_asked or _is_beyond(relative(at, pose), _STEP, _TURN)):
+            return False
+        found = locate(query, LineMap.from_features([seen], [at]), pose, _NEAR)
+        if not found or _is_beyond(relative(pose, found.pose), *REACH):
+            return False
+        self._seen = features, found.pose
+        return True
+
+
+def _is_beyond(off: Pose, reach: float, turn: float) -> bool:
+    return math.hypot(*off[:2]) >= reach or abs(off[2]) >= turn
