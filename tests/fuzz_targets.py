@@ -28,8 +28,8 @@ from worlds import degenerate_scans, random_scan
 from lineament import Extractor, LaserScan, RangeNoise, open_log
 from lineament.features import TABLES
 from lineament.live import LiveConfig, Node, Pipeline, RosSink
+from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, Received, received_scan
-from lineament.live.sinks import Publisher
 from lineament.logs import save_log
 from lineament.methods import get_method, method_names
 from lineament.output import ENDINGS, open_writer

@@ -25,6 +25,7 @@ from robot_driving import (
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig, Pipeline, RosSink
+from lineament.live.publisher import Publisher
 from lineament.live.received import (
     GUESS,
     JUDGED,
@@ -35,7 +36,6 @@ from lineament.live.received import (
     RELOCATE,
     wanted,
 )
-from lineament.live.sinks import Publisher
 from lineament.mapping import LineMap
 from lineament.output.ros_messages import RosMessages
 from lineament.rosmsg.frames import Frames

@@ -25,8 +25,8 @@ from lineament.live import (
     RosSink,
 )
 from lineament.live.pipeline import time_of, twist_of_laser
+from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, received_scan
-from lineament.live.sinks import Publisher
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
 from lineament.scan.poses import compose, poses_along, twist_between

@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 import lineament as ln
 from lineament import LaserScan
 from lineament.live import Counts, LiveConfig, Pipeline, Report, RosSink
-from lineament.live.sinks import Publisher
+from lineament.live.publisher import Publisher
 from lineament.motion import CornerPose, Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of

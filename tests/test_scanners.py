@@ -19,8 +19,8 @@ from pyarrow import csv, parquet
 
 import lineament as ln
 from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, RosSink
+from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, received_scan
-from lineament.live.sinks import Publisher
 from lineament.logs import open_log, save_npz
 from lineament.motion import Tracker
 from lineament.output.ros_messages import RosMessages

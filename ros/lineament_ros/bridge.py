@@ -12,8 +12,8 @@ from rosidl_runtime_py.utilities import get_message
 from std_srvs.srv import Empty
 
 from lineament.live import LiveConfig
+from lineament.live.publisher import Publisher
 from lineament.live.received import RELOCATE, SCAN, Received, Wanted, wanted
-from lineament.live.sinks import Publisher
 from lineament.output.scene import Message
 
 __all__ = ["RclpyPublisher", "RclpySource"]

@@ -8,9 +8,9 @@ from ..errors import one_line
 from ..output.scene import Message
 from .config import LiveConfig
 from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
+from .publisher import Publisher
 from .raw_dds import ANY_STATE, RawReader, RawWriter
 from .received import SCAN, Received, Wanted, wanted
-from .sinks import Publisher
 
 NANO = 1_000_000_000
 #: A writer waits this long for a slow reader [ns], then drops the message.

@@ -5,7 +5,7 @@ import foxglove
 from ..errors import LineamentError
 from ..output.foxglove import FoxgloveMessages
 from ..output.scene import Message
-from .sinks import Publisher
+from .publisher import Publisher
 
 #: Messages that wait for a slow viewer; then the oldest are dropped.
 _BACKLOG = 64

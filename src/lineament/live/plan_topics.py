@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..mapping.evidence import Evidence
     from ..mapping.following import Whereabouts
     from ..mapping.judging import Judgement
-    from .sinks import Publisher
+    from .publisher import Publisher
 
 DIAGNOSTICS = "/diagnostics"
 _PLACED, _STATUSES = "geometry_msgs/PoseWithCovarianceStamped", "diagnostic_msgs/DiagnosticArray"

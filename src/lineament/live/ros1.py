@@ -12,8 +12,8 @@ from typing import Any
 from ..errors import LineamentError, one_line
 from ..output.scene import Message
 from .config import LiveConfig
+from .publisher import Publisher
 from .received import RELOCATE, SCAN, Inbox, Received, Wanted, wanted
-from .sinks import Publisher
 
 #: How long the master may take to answer [s].
 _PATIENCE = 3.0
