@@ -75,6 +75,16 @@ def test_what_was_never_right_goes_on_from_nothing():
     assert verdicts == ["not sure", "wrong", "wrong"]
 
 
+def test_the_plan_alone_may_show_that_the_pose_is_right():
+    """Though we are not located ourselves: then it drives on to where things have moved."""
+    world = furnished(53)
+    judge = Judge(LineMap.from_lines(world.segments))
+    assert judge(seen(world, at(0.0), 0.0), at(0.0), NOWHERE).verdict == "not sure"
+    judge.plan = LineMap.from_lines(furnished(3).segments)
+    verdicts = [judge(seen(world, at(t), t), at(t), NOWHERE).verdict for t in (0.2, 0.4, 0.6)]
+    assert verdicts == ["not sure"] * 3
+
+
 def test_a_pose_that_drifts_away_among_things_that_have_moved():
     """The scans show where the robot really goes, step by step."""
     plan, world = LineMap.from_lines(furnished(3).segments), furnished(53)

@@ -66,7 +66,7 @@ class Judge(InTurn):
 
     The follower knows nothing of the other's poses. Where both are at the same place, and the scan
     is plainly of that place, the pose is right. Else the scan alone is looked for near the pose, on
-    the plan and in what was seen since the pose was right: a robot that was carried away sees
+    the plan and in what was seen since that was plain: a robot that was carried away sees
     neither, and is noticed with the next scans, long before it is found again. One that is where it
     is believed to be, among things that have moved since the plan was made, sees them again.
 
@@ -116,6 +116,8 @@ class Judge(InTurn):
         query = query_of_scan(features)
         found = locate(query, self.plan, pose, _NEAR)
         is_denied = found.evidence.log_odds < DENIED and found.evidence.explained < LEAST
+        if found.evidence.log_odds > _PLAIN and not _is_beyond(relative(pose, found.pose), *REACH):
+            self._seen = features, found.pose  # wherever we are ourselves
         goes_on = self._goes_on(features, query, pose, is_denied)
         self._denied = self._denied + 1 if is_denied and not goes_on else 0
         if self._denied == 1:
@@ -131,7 +133,7 @@ class Judge(InTurn):
         return Judgement(verdict, pose, off, found.evidence)
 
     def _goes_on(self, features: Features, query: Query, pose: Pose, is_asked: bool) -> bool:
-        """Whether a scan shows, near this pose, what was seen since the pose was right.
+        """Whether a scan shows, near this pose, what was seen since that was plainly right.
 
         Things that the plan does not have, or has elsewhere, are seen again; a robot that was
         carried away sees others.
