@@ -71,7 +71,7 @@ def is_text(node: object) -> bool:
 
 def stamp(seconds: float, frames: int) -> str:
     """Return commit, date, machine, versions and seeds, and the hash of what was measured."""
-    from lineament_lab.reproduce.report import machine
+    from lineament_lab.reproduce.findings import machine
 
     git = ["git", "-C", str(ROOT)]
     commit = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
@@ -347,8 +347,8 @@ class Results:
         of_open = bands(found)
         rows = [
             (claim.place, claim.paper, without_ranges(here), of_open.get(claim.place), verdict)
-            for claim, here, verdict in verdicts(found)
-            if claim.experiment != "definitions"
+            for name, claim, here, verdict in verdicts(found)
+            if name != "definitions"
         ]
         return markdown(("", "paper", "here", "by what it leaves open", "verdict"), rows)
 

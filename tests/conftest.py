@@ -179,7 +179,7 @@ def pytest_make_parametrize_id(val):
 def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Compare what an experiment reports, returns and means with what was approved."""
     from approved import NUMBER, assert_approved, figure_lines, numbers_of
-    from lineament_lab.reproduce.claims import CLAIMS, bands
+    from lineament_lab.reproduce.claims import bands, claims
 
     from lineament.output import canvas
 
@@ -192,7 +192,7 @@ def approve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         for prose in (written, written["figures"], *written["tables"]):
             for key in {"note", "text", *written["figures"]} & prose.keys():
                 prose[key] = " ".join(NUMBER.findall(str(prose[key])))
-        for claim in (claim for claim in CLAIMS if claim.experiment == name):
+        for claim in (claim for experiment, claim in claims() if experiment == name):
             here, margins, blind = claim.judge(findings.numbers)
             written[claim.place] = [here, *map(float, (*margins, *blind))]
         steps = [report.split(": ", 1)[-1] for report in reports]

@@ -25,9 +25,8 @@ from lineament_lab.reproduce import (
     similarity,
     success,
     tracking,
-    two_corners,
 )
-from lineament_lab.reproduce.seeds import Spread
+from lineament_lab.reproduce.seeds import Spread, merged
 from small_experiments import PAPER, silent, small  # noqa: F401
 
 import lineament as ln
@@ -98,7 +97,8 @@ def test_seeds_are_merged_and_recordings_are_read_once(data):
     twice = "similarity (1/3)", "two_corners (2/3)"
     names = [f"{name}, seed {seed}" for name in twice for seed in (4, 5)]
     assert starts == [*names, "tracking (3/3)"]
-    alone = [two_corners.run(one, silent) for one in setting.by_seed()]
+    alone = [run_experiments(["two_corners"], one, silent) for one in setting.by_seed()]
+    alone = [one["two_corners"] for one in alone]
     mean = found["two_corners"].numbers["places"]["iepf"][0]["mean"]
     assert mean.values == tuple(one.numbers["places"]["iepf"][0]["mean"] for one in alone)
     overall = {row[0]: row[4:6] for row in found["two_corners"].tables[0].rows}
@@ -122,7 +122,7 @@ def test_without_recordings_nothing_is_measured(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("figure", ["fig1", "fig6"])
 def test_figures_of_definitions_show_what_is_there(figure):
-    assert definitions.run(Setting(), silent).numbers[figure]["off"] < 0.01
+    assert definitions.measure(Setting(), silent).numbers[figure]["off"] < 0.01
 
 
 def test_operator_by_definition_is_that_of_the_code():
@@ -256,15 +256,20 @@ class TestTexts:
 
     def test_shares_and_errors_of_figure_12(self):
         true, liu = (
-            SimilarityScores(np.array([0.0, 0.01, error, error]), 4) for error in (0.03, 0.5)
+            similarity._numbers(SimilarityScores(np.array([0.0, 0.01, error, error]), 4))
+            for error in (0.03, 0.5)
         )
-        text = similarity._text(true, liu)
+        found = {similarity.SIMULATED: {similarity.TRUE: true, "liu:paper": liu}}
+        text, _ = similarity.report(found, Setting())
         assert "100 % are explained, and the largest error is 0.50 m" in text[-1]
         assert "50 % of the points are more than 0.01 m" in text[1]
 
     def test_table_of_similarity(self):
         scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
-        (row,) = similarity._table("x", {"iepf:paper": scores}).rows
+        true = similarity._numbers(SimilarityScores(np.array([0.0]), 1))
+        rows = {similarity.TRUE: true, "liu:paper": true, "iepf:paper": similarity._numbers(scores)}
+        _, (table,) = similarity.report({similarity.SIMULATED: rows}, Setting())
+        *_, row = table.rows
         rms = math.sqrt((100 + 900 + 25 + 225) / 4)
         assert row[:6] == ("iepf:paper", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
         assert row[6:] == ("up to 250 mm", 50)
@@ -276,6 +281,9 @@ class TestTexts:
         beyond = within | {"corner_nees": within["corner_nees_high"] + 0.1}
         text = all_methods._consistency({"lms181": {"liu": within, "iepf": beyond, "pdbs": {}}})
         assert text == "The mean NEES lies within its 95 % interval in 1 of 2 rows for corners."
+        both = {"lms181": {"liu": merged([within, beyond]), "iepf": merged([within, {}])}}
+        text = all_methods._consistency(both)
+        assert text.endswith("in 1 (0–2) of 2 (1–2) rows for corners.")
 
     def test_methods_with_arcs_are_named(self):
         sensors = {"lms181": {"liu": {}, "optimal": {}}, "ld19": {"liu": {}}}
@@ -284,14 +292,23 @@ class TestTexts:
         assert all_methods._arcs(sensors).startswith("Arcs are found by optimal.")
 
     def test_rows_of_table_3_have_the_papers_numbers(self):
-        counts = [Counts(1, 2, 4), Counts(3, 4, 6)]
-        row = success._row("iepf:paper", 2, counts, "corners")
+        counts = {"few": Counts(1, 2, 4), "many": Counts(3, 4, 6)}
+        none = FeatureScores.none("corners")
+        of = {
+            name: success._numbers(Scores(1, replace(none, by_gate=none.by_gate | {0.1: count})))
+            for name, count in counts.items()
+        }
+        of["seconds"] = np.array([3e-6, 1e-6])
+        row = success._row("iepf:paper", of, 2, "corners")
         assert row["paper: success"] == 0.7251
         assert (row["here: success, 2 frames"], row["corners in 2"]) == (0.25, "1 of 4")
         assert (row["precision in 20"], row["F1 in 20"]) == (0.75, 0.6)
-        times = success._times("liu, no corners", np.array([3e-6, 1e-6]), success.PAPER_PARTITION)
-        assert list(times.values()) == ["9.6 – 25.3", "1.0 – 3.0"]
-        assert success._row("hough", 2, counts, "corners")["paper: success"] is None
+        row = success._row("liu, no corners", of, 2, "clusters")
+        assert list(row.values())[-2:] == ["9.6 – 25.3", "1.0 – 3.0"]
+        assert success._row("hough", of, 2, "corners")["paper: success"] is None
+        of["seconds"] = merged([[3e-6, 1e-6], [4e-6, 2e-6]])
+        times = success._row("hough", of, 2, "corners")["here: time [µs]"]
+        assert times == "1.5 (1.0–2.0) – 3.5 (3.0–4.0)"
 
 
 @pytest.mark.parametrize("errors", [[0.0, 0.02, np.nan], [3.0, 0.1, 0.1], [np.nan] * 3])

@@ -21,6 +21,9 @@ import lineament as ln
 from lineament.methods.stages import bilateral_filter
 from lineament.simulation import truth
 
+#: A row of the table of choices.
+CHOICE = dict.fromkeys(repetition._COLUMNS.values(), 0)
+
 
 class TestRepetition:
     @pytest.fixture
@@ -49,13 +52,22 @@ class TestRepetition:
     def test_readings_are_alike_whose_peak_is_at_the_papers_parameters(self, made):
         flat = [paper.reading for paper in repetition._papers() if paper.response != "relative"]
         flat.remove("product, half-width 2")
-        assert repetition._alike(made, "half_sum") == flat
+
+        def alike():
+            peaks = repetition._peaks(made, "half_sum")
+            alike = [reading for reading, at in peaks.items() if at["lead"] >= 0]
+            assert repetition._alike({"peaks": {"half_sum": peaks}}, "half_sum") == len(alike)
+            return alike
+
+        assert alike() == flat
         made[Parameters("tangent", 8, 8, 0.66)]["half_sum"] = 0.95
         flat.remove("tangent, half-width 8")
-        assert repetition._alike(made, "half_sum") == flat
+        assert alike() == flat
 
     def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(self, made):
-        rows = {name: cells for name, *cells in repetition._peaks(made, "half_sum").rows}
+        peaks = {criterion: repetition._peaks(made, criterion) for criterion in grid.CRITERIA}
+        _, tables = repetition.report({"peaks": peaks, "choices": [CHOICE]}, Setting())
+        rows = {name: cells for name, *cells in tables[1].rows}
         assert rows["paper"] == [6, "lost", 0.66, "lost", "lost", "lost"]
         assert rows["tangent, half-width 8"] == [8, 0.91, 0.66, 0.9, 0.9, 0.91]
         assert rows["product, half-width 2"] == [8, 0.7, 0.5, 0.6, 0.1, 0.7]
@@ -135,7 +147,15 @@ class TestTwoCorners:
 
     def test_tables_by_hand(self):
         found = {"liu": [np.array([DISTANCE - 0.0125] * 2), np.empty(0)], "iepf": [np.empty(0)] * 2}
-        overall = two_corners._overall(found, np.array([0.003, 0.004]), 4)
+        n = {
+            "places": {name: [two_corners._numbers(d, 4) for d in of] for name, of in found.items()}
+        }
+        n["all"] = {
+            name: two_corners._numbers(np.concatenate(of), 20) for name, of in found.items()
+        }
+        n |= {"bound": np.array([0.003, 0.004]), "all_bound": math.sqrt(12.5e-6)}
+        text, (overall, off, spread, share) = two_corners.report(n, Setting())
+        assert text[-1] == "iepf: no scan has both corners."
         liu, iepf, bound = (dict(zip(overall.columns, row, strict=True)) for row in overall.rows)
         assert liu["paper: mean [m]"] == "2.302"
         assert liu["here: mean [m]"] == "2.2895"
@@ -143,7 +163,6 @@ class TestTwoCorners:
         assert liu["share of scans with both"] == pytest.approx(2 / 20)
         assert iepf["here: mean [m]"] is iepf["paper: mean [m]"] is None
         assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
-        off, spread, share = two_corners._by_place(found, np.array([0.003, 0.004]), 4)
         assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
         assert off.columns == ("method", "place 1", "place 2")
         assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
@@ -203,11 +222,14 @@ class TestSensitivity:
     def test_two_parameters_together_are_a_table_of_both(self):
         rows, columns = (list(sensitivity.OPEN[name]) for name in sensitivity.TOGETHER)
         together = {
-            (row, column): {"recall": 10 * i + k, "both": -1}
+            f"{row}, {column}": {"recall": 10 * i + k, "both": -1}
             for i, row in enumerate(rows)
             for k, column in enumerate(columns)
         }
-        table = sensitivity._table_together(together, "recall", "Found")
+        none = dict.fromkeys([key for key, _ in sensitivity.SHOWN.values()])
+        n = {"together": together, "alone": {}, "pdbs": {}, "iepf": {"none": {}, "fixed": {}}}
+        n |= {"default": none, "bands": {key: {} for key in none}}
+        _, (_, table, *_) = sensitivity.report(n, Setting())
         assert table.columns[1:] == tuple(columns)
         for i, (name, *cells) in enumerate(table.rows):
             assert (name, cells) == (rows[i], [10 * i + k for k in range(len(columns))])

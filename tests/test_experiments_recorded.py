@@ -12,6 +12,7 @@ from lineament_lab.reproduce import (
     museum,
     plans,
     real,
+    run_experiments,
     scans,
     tracking,
 )
@@ -53,7 +54,8 @@ class TestMuseum:
     def test_bag_gives_figures_11_to_13_and_tables_2_and_3(self, bag, approve, monkeypatch):
         monkeypatch.setattr(museum, "SCANS_A_FRAME", 20)
         reports = []
-        findings = museum.run(Setting(2, museum=bag), reports.append)
+        setting = Setting(2, museum=bag)
+        findings = run_experiments(["museum"], setting, reports.append)["museum"]
         methods, distance = (findings.numbers[key] for key in ("methods", "distance"))
         assert methods["iepf"]["mean"] < 0.01 < methods["pdbs, fitted"]["mean"]
         assert distance["iepf"]["mean"] == pytest.approx(DISTANCE, abs=0.01)
@@ -156,7 +158,7 @@ class TestTracking:
         found = tracking.load_recording(path, 12, 0.5)
         every = tracking.load_recording(path, 99)
         assert found[0].stamp == every[len(every) // 2].stamp
-        numbers = tracking.measure("small", found, 0, silent)
+        numbers = tracking.measure_log("small", found, 0, silent)
         motions, tracks = numbers["motion"], numbers["tracks"]
         assert numbers["relations"] == numbers["near"] == numbers["far_apart"] == {}
         assert list(motions) == [
@@ -195,7 +197,7 @@ class TestReal:
         return tmp_path
 
     def test_numbers_of_a_tiny_recording(self, folder):
-        findings = real.run(Setting(2, 0, folder), silent)
+        findings = run_experiments(["real"], Setting(2, 0, folder), silent)["real"]
         assert findings.text[-1] == "Left out, as they hold no scans: other.npz."
         free = findings.numbers["free_space"]
         assert list(free) == ["wedge.npz"]
@@ -240,7 +242,7 @@ class TestReal:
     def test_all_recordings(self, data_dir, monkeypatch):
         logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
         monkeypatch.setattr(real, "LOGS", logs)
-        findings = real.run(Setting(1, 0, data_dir), silent)
+        findings = run_experiments(["real"], Setting(1, 0, data_dir), silent)["real"]
         assert len(findings.numbers["free_space"]) >= 20
         unread = set(findings.text[-2].rstrip(".").split(": ")[1].split(", "))
         doubles = findings.numbers["doubles"]
@@ -269,7 +271,7 @@ class TestPlans:
         return tmp_path
 
     def test_every_method_is_scored_by_plan(self, folder):
-        found = plans.run(Setting(2, 0, folder / "data"), silent)
+        found = run_experiments(["plans"], Setting(2, 0, folder / "data"), silent)["plans"]
         numbers = found.numbers["methods"]
         assert {"optimal", "liu:paper", "iepf", "blind cut, shared steps"} <= set(numbers)
         best = numbers["optimal"]
@@ -300,6 +302,6 @@ class TestPlans:
 
     def test_without_plans_nothing_is_measured(self, tmp_path):
         for data in (None, tmp_path):
-            found = plans.run(Setting(1, 0, data), silent)
+            found = run_experiments(["plans"], Setting(1, 0, data), silent)["plans"]
             assert "not at hand" in found.text[0]
             assert found.tables == ()

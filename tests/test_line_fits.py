@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lineament_lab.evaluation.line_fits import FITS, algebraic_fit, conformal_fit
 from lineament_lab.reproduce import Setting
-from lineament_lab.reproduce.fits import fitted, meeting, run
+from lineament_lab.reproduce.fits import fitted, measure, meeting
 from lineament_lab.reproduce.scans import scene_numbers, simulated_frames
 
 from lineament import RangeNoise
@@ -91,7 +91,7 @@ def test_fitted_walls_are_numbered_anew():
 
 def test_weights_without_incidence_claim_too_much_and_ours_are_right():
     """The claim of the table: NEES of WCTLS is far below 1, that of lineament at 1."""
-    numbers = run(Setting(4, 3), str).numbers
+    numbers = measure(Setting(4, 3), str).numbers
     for of in numbers.values():
         assert 0.4 < of["WCTLS"]["segment_nees"] < 0.8
         assert 0.8 < of["lineament"]["segment_nees"] < 1.25

@@ -16,15 +16,15 @@ from lineament_lab.reproduce import (
     Findings,
     Setting,
     Table,
-    definitions,
     experiment_names,
     noise,
     run_experiments,
 )
-from lineament_lab.reproduce.claims import CLAIMS, WORDS, bands, verdicts
-from lineament_lab.reproduce.findings import cell_text, dot_chart, median_of, merged_findings
+from lineament_lab.reproduce.claims import bands, claims, verdicts
+from lineament_lab.reproduce.experiment import WORDS, Experiment, Measured, MissingError
+from lineament_lab.reproduce.findings import cell_text, cells, dot_chart, median_of
 from lineament_lab.reproduce.report import benchmark_tables, reproduce, write_report
-from lineament_lab.reproduce.seeds import Spread, merged, merged_text
+from lineament_lab.reproduce.seeds import Spread, merged
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.keys import Keys
@@ -77,7 +77,7 @@ def test_report_is_one_page_and_one_file_of_numbers(tmp_path):
     assert parsed.places == ["verdicts", "extra", "fig1"]
     assert {"All is <well>.", "Corners < 0.1 m", "lost", "–", 'a "b" & c'} <= set(parsed.text)
     assert not {"well", "link"} & set(parsed.tags)
-    assert {claim.place for claim in CLAIMS} <= set(parsed.text)
+    assert {claim.place for _, claim in claims()} <= set(parsed.text)
     assert "http" not in page.read_text(encoding="utf-8")
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     assert (figures["frames"], figures["seeds"], figures["recordings"]) == (3, [5, 6], False)
@@ -92,8 +92,14 @@ def test_cells():
     shown = [cell_text(c) for c in (None, "liu", 3, 0.5, np.float64(12.345), 12345.6, 1e-5, 0.0)]
     assert shown == ["–", "liu", "3", "0.5", "12.3", "12346", "1.00e-05", "0"]
     assert plain((np.bool_(True), {1: np.nan})) == [True, {"1": None}]
-    table = Table.of_numbers("A", {"x": {"n": 2}}, {"n [mm]": ("n", 1e3), "m": ("m", 1)}, "", "b")
+    table = Table.of_numbers("A", {"x": {"n": 2}}, {"n [mm]": "n", "m": "m"}, "", "b")
     assert (table.columns, table.rows) == (("b", "n [mm]", "m"), (("x", 2000.0, None),))
+    given = {"length": 0.5, "text": "lost", "none": None}
+    columns = {"[m]": "length", "a [mm]": "length", "of b [%]": "length", "a": ("length", 2)}
+    units = {"[µs]": "length", "[mrad]": "length", "[°]": "length", "[%]": "text", "b": "none"}
+    assert list(cells(given, columns | units).values()) == [
+        *(0.5, 500.0, 50.0, 1.0, 5e5, 500.0, pytest.approx(90 / math.pi), "lost", None)
+    ]
     with pytest.raises(ValueError, match=r"has columns .*'b'.*, then .*'c'"):
         Table.of_records("A", [{"b": 1}, {"c": 1}])
 
@@ -115,7 +121,7 @@ def test_chart_draws_what_is_finite(monkeypatch):
     shown = []
     monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
     numbers = {"one": {"a": {"f1": 1.0}, "b": {"f1": np.nan, "t": 3}}, "other": {"b": {"f1": 2}}}
-    dot_chart(numbers, {"F1 [%]": ("f1", 100), "time": ("t", 1)}, ["time"])
+    dot_chart(numbers, {"F1 [%]": "f1", "time": "t"}, ["time"])
     f1, time = shown[0].axes
     assert [tick.get_text() for tick in f1.get_yticklabels()] == ["b", "a"]
     drawn = [np.asarray(line.get_xdata(), float) for line in f1.lines]
@@ -128,17 +134,70 @@ def test_chart_draws_what_is_finite(monkeypatch):
 def test_labels_of_a_chart_have_lines_of_22_letters(label, lines, monkeypatch):
     shown = []
     monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
-    dot_chart({"one": {"a": {"f1": 1.0}}}, {label: ("f1", 1)}, [])
+    dot_chart({"one": {"a": {"f1": 1.0}}}, {label: "f1"}, [])
     assert len(shown[0].axes[0].get_xlabel().split("\n")) == lines
 
 
-def test_what_no_seed_changes_runs_once(monkeypatch):
-    ran = []
-    for module in (definitions, noise):
-        monkeypatch.setattr(module, "run", lambda one, _: ran.append(one.seed) or findings())
-    run_experiments(["definitions"], Setting(1, 3, seeds=2), print)
-    run_experiments(["noise"], Setting(1, 3, seeds=2), print)
-    assert ran == [3, 3, 4]
+class TestEngine:
+    """An experiment of nothing: it measures the seed, and draws what it measured."""
+
+    def declared(self, ran, once=False):
+        def measure(setting, progress):
+            ran.append(setting.seed)
+            progress("measuring")
+            drawn = Figure("fig", f"seed {setting.seed}", b"")
+            return Measured({"n": setting.seed, "all": {"a": np.float64(1)}}, lambda: [drawn])
+
+        def report(n, setting):
+            table = Table.of_numbers("T", {"a": n}, {"n": "n"})
+            return (f"{n['n']:.0f} of {setting.frames} frames",), (table,)
+
+        return Experiment("Nothing", measure, report, once=once)
+
+    def test_seeds_are_pooled_before_they_are_reported_and_the_first_is_drawn(self):
+        ran, reports = [], []
+        found = self.declared(ran).run(Setting(9, 3, seeds=3), lambda *about: reports.append(about))
+        assert ran == [3, 4, 5]
+        assert found.title == "Nothing"
+        assert found.text == ("4 (3–5) of 9 frames",)
+        assert found.figures == (Figure("fig", "seed 3", b""),)
+        assert (
+            repr(found.numbers) == "{'n': Spread([3.0, 4.0, 5.0]), 'all': {'a': np.float64(1.0)}}"
+        )
+        assert found.tables[0].rows[0][1].values == (3.0, 4.0, 5.0)
+        seeds = [f", seed {seed}" for seed in (3, 4, 5)]
+        assert reports == [(s, what) for s in seeds for what in ("starting", "measuring")] + [
+            ("", "drawing")
+        ]
+
+    def test_what_no_seed_changes_is_measured_once(self):
+        ran, reports = [], []
+        self.declared(ran, once=True).run(Setting(1, 3, seeds=2), lambda *a: reports.append(a))
+        assert ran == [3]
+        assert reports[0] == ("", "starting")
+
+    def test_what_is_missing_is_said(self):
+        def measure(*_):
+            raise MissingError("No bag is given.")
+
+        found = Experiment("A bag", measure, print).run(Setting(), lambda *_: None)
+        assert found == Findings("A bag", ("No bag is given.",))
+
+    def test_experiments_run_by_their_names(self, monkeypatch):
+        ran, reports = [], []
+        monkeypatch.setattr(noise, "EXPERIMENT", self.declared(ran))
+        found = run_experiments(["fig2"], Setting(1, 3, seeds=2), reports.append)
+        assert (list(found), ran) == (["noise"], [3, 4])
+        assert reports[2] == "noise (1/1), seed 4: starting"
+
+
+def test_claims_are_those_of_the_paper_in_its_order():
+    places = [claim.place for _, claim in claims()]
+    figures = [*(1, "2, 3"), *range(4, 14)]
+    assert places == [
+        *(f"Figure{'s' * (k == '2, 3')} {k}" for k in figures),
+        *("Table 1", "Table 2", "Table 3: partition", "Table 3: corners", "Table 3: time"),
+    ]
 
 
 def test_nothing_is_run_for_a_folder_that_cannot_be(tmp_path):
@@ -219,48 +278,12 @@ class TestSeeds:
             ([np.array([1.0, 2.0]), np.array([1.0, 4.0])], [1.0, Spread([2.0, 4.0])]),
             ([[1], [1, 2]], [[1], [1, 2]]),
             ([True, True], True),
+            (["radius", "k", "k"], "k (so in 2 of 3 seeds)"),
+            ([None, "k", "k"], "k"),
         ],
     )
     def test_merging_by_kind(self, values, expected):
         assert repr(merged(values)) == repr(expected)
-
-    @pytest.mark.parametrize(
-        ("texts", "expected"),
-        [
-            (["a 1", "a 1"], "a 1"),
-            (["3 of 9", "5 of 8", "4 of 7"], "4 (3–5) of 8 (7–9)"),
-            (["−1.5 ± 2", "+0.5 ± 2", "-0.1 ± 2"], "-0.1 (−1.5 to +0.5) ± 2"),
-            (["10", "9"], "9 (9–10)"),
-            (["F1 0.50 of liu2", "F1 0.75 of liu2"], "F1 0.50 (0.50–0.75) of liu2"),
-            (
-                ["A 1. It holds.", "A 2. It fails."],
-                "A 1 (1–2). It holds. (so in 1 of 2 seeds)",
-            ),
-            (["9.6 – 25.3", "9.7 – 20.0"], "9.6 (9.6–9.7) – 20.0 (20.0–25.3)"),
-        ],
-    )  # fmt: skip
-    def test_texts_differ_in_their_numbers_or_as_a_whole(self, texts, expected):
-        assert merged_text(texts) == expected
-
-    def test_tables_are_merged_by_title_and_rows_by_name(self):
-        def of_seed(value, names, *more):
-            rows = tuple((name, value, None) for name in names)
-            tables = (Table("T", ("m", "v", "w"), rows, f"{value} scans."), *more)
-            return Findings("F", (f"It is {value}.",), tables, (value,), {"v": value})
-
-        extra = Table("Log", ("m",), (("x",),))
-        found = merged_findings([of_seed(1, "aab", extra), of_seed(4, "ba")])
-        assert found.text == ("It is 1 (1–4).",)
-        assert found.figures == (1,)
-        assert repr(found.numbers) == "{'v': Spread([1.0, 4.0])}"
-        table, log = found.tables
-        assert log is extra or log == extra
-        assert table.note == "1 (1–4) scans."
-        assert [row[0] for row in table.rows] == ["a", "a", "b"]
-        both, alone = Spread([1, 4]), Spread([1, math.nan])
-        assert repr([row[1] for row in table.rows]) == repr([both, alone, both])
-        only = of_seed(1, "a")
-        assert merged_findings([only]) is only
 
     def test_recordings_are_read_with_the_first_seed_only(self, tmp_path):
         settings = Setting(2, 7, tmp_path, seeds=3).by_seed()
@@ -313,7 +336,7 @@ class TestVerdicts:
 
     def judged(self, numbers):
         judged = verdicts(self.found(numbers))
-        return {claim.place: (here, word) for claim, here, word in judged}
+        return {one.claim.place: (one.here, one.verdict) for one in judged}
 
     def test_each_is_one_of_the_words_or_not_run(self):
         judged = self.judged(NUMBERS)
@@ -362,24 +385,23 @@ class TestVerdicts:
         assert self.judged(numbers)["Figure 5"][1] == "does not"
 
     @pytest.mark.parametrize(
-        ("at_paper", "other_reading", "word", "alike"),
+        ("letter", "other_reading", "word", "alike"),
         [
-            (0.79, 0.8, "holds", "2"),
-            (0.7, 0.79, "does not", "1"),
-            (Spread([0.9, 0.7]), 0.7, "in part", "0 (0–1)"),
-            (0.0, 0.0, "does not", "0"),
+            (0.02, 0.01, "holds", "2"),
+            (-0.1, 0.02, "does not", "1"),
+            (Spread([0.03, -0.07]), -0.1, "in part", "0 (0–1)"),
+            (-1e-9, -1e-9, "does not", "0"),
         ],
     )
     def test_figure_9_is_judged_by_the_letter_with_all_readings_beside(
-        self, at_paper, other_reading, word, alike
+        self, letter, other_reading, word, alike
     ):
-        grid = [
-            {"response": "tangent", "half_width": h, "support_radius": r, "threshold": t}
-            | {"repetition": ar, "half_sum": 1.0}
-            for h, here in ((2, at_paper), (8, other_reading))
-            for r, t, ar in ((6, 0.66, here), (5, 0.66, 0.8), (6, 0.5, 0), (5, 0.5, 1))
-        ]
-        here, found = self.judged({"repetition": {"grid": grid}})["Figure 9"]
+        leads = {"tangent, half-width 2": letter, "tangent, half-width 8": other_reading}
+        peaks = {
+            "repetition": {reading: {"lead": lead} for reading, lead in leads.items()},
+            "half_sum": {reading: {"lead": 0.03} for reading in leads},
+        }
+        here, found = self.judged({"repetition": {"peaks": peaks}})["Figure 9"]
         assert here.startswith("Of 2 readings, within 0.03 of the largest there: ")
         assert f": {alike} by AR of two views" in here
         assert "; 2 by ½ (precision + recall)" in here

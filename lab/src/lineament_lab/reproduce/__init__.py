@@ -1,17 +1,20 @@
-"""The experiments of Liu et al. 2023 and further ones: one module each, with a function `run`."""
+"""The experiments of Liu et al. 2023 and further ones: a module each, with its `EXPERIMENT`."""
 
 from collections.abc import Iterable
 from importlib import import_module
 
-from .findings import Figure, Findings, Progress, Setting, Table, merged_findings
+from .experiment import Experiment
+from .findings import Figure, Findings, Progress, Setting, Table
 
 __all__ = [
     "EXPERIMENTS",
+    "Experiment",
     "Figure",
     "Findings",
     "Progress",
     "Setting",
     "Table",
+    "experiment",
     "experiment_names",
     "run_experiments",
 ]
@@ -34,8 +37,6 @@ EXPERIMENTS: dict[str, tuple[str, ...]] = {
     "real": ("repeatability",),
     "museum": (),
 }
-#: Experiments that are run once: on recordings, or on nothing random.
-ONCE = ("definitions", "plans", "tracking", "real", "museum")
 
 
 def experiment_names(names: Iterable[str]) -> list[str]:
@@ -89,15 +90,15 @@ def run_experiments(
     chosen = experiment_names(names)
     findings = {}
     for k, name in enumerate(chosen, 1):
-        module = import_module(f".{name}", __name__)
-        found = []
-        for one in setting.by_seed()[: 1 if name in ONCE else None]:
-            seed = f", seed {one.seed}" if setting.seeds > 1 and name not in ONCE else ""
 
-            def report(about: str, where: str = f"{name} ({k}/{len(chosen)}){seed}") -> None:
-                progress(f"{where}: {about}")
+        def report(seed: str, about: str, where: str = f"{name} ({k}/{len(chosen)})") -> None:
+            progress(f"{where}{seed}: {about}")
 
-            report("starting")
-            found.append(module.run(one, report))
-        findings[name] = merged_findings(found)
+        findings[name] = experiment(name).run(setting, report)
     return findings
+
+
+def experiment(name: str) -> Experiment:
+    """Return what an experiment declares, from the module of its name."""
+    declared: Experiment = import_module(f".{name}", __name__).EXPERIMENT
+    return declared

@@ -1,88 +1,86 @@
 """All methods with all sensors: what they find, how exactly, their covariances, and their time."""
 
+import math
+from typing import Any
+
 import numpy as np
 
 from lineament.simulation import SCENES, SENSORS
 
-from ..evaluation.scores import Scores, evaluate
+from ..evaluation.scores import Scores
 from .contenders import LIU, LIU_NOTE, PARTITION_ONLY, RIVALS_NOTE, every_method
-from .findings import Figure, Findings, Numbers, Progress, Setting, Table, dot_chart, each
-from .scans import batch_of, interleaved_times, scene_numbers, simulated_frames, time_ratio
+from .experiment import Experiment, Measured, Report
+from .findings import Figure, Numbers, Progress, Setting, Table, dot_chart
+from .scans import frames_of, interleaved_times, scored, time_ratio
+from .seeds import by_seed
 
 _COLUMNS = {
-    "corner F1": ("corner_f1_0.10", 1),
-    "precision": ("corner_precision_0.10", 1),
-    "recall": ("corner_recall_0.10", 1),
-    "median error [mm]": ("corner_median_error", 1e3),
-    "÷ bound": ("corner_over_bound_median", 1),
-    "÷ bound, RMS": ("corner_over_bound", 1),
-    "corner NEES": ("corner_nees_median", 1),
-    "corner NEES, mean": ("corner_nees", 1),
-    "segment F1": ("segment_f1", 1),
-    "offset RMS [mm]": ("segment_offset_rmse", 1e3),
-    "offset ÷ bound": ("segment_offset_over_bound_median", 1),
-    "angle ÷ bound": ("segment_angle_over_bound_median", 1),
-    "segment NEES": ("segment_nees_median", 1),
-    "segment NEES, mean": ("segment_nees", 1),
-    "arc F1": ("arc_f1", 1),
-    "partition": ("partition_success", 1),
-    "time [µs]": ("time", 1e6),
-    "÷ liu": ("time_ratio", 1),
+    "corner F1": "corner_f1_0.10",
+    "precision": "corner_precision_0.10",
+    "recall": "corner_recall_0.10",
+    "median error [mm]": "corner_median_error",
+    "÷ bound": "corner_over_bound_median",
+    "÷ bound, RMS": "corner_over_bound",
+    "corner NEES": "corner_nees_median",
+    "corner NEES, mean": "corner_nees",
+    "segment F1": "segment_f1",
+    "offset RMS [mm]": "segment_offset_rmse",
+    "offset ÷ bound": "segment_offset_over_bound_median",
+    "angle ÷ bound": "segment_angle_over_bound_median",
+    "segment NEES": "segment_nees_median",
+    "segment NEES, mean": "segment_nees",
+    "arc F1": "arc_f1",
+    "partition": "partition_success",
+    "time [µs]": "time",
+    "÷ liu": "time_ratio",
 }
 _PANELS = {
-    "corner F1": ("corner_f1_0.10", 1),
-    "segment F1": ("segment_f1", 1),
-    "corner error ÷ bound (median)": ("corner_over_bound_median", 1),
-    "time per scan [µs]": ("time", 1e6),
+    "corner F1": "corner_f1_0.10",
+    "segment F1": "segment_f1",
+    "corner error ÷ bound (median)": "corner_over_bound_median",
+    "time per scan [µs]": "time",
 }
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Score all methods on frames of all kinds of scenes, for each sensor."""
     methods = every_method(setting.methods)
-    scenes = scene_numbers(len(SCENES) * setting.frames, setting.seed)
     numbers: dict[str, dict[str, dict[str, float]]] = {}
-    for name, sensor in SENSORS.items():
-        progress(f"{name}: simulating")
-        frames = list(simulated_frames(sensor, SCENES, scenes))
-        scans = [frame.scan for frame in frames]
-        numbers[name], times = {}, interleaved_times(methods, scans[: len(SCENES)])
-        for method, extractor in each(methods, progress, name):
-            scores = map(evaluate, batch_of(extractor, scans), (frame.truth for frame in frames))
+    for sensor in SENSORS:
+        progress(f"{sensor}: simulating")
+        frames = frames_of(setting, SCENES, len(SCENES), sensor)
+        times = interleaved_times(methods, [frame.scan for frame in frames[: len(SCENES)]])
+        numbers[sensor] = {}
+        for method, scores in scored(methods, frames, progress, sensor).items():
             of = Scores.total(scores).summary()
             kinds = ("corner", "segment") if method == PARTITION_ONLY else ("corner",)
             if method == PARTITION_ONLY or "corner_precision_0.10" not in of:
                 of = {k: v for k, v in of.items() if not k.startswith((*kinds, "arc"))}
             of["time"] = float(np.median(times[method]))
             of["time_ratio"] = time_ratio(times[method], times[LIU])[0]
-            numbers[name][method] = of
-    progress("drawing")
+            numbers[sensor][method] = of
+    return Measured(numbers, lambda: [_chart(numbers)])
+
+
+def _chart(numbers: Numbers) -> Figure:
     shown = {
         sensor: {method: of for method, of in found.items() if method != PARTITION_ONLY}
         for sensor, found in numbers.items()
     }
+    about = "All methods that find corners and segments (rows), with all sensors (colours)."
     logarithmic = [label for label in _PANELS if "÷" in label or "time" in label]
-    return Findings(
-        "All methods, by sensor",
-        (_ABOUT, RIVALS_NOTE, LIU_NOTE, _consistency(numbers), _arcs(numbers)),
-        tuple(
-            Table.of_numbers(
-                f"{name}: {SENSORS[name].n_beams} beams, {len(scenes)} scans",
-                found,
-                _COLUMNS,
-                "A dash: nothing found, or nothing that defines the number.",
-            )
-            for name, found in numbers.items()
-        ),
-        (
-            Figure(
-                "methods",
-                "All methods that find corners and segments (rows), with all sensors (colours).",
-                dot_chart(shown, _PANELS, logarithmic),
-            ),
-        ),
-        numbers,
+    return Figure("methods", about, dot_chart(shown, _PANELS, logarithmic))
+
+
+def report(n: Numbers, setting: Setting) -> Report:
+    """Make a table for each sensor."""
+    scans = len(SCENES) * setting.frames
+    note = "A dash: nothing found, or nothing that defines the number."
+    tables = (
+        Table.of_numbers(f"{s}: {SENSORS[s].n_beams} beams, {scans} scans", of, _COLUMNS, note)
+        for s, of in n.items()
     )
+    return (_ABOUT, RIVALS_NOTE, LIU_NOTE, _consistency(n), _arcs(n)), tables
 
 
 _ABOUT = (
@@ -96,15 +94,17 @@ _ABOUT = (
 )
 
 
-def _consistency(numbers: Numbers) -> str:
+def _consistency(n: Numbers) -> str:
     """Report how many methods have a mean NEES within its 95 % interval."""
     parts = []
     for kind in ("corner", "segment"):
         keys = (f"{kind}_nees_low", f"{kind}_nees", f"{kind}_nees_high")
-        rows = [of for found in numbers.values() for of in found.values() if keys[1] in of]
-        within = sum(of[keys[0]] <= of[keys[1]] <= of[keys[2]] for of in rows)
-        if rows:
-            parts.append(f"{within} of {len(rows)} rows for {kind}s")
+        every: Any = [[of.get(k) for k in keys] for rows in n.values() for of in rows.values()]
+        found = [row for row in every if row[1] is not None]
+        within = sum((by_seed(lambda a, x, b: a <= x <= b, *row) for row in found), 0.0)
+        known = sum((by_seed(lambda x: not math.isnan(x), row[1]) for row in found), 0.0)
+        if found:
+            parts.append(f"{within:.0f} of {known:.0f} rows for {kind}s")
     return f"The mean NEES lies within its 95 % interval in {' and in '.join(parts) or 'no row'}."
 
 
@@ -116,3 +116,6 @@ def _arcs(numbers: Numbers) -> str:
         f"Arcs are found by {', '.join(giving) or 'none of the methods'}. Without arcs, round "
         "columns become polygons with false corners."
     )
+
+
+EXPERIMENT = Experiment("All methods, by sensor", measure, report)

@@ -21,8 +21,8 @@ from lineament.progress import Track, untracked
 from lineament.scan import Array, LaserScan
 
 from ..evaluation.similarity import similarity_errors, similarity_scores
-from .findings import Columns, Figure, Findings, Table, cells
-from .report import findings_parts, machine
+from .findings import Columns, Figure, Findings, Table, machine
+from .report import findings_parts
 from .scans import interleaved_times, time_ratio
 
 #: The endings that `write_comparison` knows.
@@ -30,17 +30,26 @@ ENDINGS = (".html", *canvas.PICTURE_ENDINGS)
 #: Scans of a log that methods are timed on.
 _TIMED = 50
 #: How many measurements a method explains, and how far they are from its lines and arcs.
-SIMILARITY: Columns = {
-    "explained [%]": ("similarity_explained", 100),
-    "mean error [mm]": ("similarity_mean", 1e3),
-    "RMS [mm]": ("similarity_rms", 1e3),
-    "95 % [mm]": ("similarity_p95", 1e3),
-    "largest [mm]": ("similarity_maximum", 1e3),
+SIMILARITY = {
+    "explained [%]": "similarity_explained",
+    "mean error [mm]": "similarity_mean",
+    "RMS [mm]": "similarity_rms",
+    "95 % [mm]": "similarity_p95",
+    "largest [mm]": "similarity_maximum",
 }
+#: The same, and how many features there are.
+COUNTS: Columns = {k: k for k in ("segments", "corners", "arcs", "clusters")} | SIMILARITY
 SIMILARITY_NOTE = (
     "Explained: share of the valid measurements that a segment or an arc has, as it says itself. "
     "Error: their distance from it; what a method calls noise has none."
 )
+
+
+def counts_of(scan: LaserScan, features: Features) -> dict[str, Any]:
+    """Return the numbers of `COUNTS` for one scan."""
+    numbers = {kind: len(getattr(features, kind)) for kind in ("segments", "corners", "arcs")}
+    numbers["clusters"] = int(features.clusters.max(initial=-1)) + 1
+    return numbers | similarity_scores(scan, features).summary()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,31 +64,22 @@ class Comparison:
     features: dict[str, Features]
     seconds: dict[str, Array]
 
-    def table(self, times: bool = True) -> Table:
-        """List counts, similarity errors and, if asked for, times: a row for each method."""
-        records, first = [], next(iter(self.features))
+    def table(self) -> Table:
+        """List counts, similarity errors and times: a row for each method."""
+        first, rows = next(iter(self.features)), {}
+        rounds, scans = self.seconds[first].shape
         for name, features in self.features.items():
-            record: dict[str, object] = {
-                "method": name,
-                "segments": len(features.segments),
-                "corners": len(features.corners),
-                "arcs": len(features.arcs),
-                "clusters": int(features.clusters.max(initial=-1)) + 1,
-                **cells(similarity_scores(self.scan, features).summary(), SIMILARITY),
+            ratios = time_ratio(self.seconds[name], self.seconds[first])
+            rows[name] = counts_of(self.scan, features) | {
+                "time": float(np.median(self.seconds[name])),
+                "ratio": "{:.2f} ({:.2f}–{:.2f})".format(*ratios),
             }
-            if times:
-                ratios = time_ratio(self.seconds[name], self.seconds[first])
-                record["time [µs]"] = 1e6 * float(np.median(self.seconds[name]))
-                record[f"÷ {first}"] = "{:.2f} ({:.2f}–{:.2f})".format(*ratios)
-            records.append(record)
-        note = SIMILARITY_NOTE
-        if times:
-            rounds, scans = self.seconds[first].shape
-            note += (
-                f" Time: median of {scans} scans, {rounds} rounds of all methods in turns, with "
-                f"the range of the ratio over the rounds; {machine()}."
-            )
-        return Table.of_records(self.title, records, note)
+        columns = {**COUNTS, "time [µs]": "time", f"÷ {first}": "ratio"}
+        note = (
+            f"{SIMILARITY_NOTE} Time: median of {scans} scans, {rounds} rounds of all methods in "
+            f"turns, with the range of the ratio over the rounds; {machine()}."
+        )
+        return Table.of_numbers(self.title, rows, columns, note)
 
     def figure(self) -> matplotlib.figure.Figure:
         """Draw what each method finds, and the similarity error of each beam below it."""

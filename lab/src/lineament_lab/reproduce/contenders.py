@@ -1,8 +1,9 @@
-"""The methods that experiments compare, by their names in tables."""
+"""The methods that experiments compare, by their names in tables, and claims about them."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from lineament.scan import LaserScan
 
 from ..methods import RIVALS
 from .controls import BlindCut, OperatorCut
+from .experiment import Judged, Margins
 
 #: The paper by its letter; by the reading that brings Figure 9 nearest; with better last steps.
 PAPER, FIGURE_9, LIU = "liu:paper", "liu:figure9", "liu"
@@ -94,6 +96,18 @@ def is_drawn(name: str) -> bool:
     """
     published = name.endswith(":paper") and name not in (PAPER, IEPF)
     return not (published or name in (LIU_SHARED, BLIND))
+
+
+def by_letter(about: str, measure: Callable[[Any, str], tuple[str, Margins]], *more: str) -> Any:
+    """Judge a measure of methods by the paper's letter; what others have stands beside it."""
+
+    def judge(n: Any) -> Judged:
+        here, margins = measure(n, PAPER)
+        beside = (f"{name} {measure(n, name)[0]}" for name in (FIGURE_9, LIU, *more))
+        here = f"{about}: {here} (beside it: {', '.join(beside)})"
+        return Judged(here, margins, measure(n, BLIND)[1])
+
+    return judge
 
 
 def _with_lines(extract: Extractor, scan: LaserScan) -> Features:

@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Callable
 from importlib.metadata import version
 from itertools import product
 from typing import Any
@@ -15,8 +16,8 @@ from lineament.output import canvas, drawing
 from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, Sensor, World
 
-from .findings import Figure, Findings, Progress, Setting, Table
-from .report import machine
+from .experiment import Claim, Experiment, Judged, Measured, Report
+from .findings import Figure, Progress, Setting, Table, machine
 
 #: The support radius of the paper [beams].
 RADIUS = 6
@@ -31,20 +32,21 @@ _NOISY, _NOISE = 263, 3.7
 _STEPS = [(3.0, -1.6), (3.0, 0.3), (1.9, 0.5), (1.7, 1.6)]
 
 
-def run(_: Setting, progress: Progress) -> Findings:
-    """Draw the figures that illustrate definitions."""
-    progress("drawing")
+def measure(_: Setting, __: Progress) -> Measured:
+    """Compute the figures that illustrate definitions."""
     drawn = (_scan(), _spacing(), _chords(), _parabolas(), _tangent())
-    return Findings(
-        "Definitions (Figures 1, 4, 6, 7, 8) and the machine (Table 1)",
-        (
-            "These figures of the paper illustrate definitions. They are drawn of computed scans, "
-            "by the stages of the method, so each shows what the code does with it.",
-        ),
-        (_machines(),),
-        tuple(Figure(name, caption, canvas.figure_bytes(f)) for name, caption, f, _ in drawn),
-        {name: of for name, _, _, of in drawn},
+    return Measured(
+        {name: numbers for name, _, _, numbers in drawn},
+        lambda: [Figure(n, caption, canvas.figure_bytes(f)) for n, caption, f, _ in drawn],
     )
+
+
+def report(_: Any, __: Setting) -> Report:
+    """Make Table 1."""
+    return (
+        "These figures of the paper illustrate definitions. They are drawn of computed scans, "
+        "by the stages of the method, so each shows what the code does with it.",
+    ), (_machines(),)
 
 
 #: Short name, caption, drawing, and numbers of a figure.
@@ -300,3 +302,45 @@ def _machines() -> Table:
         ),
         "The table is lost: its values are those of the text around it.",
     )
+
+
+def _claim(figure: str, paper: str, about: str, margin: Callable[[Any], float]) -> Claim:
+    """Declare what a figure shows, and by how much its numbers do."""
+    place = f"Figure {figure[3:]}"
+    return Claim(place, paper, lambda n: Judged(about, [margin(n[figure])]), figure)
+
+
+CLAIMS = (
+    _claim(
+        *("fig1", "Breakpoint, corner and noise point of a scan", "Each found where it is drawn"),
+        lambda n: 0.02 - n["off"],
+    ),
+    _claim(
+        *("fig4", "Points are farther apart at a distance", "So is the threshold"),
+        lambda n: min(n["ratio"] - 1, -n["beyond"]),
+    ),
+    _claim(
+        *("fig6", "Primary corners are farthest from the chord", "Corners within a beam"),
+        lambda n: 0.02 - n["off"],
+    ),
+    _claim(
+        *("fig7", "Distance to the tangent grows with the curvature", "Proportional"),
+        lambda n: 1e-9 - n["off"],
+    ),
+    _claim(
+        *("fig8", "Support, arc length, parabolas, tangent"),
+        "By definition and by the code: the same sum",
+        lambda n: 1e-9 - abs(n["sum"] - n["stage"]),
+    ),
+    Claim(
+        *("Table 1", "Hardware and software"),
+        lambda _: Judged("Other hardware, compiled code", ()),
+    ),
+)
+EXPERIMENT = Experiment(
+    "Definitions (Figures 1, 4, 6, 7, 8) and the machine (Table 1)",
+    measure,
+    report,
+    CLAIMS,
+    once=True,
+)

@@ -1,8 +1,10 @@
-"""What an experiment gets and returns: a setting; text, tables, figures and numbers."""
+"""What an experiment gets and gives: a setting; text, tables, figures and numbers."""
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import os
+import platform
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
@@ -11,18 +13,19 @@ from typing import Any, NamedTuple, Self, TypeVar
 from lineament.output import canvas
 
 from ..evaluation.counts import plain
-from .seeds import Spread, merged, merged_text
+from .seeds import Spread
 
 T = TypeVar("T")
 
 #: Called every second or two with a few words on what is being done.
 Progress = Callable[[str], None]
 #: Numbers of an experiment: by log, sensor or group of scans, then by method, then by name.
-Numbers = Mapping[str, Mapping[str, Mapping[str, Any]]]
-#: Columns of a table or panels of a chart: label to the name of a number, and its factor.
-Columns = Mapping[str, tuple[str, float]]
-
-NO_RECORDINGS = "The recordings are missing: nothing is measured."
+Numbers = Mapping[str, Mapping[str, Mapping[Any, Any]]]
+#: Columns of a table or panels of a chart: label to the name of a number. Numbers are in metres,
+#: radians, seconds and shares; a unit in the label, as in "error [mm]", is what they are shown in,
+#: unless the name comes with a factor.
+Columns = Mapping[str, Any]
+UNITS = {"mm": 1e3, "%": 100, "µs": 1e6, "mrad": 1e3, "°": math.degrees(1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,7 @@ class Table:
     def of_numbers(
         cls,
         title: str,
-        numbers: Mapping[str, Mapping[str, Any]],
+        numbers: Mapping[str, Mapping[Any, Any]],
         columns: Columns,
         note: str = "",
         first: str = "method",
@@ -77,7 +80,7 @@ class Table:
         Examples
         --------
         >>> found = {"liu": {"rmse": 0.004}, "pdbs": {}}
-        >>> Table.of_numbers("Errors", found, {"RMSE [mm]": ("rmse", 1e3)}).rows
+        >>> Table.of_numbers("Errors", found, {"RMSE [mm]": "rmse"}).rows
         (('liu', 4.0), ('pdbs', None))
         """
         rows = ((name, *cells(of, columns).values()) for name, of in numbers.items())
@@ -102,12 +105,27 @@ class Table:
         }
 
 
-def cells(numbers: Mapping[str, Any], columns: Columns) -> dict[str, object]:
-    """Return the cells of a row by their columns, None where a number is missing."""
-    return {
-        label: factor * numbers[key] if key in numbers else None
-        for label, (key, factor) in columns.items()
-    }
+def cells(numbers: Mapping[Any, Any], columns: Columns) -> dict[str, object]:
+    """Return the cells of a row by their columns: numbers by the factor, texts, None if missing."""
+    shown = {}
+    for label in columns:
+        key, factor = column(columns, label)
+        value = numbers.get(key)
+        shown[label] = value if value is None or isinstance(value, str) else factor * value
+    return shown
+
+
+def column(columns: Columns, label: str) -> tuple[Any, float]:
+    """Return the name of the number of a column, and the factor to the unit in its label.
+
+    Examples
+    --------
+    >>> column({"error [mm]": "rmse", "of two [%]": ("both", 1)}, "error [mm]")
+    ('rmse', 1000.0)
+    """
+    unit = re.search(r"\[(.+?)\]", label)
+    key = columns[label]
+    return key if isinstance(key, tuple) else (key, UNITS.get(unit[1], 1) if unit else 1)
 
 
 class Figure(NamedTuple):
@@ -119,7 +137,7 @@ class Figure(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """What an experiment returns: title, paragraphs, tables, figures, and all numbers by name."""
+    """What an experiment gives: title, paragraphs, tables, figures, and all numbers by name."""
 
     title: str
     text: tuple[str, ...]
@@ -136,48 +154,6 @@ class Findings(NamedTuple):
             "figures": {figure.name: figure.caption for figure in self.figures},
             "numbers": plain(self.numbers),
         }
-
-
-def merged_findings(found: Sequence[Findings]) -> Findings:
-    """Merge what an experiment found with several seeds; the figures are those of the first.
-
-    Tables are the same if they have the same title. One that only the first seed has, such as that
-    of a recording, stays as it is.
-    """
-    if len(found) == 1:
-        return found[0]
-    first = found[0]
-    tables = []
-    for table in first.tables:
-        same = [other for each in found for other in each.tables if other.title == table.title]
-        tables.append(_merged_table(same))
-    numbers = merged([each.numbers for each in found])
-    texts = (merged_text(texts) for texts in zip(*(each.text for each in found), strict=False))
-    return first._replace(text=tuple(texts), tables=tuple(tables), numbers=numbers)
-
-
-def _merged_table(tables: Sequence[Table]) -> Table:
-    """Merge the cells of tables: rows are the same if they begin alike."""
-    by_name = [_named(table.rows) for table in tables]
-    rows = (
-        tuple(merged(cells) for cells in zip(*(of.get(name, blank) for of in by_name), strict=True))
-        for name, row in by_name[0].items()
-        for blank in [(row[0], *[None] * (len(row) - 1))]
-    )
-    first = tables[0]
-    return Table(
-        first.title, first.columns, tuple(rows), merged_text([table.note for table in tables])
-    )
-
-
-def _named(rows: Iterable[tuple[object, ...]]) -> dict[tuple[object, int], tuple[object, ...]]:
-    """Name each row by its first cell, and how many before it begin so."""
-    seen: Counter[object] = Counter()
-    named = {}
-    for row in rows:
-        named[row[0], seen[row[0]]] = row
-        seen[row[0]] += 1
-    return named
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,8 +208,16 @@ def each(items: Mapping[str, T], progress: Progress, what: str) -> Iterator[tupl
 
 
 def median_of(items: Iterable[T], score: Callable[[T], float]) -> T:
-    """Return the item with the median score, of an even number the lower one: to be drawn."""
-    in_order = sorted(items, key=score)
+    """Return the item with the median score, of an even number the lower one: to be drawn.
+
+    A score that is NaN is the largest.
+    """
+
+    def order(item: T) -> float:
+        value = score(item)
+        return math.inf if math.isnan(value) else value
+
+    in_order = sorted(items, key=order)
     return in_order[(len(in_order) - 1) // 2]
 
 
@@ -243,6 +227,10 @@ class Interval(NamedTuple):
     value: float
     low: float
     high: float
+
+    def __rmul__(self, factor: Any) -> "Interval":
+        """Return it in another unit."""
+        return Interval(*(factor * value for value in self))
 
 
 def cell_text(cell: object) -> str:
@@ -268,7 +256,8 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
     rows = list(next(iter(numbers.values())))[::-1]
     figure = canvas.new_figure(canvas.PAGE_WIDTH, 1.2 + 0.24 * len(rows))
     all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
-    for axes, (label, (key, factor)) in zip(all_axes, panels.items(), strict=True):
+    for axes, label in zip(all_axes, panels, strict=True):
+        key, factor = column(panels, label)
         canvas.style(axes, "", xlabel=fill(label, 22))
         for color, (name, methods) in zip(canvas.PALETTE, numbers.items(), strict=False):
             values = [factor * methods.get(row, {}).get(key, math.nan) for row in rows]
@@ -291,3 +280,21 @@ def log_axis(axis: Any) -> None:
     axis.set_major_locator(LogLocator(10, digits))
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_locator(NullLocator())
+
+
+def machine() -> str:
+    """Return processor, cores, system and Python, in a line.
+
+    Examples
+    --------
+    >>> machine().endswith(f"Python {platform.python_version()}")
+    True
+    """
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
+        name = lines[0].split(":")[1].strip() if lines else name
+    return (
+        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
+    )

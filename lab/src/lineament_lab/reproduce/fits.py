@@ -12,45 +12,40 @@ from lineament.simulation import SCENES, SENSORS
 from ..evaluation.beams import MIN_BEAMS, beams_of
 from ..evaluation.line_fits import FITS, Fit, LineFit
 from ..evaluation.scores import Scores, evaluate
-from .findings import Columns, Findings, Progress, Setting, Table, each
-from .scans import Frame, scene_numbers, simulated_frames
+from .experiment import Experiment, Measured, Report
+from .findings import Columns, Numbers, Progress, Setting, Table, each
+from .scans import Frame, frames_of
 
 #: A measurement is of the wall within so many deviations: others are mixed pixels and outliers,
 #: which no fit here is made for.
 _SIGMAS = 5.0
 _COLUMNS: Columns = {
-    "offset ÷ bound, RMS": ("segment_offset_over_bound", 1),
-    "angle ÷ bound, RMS": ("segment_angle_over_bound", 1),
-    "segment NEES, median": ("segment_nees_median", 1),
-    "segment NEES, mean": ("segment_nees", 1),
-    "corner ÷ bound, RMS": ("corner_over_bound", 1),
-    "corner NEES, median": ("corner_nees_median", 1),
-    "corner NEES, mean": ("corner_nees", 1),
+    "offset ÷ bound, RMS": "segment_offset_over_bound",
+    "angle ÷ bound, RMS": "segment_angle_over_bound",
+    "segment NEES, median": "segment_nees_median",
+    "segment NEES, mean": "segment_nees",
+    "corner ÷ bound, RMS": "corner_over_bound",
+    "corner NEES, median": "corner_nees_median",
+    "corner NEES, mean": "corner_nees",
 }
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Fit every true wall by each fit, for each sensor."""
     numbers: dict[str, dict[str, dict[str, float]]] = {}
-    for name, sensor in SENSORS.items():
-        scenes = scene_numbers(len(SCENES) * setting.frames, setting.seed)
-        frames = list(simulated_frames(sensor, SCENES, scenes))
-        numbers[name] = {
-            fit: Scores.total(
-                evaluate(fitted(frame, of), frame.truth) for frame in frames
-            ).summary()
-            for fit, of in each(FITS, progress, name)
+    for sensor in SENSORS:
+        frames = frames_of(setting, SCENES, len(SCENES), sensor)
+        numbers[sensor] = {
+            name: Scores.total(evaluate(fitted(f, fit), f.truth) for f in frames).summary()
+            for name, fit in each(FITS, progress, sensor)
         }
-    return Findings(
-        "Line fits, given the walls",
-        (_ABOUT,),
-        tuple(
-            Table.of_numbers(f"{name}: fits of true walls", found, _COLUMNS)
-            for name, found in numbers.items()
-        ),
-        (),
-        numbers,
-    )
+    return Measured(numbers)
+
+
+def report(n: Numbers, _: Setting) -> Report:
+    """Make a table for each sensor."""
+    titles = ((f"{sensor}: fits of true walls", of) for sensor, of in n.items())
+    return (_ABOUT,), (Table.of_numbers(title, of, _COLUMNS) for title, of in titles)
 
 
 def fitted(frame: Frame, fit: Fit) -> Features:
@@ -117,3 +112,6 @@ _ABOUT = (
     "across the line, which incidence makes smaller than that of the range. Corners are where the "
     "fitted lines meet. NEES: 1 is right, more is overconfident."
 )
+
+
+EXPERIMENT = Experiment("Line fits, given the walls", measure, report)

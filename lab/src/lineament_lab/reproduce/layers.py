@@ -1,7 +1,6 @@
 """Figures 5 and 10: the clusters of layered obstacles, and all methods on them."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,96 +13,99 @@ from lineament.simulation import SENSORS
 
 from ..evaluation.partition import PartitionScores, partition_scores
 from ..methods.pdbs import RULES
-from .contenders import LIU, PAPER, fitted_methods
-from .findings import Figure, Findings, Progress, Setting, Table, median_of
-from .scans import Frame, scene_numbers, simulated_frames
+from .contenders import LIU, PAPER, by_letter, fitted_methods
+from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better
+from .findings import Figure, Progress, Setting, Table, median_of
+from .scans import Frame, frames_of, scene_numbers, scored, simulated_frames
 from .scenes import TRUE, pictures
 
 #: What the paper reports of ten frames of its recording [%].
-OF_PAPER = {PAPER: 95.11, "pdbs, fixed": 83.55}
+FIXED = "pdbs, fixed"
+OF_PAPER = {PAPER: 95.11, FIXED: 83.55}
 #: Clusters and corners of Figure 10, and how many scenes are looked at for such a one.
 PAPER_COUNTS, SOUGHT = (11, 5), 400
+#: Scans for each frame of the setting; sensors, and what distinguishes them.
+SCANS_A_FRAME, SCANNERS = 4, {"paper": "its scanner", "utm30lx": "mixed pixels"}
 _COLUMNS = {
     "success, paper [%]": ("paper", 1),
-    "success, here [%]": ("success", 100),
-    "breakpoints: precision": ("breakpoint_precision", 1),
-    "recall": ("breakpoint_recall", 1),
-    "F1": ("breakpoint_f1", 1),
-    "Rand index": ("rand_index", 1),
+    "success, here [%]": "success",
+    "breakpoints: precision": "breakpoint_precision",
+    "recall": "breakpoint_recall",
+    "F1": "breakpoint_f1",
+    "Rand index": "rand_index",
 }
-_COUNTS = {"clusters": ("clusters", 1), "corners": ("corners", 1)}
+_COUNTS = {"clusters": "clusters", "corners": "corners"}
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
-    """Score the clusters of layered obstacles, and draw the results of all methods on one scan."""
-    scenes = scene_numbers(4 * setting.frames, setting.seed)
+def measure(setting: Setting, progress: Progress) -> Measured:
+    """Score the clusters of layered obstacles, and count those of a scene like Figure 10."""
     rules = {f"pdbs, {rule}": Extractor("pdbs", rule=rule) for rule in RULES}
     methods = {PAPER: Extractor(PAPER), LIU: Extractor(LIU), **rules}
-    numbers: dict[str, dict[str, Any]] = {}
-    lead, tables = {}, []
-    for sensor in ("paper", "utm30lx"):
-        progress(f"clusters, {sensor}")
-        frames = list(simulated_frames(SENSORS[sensor], ["layers"], scenes))
-        each = {
-            name: [partition_scores(e(frame.scan), frame.truth) for frame in frames]
-            for name, e in methods.items()
-        }
-        scores = {name: PartitionScores.total(of) for name, of in each.items()}
-        numbers[sensor] = {name: score.summary() for name, score in scores.items()}
-        success = 100 * (scores[PAPER].success - scores["pdbs, fixed"].success)
-        lead[sensor] = f"{success:+.1f}".replace("-", "−")
-        rows = {n: {"paper": OF_PAPER.get(n, math.nan)} | of for n, of in numbers[sensor].items()}
-        title = f"Clusters of layered obstacles, sensor “{sensor}”"
-        tables.append(Table.of_numbers(title, rows, _COLUMNS, f"{len(scenes)} scans."))
-    progress("drawing")
-    mixed = scores[PAPER].regions
-    of_frames = [PartitionScores.total(of) for of in zip(*each.values(), strict=True)]
-    shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
-    few = {name: methods[name](shown.scan) for name in (PAPER, "pdbs, fixed")}
+    numbers: dict[str, Any] = {}
+    for sensor in SCANNERS:
+        frames = frames_of(setting, ["layers"], SCANS_A_FRAME, sensor)
+        scores = scored(methods, frames, progress, f"clusters, {sensor}", partition_scores)
+        totals = {name: PartitionScores.total(of) for name, of in scores.items()}
+        numbers[sensor] = {name: score.summary() for name, score in totals.items()}
+    mixed = totals[PAPER].regions
+    numbers["mixed"] = {"found": mixed.found, "true": mixed.true}
     alike = like_figure_10(setting.seed)
-    found = {name: e(alike.scan) for name, e in fitted_methods(setting.methods).items()}
-    found = {TRUE: alike.truth} | found
-    counts = numbers["example"] = {
-        name: {
-            "clusters": len(np.unique(features.clusters[features.clusters >= 0])),
-            "corners": len(features.corners),
-        }
+    found = {TRUE: alike.truth}
+    found |= {name: e(alike.scan) for name, e in fitted_methods(setting.methods).items()}
+    numbers["example"] = {
+        name: {"clusters": _count(features), "corners": len(features.corners)}
         for name, features in found.items()
     }
-    rows = {"paper": dict(zip(_COUNTS, PAPER_COUNTS, strict=True))} | counts
-    tables.append(
-        Table.of_numbers(
-            "Figure 10: clusters and corners of a scene with as many as the paper’s",
-            rows,
-            _COUNTS,
-            "The paper’s scene is not available.",
-        )
+
+    def draw() -> Iterable[Figure]:
+        """Draw the last frame with the median success of all methods, and the scene."""
+        of_frames = [PartitionScores.total(of) for of in zip(*scores.values(), strict=True)]
+        shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
+        few = {name: methods[name](shown.scan) for name in (PAPER, FIXED)}
+        yield _clusters(shown.scan, {"true clusters": shown.truth} | few)
+        yield from pictures("fig10", _ALIKE, alike.scan, found)
+
+    return Measured(numbers, draw)
+
+
+_ALIKE = (
+    "The first of the simulated scenes of layered obstacles that has the 11 clusters and 5 corners "
+    "of the paper’s Figure 10"
+)
+
+
+def report(n: Any, setting: Setting) -> Report:
+    """Make a table for each sensor, and that of the scene."""
+    text = (
+        "Several levels of obstacles stand one behind the other before a back wall. A cluster is "
+        "right if it has the beams of the true one, but for one at each end or a tenth of them; a "
+        "breakpoint, if the beams on both its sides are within one of the true ones. The paper’s "
+        "numbers are of ten frames of a recording that is not used here. It does not name the rule "
+        "and the threshold of its PDBS: a fixed distance of 0.3 m and the adaptive rules of the "
+        "literature are compared.",
+        "The paper reports a lead of 11.6 points over PDBS. Over a fixed distance it is "
+        f"{_lead(n['paper'])} points here with the paper’s scanner and {_lead(n['utm30lx'])} with "
+        "one whose ranges mix both depths at edges (utm30lx), where it finds "
+        f"{n['mixed']['found']:.0f} clusters for {n['mixed']['true']:.0f} true ones.",
     )
-    about = (
-        "The first of the simulated scenes of layered obstacles that has the 11 clusters and 5 "
-        "corners of the paper’s Figure 10"
-    )
-    return Findings(
-        "Layered obstacles (Figures 5 and 10)",
-        (
-            "Several levels of obstacles stand one behind the other before a back wall. A cluster "
-            "is right if it has the beams of the true one, but for one at each end or a tenth of "
-            "them; a breakpoint, if the beams on both its sides are within one of the true ones. "
-            "The paper’s numbers are of ten frames of a recording that is not used here. It does "
-            "not name the rule and the threshold of its PDBS: a fixed distance of 0.3 m and the "
-            "adaptive rules of the literature are compared.",
-            "The paper reports a lead of 11.6 points over PDBS. Over a fixed distance it is "
-            f"{lead['paper']} points here with the paper’s scanner and {lead['utm30lx']} with one "
-            "whose ranges mix both depths at edges (utm30lx), where it finds "
-            f"{mixed.found} clusters for {mixed.true} true ones.",
-        ),
-        tuple(tables),
-        (
-            _clusters(shown.scan, {"true clusters": shown.truth} | few),
-            *pictures("fig10", about, alike.scan, found),
-        ),
-        numbers,
-    )
+    note = f"{SCANS_A_FRAME * setting.frames} scans."
+    tables = []
+    for sensor in SCANNERS:
+        rows = {name: {"paper": OF_PAPER.get(name)} | of for name, of in n[sensor].items()}
+        title = f"Clusters of layered obstacles, sensor “{sensor}”"
+        tables.append(Table.of_numbers(title, rows, _COLUMNS, note))
+    rows = {"paper": dict(zip(_COUNTS, PAPER_COUNTS, strict=True))} | n["example"]
+    title = "Figure 10: clusters and corners of a scene with as many as the paper’s"
+    note = "The paper’s scene is not available."
+    return text, (*tables, Table.of_numbers(title, rows, _COUNTS, note))
+
+
+def _lead(n: Any) -> str:
+    return f"{100 * (n[PAPER]['success'] - n[FIXED]['success']):+.1f}".replace("-", "−")
+
+
+def _count(features: Features) -> int:
+    return len(np.unique(features.clusters[features.clusters >= 0]))
 
 
 def like_figure_10(seed: int) -> Frame:
@@ -127,8 +129,7 @@ def _clusters(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     figure, panels = canvas.new_panels(len(found), len(found))
     for axes, (name, features) in zip(panels, found.items(), strict=True):
         shown = drawing.draw_beams(axes, scan, features.clusters)
-        clusters = len(np.unique(features.clusters[features.clusters >= 0]))
-        canvas.style_plane(axes, name, canvas.count(clusters, "cluster"), shown)
+        canvas.style_plane(axes, name, canvas.count(_count(features), "cluster"), shown)
         drawing.draw_breakpoints(axes, features.breakpoints)
     return Figure(
         "fig5",
@@ -137,3 +138,31 @@ def _clusters(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
         "breakpoints. Of all scans the one with the median success of all methods together.",
         canvas.figure_bytes(figure),
     )
+
+
+def _judged_layers(n: Any) -> Judged:
+    parts, margins = [], []
+    for sensor, about in SCANNERS.items():
+        liu, pdbs = (n[sensor][name]["success"] for name in (PAPER, FIXED))
+        parts.append(f"{about}: {100 * liu:.0f} %, PDBS {100 * pdbs:.0f} %")
+        margins.append(better(liu, pdbs))
+    return Judged(f"Clusters right, {'; '.join(parts)}", margins)
+
+
+def _judged_counts(n: Any, method: str) -> tuple[str, Margins]:
+    true, found = n["example"][TRUE], n["example"][method]
+    return (
+        f"{found['clusters']:.0f} and {found['corners']:.0f}",
+        [-abs(found[name] - true[name]) for name in ("clusters", "corners")],
+    )
+
+
+CLAIMS = (
+    Claim("Figure 5", "Adaptive clusters part the levels of obstacles", _judged_layers, "fig5"),
+    Claim(
+        *("Figure 10", "11 clusters and 5 corners, as in the scene"),
+        by_letter("A scene with as many", _judged_counts),
+        "fig10",
+    ),
+)
+EXPERIMENT = Experiment("Layered obstacles (Figures 5 and 10)", measure, report, CLAIMS)

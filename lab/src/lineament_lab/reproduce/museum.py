@@ -19,8 +19,9 @@ from lineament.scan import Array, LaserScan
 from lineament.scan.poses import compose
 
 from ..evaluation.similarity import SimilarityScores, similarity_scores
-from .contenders import PAPER, PDBS_LINES, Extract, fitted_methods
-from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
+from .contenders import IEPF, PAPER, PDBS_LINES, Extract, fitted_methods
+from .experiment import Experiment, Measured, MissingError, Report
+from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
 from .scans import frame_times
 from .scenes import pictures
 from .similarity import error_strips
@@ -32,7 +33,6 @@ TOPIC = "horizontal_laser_2d"
 #: time at least [s]; and of the corners, at least and at most [m].
 SCANS_A_FRAME, APART, FAR = 40, 0.1, (1.0, 5.0)
 PLACES = 5
-TITLE = "The paper’s museum"
 
 
 class View(NamedTuple):
@@ -47,50 +47,67 @@ class View(NamedTuple):
     corners: dict[int, tuple[Array, bool]]
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure all methods on the bag of the setting."""
     if setting.museum is None:
-        text = (
-            "No bag is given. The paper’s scans are from the Deutsches Museum, recorded for "
-            "Cartographer, whose bags are public but not part of this report: “lineament reproduce "
-            "--museum BAG” runs this part.",
-        )
-        return Findings(TITLE, text)
+        raise MissingError(_MISSING)
     progress("reading")
     frames, in_row = read(setting.museum, setting.frames)
     methods = fitted_methods(setting.methods)
     scores, of_methods = {}, {}
     for name, extract in each(methods, progress, f"{len(frames)} scans"):
         scores[name], of_methods[name] = _measured(extract, frames)
-    numbers: dict[str, Any] = {"methods": of_methods}
+    numbers: dict[str, Any] = {"methods": of_methods, "scans": len(frames)}
     of_scans = [SimilarityScores.total(of).mean for of in zip(*scores.values(), strict=True)]
     scan = frames[median_of(range(len(frames)), of_scans.__getitem__)]
-    about = (
-        f"The museum: of {len(frames)} scans from equal parts of the bag the one with the median "
-        "mean similarity error of all methods together"
-    )
-    found = {name: extract(scan) for name, extract in methods.items()}
-    figures = [*pictures("museum-fig11", about, scan, found), _errors(scan, found)]
-    title = f"Figure 12 and Table 3, as far as they need no truth: {len(frames)} scans"
-    tables = [Table.of_numbers(title, of_methods, _COLUMNS, _NOTE)]
     progress("following corners")
     seen = views_of_two(follow(in_row))
     if seen is not None:
-        views, a, b = seen
-        numbers["distance"] = _distances(views, a, b, methods)
-        tables.append(_distance_table(numbers["distance"], len(views)))
-        figures.append(_places(views, a, b))
-    return Findings(TITLE, _TEXT, tuple(tables), tuple(figures), numbers)
+        numbers |= {"distance": _distances(*seen, methods), "views": len(seen[0])}
+
+    def draw() -> Iterable[Figure]:
+        """Draw the scan with the median error, its errors, and the two corners."""
+        about = (
+            f"The museum: of {len(frames)} scans from equal parts of the bag the one with the "
+            "median mean similarity error of all methods together"
+        )
+        found = {name: extract(scan) for name, extract in methods.items()}
+        yield from pictures("museum-fig11", about, scan, found)
+        yield _errors(scan, found)
+        if seen is not None:
+            yield _places(*seen)
+
+    return Measured(numbers, draw)
 
 
+def report(n: Any, _: Setting) -> Report:
+    """Make a table of all scans, and that of the distance."""
+    title = f"Figure 12 and Table 3, as far as they need no truth: {n['scans']} scans"
+    tables = [Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE)]
+    if "distance" in n:
+        tables.append(_distance_table(n["distance"], n["views"]))
+    return _TEXT, tables
+
+
+_MISSING = (
+    "No bag is given. The paper’s scans are from the Deutsches Museum, recorded for Cartographer, "
+    "whose bags are public but not part of this report: “lineament reproduce --museum BAG” runs "
+    "this part."
+)
 _COLUMNS = {
-    "clusters a scan": ("clusters", 1),
-    "segments a scan": ("segments", 1),
-    "corners a scan": ("corners", 1),
-    "similarity error, mean [mm]": ("mean", 1e3),
-    "largest [m]": ("largest", 1),
-    "explained [%]": ("explained", 100),
-    "time [µs]": ("time", 1e6),
+    "clusters a scan": "clusters",
+    "segments a scan": "segments",
+    "corners a scan": "corners",
+    "similarity error, mean [mm]": "mean",
+    "largest [m]": "largest",
+    "explained [%]": "explained",
+    "time [µs]": "time",
+}
+_DISTANCE: Columns = {
+    "paper: mean [m]": "paper",
+    "here: mean [m]": "here",
+    "standard deviation [mm]": "deviation",
+    "found in [%]": "found",
 }
 _NOTE = (
     "Nothing true is known of these scans, so what is right cannot be counted. Explained: share of "
@@ -214,30 +231,24 @@ def _distances(
 
 
 def _distance_table(numbers: Mapping[str, Mapping[str, Any]], count: int) -> Table:
-    return Table.of_records(
-        f"Table 2: distance of A and B in {count} scans",
-        [
-            {
-                "method": name,
-                "paper: mean [m]": f"{DISTANCE}" if name == PAPER else None,
-                "here: mean [m]": _metres(of["mean"]),
-                "standard deviation [mm]": 1e3 * of["deviation"],
-                "found in [%]": 100 * of["found"],
-                **{f"place {k} [m]": _metres(at) for k, at in enumerate(of["places"], 1)},
-            }
-            for name, of in numbers.items()
-        ],
-        "The paper’s corners are others; its variance is lost.",
+    """Make the table of the distance, which every method measures in so many scans."""
+    rows = {}
+    for name, of in numbers.items():
+        metres = (None if math.isnan(at) else f"{at:.3f}" for at in of["places"])
+        places = {f"place {k}": at for k, at in enumerate(metres, 1)}
+        mean = None if math.isnan(of["mean"]) else f"{of['mean']:.3f}"
+        paper = f"{DISTANCE}" if name == PAPER else None
+        rows[name] = {**of, **places, "here": mean, "paper": paper}
+    columns = {**_DISTANCE, **{f"place {k} [m]": f"place {k}" for k in range(1, PLACES + 1)}}
+    title = f"Table 2: distance of A and B in {count} scans"
+    return Table.of_numbers(
+        title, rows, columns, "The paper’s corners are others; its variance is lost."
     )
-
-
-def _metres(length: float) -> str | None:
-    return None if math.isnan(length) else f"{length:.3f}"
 
 
 def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     """Draw the similarity error of each beam, by method."""
-    shown = [name for name in (PAPER, "iepf:paper", PDBS_LINES) if name in found]
+    shown = [name for name in (PAPER, IEPF, PDBS_LINES) if name in found]
     figure = error_strips(scan, {name: found[name] for name in shown})
     caption = "The museum, the same scan: similarity error of each beam. Dashed: 0.01 m."
     return Figure("museum-fig12", caption, canvas.figure_bytes(figure))
@@ -254,3 +265,6 @@ def _places(views: Sequence[View], a: int, b: int) -> Figure:
         f"The museum: a convex corner A and a concave one B from five places ({DEFAULT_METHOD})."
     )
     return Figure("museum-fig13", caption, canvas.figure_bytes(figure))
+
+
+EXPERIMENT = Experiment("The paper’s museum", measure, report, once=True)

@@ -1,7 +1,6 @@
 """Figures 2 and 3: a scan with noise points, filtered and not, and what that does to features."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -17,10 +16,11 @@ from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 from ..evaluation.counts import ratio, rms
-from ..evaluation.scores import Scores, evaluate
+from ..evaluation.scores import Scores
 from .contenders import FIGURE_9, LIU, PAPER
-from .findings import Figure, Findings, Progress, Setting, Table, each, log_axis
-from .scans import scene_numbers
+from .experiment import Claim, Experiment, Judged, Measured, Report
+from .findings import Figure, Progress, Setting, Table, log_axis
+from .scans import scene_numbers, scored
 
 #: The paper's scanner, with a noise point in every fiftieth beam.
 SENSOR: Sensor = replace(SENSORS["paper"], outlier=0.02)
@@ -30,6 +30,8 @@ OFF = 0.10
 SIZES = [(0.1, 0.3), (0.3, 0.6), (0.6, 1.2), (1.2, math.inf)]
 #: Beams that the filter uses on either side.
 HALF_WIDTH = Liu().half_width
+#: Scans for each frame of the setting.
+SCANS_A_FRAME = 4
 _RAW, _FILTERED = "#4477aa", "#d1242f"
 
 Mask = NDArray[np.bool_]
@@ -40,20 +42,20 @@ _NAMES = {
     "corners": "nearest to a corner",
 }
 _RANGES = {
-    "number": ("beams", 1),
-    "raw, rms [mm]": ("raw", 1e3),
-    "filtered, rms [mm]": ("filtered", 1e3),
-    "off by > 0.1 m after [%]": ("off_after", 100),
-    "labelled noise by liu:paper [%]": ("labelled", 100),
+    "number": "beams",
+    "raw, rms [mm]": "raw",
+    "filtered, rms [mm]": "filtered",
+    "off by > 0.1 m after [%]": "off_after",
+    "labelled noise by liu:paper [%]": "labelled",
 }
 _FEATURES = {
-    "corners a scan": ("corners_a_scan", 1),
-    "precision": ("corner_precision_0.10", 1),
-    "recall": ("corner_recall_0.10", 1),
-    "F1": ("corner_f1_0.10", 1),
-    "corner error, median [mm]": ("corner_median_error", 1e3),
-    "offset of lines, rmse [mm]": ("segment_offset_rmse", 1e3),
-    "the same ÷ bound": ("segment_offset_over_bound", 1),
+    "corners a scan": "corners_a_scan",
+    "precision": "corner_precision_0.10",
+    "recall": "corner_recall_0.10",
+    "F1": "corner_f1_0.10",
+    "corner error, median [mm]": "corner_median_error",
+    "offset of lines, rmse [mm]": "segment_offset_rmse",
+    "the same ÷ bound": "segment_offset_over_bound",
 }
 
 
@@ -66,12 +68,11 @@ class _Frame(NamedTuple):
     places: dict[str, Mask]
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Compare raw and filtered ranges, and what is found with the filter and without it."""
-    numbers = scene_numbers(4 * setting.frames, setting.seed)
+    numbers = scene_numbers(SCANS_A_FRAME * setting.frames, setting.seed)
     progress(f"simulating {len(numbers)} scans")
     frames = [_frame(*scene(("room", "hall")[i % 2], n), n) for i, n in enumerate(numbers)]
-    ranges = _ranges(frames)
     variants = {
         f"{name}, {how}": Extractor(name, **changes)
         for name in (PAPER, FIGURE_9, LIU)
@@ -79,52 +80,45 @@ def run(setting: Setting, progress: Progress) -> Findings:
     }
     variants[f"{LIU}, lines fitted to filtered ranges"] = Extractor(LIU, measure="filtered")
     features = {}
-    for name, extract in each(variants, progress, "features"):
-        scores = Scores.total(evaluate(extract(f.scan), f.truth) for f in frames)
+    for name, of in scored(variants, frames, progress, "features").items():
+        scores = Scores.total(of)
         found = scores.corners.counts.found
         features[name] = {"corners_a_scan": found / scores.scans, **scores.summary()}
-    progress("drawing")
-    names = {place: _NAMES.get(place, f"noise points, off by {place}") for place in ranges}
-    return Findings(
-        "Noise points, filtered and not (Figures 2 and 3)",
-        _text(ranges, features),
-        (
-            Table.of_numbers(
-                "Errors of ranges",
-                {names[place]: of for place, of in ranges.items()},
-                _RANGES,
-                f"{len(frames)} scans; the noise of the ranges is 10 mm. Labelled noise: in a "
-                "cluster of fewer than three points, with the filter and the paper’s numbers.",
-                first="beams",
-            ),
-            Table.of_numbers(
-                "What is found with the filter and without it",
-                features,
-                _FEATURES,
-                "Corners within 0.1 m of true ones that show six beams or more of both sides; "
-                "errors of correct corners and lines. ÷ bound: root mean square of the offset "
-                "over its Cramér–Rao bound.",
-                first="liu",
-            ),
-        ),
-        (_figure(setting.seed),),
-        {"ranges": ranges, "features": features},
+    return Measured(
+        {"ranges": _ranges(frames), "features": features}, lambda: [_figure(setting.seed)]
     )
 
 
-def _text(
-    ranges: Mapping[str, Mapping[str, float]], features: Mapping[str, Mapping[str, Any]]
-) -> tuple[str, ...]:
-    labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in ranges.items()}
+def report(n: Any, setting: Setting) -> Report:
+    """Make a table of ranges, by place, and one of features, by variant."""
+    names = {place: _NAMES.get(place, f"noise points, off by {place}") for place in n["ranges"]}
+    ranges = Table.of_numbers(
+        "Errors of ranges",
+        {names[place]: of for place, of in n["ranges"].items()},
+        _RANGES,
+        f"{SCANS_A_FRAME * setting.frames} scans; the noise of the ranges is 10 mm. Labelled "
+        "noise: in a cluster of fewer than three points, with the filter and the paper’s numbers.",
+        first="beams",
+    )
+    features = Table.of_numbers(
+        "What is found with the filter and without it",
+        n["features"],
+        _FEATURES,
+        "Corners within 0.1 m of true ones that show six beams or more of both sides; errors of "
+        "correct corners and lines. ÷ bound: root mean square of the offset over its Cramér–Rao "
+        "bound.",
+        first="liu",
+    )
+    labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in n["ranges"].items()}
     smallest, largest = (_size(*SIZES[i]) for i in (0, -1))
     raw, filtered = (
         [
-            f"{100 * features[f'{PAPER}, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
+            f"{100 * n['features'][f'{PAPER}, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
             for of in ("precision", "recall")
         ]
         for how in ("not filtered", "filtered")
     )
-    return (
+    text = (
         "The paper filters noise points away, so that they do not become corners (Figures 2, 3). "
         "Here every fiftieth beam of scans of rooms and halls is a noise point; the filter has the "
         "paper’s numbers, σ_d = 4 beams and σ_r = 0.3 m. It halves the noise on planes, pulls in "
@@ -135,6 +129,16 @@ def _text(
         "points on planes. The filter moves edges and corners by more than the noise.",
         f"By {PAPER}, {raw[0]} of the corners found are right without the filter, "
         f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found.",
+    )
+    return text, (ranges, features)
+
+
+def _judged(n: Any) -> Judged:
+    small, large = (n["ranges"][size]["off_after"] for size in ("0.1–0.3 m", "0.6–1.2 m"))
+    return Judged(
+        f"Still off by more than 0.1 m after it: {100 * small:.0f} % of the points off by "
+        f"0.1–0.3 m, {100 * large:.0f} % of those off by 0.6–1.2 m",
+        [0.5 - small, 0.5 - large],
     )
 
 
@@ -214,3 +218,11 @@ def _figure(seed: int) -> Figure:
         "others stay, and their spacing stays above the threshold."
     )
     return Figure("fig2-3", caption, canvas.figure_bytes(figure))
+
+
+EXPERIMENT = Experiment(
+    "Noise points, filtered and not (Figures 2 and 3)",
+    measure,
+    report,
+    (Claim("Figures 2, 3", "Filtering removes noise points and keeps edges", _judged, "fig2-3"),),
+)

@@ -13,10 +13,11 @@ from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, World, truth
 from lineament.simulation.surfaces import View
 
-from ..evaluation.scores import Scores, evaluate
+from ..evaluation.scores import Scores
 from .contenders import RIVALS_NOTE, feature_methods
-from .findings import Columns, Findings, Progress, Setting, Table, each
-from .scans import Frame, batch_of
+from .experiment import Experiment, Measured, MissingError, Report
+from .findings import Columns, Numbers, Progress, Setting, Table
+from .scans import Frame, scored
 
 #: Occupancy grids, in a folder beside that of the recordings.
 PLANS = ("stata_basement", "building_31", "depot", "warehouse", "tb3_sandbox")
@@ -27,46 +28,39 @@ BOW, LONG = 0.02, 1.0
 #: A person stands on each so many square metres, a round thing of this radius [m].
 AREA, RADIUS = 20.0, 0.2
 SENSOR = "utm30lx"
-TITLE = "Scenes that are not ours"
 _COLUMNS: Columns = {
-    "corner F1": ("corner_f1_0.10", 1),
-    "least": ("corner_least", 1),
-    "greatest": ("corner_greatest", 1),
-    "precision": ("corner_precision_0.10", 1),
-    "recall": ("corner_recall_0.10", 1),
-    "median error [mm]": ("corner_median_error", 1e3),
-    "segment F1": ("segment_f1", 1),
-    "segment F1, least": ("segment_least", 1),
-    "greatest segment F1": ("segment_greatest", 1),
+    "corner F1": "corner_f1_0.10",
+    "least": "corner_least",
+    "greatest": "corner_greatest",
+    "precision": "corner_precision_0.10",
+    "recall": "corner_recall_0.10",
+    "median error [mm]": "corner_median_error",
+    "segment F1": "segment_f1",
+    "segment F1, least": "segment_least",
+    "greatest segment F1": "segment_greatest",
 }
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Score all methods on scans simulated in each of the plans."""
     folder = None if setting.data is None else setting.data / ".." / "plans"
     if folder is None or not all((folder / f"{name}.yaml").exists() for name in PLANS):
-        return Findings(TITLE, (_MISSING,))
+        raise MissingError(_MISSING)
     methods = feature_methods(setting.methods)
-    by_plan: dict[str, dict[str, Scores]] = {}
+    by_plan: list[dict[str, Scores]] = []
     for plan in PLANS:
         progress(f"{plan}: simulating")
         frames = list(frames_on(folder / f"{plan}.yaml", SCANS_A_FRAME * setting.frames))
-        scans = [frame.scan for frame in frames]
-        by_plan[plan] = {
-            name: Scores.total(
-                map(evaluate, batch_of(extract, scans), (frame.truth for frame in frames))
-            )
-            for name, extract in each(methods, progress, plan)
-        }
-    numbers = {name: _over_plans([of[name] for of in by_plan.values()]) for name in methods}
+        found = scored(methods, frames, progress, plan)
+        by_plan.append({name: Scores.total(of) for name, of in found.items()})
+    over_plans = {name: _over_plans([of[name] for of in by_plan]) for name in methods}
+    return Measured({"methods": over_plans})
+
+
+def report(n: Numbers, setting: Setting) -> Report:
+    """Make a table of all plans together."""
     title = f"{len(PLANS)} plans, {SCANS_A_FRAME * setting.frames} scans in each"
-    return Findings(
-        TITLE,
-        (_ABOUT, RIVALS_NOTE),
-        (Table.of_numbers(title, numbers, _COLUMNS, _NOTE),),
-        (),
-        {"methods": numbers},
-    )
+    return (_ABOUT, RIVALS_NOTE), (Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE),)
 
 
 def frames_on(path: Path, count: int) -> Iterator[Frame]:
@@ -143,3 +137,6 @@ _ABOUT = (
     "calls a corner may be a step of a few centimetres."
 )
 _NOTE = "Least and greatest: of one plan."
+
+
+EXPERIMENT = Experiment("Scenes that are not ours", measure, report, once=True)

@@ -24,18 +24,8 @@ from ..evaluation.repeatability import (
 from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
 from .arena import ARENAS, arena_figure, arena_scores, load_arena
 from .contenders import corner_methods, feature_methods
-from .findings import (
-    NO_RECORDINGS,
-    Columns,
-    Figure,
-    Findings,
-    Numbers,
-    Progress,
-    Setting,
-    Table,
-    cells,
-    each,
-)
+from .experiment import NO_RECORDINGS, Experiment, Measured, Report
+from .findings import Columns, Figure, Numbers, Progress, Setting, Table, column, each
 from .recordings import BUILDINGS, by_building, distinct, pooled, pooled_table
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
@@ -64,38 +54,38 @@ RATE, QUALITIES = 0.8, (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 #: Titles of the tables, and the numbers that they show.
 FREE_SPACE: Columns = {
-    "Phantom metres in 100 m of segments": ("phantom_in_100m", 1),
-    "Longest phantom stretch [m]": ("longest_phantom", 1),
-    "Scans with a phantom stretch of more than 0.3 m [%]": ("phantom_scans", 100),
-    "Covered measurements [%]": ("covered", 100),
+    "Phantom metres in 100 m of segments": "phantom_in_100m",
+    "Longest phantom stretch [m]": "longest_phantom",
+    "Scans with a phantom stretch of more than 0.3 m [%]": "phantom_scans",
+    "Covered measurements [%]": "covered",
 }
 STANDING_STILL: Columns = {
-    "NEES, median": ("nees_median", 1),
-    "in the 95 % ellipse [%]": ("in_95_ellipse", 100),
-    "found again [%]": ("found_again", 100),
-    "pairs": ("pairs", 1),
+    "NEES, median": "nees_median",
+    "in the 95 % ellipse [%]": "in_95_ellipse",
+    "found again [%]": "found_again",
+    "pairs": "pairs",
 }
 _AT = f"repeated among the best, of which {100 * RATE:.0f} % are"
 REPEATS: Columns = {
-    "Corners: expected in the other scan": ("expected", 1),
-    "Corners: repeated, less chance [%]": ("rate", 100),
-    "Corners: repeated by chance [%]": ("chance", 100),
-    "Corners: AUC of the quality": ("auc", 1),
-    f"Corners: {_AT}": ("count", 1),
-    "Corners alone: AUC of the quality": ("auc_without_edges", 1),
-    f"Corners alone: {_AT}": ("count_without_edges", 1),
-    "Corners alone: in a scan": ("corners_per_scan", 1),
-    "Corners alone: repeated [%]": ("corner_rate", 100),
-    "Corners alone: repeated of the fewer [%]": ("fewer_rate", 100),
-    "Corners alone: distance, RMS [mm]": ("corner_rmse", 1e3),
-    "Segments: repeated [%]": ("segment_rate", 100),
-    "Segments: distance, RMS [mm]": ("segment_rmse", 1e3),
+    "Corners: expected in the other scan": "expected",
+    "Corners: repeated, less chance [%]": "rate",
+    "Corners: repeated by chance [%]": "chance",
+    "Corners: AUC of the quality": "auc",
+    f"Corners: {_AT}": "count",
+    "Corners alone: AUC of the quality": "auc_without_edges",
+    f"Corners alone: {_AT}": "count_without_edges",
+    "Corners alone: in a scan": "corners_per_scan",
+    "Corners alone: repeated [%]": "corner_rate",
+    "Corners alone: repeated of the fewer [%]": "fewer_rate",
+    "Corners alone: distance, RMS [mm]": "corner_rmse",
+    "Segments: repeated [%]": "segment_rate",
+    "Segments: distance, RMS [mm]": "segment_rmse",
 }
 ARENA: Columns = {
-    "Corners of the arena: recall [%]": ("recall", 100),
-    "Corners of the arena: error, median [mm]": ("median_error", 1e3),
-    "Corners of the arena: at no real corner, of those found [%]": ("false", 100),
-    "Corners of the arena: in a scan": ("corners_per_scan", 1),
+    "Corners of the arena: recall [%]": "recall",
+    "Corners of the arena: error, median [mm]": "median_error",
+    "Corners of the arena: at no real corner, of those found [%]": "false",
+    "Corners of the arena: in a scan": "corners_per_scan",
 }
 
 S = TypeVar("S", bound=Summable)
@@ -103,11 +93,11 @@ S = TypeVar("S", bound=Summable)
 Scored = dict[str, dict[str, S]]
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure every method on all recordings."""
-    title, (logs, doubles) = "Real scans", distinct(_logs(setting))
+    logs, doubles = distinct(_logs(setting))
     if not logs:
-        return Findings(title, (NO_RECORDINGS,))
+        raise NO_RECORDINGS
     methods, frames = feature_methods(setting.methods), setting.frames
     unread: list[str] = []
 
@@ -115,7 +105,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
         what: str,
         kind: type[S],
         read: Callable[[str, Path], Sequence[Any]],
-        measure: Callable[[Any, Extractor], S],
+        measured: Callable[[Any, Extractor], S],
     ) -> Scored[S]:
         """Score all methods on what is read of each log."""
         found: Scored[S] = {}
@@ -126,7 +116,7 @@ def run(setting: Setting, progress: Progress) -> Findings:
                 unread.append(log)
                 continue
             for method, extract in each(methods, progress, f"{what}, {log}") if items else ():
-                total = kind.total(measure(item, extract) for item in items)
+                total = kind.total(measured(item, extract) for item in items)
                 found.setdefault(log, {})[method] = total
         return found
 
@@ -142,51 +132,59 @@ def run(setting: Setting, progress: Progress) -> Findings:
     )
     methods = corner_methods(setting.methods)
     repeats: dict[str, dict[str, dict[str, float]]] = {}
-    ranked: dict[str, dict[str, RankedRepeats]] = {}
+    ranked: Scored[RankedRepeats] = {}
     for log, path in setting.recordings(LOGS | FURTHER_LOGS).items():
         pairs = scan_pairs(path, PAIRS_A_FRAME * frames)
         for method, extract in each(methods, progress, f"repeated corners, {log}") if pairs else ():
             found = _repeats(pairs, extract)
             ranked.setdefault(log, {})[method], repeats.setdefault(log, {})[method] = found
-    arenas, figures = {}, []
+    arenas = {}
     for name, path in setting.recordings(ARENAS).items():
         arena = load_arena(path, ARENA_A_FRAME * frames)
         scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
-        arenas[name] = {method: of for method, (of, _) in scores.items()}
-        figures.append(arena_figure(name, arena, scores))
-    pools = {
-        about: pooled(*(by_building(_only(of, chosen)) for of in (free, standing)))
-        for about, chosen in (("all", False), ("nothing chosen", True))
-    }
-    pools = {about: rows for about, rows in pools.items() if rows}
+        arenas[name] = arena, scores
     numbers = {
-        "pooled": pools,
+        "pooled": _pooled(free, standing),
         "doubles": doubles,
+        "unread": unread,
         "free_space": _numbers(free, FreeSpaceScores.summary),
-        "standing": _numbers(
-            standing, lambda of: {"segments": of.segments.bins(), "corners": of.corners.bins()}
-        ),
+        "free_space_all": {m: of.summary() for m, of in _totals(free, FreeSpaceScores).items()},
+        "standing": _numbers(standing, _of_standing(ScatterScores.bins)),
+        "standing_figures": _numbers(standing, _of_standing(ScatterScores.figures)),
+        "standing_all": {
+            method: _of_standing(ScatterScores.bins)(of)
+            for method, of in _totals(standing, StandingScores).items()
+        },
         "repeats": repeats,
-        "arena": arenas,
+        "quality": {log: _by_quality(of[SHOWN]) for log, of in ranked.items()},
+        "arena": {
+            name: {method: of for method, (of, _) in scores.items()}
+            for name, (_, scores) in arenas.items()
+        },
     }
-    every_free = {**free, "all": _totals(free, FreeSpaceScores)}
-    return Findings(
-        title,
-        (
-            *_TEXT,
-            *([f"Left out, as they hold no scans: {', '.join(unread)}."] if unread else []),
-            *([f"Left out, as others have the same scans: {', '.join(doubles)}."] * bool(doubles)),
-        ),
-        (
-            *(pooled_table(_POOLS[about], rows) for about, rows in pools.items()),
-            *_tables(_numbers(every_free, FreeSpaceScores.summary), FREE_SPACE),
-            *(table for kind in ("segments", "corners") for table in _standing(standing, kind)),
-            *_tables(repeats, REPEATS),
-            *_quality_table(ranked),
-            *_tables(arenas, ARENA),
-        ),
-        (*_curves(ranked), *figures),
+    return Measured(
         numbers,
+        lambda: [*_curves(ranked), *(arena_figure(name, *of) for name, of in arenas.items())],
+    )
+
+
+def report(n: Any, _: Setting) -> Report:
+    """Make the pooled tables, and one for each measure: recordings are rows, methods columns."""
+    unread, doubles = (", ".join(n[key]) for key in ("unread", "doubles"))
+    text = (
+        *_TEXT,
+        *([f"Left out, as they hold no scans: {unread}."] if unread else []),
+        *([f"Left out, as others have the same scans: {doubles}."] if doubles else []),
+    )
+    title = f"Corners of {SHOWN} found again [%], by their quality"
+    quality = {name: (name, 100.0) for name in next(iter(n["quality"].values()), ())}
+    return text, (
+        *(pooled_table(_POOLS[about], rows) for about, rows in n["pooled"].items()),
+        *_tables({**n["free_space"], "all": n["free_space_all"]}, FREE_SPACE),
+        *(table for kind in ("segments", "corners") for table in _standing(n, kind)),
+        *_tables(n["repeats"], REPEATS),
+        *([Table.of_numbers(title, n["quality"], quality, first="recording")] if quality else []),
+        *_tables(n["arena"], ARENA),
     )
 
 
@@ -241,28 +239,45 @@ def _numbers(scored: Scored[S], figures: Callable[[S], Any]) -> dict[str, dict[s
     return {log: {m: figures(of) for m, of in found.items()} for log, found in scored.items()}
 
 
+def _of_standing(figures: Callable[[ScatterScores], Any]) -> Callable[[StandingScores], Any]:
+    """Return what takes figures of both kinds of features."""
+    return lambda of: {"segments": figures(of.segments), "corners": figures(of.corners)}
+
+
+def _pooled(free: Scored[FreeSpaceScores], standing: Scored[StandingScores]) -> dict[str, Any]:
+    """Pool the scores of all buildings, and of those on which nothing was chosen."""
+    pools = {
+        about: pooled(*(by_building(_only(of, chosen)) for of in (free, standing)))
+        for about, chosen in (("all", False), ("nothing chosen", True))
+    }
+    return {about: rows for about, rows in pools.items() if rows}
+
+
 def _tables(numbers: Numbers, columns: Columns, about: str = "") -> list[Table]:
     """Make one table for each measure: recordings are its rows, methods its columns."""
+    methods = next(iter(numbers.values()), ())
     return [
-        Table.of_records(
+        Table.of_numbers(
             f"{about}{title}",
-            [
-                {"recording": log} | {m: cells(of, {m: column})[m] for m, of in found.items()}
-                for log, found in numbers.items()
-            ],
+            {log: {m: of.get(key) for m, of in found.items()} for log, found in numbers.items()},
+            {method: (method, factor) for method in methods},
+            first="recording",
         )
-        for title, column in columns.items()
+        for title in columns
+        for key, factor in [column(columns, title)]
         if any(numbers.values())
     ]
 
 
-def _standing(scored: Scored[StandingScores], kind: str) -> list[Table]:
+def _standing(n: Any, kind: str) -> list[Table]:
     """Make the tables of one kind of feature; the last rows are of all recordings, by arms."""
-    totals = _totals(scored, StandingScores)
-    rows = _numbers(scored, lambda of: getattr(of, kind).figures())
-    for name in ScatterScores().bins() if totals else ():
+    rows = {
+        log: {method: figures[kind] for method, figures in found.items()}
+        for log, found in n["standing_figures"].items()
+    }
+    for name in ScatterScores().bins() if n["standing_all"] else ():
         rows[f"all, {name} measurements"] = {
-            method: getattr(of, kind).bins()[name] for method, of in totals.items()
+            method: bins[kind][name] for method, bins in n["standing_all"].items()
         }
     return _tables(rows, STANDING_STILL, f"Standing still, {kind}: ")
 
@@ -306,15 +321,9 @@ def _repeats(
     }
 
 
-def _quality_table(ranked: Scored[RankedRepeats]) -> list[Table]:
-    """Compare the share that is found again with what the quality promises."""
-    records = [
-        {"recording": log}
-        | {f"{a:.1f}–{b:.1f}": 100 * of[SHOWN].rate_between(a, b) for a, b in pairwise(QUALITIES)}
-        for log, of in ranked.items()
-    ]
-    title = f"Corners of {SHOWN} found again [%], by their quality"
-    return [Table.of_records(title, records)] if records else []
+def _by_quality(ranked: RankedRepeats) -> dict[str, float]:
+    """Return the share that is found again, by what the quality promises."""
+    return {f"{a:.1f}–{b:.1f}": ranked.rate_between(a, b) for a, b in pairwise(QUALITIES)}
 
 
 def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
@@ -337,3 +346,6 @@ def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
         "right is better."
     )
     return [Figure("repeated-corners", caption, canvas.figure_bytes(figure))]
+
+
+EXPERIMENT = Experiment("Real scans", measure, report, once=True)

@@ -13,7 +13,7 @@ from ..evaluation.consistency import NormalisedErrors
 from ..evaluation.counts import ratio
 from ..evaluation.free_space import FreeSpaceScores
 from ..evaluation.standing import StandingScores
-from .findings import Interval, Table
+from .findings import Columns, Interval, Table
 
 #: Where recordings were made, by their path in the folder. All were at hand when the constants of
 #: `optimal` were chosen: nothing was chosen on any other.
@@ -54,6 +54,13 @@ _SHARE = 0.5
 _DRAWS, _TAIL, _LEAST = 1000, 0.025, 3
 #: Fewest and most measurements of the features whose scatter is shown.
 _ARMS = 30, 100
+
+_POOLED: Columns = {
+    "phantom m in 100 m": "phantom_in_100m",
+    "covered [%]": "covered",
+    "NEES still, segments": "segments_nees",
+    "NEES still, corners": "corners_nees",
+}
 
 T = TypeVar("T")
 #: What a method has of one building, by method.
@@ -159,22 +166,12 @@ def pooled(
 def pooled_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     """Make the table of what is pooled: a row for each method."""
     first = next(iter(rows.values()))
-    records = [
-        {
-            "method": method,
-            "phantom m in 100 m": of["phantom_in_100m"],
-            "covered [%]": Interval(*(100 * value for value in of["covered"])),
-            "NEES still, segments": of.get("segments_nees"),
-            "NEES still, corners": of.get("corners_nees"),
-        }
-        for method, of in rows.items()
-    ]
     note = (
         f"By length, measurements and pairs of {first['buildings']} buildings "
         f"({first['standing_buildings']} where a sensor stands); in brackets 95 % by a bootstrap "
         "over the buildings."
     )
-    return Table.of_records(title, records, note)
+    return Table.of_numbers(title, rows, _POOLED, note)
 
 
 def _in_bin(arms: Any) -> Any:

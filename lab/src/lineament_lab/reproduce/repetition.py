@@ -3,9 +3,11 @@
 from itertools import product
 from typing import Any
 
+from lineament.methods.liu import Liu
 from lineament.output import canvas
 
-from .findings import Figure, Findings, Progress, Setting, Table
+from .experiment import Claim, Experiment, Judged, Measured, Report
+from .findings import Columns, Figure, Progress, Setting, Table
 from .grid import (
     CRITERIA,
     FORMS,
@@ -19,12 +21,21 @@ from .grid import (
     repetition_grid,
     repetition_scenes,
 )
+from .seeds import by_seed
 
 _COLORS = dict(zip(FORMS, canvas.PALETTE, strict=False))
 #: Seeds of the bands in the figures.
 _SEEDS = range(5)
 #: The paper's parameters are as good as the best if they are within this.
-_FLAT = 0.03
+FLAT = 0.03
+_PEAKS: Columns = {
+    f"best radius at {THRESHOLD}": "radius",
+    "value there": "at_radius",
+    f"best threshold at {RADIUS}": "threshold",
+    "value there ": "at_threshold",
+    f"at {RADIUS} and {THRESHOLD}": "here",
+    "largest of all": "largest",
+}
 _COLUMNS = {
     "reading": "reading",
     "chosen by": "chosen_by",
@@ -39,7 +50,7 @@ _COLUMNS = {
 }
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Repeat the experiment of Figure 9 on simulated scans, for every reading of the paper."""
     grid = repetition_grid(setting, progress)
     numbers = repetition_scenes(setting, reported=True)
@@ -52,30 +63,15 @@ def run(setting: Setting, progress: Progress) -> Findings:
         for by, p in chosen.items():
             measured = repetition(p, numbers)
             choices.append({"reading": p.reading, "chosen_by": by, **p._asdict(), **measured})
-    choice_table = Table.of_records(
-        "The paper’s parameters and the best of the grid, on other scenes",
-        [{column: of[key] for column, key in _COLUMNS.items()} for of in choices],
-        "Precision, recall and F1: corners within 0.1 m of true ones with six beams or more on "
-        "both sides. The paper’s values of AR are lost.",
+    peaks = {criterion: _peaks(grid, criterion) for criterion in CRITERIA}
+    alike = {
+        c: [reading for reading, at in of.items() if at["lead"] >= 0] for c, of in peaks.items()
+    }
+    points = [p._asdict() | of for p, of in grid.items()]
+    return Measured(
+        {"grid": points, "choices": choices, "peaks": peaks, "alike": alike},
+        lambda: _figures(setting, progress),
     )
-    return Findings(
-        "Average repetition against support radius and threshold (Figure 9)",
-        _text(grid),
-        (*(_peaks(grid, criterion) for criterion in CRITERIA), choice_table),
-        _figures(setting, progress),
-        {
-            "grid": [p._asdict() | of for p, of in grid.items()],
-            "choices": choices,
-            "alike": {criterion: _alike(grid, criterion) for criterion in CRITERIA},
-        },
-    )
-
-
-def _along(grid: Grid, paper: Parameters, criterion: str) -> tuple[Parameters, Parameters]:
-    """Return the best along each line of Figure 9, for the reading of the paper."""
-    reading = {"response": paper.response, "half_width": paper.half_width}
-    by_radius = largest(grid, criterion, **reading, threshold=THRESHOLD)
-    return by_radius, largest(grid, criterion, **reading, support_radius=RADIUS)
 
 
 def _papers() -> list[Parameters]:
@@ -83,63 +79,90 @@ def _papers() -> list[Parameters]:
     return [Parameters(*reading, RADIUS, THRESHOLD) for reading in product(FORMS, HALF_WIDTHS)]
 
 
-def _alike(grid: Grid, criterion: str) -> list[str]:
-    """Name the readings in which the paper's parameters are as good as any on both lines."""
-    alike = []
+def _peaks(grid: Grid, criterion: str) -> dict[str, dict[str, Any]]:
+    """Return where a criterion is largest along both lines of Figure 9, by reading.
+
+    `lead` is not negative where the paper's parameters are as good as any on both lines.
+    """
+    peaks = {}
     for paper in _papers():
-        at_paper = grid[paper][criterion]
-        best = max(grid[p][criterion] for p in _along(grid, paper, criterion))
-        if at_paper > 0 and at_paper >= best - _FLAT:
-            alike.append(paper.reading)
-    return alike
+        reading = {"response": paper.response, "half_width": paper.half_width}
+        by_radius = largest(grid, criterion, **reading, threshold=THRESHOLD)
+        by_threshold = largest(grid, criterion, **reading, support_radius=RADIUS)
+        best = largest(grid, criterion, **reading)
+        here, at_radius, at_threshold = (
+            grid[p][criterion] for p in (paper, by_radius, by_threshold)
+        )
+        peaks[paper.reading] = {
+            "radius": by_radius.support_radius if at_radius else None,
+            "at_radius": at_radius,
+            "threshold": by_threshold.threshold,
+            "at_threshold": at_threshold,
+            "here": here,
+            "largest": grid[best][criterion],
+            "lead": min(here - max(at_radius, at_threshold) + FLAT, here - 1e-9),
+        }
+    return peaks
 
 
-def _peaks(grid: Grid, criterion: str) -> Table:
-    """Where a criterion is largest along the two lines of Figure 9, and how large."""
-    rows: list[tuple[Any, ...]] = [("paper", RADIUS, "lost", THRESHOLD, "lost", "lost", "lost")]
-    for paper in _papers():
-        by_radius, by_threshold = _along(grid, paper, criterion)
-        most = [grid[p][criterion] for p in (by_radius, by_threshold, paper)]
-        best = largest(grid, criterion, response=paper.response, half_width=paper.half_width)
-        radius = by_radius.support_radius if most[0] else None
-        at = (radius, most[0], by_threshold.threshold, most[1])
-        rows.append((paper.reading, *at, most[2], grid[best][criterion]))
-    return Table(
-        f"Where it is largest: {CRITERIA[criterion]}",
-        (
-            "reading",
-            f"best radius at {THRESHOLD}",
-            "value there",
-            f"best threshold at {RADIUS}",
-            "value there ",
-            f"at {RADIUS} and {THRESHOLD}",
-            "largest of all",
-        ),
-        tuple(rows),
-        f"A dash: at {THRESHOLD} no corner is found again with any radius. An optimum at an end of "
-        "the grid may lie beyond it.",
+def _alike(n: Any, criterion: str) -> float:
+    """Return in how many readings the paper's parameters are as good as any on both lines."""
+    leads = (at["lead"] for at in n["peaks"][criterion].values())
+    return by_seed(lambda *each: sum(lead >= 0 for lead in each), *leads)
+
+
+def report(n: Any, _: Setting) -> Report:
+    """Make a table of peaks for each criterion, and that of the choices on other scenes."""
+    lost: dict[str, Any] = {"radius": RADIUS, "threshold": THRESHOLD}
+    lost |= dict.fromkeys(("at_radius", "at_threshold", "here", "largest"), "lost")
+    peaks = (
+        Table.of_numbers(
+            f"Where it is largest: {about}",
+            {"paper": lost} | n["peaks"][criterion],
+            _PEAKS,
+            f"A dash: at {THRESHOLD} no corner is found again with any radius. An optimum at an "
+            "end of the grid may lie beyond it.",
+            first="reading",
+        )
+        for criterion, about in CRITERIA.items()
     )
-
-
-def _text(grid: Grid) -> tuple[str, ...]:
+    choices = Table.of_records(
+        "The paper’s parameters and the best of the grid, on other scenes",
+        [{column: of[key] for column, key in _COLUMNS.items()} for of in n["choices"]],
+        "Precision, recall and F1: corners within 0.1 m of true ones with six beams or more on "
+        "both sides. The paper’s values of AR are lost.",
+    )
     readings = (
         f"{len(FORMS)} forms of equation 22 with {len(HALF_WIDTHS)} half-widths of the filter"
     )
-    two, one = (len(_alike(grid, criterion)) for criterion in CRITERIA)
-    return (
+    two, one = (f"{_alike(n, criterion):.0f}" for criterion in CRITERIA)
+    text = (
         "AR is ½ (N_r/N_o + N_r/N_t): N_o corners of a view, N_t of a second one after a turn by a "
         "part of a beam with fresh noise, N_r of them in both within 0.1 m (Awrangjeb and Lu "
         "2008), mean over the views. It knows no truth. Where the paper speaks of the actual "
         "corners, one view is compared with the truth: ½ (precision + recall). Both are measured "
         "with the paper’s last steps, on simulated scenes of all kinds.",
         "In the paper AR is largest at radius 6 and threshold 0.66. What its response is, and how "
-        f"wide its filter, it leaves unsaid: {readings}. The paper’s parameters are within {_FLAT} "
+        f"wide its filter, it leaves unsaid: {readings}. The paper’s parameters are within {FLAT} "
         f"of the largest on both lines in {two} of {len(_papers())} by AR of two views, "
         f"and in {one} by ½ (precision + recall). liu:figure9 has one of the latter, selected "
         "after the fact: it is a hypothesis, not a reproduction.",
         "At a fixed radius the corners of a higher threshold are among those of a lower one, so "
         "recall alone has no largest value inside the grid: the peak needs a term of "
         "precision (docs/equations.md).",
+    )
+    return text, (*peaks, choices)
+
+
+def _judged(n: Any) -> Judged:
+    """Judge the letter by the repetition of two views; all readings by both criteria beside it."""
+    letter = Liu.paper()
+    reading = Parameters(letter.response, letter.half_width, RADIUS, THRESHOLD).reading
+    peaks = n["peaks"]["repetition"]
+    alike = "; ".join(f"{_alike(n, name):.0f} by {about}" for name, about in CRITERIA.items())
+    return Judged(
+        f"Of {len(peaks)} readings, within {FLAT} of the largest there: {alike}",
+        [peaks[reading]["lead"]],
     )
 
 
@@ -189,3 +212,11 @@ def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) 
         axes.set_ylabel(about)
     canvas.add_legend(figure)
     return Figure(name, caption, canvas.figure_bytes(figure))
+
+
+EXPERIMENT = Experiment(
+    "Average repetition against support radius and threshold (Figure 9)",
+    measure,
+    report,
+    (Claim("Figure 9", "Repetition is largest at radius 6 and threshold 0.66", _judged, "fig9a"),),
+)

@@ -3,7 +3,6 @@
 import io
 import json
 import os
-import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
@@ -23,9 +22,10 @@ from lineament.output.page import (
 
 from ..evaluation.ple import BenchmarkResult
 from . import experiment_names, run_experiments
-from .claims import BLIND_TOO, WORDS, Claim, bands, verdicts
+from .claims import Verdict, bands, verdicts
 from .contenders import PAPER
-from .findings import Findings, Interval, Progress, Setting, Table, cell_text
+from .experiment import BLIND_TOO, WORDS
+from .findings import Findings, Interval, Progress, Setting, Table, cell_text, machine
 from .seeds import Spread
 
 #: Names of the files.
@@ -93,7 +93,7 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     judged = verdicts(findings)
     written = {
         **about,
-        "verdicts": {claim.place: verdict for claim, _, verdict in judged},
+        "verdicts": {one.claim.place: one.verdict for one in judged},
         "experiments": {name: found.to_dict() for name, found in findings.items()},
     }
     text = json.dumps(written, indent=1, ensure_ascii=False)
@@ -116,19 +116,17 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
 _VERDICTS = "", "verdict", "paper", "here", "by what the paper leaves open"
 
 
-def _verdicts_part(
-    judged: Sequence[tuple[Claim, str, str]], findings: Mapping[str, Findings]
-) -> str:
+def _verdicts_part(judged: Sequence[Verdict], findings: Mapping[str, Findings]) -> str:
     """Make the table of the paper's figures and tables: where they are here, and verdicts."""
     rows, of_open = [], bands(findings)
-    for claim, here, verdict in judged:
-        found = findings.get(claim.experiment)
+    for name, claim, here, verdict in judged:
+        found = findings.get(name)
         figures = {figure.name for figure in found.figures} if found else {}
-        at = claim.figure if claim.figure in figures else claim.experiment
+        at = claim.figure if claim.figure in figures else name
         place = Cell(claim.place, href=f"#{at}" if found else "")
-        word = Cell(verdict or "–", "verdict")
         band = Cell(of_open.get(claim.place, "–"))
-        rows.append([place, word, Cell(claim.paper), Cell(here or "–"), band])
+        verdict_cell = Cell(verdict or "–", "verdict")
+        rows.append([place, verdict_cell, Cell(claim.paper), Cell(here or "–"), band])
     words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
     note = (
         f"{words[0].upper()}{words[1:]}. Judged is {PAPER}, the letter of the paper. "
@@ -189,21 +187,3 @@ def benchmark_tables(results: Sequence[BenchmarkResult]) -> list[Table]:
         rows += [(f"{method} (authors)", *m) for method, m in authors.get(score, {}).items()]
         tables.append(Table(f"{benchmark.name}: {score}", columns, tuple(rows)))
     return tables
-
-
-def machine() -> str:
-    """Return processor, cores, system and Python, in a line.
-
-    Examples
-    --------
-    >>> machine().endswith(f"Python {platform.python_version()}")
-    True
-    """
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        name = lines[0].split(":")[1].strip() if lines else name
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-    )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from lineament.extractor import Extractor
 from lineament.features import FeatureBatch, Features
 from lineament.logs import open_log
 from lineament.scan import Array, LaserScan, Pose
-from lineament.simulation import Sensor, scene, truth
+from lineament.simulation import SENSORS, Sensor, scene, truth
 
-from .findings import Setting
+from ..evaluation.scores import evaluate
+from .findings import Progress, Setting, each
 
+Extract = Callable[[LaserScan], Features]
 Pair = tuple[LaserScan, LaserScan]
 
 #: Kinds of scenes of Figures 11 and 12.
@@ -69,6 +71,28 @@ def simulated_frames(sensor: Sensor, kinds: Iterable[str], numbers: range) -> It
         world, pose = scene(in_turn[i % len(in_turn)], number)
         scan = sensor.scan(world, pose, np.random.default_rng([number, 1]))
         yield Frame(scan, truth(world, pose, sensor))
+
+
+def frames_of(
+    setting: Setting, kinds: Iterable[str], frames: int = 1, sensor: str = "paper"
+) -> list[Frame]:
+    """Simulate so many frames, for each of the setting, of scenes that are reported."""
+    numbers = scene_numbers(frames * setting.frames, setting.seed)
+    return list(simulated_frames(SENSORS[sensor], kinds, numbers))
+
+
+def scored(
+    methods: Mapping[str, Extract],
+    frames: Sequence[Any],
+    progress: Progress,
+    what: str,
+    score: Callable[[Features, Features], Any] = evaluate,
+) -> dict[str, list[Any]]:
+    """Score what methods find in each frame, which has a scan and a truth; lists by name."""
+    return {
+        name: [score(extract(frame.scan), frame.truth) for frame in frames]
+        for name, extract in each(methods, progress, what)
+    }
 
 
 def batch_of(extractor: Extractor, scans: Iterable[LaserScan]) -> list[Features]:

@@ -2,7 +2,6 @@
 
 import math
 import operator
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import median
@@ -72,10 +71,13 @@ class Spread(float):
     def written(self, write: Callable[[float], str]) -> str:
         """Write the median, and the range if that is another, each as a function does."""
         known = [value for value in self.values if not math.isnan(value)]
-        if not known:
-            return write(math.nan)
-        some = f"{len(known)} of {len(self.values)} seeds" if len(known) < len(self.values) else ""
-        return _with_range(write(float(self)), write(min(known)), write(max(known)), some)
+        ends = (min(known), max(known)) if known else (math.nan, math.nan)
+        middle, least, most = map(write, (float(self), *ends))
+        to = " to " if least[:1] in ("-", "−", "+") else "–"
+        about = [f"{least}{to}{most}"] if least != most else []
+        if 0 < len(known) < len(self.values):
+            about.append(f"{len(known)} of {len(self.values)} seeds")
+        return f"{middle} ({', '.join(about)})" if about else middle
 
     def __format__(self, form: str) -> str:
         """Write each number in a format."""
@@ -90,19 +92,15 @@ class Spread(float):
         return {"median": float(self), "seeds": list(self.values)}
 
 
-def _with_range(middle: str, least: str, most: str, seeds: str = "") -> str:
-    to = " to " if least[:1] in ("-", "−", "+") else "–"
-    parts = [*([f"{least}{to}{most}"] if least != most else []), *([seeds] if seeds else [])]
-    return f"{middle} ({', '.join(parts)})" if parts else middle
-
-
 def merged(values: Sequence[Any]) -> Any:
     """Merge the same number, text or container of several seeds; None is one that has none.
 
+    Of texts that differ the most frequent one counts.
+
     Examples
     --------
-    >>> merged([{"f1": 0.5, "best": "radius 6"}, {"f1": 0.75, "best": "radius 8"}])
-    {'f1': Spread([0.5, 0.75]), 'best': 'radius 6 (6–8)'}
+    >>> merged([{"f1": 0.5, "best": "λ"}, {"f1": 0.75, "best": "λ"}])
+    {'f1': Spread([0.5, 0.75]), 'best': 'λ'}
     """
     given = [value.tolist() if isinstance(value, np.ndarray) else value for value in values]
     known = [value for value in given if value is not None]
@@ -117,38 +115,9 @@ def merged(values: Sequence[Any]) -> Any:
     if all(isinstance(value, int | float | np.number) for value in known):
         numbers = [math.nan if value is None else value for value in given]
         return first if all(repr(value) == repr(first) for value in numbers) else Spread(numbers)
-    if all(isinstance(value, str) for value in known):
-        return merged_text(known)
-    return first if all(value == first for value in known) else given
-
-
-_NUMBER = re.compile(r"(?<![\w.])[+−-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-_SENTENCES = re.compile(r"(?<=[.:;]) ")
-
-
-def merged_text(texts: Sequence[str]) -> str:
-    """Merge sentences that differ in their numbers; of those that differ otherwise, most count.
-
-    Examples
-    --------
-    >>> merged_text(["3 of 9. It holds.", "4 of 9. It holds.", "8 of 9. It fails."])
-    '4 (3–8) of 9. It holds. (so in 2 of 3 seeds)'
-    """
-    if len(set(texts)) == 1:
-        return texts[0]
-    sentences = [_SENTENCES.split(text) for text in texts]
-    if len({len(each) for each in sentences}) == 1 < len(sentences[0]):
-        return " ".join(merged_text(same) for same in zip(*sentences, strict=True))
-    forms = Counter(_NUMBER.sub("", text) for text in texts)
-    if len(forms) > 1:
-        form, count = forms.most_common(1)[0]
-        alike = merged_text([text for text in texts if _NUMBER.sub("", text) == form])
-        return f"{alike} (so in {count} of {len(texts)} seeds)"
-    tokens = iter([_merged_token(each) for each in zip(*map(_NUMBER.findall, texts), strict=True)])
-    return _NUMBER.sub(lambda _: next(tokens), texts[0])
-
-
-def _merged_token(tokens: Sequence[str]) -> str:
-    """Merge one number of a text; of an even number of them the median is the lower one."""
-    in_order = sorted(tokens, key=lambda token: float(token.replace("−", "-")))
-    return _with_range(in_order[(len(tokens) - 1) // 2], in_order[0], in_order[-1])
+    if all(value == first for value in known):
+        return first
+    if isinstance(first, str):
+        most, count = Counter(known).most_common(1)[0]
+        return f"{most} (so in {count} of {len(known)} seeds)"
+    return given

@@ -5,7 +5,6 @@ which the paper does not state either, likewise.
 """
 
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -19,9 +18,11 @@ from lineament.simulation import SCENES, SENSORS
 from ..evaluation.counts import Counts
 from ..evaluation.kinds import corner_scores
 from ..evaluation.partition import PartitionScores, partition_scores
-from .findings import Columns, Findings, Progress, Setting, Table
+from .contenders import IEPF
+from .experiment import Experiment, Measured, Report
+from .findings import Columns, Progress, Setting, Table
 from .grid import FORMS, GATE
-from .scans import Frame, batch_of, scene_numbers, simulated_frames
+from .scans import Frame, batch_of, frames_of
 from .two_corners import POSES, WORLD, found_distances
 
 #: Changes of `liu:paper` by parameter and value. PASSES is how often the ranges are filtered.
@@ -45,13 +46,25 @@ TOGETHER = "half-width of the filter [beams]", "form of the response"
 DISTANCES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2)
 TOLERANCES = (0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3)
 #: What is measured, and what the paper reports of it.
-CLAIMS: dict[str, tuple[str, float | None]] = {
+SHOWN: dict[str, tuple[str, float | None]] = {
     "clusters right [%]": ("clusters", 95.11),
     "corners found [%]": ("recall", 92.62),
     "their precision [%]": ("precision", None),
     "both corners found [%]": ("both", 100.0),
 }
-_COLUMNS: Columns = {label: (key, 1) for label, (key, _) in CLAIMS.items()}
+_COLUMNS: Columns = {label: (key, 1) for label, (key, _) in SHOWN.items()}
+_BANDS: Columns = {
+    "paper": "paper",
+    "liu:paper": "default",
+    "least of all": "low",
+    "greatest of all": "high",
+    "most by": "by",
+}
+#: Clusters of IEPF, and what they are.
+IEPF_CLUSTERS = {
+    "none": "as published: of the whole scan",
+    "fixed": "within clusters that end at 0.3 m",
+}
 #: Scans of mixed scenes, and from each of the five places, for each frame of the setting.
 SCANS_A_FRAME, VIEWS_A_FRAME = 6, 4
 
@@ -61,59 +74,75 @@ class _Data(NamedTuple):
     views: list[list[LaserScan]]
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure the claims of the paper for all values of what it leaves open."""
     data = _data(setting)
-    default = _measure(data, "liu:paper", {})
     alone: dict[str, dict[str, dict[str, float]]] = {}
     for name, values in OPEN.items():
         progress(name)
-        alone[name] = {v: _measure(data, "liu:paper", changes) for v, changes in values.items()}
+        alone[name] = {v: _measured(data, "liu:paper", changes) for v, changes in values.items()}
     rows, columns = (OPEN[name] for name in TOGETHER)
     together = {}
     for row, column in product(rows, columns):
         progress(f"half-width {row}, {column}")
-        together[row, column] = _measure(data, "liu:paper", rows[row] | columns[column])
+        both = _measured(data, "liu:paper", rows[row] | columns[column])
+        together[f"{row}, {column}"] = both
     progress("PDBS and IEPF")
-    pdbs = {f"{d:g} m": _measure(data, "pdbs", {"rule": "fixed", "distance": d}) for d in DISTANCES}
-    iepf = {
-        clusters: {
-            f"{t:g} m": _measure(data, "iepf:paper", {"threshold": t, "clusters": clusters})
-            for t in TOLERANCES
-        }
-        for clusters in ("none", "fixed")
-    }
-    bands = _bands(default, alone)
-    return Findings(
-        "What the paper leaves open",
-        _TEXT,
-        (
-            _band_table(default, bands),
-            *(
-                Table.of_numbers(name, found, _COLUMNS, first="value")
-                for name, found in alone.items()
-            ),
-            _table_together(together, "recall", "Corners found [%]"),
-            _table_together(together, "both", "Both corners found [%]"),
-            Table.of_numbers("PDBS by its distance D_0", pdbs, _only("clusters"), first="D_0"),
-            *(
-                Table.of_numbers(
-                    f"IEPF by its tolerance, {about}", iepf[clusters], _COLUMNS, first="tolerance"
-                )
-                for clusters, about in (
-                    ("none", "as published: of the whole scan"),
-                    ("fixed", "within clusters that end at 0.3 m"),
-                )
-            ),
-        ),
-        numbers={
+    default = _measured(data, "liu:paper", {})
+    return Measured(
+        {
             "default": default,
-            "bands": bands,
+            "bands": _bands(default, alone),
             "alone": alone,
-            "together": {f"{row}, {column}": of for (row, column), of in together.items()},
-            "pdbs": pdbs,
-            "iepf": iepf,
-        },
+            "together": together,
+            "pdbs": {f"{d:g} m": _measured(data, "pdbs", {"rule": "fixed", "distance": d})
+                     for d in DISTANCES},
+            "iepf": {
+                clusters: {
+                    f"{t:g} m": _measured(data, IEPF, {"threshold": t, "clusters": clusters})
+                    for t in TOLERANCES
+                }
+                for clusters in IEPF_CLUSTERS
+            },
+        }
+    )  # fmt: skip
+
+
+def report(n: Any, _: Setting) -> Report:
+    """Make a table of bands, one for each parameter, two of two together, and of the rivals."""
+    bands = {
+        label: {"paper": paper, "default": n["default"][key], **n["bands"][key]}
+        for label, (key, paper) in SHOWN.items()
+    }
+    note = "Least and greatest: over all values of the parameters below, one changed at a time."
+    title = "Bands of what the paper leaves open"
+    rows, columns = (list(OPEN[name]) for name in TOGETHER)
+    return _TEXT, (
+        Table.of_numbers(title, bands, _BANDS, note, first=""),
+        *(
+            Table.of_numbers(name, found, _COLUMNS, first="value")
+            for name, found in n["alone"].items()
+        ),
+        *(
+            Table.of_numbers(
+                f"{title} by half-width of the filter and form of the response",
+                {row: {c: n["together"][f"{row}, {c}"][key] for c in columns} for row in rows},
+                {column: (column, 1) for column in columns},
+                first="half-width",
+            )
+            for title, key in (("Corners found [%]", "recall"), ("Both corners found [%]", "both"))
+        ),
+        Table.of_numbers(
+            *("PDBS by its distance D_0", n["pdbs"]),
+            {"clusters right [%]": ("clusters", 1)},
+            first="D_0",
+        ),
+        *(
+            Table.of_numbers(
+                f"IEPF by its tolerance, {about}", n["iepf"][clusters], _COLUMNS, first="tolerance"
+            )
+            for clusters, about in IEPF_CLUSTERS.items()
+        ),
     )
 
 
@@ -129,21 +158,18 @@ _TEXT = (
 )
 
 
-@lru_cache(maxsize=4)
 def _data(setting: Setting) -> _Data:
     """Simulate mixed scenes, and the two corners from five places."""
-    sensor = SENSORS["paper"]
-    scenes = scene_numbers(SCANS_A_FRAME * setting.frames, setting.seed)
-    views = []
+    sensor, views = SENSORS["paper"], []
     for k, pose in enumerate(POSES):
         rng = np.random.default_rng([setting.seed, k, 14])
         count = VIEWS_A_FRAME * setting.frames
         views.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
-    return _Data(list(simulated_frames(sensor, SCENES, scenes)), views)
+    return _Data(frames_of(setting, SCENES, SCANS_A_FRAME), views)
 
 
-def _measure(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str, float]:
-    """Measure a method by the names in `CLAIMS` [%]."""
+def _measured(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str, float]:
+    """Measure a method by the names in `SHOWN` [%]."""
     own = {name: value for name, value in changes.items() if name != PASSES}
     extractor, passes = Extractor(method, **own), int(changes.get(PASSES, 1))
     truths = [frame.truth for frame in data.frames]
@@ -198,32 +224,4 @@ def _bands(
     return bands
 
 
-def _band_table(default: Mapping[str, float], bands: Mapping[str, Mapping[str, Any]]) -> Table:
-    records = []
-    for label, (key, paper) in CLAIMS.items():
-        band = bands[key]
-        records.append(
-            {
-                "": label,
-                "paper": paper,
-                "liu:paper": default[key],
-                "least of all": band["low"],
-                "greatest of all": band["high"],
-                "most by": band["by"],
-            }
-        )
-    note = "Least and greatest: over all values of the parameters below, one changed at a time."
-    return Table.of_records("Bands of what the paper leaves open", records, note)
-
-
-def _table_together(
-    together: Mapping[tuple[str, str], Mapping[str, float]], key: str, title: str
-) -> Table:
-    rows, columns = (list(OPEN[name]) for name in TOGETHER)
-    cells = ((row, *(together[row, column][key] for column in columns)) for row in rows)
-    about = f"{title} by half-width of the filter and form of the response"
-    return Table(about, ("half-width", *columns), tuple(cells))
-
-
-def _only(key: str) -> Columns:
-    return {label: (name, factor) for label, (name, factor) in _COLUMNS.items() if name == key}
+EXPERIMENT = Experiment("What the paper leaves open", measure, report)

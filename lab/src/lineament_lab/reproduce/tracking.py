@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +18,8 @@ from ..evaluation.counts import ratio
 from ..evaluation.icp import icp
 from ..evaluation.relations import read_relations
 from ..evaluation.tracking import chained, motion_errors, track_scores
-from .findings import (
-    NO_RECORDINGS,
-    Columns,
-    Figure,
-    Findings,
-    Numbers,
-    Progress,
-    Setting,
-    Table,
-    cells,
-    dot_chart,
-)
+from .experiment import NO_RECORDINGS, Experiment, Measured, Report
+from .findings import Columns, Figure, Numbers, Progress, Setting, Table, cells, dot_chart
 from .scans import archived_scans
 
 #: The recordings, and the share that is left out at the beginning: the first half of fr079 is
@@ -57,76 +47,78 @@ CORRECTED = "the log’s corrected poses"
 RELATION_KEYS = "relations", "near", "far_apart"
 
 _RELATIONS = {
-    "relations": ("motions", 1),
-    "way, mean [mm]": ("way_mean", 1e3),
-    "std": ("way_std", 1e3),
-    "median": ("way_median", 1e3),
-    "turn, mean [°]": ("turn_mean", math.degrees(1)),
-    "std ": ("turn_std", math.degrees(1)),
-    "median ": ("turn_median", math.degrees(1)),
+    "relations": "motions",
+    "way, mean [mm]": "way_mean",
+    "std [mm]": "way_std",
+    "median [mm]": "way_median",
+    "turn, mean [°]": "turn_mean",
+    "std [°]": "turn_std",
+    "median [°]": "turn_median",
 }
 _MOTION = {
-    "way, RMSE [mm]": ("way_rmse", 1e3),
-    "median": ("way_median", 1e3),
-    "95 %": ("way_p95", 1e3),
-    "turn, RMSE [mrad]": ("turn_rmse", 1e3),
-    "median ": ("turn_median", 1e3),
-    f"way over {_FAR} scans, median [mm]": ("far_way_median", 1e3),
-    "unobserved [%]": ("unobserved", 100),
+    "way, RMSE [mm]": "way_rmse",
+    "median [mm]": "way_median",
+    "95 % [mm]": "way_p95",
+    "turn, RMSE [mrad]": "turn_rmse",
+    "median [mrad]": "turn_median",
+    f"way over {_FAR} scans, median [mm]": "far_way_median",
+    "unobserved [%]": "unobserved",
 }
 _TRACKS = {
-    "same in both scans": ("pairs", 1),
-    "number kept [%]": ("kept", 100),
-    "switched [%]": ("switched", 100),
-    "lost [%]": ("lost", 100),
-    "length of tracks, mean [scans]": ("length_mean", 1),
-    "90 %": ("length_p90", 1),
+    "same in both scans": "pairs",
+    "number kept [%]": "kept",
+    "switched [%]": "switched",
+    "lost [%]": "lost",
+    "length of tracks, mean [scans]": "length_mean",
+    "90 %": "length_p90",
 }
 _PANELS = {
-    "error of the way, median [mm]": ("way_median", 1e3),
-    "95 % [mm]": ("way_p95", 1e3),
-    "error of the turn, median [mrad]": ("turn_median", 1e3),
+    "error of the way, median [mm]": "way_median",
+    "95 % [mm]": "way_p95",
+    "error of the turn, median [mrad]": "turn_median",
 }
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Follow the features of all logs."""
-    title = "Tracking and motion in real logs"
     paths = setting.recordings({name: file for name, (file, _) in LOGS.items()})
     verified = setting.recordings(RELATIONS)
     if not paths:
-        return Findings(title, (NO_RECORDINGS,))
+        raise NO_RECORDINGS
     found = {}
     for log, path in paths.items():
         progress(f"{log}: reading")
         scans = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
-        found[log] = measure(log, scans, setting.seed, progress, verified.get(log))
+        found[log] = measure_log(log, scans, setting.seed, progress, verified.get(log))
+    return Measured(found, lambda: [_chart(found)])
+
+
+def _chart(found: Numbers) -> Figure:
+    about = "Motion against the corrected poses, from scan to scan, by log (colours)."
     motions = {log: of["motion"] for log, of in found.items()}
+    return Figure("tracking", about, dot_chart(motions, _PANELS, _PANELS))
+
+
+def report(n: Numbers, _: Setting) -> Report:
+    """Make a table for each reference of motion, and that of tracks."""
     kinds = {
-        log: {f"{name}: {kind}": of_kind for name, of in every["tracks"].items()
-              for kind, of_kind in of.items()}
-        for log, every in found.items()
-    }  # fmt: skip
-    every, near, far = ({log: of[key] for log, of in found.items()} for key in RELATION_KEYS)
-    return Findings(
-        title,
-        _TEXT,
-        (
-            *_table("Motion against verified relations", every, _RELATIONS, "motion from"),
-            *_table("Of these, those up to a minute apart", near, _RELATIONS, "motion from"),
-            *_table("Of these, those over a minute apart", far, _RELATIONS, "motion from"),
-            *_table("Motion against the log’s corrected poses", motions, _MOTION, "motion from"),
-            *_table("Tracks", kinds, _TRACKS, "tracker: of"),
-        ),
-        (
-            Figure(
-                "tracking",
-                "Motion against the corrected poses, from scan to scan, by log (colours).",
-                dot_chart(motions, _PANELS, _PANELS),
-            ),
-        ),
-        found,
+        log: {
+            f"{name}: {kind}": of_kind
+            for name, of in every["tracks"].items()
+            for kind, of_kind in of.items()
+        }
+        for log, every in n.items()
+    }
+    motions = (
+        _table(title, {log: of[key] for log, of in n.items()}, columns, "motion from")
+        for title, key, columns in (
+            ("Motion against verified relations", "relations", _RELATIONS),
+            ("Of these, those up to a minute apart", "near", _RELATIONS),
+            ("Of these, those over a minute apart", "far_apart", _RELATIONS),
+            ("Motion against the log’s corrected poses", "motion", _MOTION),
+        )
     )
+    return _TEXT, (*chain(*motions), *_table("Tracks", kinds, _TRACKS, "tracker: of"))
 
 
 def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table]:
@@ -178,7 +170,7 @@ def stand_in_odometry(poses: Sequence[Pose], seed: int) -> list[Pose]:
     return way
 
 
-def measure(
+def measure_log(
     name: str,
     scans: Sequence[LaserScan],
     seed: int,
@@ -240,3 +232,6 @@ def _icp_motions(scans: Sequence[LaserScan], starts: Sequence[Pose] | None) -> l
         last = motions[-1] if motions else (0.0, 0.0, 0.0)
         motions.append(icp(scans[i], scans[i + 1], last if starts is None else starts[i]))
     return motions
+
+
+EXPERIMENT = Experiment("Tracking and motion in real logs", measure, report, once=True)

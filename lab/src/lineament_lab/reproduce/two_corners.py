@@ -1,8 +1,9 @@
 """Figure 13 and Table 2: a convex and a concave corner, and their distance, from five places."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,8 +15,9 @@ from lineament.scan import Array, LaserScan, Pose
 from lineament.simulation import SENSORS, World, truth
 
 from ..evaluation.counts import rms
-from .contenders import LIU_NOTE, PAPER, feature_methods
-from .findings import Figure, Findings, Progress, Setting, Table, each, median_of
+from .contenders import LIU_NOTE, PAPER, by_letter, feature_methods
+from .experiment import Claim, Experiment, Margins, Measured, Report
+from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
 from .scans import batch_of
 
 #: Distance between the corners: the mean that the paper measured, here the truth [m].
@@ -44,47 +46,81 @@ def _pose(x: float, y: float, past: float) -> Pose:
 _PLACES = ((0.7, 0.9, 0.5), (2.0, 0.6, -0.4), (2.9, 1.3, 0.2), (1.4, 2.3, -0.6), (2.6, 2.4, 0.1))
 POSES = tuple(_pose(*place) for place in _PLACES)
 
-#: Distances found from each place [m], by method.
-Distances = Mapping[str, list[Array]]
+_COLUMNS: Columns = {
+    "paper: mean [m]": "paper",
+    "here: mean [m]": "here",
+    "paper: spread": "lost",
+    "here: standard deviation [mm]": "standard_deviation",
+    "RMS error [mm]": "error",
+    "RMS error ÷ bound": "over",
+    "share of scans with both": "found",
+}
+#: Titles of the tables by place, and the number in each with its factor.
+_BY_PLACE = (
+    ("Mean minus 2.302 m [mm]", "off", 1e3),
+    ("Standard deviation [mm]", "standard_deviation", 1e3),
+    ("Scans with both corners [%]", "found", 100),
+)
 
 
-def run(setting: Setting, progress: Progress) -> Findings:
+def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure the distance between two corners from five places, many times."""
-    sensor, count = SENSORS["paper"], SCANS_A_FRAME * setting.frames
     scans = []
     for k, pose in enumerate(POSES):
         progress(f"simulating place {k + 1}")
         rng = np.random.default_rng([setting.seed, k, 13])
-        scans.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
+        count = SCANS_A_FRAME * setting.frames
+        scans.append([SENSORS["paper"].scan(WORLD, pose, rng) for _ in range(count)])
     methods = feature_methods(setting.methods)
-    found = {
-        name: [found_distances(batch_of(extract, s), p) for s, p in zip(scans, POSES, strict=True)]
-        for name, extract in each(methods, progress, "distances")
-    }
     bounds = np.array([distance_bound(pose) for pose in POSES])
-    absent = [name for name, distances in found.items() if not any(map(len, distances))]
-    progress("drawing")
-    return Findings(
-        "A convex and a concave corner from five places (Figure 13, Table 2)",
-        (
-            "In the paper a convex corner A and a concave corner B of a museum, seen from five "
-            "places, are 2.302 m apart on average; the variance is lost with Table 2, and the true "
-            "distance is not given. Here they belong to a box and a room, 2.302 m apart, with "
-            f"{count} scans from each place and fresh noise of 1 cm. The bound is that of Cramér "
-            "and Rao for both corners, propagated to their distance; over all places it is the "
-            "root mean square. A biased estimate can spread less: compare the RMS error.",
-            LIU_NOTE,
-            *([f"{' and '.join(absent)}: no scan has both corners."] if absent else []),
-        ),
-        (_overall(found, bounds, count), *_by_place(found, bounds, count)),
-        (_figure(list(map(partial(_median_view, methods[PAPER]), scans, POSES))),),
-        {
-            "bound": bounds,
-            "places": {
-                name: [_numbers(d, count) for d in distances] for name, distances in found.items()
-            },
-        },
+    places, overall = {}, {}
+    for name, extract in each(methods, progress, "distances"):
+        found = [
+            found_distances(batch_of(extract, s), p) for s, p in zip(scans, POSES, strict=True)
+        ]
+        places[name] = [_numbers(distances, len(scans[0])) for distances in found]
+        overall[name] = _numbers(np.concatenate(found), len(POSES) * len(scans[0]))
+    return Measured(
+        {"bound": bounds, "all_bound": rms(bounds), "places": places, "all": overall},
+        lambda: [_figure(list(map(partial(_median_view, methods[PAPER]), scans, POSES)))],
     )
+
+
+def report(n: Any, setting: Setting) -> Report:
+    """Make a table of all places together, and one of each number by place."""
+    places = n["places"]
+    names = [name for name, of in n["all"].items() if of["found"] == 0]
+    absent = [f"{' and '.join(names)}: no scan has both corners."] if names else []
+    text = (
+        "In the paper a convex corner A and a concave corner B of a museum, seen from five places, "
+        "are 2.302 m apart on average; the variance is lost with Table 2, and the true distance is "
+        "not given. Here they belong to a box and a room, 2.302 m apart, with "
+        f"{SCANS_A_FRAME * setting.frames} scans from each place and fresh noise of 1 cm. The "
+        "bound is that of Cramér and Rao for both corners, propagated to their distance; over all "
+        "places it is the root mean square. A biased estimate can spread less: compare the RMS "
+        "error.",
+        LIU_NOTE,
+        *absent,
+    )
+    rows = {name: _row(of, n["all_bound"], name.startswith("liu")) for name, of in n["all"].items()}
+    rows["bound"] = {"here": f"{DISTANCE:.4f}", "over": 1.0}
+    rows["bound"] |= dict.fromkeys(("standard_deviation", "error"), n["all_bound"])
+    overall = Table.of_numbers(
+        "Table 2: distance between the two corners, from all five places together",
+        rows,
+        _COLUMNS,
+        f"A and B are the found corners nearest to them, within {GATE} m. That favours methods "
+        "that find several corners at one vertex.",
+    )
+    tables = [overall]
+    for title, key, factor in _BY_PLACE:
+        of_places = {name: dict(enumerate(one[key] for one in of)) for name, of in places.items()}
+        if key == "standard_deviation":
+            of_places["bound"] = dict(enumerate(n["bound"]))
+        columns = {f"place {k + 1}": (k, factor) for k in range(len(n["bound"]))}
+        note = "The paper’s values of single places are lost."
+        tables.append(Table.of_numbers(f"{title}, by place", of_places, columns, note))
+    return text, tables
 
 
 def distance_bound(pose: Pose) -> float:
@@ -129,64 +165,22 @@ def _median_view(
 
 
 def _numbers(distances: Array, count: int) -> dict[str, float | None]:
+    """Return the numbers of the distances that are found in so many scans."""
     mean = float(np.mean(distances)) if len(distances) else None
-    found = len(distances) / count
-    return {"mean": mean, "standard_deviation": _deviation(distances), "found": found}
+    return {
+        "mean": mean,
+        "off": None if mean is None else mean - DISTANCE,
+        "standard_deviation": float(np.std(distances, ddof=1)) if len(distances) > 1 else None,
+        "error": rms(distances - DISTANCE),
+        "found": len(distances) / count,
+    }
 
 
-def _deviation(distances: Array) -> float | None:
-    return float(np.std(distances, ddof=1)) if len(distances) > 1 else None
-
-
-def _overall(found: Distances, bounds: Array, count: int) -> Table:
-    bound, rows = rms(bounds), []
-    for name, distances in found.items():
-        together = np.concatenate(distances)
-        error, spread = rms(together - DISTANCE), _deviation(together)
-        is_papers = name.startswith("liu")
-        rows.append(
-            {
-                "method": name,
-                "paper: mean [m]": "2.302" if is_papers else None,
-                "here: mean [m]": f"{together.mean():.4f}" if len(together) else None,
-                "paper: spread": "lost" if is_papers else None,
-                "here: standard deviation [mm]": _in_mm(spread),
-                "RMS error [mm]": 1e3 * error,
-                "RMS error ÷ bound": error / bound,
-                "share of scans with both": len(together) / (len(POSES) * count),
-            }
-        )
-    least = ("bound", None, f"{DISTANCE:.4f}", None, 1e3 * bound, 1e3 * bound, 1.0, None)
-    return Table.of_records(
-        "Table 2: distance between the two corners, from all five places together",
-        [*rows, dict(zip(rows[0], least, strict=True))],
-        f"A and B are the found corners nearest to them, within {GATE} m. That favours methods "
-        "that find several corners at one vertex.",
-    )
-
-
-def _by_place(found: Distances, bounds: Array, count: int) -> list[Table]:
-    """Make a table of each number of single places: offset, standard deviation, share found."""
-    tables = []
-    for title, of_place, of_bound in (
-        (
-            "Mean minus 2.302 m [mm]",
-            lambda d: 1e3 * (d.mean() - DISTANCE) if len(d) else None,
-            None,
-        ),
-        ("Standard deviation [mm]", lambda d: _in_mm(_deviation(d)), 1e3 * bounds),
-        ("Scans with both corners [%]", lambda d: 100 * len(d) / count, None),
-    ):
-        rows = [(name, *map(of_place, distances)) for name, distances in found.items()]
-        rows += [] if of_bound is None else [("bound", *of_bound)]
-        columns = "method", *(f"place {k + 1}" for k in range(len(bounds)))
-        note = "The paper’s values of single places are lost."
-        tables.append(Table(f"{title}, by place", columns, tuple(rows), note))
-    return tables
-
-
-def _in_mm(length: float | None) -> float | None:
-    return None if length is None else 1e3 * length
+def _row(of: Any, bound: float, is_papers: bool) -> dict[str, Any]:
+    """Return the row of a method, with what the paper has of its own."""
+    mean = None if of["mean"] is None else f"{of['mean']:.4f}"
+    paper = {"paper": f"{DISTANCE}", "lost": "lost"} if is_papers else {}
+    return {**of, **paper, "here": mean, "over": of["error"] / bound}
 
 
 def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
@@ -224,3 +218,36 @@ def draw_place(axes: Axes, k: int, scan: LaserScan, features: Features, a: Array
     drawing.draw_features(axes, features, scan, extent=6.0)
     for name, vertex in (("A", a), ("B", b)):
         drawing.draw_name(axes, name, vertex, np.zeros(2), canvas.CORNER_COLOR)
+
+
+def _judged_found(n: Any, method: str) -> tuple[str, Margins]:
+    found = [place["found"] for place in n["places"][method]]
+    least, most = min(found), max(found)
+    return f"{100 * least:.0f} to {100 * most:.0f} %", [share - 0.5 for share in found]
+
+
+def _judged_distance(n: Any, method: str) -> tuple[str, Margins]:
+    means = [place["mean"] for place in n["places"][method] if place["mean"] is not None]
+    if not means:
+        return "found in no scan", []
+    about = f"{min(means):.3f} to {max(means):.3f} m"
+    return about, [0.01 - abs(mean - DISTANCE) for mean in means]
+
+
+EXPERIMENT = Experiment(
+    "A convex and a concave corner from five places (Figure 13, Table 2)",
+    measure,
+    report,
+    (
+        Claim(
+            *("Figure 13", "A convex and a concave corner from five places"),
+            by_letter("Both found, worst to best place", _judged_found),
+            *("fig13", "both"),
+        ),
+        Claim(
+            *("Table 2", "Their distance: 2.302 m on average, variance lost"),
+            by_letter(f"Means of the places, of {DISTANCE} m", _judged_distance),
+            open="both",
+        ),
+    ),
+)
