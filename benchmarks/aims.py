@@ -14,11 +14,11 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from lineament_lab.evaluation.arena import ARENAS, arena_scores, load_arena
 from lineament_lab.evaluation.beams import MIN_BEAMS
 from lineament_lab.evaluation.ple import load_benchmark, run_benchmark
 from lineament_lab.evaluation.scores import Scores, evaluate
 from lineament_lab.reproduce import Setting, Table
-from lineament_lab.reproduce.arena import ARENAS, arena_scores, load_arena
 from lineament_lab.reproduce.findings import cell_text
 from lineament_lab.reproduce.scans import (
     INDOORS,

@@ -21,8 +21,8 @@ from lineament_lab.evaluation import (
     ranked_repeats,
     standing_scores,
 )
+from lineament_lab.evaluation.arena import ARENAS, load_arena
 from lineament_lab.evaluation.repeatability import with_edges
-from lineament_lab.reproduce.arena import ARENAS, load_arena
 from lineament_lab.reproduce.real import LOGS
 from lineament_lab.reproduce.scans import (
     STANDING,

@@ -57,9 +57,13 @@ AREAS: dict[str, tuple[str, str]] = {
         "motion tracking* docking odometry deskewing relocation evaluation_tracking",
     ),
     "live": ("live", "live* relocation ros_messages locating"),
-    "evaluation": ("evaluation", "evaluation* ple partition* consistency liu* compare"),
+    "evaluation": (
+        "evaluation",
+        "evaluation* ple partition* consistency liu* compare line_fits pooled_recordings "
+        "experiment_scans experiment_settings",
+    ),
     "simulation": ("simulation", "simulation scenes truth buildings world scanners"),
-    "reproduce": ("reproduce", "experiment* reproduce compare"),
+    "reproduce": ("reproduce compare.py", "experiment* reproduce compare"),
     "commands": (
         "tasks cli view files.py errors.py",
         "cli ends view* bulk* progress locating* mapping* extractor explaining dependencies limits",

@@ -24,11 +24,11 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = tuple(ROOT / name for name in ("docs/results.md", "README.md", "docs/comparison.md"))
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 SEEDS = range(5)
-#: Kernels and methods, what simulates, bounds and moves; metrics and experiments.
+#: Kernels and methods, what simulates, bounds and moves; rivals, metrics and experiments.
 MEASURED = (
     *(f"src/lineament/{name}" for name in ("kernels", "methods", "simulation", "motion")),
-    *("src/lineament/bounds.py", "lab/src/lineament_lab/evaluation"),
-    "lab/src/lineament_lab/reproduce",
+    "src/lineament/bounds.py",
+    *(f"lab/src/lineament_lab/{n}" for n in ("kernels", "methods", "evaluation", "reproduce")),
 )
 
 Rows = Iterable[Sequence[object]]
@@ -209,9 +209,9 @@ class Results:
 
     def real(self) -> str:
         """Methods on all recordings, by measures that need no truth, with intervals."""
+        from lineament_lab.evaluation.pooling import bootstrap
         from lineament_lab.reproduce.findings import Interval
         from lineament_lab.reproduce.real import FURTHER_LOGS
-        from lineament_lab.reproduce.recordings import bootstrap
 
         found = self.numbers("real")
         rows = []

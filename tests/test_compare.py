@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lineament_lab.reproduce.compare import compare_log, compare_scan, write_comparison
+from lineament_lab.compare import compare_log, compare_scan, write_comparison
 
 import lineament as ln
 from lineament import LineamentError, LogError

@@ -88,7 +88,7 @@ def test_no_file_of_relations(tmp_path, text):
 
 def test_relations_of_the_corrected_poses_are_those_known(data_dir):
     """350 of Intel are of its scans, and its corrected poses are .0313 ± .0225 m off."""
-    from lineament_lab.reproduce.scans import archived_scans
+    from lineament_lab.evaluation.arena import archived_scans
 
     scans = archived_scans(data_dir / "truth/intel_graph.npz")
     stamps = np.array([scan.stamp for scan in scans])

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from handmade import features
+from lineament_lab.evaluation.arena import Arena
 from lineament_lab.reproduce import (
-    arena,
     grid,
     layers,
     museum,
@@ -181,10 +181,10 @@ def test_the_museums_places_are_at_equal_parts_of_the_way(shown):
 
 def test_corners_of_the_arena_are_drawn_for_each_method_that_found_some(shown):
     walls = World([[0, 0, 4, 0], [4, 0, 4, 3]])
-    known = arena.Arena([], [], walls, np.array([(4.0, 0.0)]))
+    known = Arena([], [], walls, np.array([(4.0, 0.0)]))
     some = {"recall": 0.5, "false": 0.25}
     scores = {f"m{k}": (some, np.array([(4.0, 0.1 * k)])) for k in range(1, 6)}
-    figure = arena.arena_figure("arena, static", known, scores | {"none": (some, np.empty((0, 2)))})
+    figure = real.arena_figure("arena, static", known, scores | {"none": (some, np.empty((0, 2)))})
     assert figure.name == "arena-static"
     assert [axes.get_title(loc="left") for axes in shown[0].axes] == list(scores)
     for axes, (_, found) in zip(shown[0].axes, scores.values(), strict=True):

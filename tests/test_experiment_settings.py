@@ -5,13 +5,12 @@ import math
 from dataclasses import fields
 
 import pytest
+from lineament_lab.evaluation import arena
+from lineament_lab.methods import controls
 from lineament_lab.methods.lines import PieceMethod
-from lineament_lab.reproduce import EXPERIMENTS, controls, experiment_names
+from lineament_lab.reproduce import EXPERIMENTS, experiment_names
 
 SETTINGS = {
-    "arena": {"GATE": 0.1, "_JOINED": 0.15, "FACE_BEAMS": 4, "FACE_WIDTH": 0.04,
-              "FACE_FROM": 0.1, "FACE_TO": 0.6},
-    "compare": {"_TIMED": 50},
     "definitions": {"RADIUS": 6, "_CORNER": (3.0, -1.6), "_NOISY": 263, "_NOISE": 3.7,
                     "_EDGES": ((2.3, 0.5), (1.8, 2.2), (0.7, -1.75)),
                     "_WALLS": [[(0.7, -1.75), (3.0, -1.6), (3.3, 0.2)], ((2.3, 0.5), (1.8, 2.2))],
@@ -56,6 +55,11 @@ OPEN = [
     [{"spacing_scale": scale} for scale in (3, 4, 6, 8, 12)],
     [{"density_k": k} for k in (0, 1, 2, 3, 5)],
 ]
+
+
+def test_corners_of_the_arena_are_demanded_by_these_rules():
+    assert (arena.GATE, arena._JOINED, arena.FACE_BEAMS) == (0.1, 0.15, 4)
+    assert (arena.FACE_WIDTH, arena.FACE_FROM, arena.FACE_TO) == (0.04, 0.1, 0.6)
 
 
 def module(name):

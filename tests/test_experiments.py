@@ -9,13 +9,12 @@ import pytest
 from handmade import features
 from lineament_lab.evaluation import Counts, FeatureScores, Scores, SimilarityScores
 from lineament_lab.evaluation.consistency import NormalisedErrors
-from lineament_lab.methods import RIVALS
+from lineament_lab.methods import RIVALS, controls
 from lineament_lab.reproduce import (
     EXPERIMENTS,
     Setting,
     all_methods,
     contenders,
-    controls,
     definitions,
     layers,
     noise,

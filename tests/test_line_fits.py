@@ -4,9 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from lineament_lab.evaluation.line_fits import FITS, algebraic_fit, conformal_fit
+from lineament_lab.evaluation.line_fits import (
+    FITS,
+    algebraic_fit,
+    conformal_fit,
+    fit_walls,
+    meeting,
+)
 from lineament_lab.reproduce import Setting
-from lineament_lab.reproduce.fits import fitted, measure, meeting
+from lineament_lab.reproduce.fits import measure
 from lineament_lab.reproduce.scans import scene_numbers, simulated_frames
 
 from lineament import RangeNoise
@@ -78,7 +84,7 @@ def test_the_meeting_of_two_walls_at_right_angles():
 def test_fitted_walls_are_numbered_anew():
     frames = simulated_frames(SENSORS["paper"], ["room", "hall"], scene_numbers(6, 7))
     for frame in frames:
-        found = fitted(frame, FITS["lineament"])
+        found = fit_walls(frame.scan, frame.truth, FITS["lineament"])
         assert len(found.segments) <= len(frame.truth.segments)
         for corner in found.corners:
             for k in corner["segments"].tolist():

@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from lineament_lab.reproduce.scans import archived_scans
+from lineament_lab.evaluation.arena import archived_scans
 
 import lineament as ln
 from lineament.cli import run

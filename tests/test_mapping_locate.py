@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from lineament_lab.reproduce.scans import archived_scans
+from lineament_lab.evaluation.arena import archived_scans
 
 import lineament as ln
 from lineament.mapping import LineMap, LocalMap, Query, locate

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from lineament_lab.evaluation import FreeSpaceScores, StandingScores
+from lineament_lab.evaluation import FreeSpaceScores, StandingScores, pooling
 from lineament_lab.evaluation.consistency import NormalisedErrors
+from lineament_lab.evaluation.pooling import Interval
 from lineament_lab.evaluation.standing import ScatterScores
-from lineament_lab.reproduce import recordings
-from lineament_lab.reproduce.findings import Interval, cell_text
+from lineament_lab.reproduce.findings import cell_text
+from lineament_lab.reproduce.real import STANDING, pooled_table
 
 from lineament import LaserScan
 from lineament.logs import save_npz
@@ -41,7 +42,7 @@ def test_recordings_whose_scans_are_in_others_are_left_out(tmp_path):
     for name, scans in of.items():
         logs[name] = tmp_path / f"{name}.npz"
         save_npz(logs[name], scans)
-    kept, doubles = recordings.distinct(logs)
+    kept, doubles = pooling.distinct(logs, STANDING)
     assert list(kept) == ["equal, with poses", "overlap", "other"]
     assert set(doubles) == {"whole", "part, with poses"}
     assert set(doubles.values()) == {"equal, with poses"}
@@ -50,7 +51,7 @@ def test_recordings_whose_scans_are_in_others_are_left_out(tmp_path):
 def test_a_file_that_cannot_be_read_stays_to_be_reported(tmp_path):
     path = tmp_path / "no.npz"
     path.write_bytes(b"none")
-    assert recordings.distinct({"no.npz": path}) == ({"no.npz": path}, {})
+    assert pooling.distinct({"no.npz": path}, ()) == ({"no.npz": path}, {})
 
 
 def test_scores_are_added_by_building():
@@ -59,7 +60,7 @@ def test_scores_are_added_by_building():
         "rosbag2/jackal_mocap": {"liu": free(2.0, 20.0)},
         "mine.npz": {"liu": free(0.0, 5.0)},
     }
-    added = recordings.by_building(of)
+    added = pooling.by_building(of)
     assert list(added) == ["arena", "mine.npz"]
     assert (added["arena"]["liu"].phantom, added["arena"]["liu"].drawn) == (3.0, 30.0)
 
@@ -67,7 +68,7 @@ def test_scores_are_added_by_building():
 def test_numbers_are_pooled_by_length_and_by_pairs():
     places = {name: {"liu": free(p, d)} for name, p, d in (("a", 9, 10), ("b", 1, 90), ("c", 0, 0))}
     standing = {"a": {"liu": still(4.0, 4.0, 4.0)}, "b": {"liu": still(1.0)}}
-    row = recordings.pooled(places, standing)["liu"]
+    row = pooling.pooled(places, standing)["liu"]
     assert (row["buildings"], row["standing_buildings"]) == (3, 2)
     assert row["phantom_in_100m"].value == pytest.approx(10.0)
     assert 0.0 <= row["phantom_in_100m"].low < 10.0 < row["phantom_in_100m"].high <= 90.0
@@ -76,7 +77,7 @@ def test_numbers_are_pooled_by_length_and_by_pairs():
     assert row["segments_nees"].value == pytest.approx(4.0 / (2 * np.log(2)))
     assert np.isnan(row["segments_nees"].low)
     assert "corners_nees" not in row
-    table = recordings.pooled_table("All", {"liu": row})
+    table = pooled_table("All", {"liu": row})
     assert "of 3 buildings (2 where a sensor stands)" in table.note
     assert cell_text(table.rows[0][2]) == "80 (80–80)"
     assert cell_text(table.rows[0][3]) == "2.89"
@@ -87,7 +88,7 @@ def test_bootstrap_covers_the_mean_as_often_as_it_says():
     rng, covered = np.random.default_rng(1), 0
     for _ in range(200):
         values = rng.normal(size=20)
-        interval = recordings.bootstrap(values.tolist(), lambda of: sum(of) / len(of))
+        interval = pooling.bootstrap(values.tolist(), lambda of: sum(of) / len(of))
         covered += interval.low <= 0 <= interval.high
     assert 0.88 < covered / 200 < 0.98
     assert cell_text(Interval(1.0, float("nan"), float("nan"))) == "1"

@@ -53,6 +53,7 @@ def test_the_hash_is_of_methods_scenes_metrics_and_experiments():
         *("src/lineament/kernels/liu.py", "src/lineament/methods/liu.py"),
         *("src/lineament/simulation/scenes.py", "src/lineament/bounds.py"),
         *(f"{lab}/evaluation/kinds.py", f"{lab}/reproduce/grid.py"),
+        *(f"{lab}/methods/iepf.py", f"{lab}/kernels/splitting.py"),
     } <= names
 
 

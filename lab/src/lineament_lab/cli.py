@@ -36,7 +36,7 @@ def compare(log: Path, index: int, output: Path, quiet: bool, **options: Any) ->
     from lineament.cli.progress import tracker
     from lineament.files import check_outputs
 
-    from .reproduce.compare import ENDINGS, compare_log, write_comparison
+    from .compare import ENDINGS, compare_log, write_comparison
 
     check_ending(output, ENDINGS)
     check_outputs([output], [log])

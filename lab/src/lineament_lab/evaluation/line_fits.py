@@ -1,4 +1,4 @@
-"""Fits of a line to points of a scan, each with the covariance that it claims.
+"""Fits of a line to points of a scan or its walls, each with the covariance that it claims.
 
 Total least squares minimises Σ w r², r = a x + b y + c, and what differs is the weight w of a point
 and how (a, b, c) is normalised, by which r becomes a distance or does not.
@@ -6,13 +6,20 @@ and how (a, b, c) is normalised, by which r becomes a distance or does not.
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from lineament.features import Features
 from lineament.methods.stages import fit_line
-from lineament.scan import Array, RangeNoise
+from lineament.scan import Array, LaserScan, RangeNoise
 
+from .beams import MIN_BEAMS, beams_of
+
+#: A measurement is of the wall within so many deviations: others are mixed pixels and outliers,
+#: which no fit here is made for.
+SIGMAS = 5.0
 #: Times that weights are taken from the line that they gave.
 _ROUNDS = 3
 
@@ -137,3 +144,56 @@ def _direction(points: Array, angle: float) -> float:
     chord = points[-1] - points[0]
     ahead = chord[0] * math.cos(angle) + chord[1] * math.sin(angle) >= 0.0
     return math.remainder(angle if ahead else angle + math.pi, 2.0 * math.pi)
+
+
+def fit_walls(scan: LaserScan, truth: Features, fit: Fit) -> Features:
+    """Return the true walls as a fit has them, and their corners where they meet.
+
+    Walls of fewer than six measurements within `SIGMAS` are left out.
+    """
+    noise = RangeNoise() if truth.noise is None else truth.noise
+    masks = beams_of(truth.segments, len(scan)) & scan.valid
+    lines: dict[int, LineFit] = {}
+    segments = truth.segments.copy()
+    for k, wall in enumerate(truth.segments):
+        beams = np.flatnonzero(masks[k])
+        beams = np.roll(beams, -int(np.searchsorted(beams, wall["first_beam"])))
+        on = scan.points[beams[1:-1]]
+        normal = np.array([-np.sin(wall["angle"]), np.cos(wall["angle"])])
+        spread = np.sqrt(noise.range_variance(np.hypot(*on.T)))
+        on = on[np.abs((on - wall["centroid"]) @ normal) <= SIGMAS * spread]
+        if len(on) >= MIN_BEAMS:
+            lines[k] = line = fit(on, noise)
+            segments[k]["centroid"], segments[k]["angle"] = line.point, line.angle
+            segments[k]["covariance"] = line.covariance
+    kept, corners = list(lines), []
+    for corner in truth.corners:
+        before, after = corner["segments"].tolist()
+        if before in lines and after in lines:
+            one = corner.copy()
+            one["position"], one["covariance"] = meeting(lines[before], lines[after])
+            one["segments"] = kept.index(before), kept.index(after)
+            corners.append(one)
+    found = np.array(corners, truth.corners.dtype)
+    return replace(truth, segments=segments[kept], corners=found)
+
+
+def meeting(before: LineFit, after: LineFit) -> tuple[Array, Array]:
+    """Return where two lines meet, and the covariance that theirs give it: A⁻¹ diag(s²) A⁻ᵀ.
+
+    Examples
+    --------
+    >>> sure = np.diag([1e-4, 0.0])
+    >>> lines = LineFit(np.array([0, 1]), 0.0, sure), LineFit(np.array([2, 0]), 1.6, sure)
+    >>> meeting(*lines)[0].round(2).tolist()
+    [1.97, 1.0]
+    """
+    normals: Any = np.array([[-np.sin(line.angle), np.cos(line.angle)] for line in (before, after)])
+    offsets = [normal @ line.point for normal, line in zip(normals, (before, after), strict=True)]
+    place = np.linalg.solve(normals, offsets)
+    variances = []
+    for line in (before, after):
+        lever = np.array([1.0, (place - line.point) @ (np.cos(line.angle), np.sin(line.angle))])
+        variances.append(lever @ line.covariance @ lever)
+    inverse = np.linalg.inv(normals)
+    return place, inverse @ np.diag(variances) @ inverse.T

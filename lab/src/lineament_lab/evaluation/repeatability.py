@@ -1,6 +1,7 @@
 """Whether features are found again from another place, in logs with known poses."""
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -235,3 +236,47 @@ def in_sight(scan: LaserScan, points: Array, margin: float) -> NDArray[np.bool_]
     reach = np.where(scan.valid, scan.ranges, -np.inf)[with_neighbours(scan)].max(axis=1)[nearest]
     in_range = (distance >= scan.range_min) & (distance < scan.range_max)
     return np.asarray(in_view & in_range & (reach >= distance - margin))
+
+
+def score_pairs(
+    pairs: Sequence[tuple[LaserScan, LaserScan]],
+    extract: Callable[[LaserScan], Features],
+    rate: float,
+) -> tuple[RankedRepeats, dict[str, float]]:
+    """Return the ranked corners of all pairs of scans, both ways, and their numbers.
+
+    ``count`` is of the best corners of which the share `rate` is repeated.
+    """
+    found = [(a, extract(a), b, extract(b)) for a, b in pairs]
+    views = [view for a, fa, b, fb in found for view in ((a, fa, b, fb), (b, fb, a, fa))]
+    each_way = [repeatability(*view) for view in views]
+    again = Repeatability.total(each_way)
+    both_ways = list(zip(each_way[::2], each_way[1::2], strict=True))
+    every, alone = (
+        RankedRepeats.total(
+            ranked_repeats(a, of(fa), b, of(fb), of(fb).corners["quality"])
+            for a, fa, b, fb in views
+        )
+        for of in (with_edges, replace)
+    )
+    return every, {
+        "expected": len(every.scores),
+        "rate": every.rate,
+        "auc": every.auc,
+        "count": every.count_at(rate),
+        "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
+        "count_without_edges": alone.count_at(rate),
+        "auc_without_edges": alone.auc,
+        "rate_without_edges": alone.rate,
+        "corners_per_scan": sum(len(features.corners) for _, features, _, _ in found) / len(found),
+        "corners_expected": again.corners.expected,
+        "corner_rate": again.corners.rate,
+        "corner_rmse": again.corners.rmse,
+        "fewer_rate": ratio(
+            sum(min(a.corners.repeated, b.corners.repeated) for a, b in both_ways),
+            sum(min(a.corners.expected, b.corners.expected) for a, b in both_ways),
+        ),
+        "segments_expected": again.segments.expected,
+        "segment_rate": again.segments.rate,
+        "segment_rmse": again.segments.rmse,
+    }

@@ -8,8 +8,8 @@ import numpy as np
 from lineament.simulation import SCENES, SENSORS
 
 from ..evaluation.scores import Scores
-from .contenders import LIU, LIU_NOTE, PARTITION_ONLY, RIVALS_NOTE, every_method
-from .experiment import Experiment, Measured, Report
+from .contenders import LIU, PARTITION_ONLY, every_method
+from .experiment import Experiment, Measured, Report, prose
 from .findings import Figure, Numbers, Progress, Setting, Table, dot_chart
 from .scans import frames_of, interleaved_times, scored, time_ratio
 from .seeds import by_seed
@@ -80,18 +80,8 @@ def report(n: Numbers, setting: Setting) -> Report:
         Table.of_numbers(f"{s}: {SENSORS[s].n_beams} beams, {scans} scans", of, _COLUMNS, note)
         for s, of in n.items()
     )
-    return (_ABOUT, RIVALS_NOTE, LIU_NOTE, _consistency(n), _arcs(n)), tables
-
-
-_ABOUT = (
-    "Simulated frames of all kinds of scenes, the same scenes for each sensor. The paper has no "
-    "such table. Corners are right within 0.1 m; segments within 0.1 m, 10° and with half of their "
-    "beams in common. Errors are those of correct features. ‘÷ bound’ is the median error over "
-    "that of an estimate that reaches the Cramér–Rao bound; ‘RMS’ is the root mean square, which "
-    "one gross error can dominate. NEES is the median squared error over the method’s own "
-    "covariance, divided by its expected value: 1 is right, more is overconfident; ‘mean’ is the "
-    "mean, likewise. Every method estimates the noise from the scan."
-)
+    about = (*prose("all_methods"), *prose("rivals"), *prose("liu"))
+    return (*about, _consistency(n), _arcs(n)), tables
 
 
 def _consistency(n: Numbers) -> str:

@@ -14,7 +14,7 @@ from lineament.methods.stages import fit_line
 from lineament.scan import LaserScan
 
 from ..methods import RIVALS
-from .controls import BlindCut, OperatorCut
+from ..methods.controls import BlindCut, OperatorCut
 from .experiment import Judged, Margins
 
 #: The paper by its letter; by the reading that brings Figure 9 nearest; with better last steps.
@@ -29,22 +29,6 @@ PARTITION_ONLY = "pdbs"
 #: Methods that return corners only, and are compared by how many are found again.
 KEYPOINTS = ("falko:paper", "falko", "flirt")
 
-LIU_NOTE = (
-    "liu:paper has the response of equation 22, a sum of distances to the tangent, and the paper’s "
-    "last steps: y = kx + b through filtered ranges, corners on measured points. liu:figure9 is "
-    "the same with the reading of the response, of five, that brings Figure 9 nearest: chosen "
-    "after the fact. liu has the response of equation 22, too, but fits lines to the raw ranges, "
-    "and its corners are where they meet. These have the paper’s numbers; those of liu:tuned were "
-    "chosen as its rivals’ were: by F1 of corners, in simulated scenes of which nothing is "
-    "reported."
-)
-RIVALS_NOTE = (
-    "Each rival has two rows: name:paper is the method as published, with its own clusters or none "
-    "and nothing shared; the plain name has clusters and last steps in common with the others "
-    "(merging, borders, intersections). ‘Blind cut’ is the control: those shared steps after cuts "
-    "at every eighth point, with no detector at all. What does not beat it says nothing of "
-    "detection. ‘liu’s operator’ has the shared steps, too. A dash: the method has no corners."
-)
 
 Extract = Callable[[LaserScan], Features]
 

@@ -16,7 +16,7 @@ from lineament.output import canvas, drawing
 from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, Sensor, World
 
-from .experiment import Claim, Experiment, Judged, Measured, Report
+from .experiment import Claim, Experiment, Judged, Measured, Report, prose
 from .findings import Figure, Progress, Setting, Table, machine
 
 #: The support radius of the paper [beams].
@@ -43,10 +43,7 @@ def measure(_: Setting, __: Progress) -> Measured:
 
 def report(_: Any, __: Setting) -> Report:
     """Make Table 1."""
-    return (
-        "These figures of the paper illustrate definitions. They are drawn of computed scans, "
-        "by the stages of the method, so each shows what the code does with it.",
-    ), (_machines(),)
+    return prose("definitions"), (_machines(),)
 
 
 #: Short name, caption, drawing, and numbers of a figure.

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 from lineament.output import canvas
 
 from ..evaluation.counts import plain
+from ..evaluation.pooling import Interval
 from .seeds import Spread
 
 T = TypeVar("T")
@@ -219,18 +220,6 @@ def median_of(items: Iterable[T], score: Callable[[T], float]) -> T:
 
     in_order = sorted(items, key=order)
     return in_order[(len(in_order) - 1) // 2]
-
-
-class Interval(NamedTuple):
-    """A number and its 95 % interval, whose ends may be NaN: unknown."""
-
-    value: float
-    low: float
-    high: float
-
-    def __rmul__(self, factor: Any) -> "Interval":
-        """Return it in another unit."""
-        return Interval(*(factor * value for value in self))
 
 
 def cell_text(cell: object) -> str:

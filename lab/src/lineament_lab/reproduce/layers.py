@@ -14,7 +14,7 @@ from lineament.simulation import SENSORS
 from ..evaluation.partition import PartitionScores, partition_scores
 from ..methods.pdbs import RULES
 from .contenders import LIU, PAPER, by_letter, fitted_methods
-from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better
+from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better, prose
 from .findings import Figure, Progress, Setting, Table, median_of
 from .scans import Frame, frames_of, scene_numbers, scored, simulated_frames
 from .scenes import TRUE, pictures
@@ -76,18 +76,7 @@ _ALIKE = (
 
 def report(n: Any, setting: Setting) -> Report:
     """Make a table for each sensor, and that of the scene."""
-    text = (
-        "Several levels of obstacles stand one behind the other before a back wall. A cluster is "
-        "right if it has the beams of the true one, but for one at each end or a tenth of them; a "
-        "breakpoint, if the beams on both its sides are within one of the true ones. The paper’s "
-        "numbers are of ten frames of a recording that is not used here. It does not name the rule "
-        "and the threshold of its PDBS: a fixed distance of 0.3 m and the adaptive rules of the "
-        "literature are compared.",
-        "The paper reports a lead of 11.6 points over PDBS. Over a fixed distance it is "
-        f"{_lead(n['paper'])} points here with the paper’s scanner and {_lead(n['utm30lx'])} with "
-        "one whose ranges mix both depths at edges (utm30lx), where it finds "
-        f"{n['mixed']['found']:.0f} clusters for {n['mixed']['true']:.0f} true ones.",
-    )
+    text = prose("layers", paper=_lead(n["paper"]), mixed=_lead(n["utm30lx"]), **n["mixed"])
     note = f"{SCANS_A_FRAME * setting.frames} scans."
     tables = []
     for sensor in SCANNERS:

@@ -20,7 +20,7 @@ from lineament.scan.poses import compose
 
 from ..evaluation.similarity import SimilarityScores, similarity_scores
 from .contenders import IEPF, PAPER, PDBS_LINES, Extract, fitted_methods
-from .experiment import Experiment, Measured, MissingError, Report
+from .experiment import Experiment, Measured, MissingError, Report, prose
 from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
 from .scans import frame_times
 from .scenes import pictures
@@ -86,7 +86,7 @@ def report(n: Any, _: Setting) -> Report:
     tables = [Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE)]
     if "distance" in n:
         tables.append(_distance_table(n["distance"], n["views"]))
-    return _TEXT, tables
+    return prose("museum", near=FAR[0], far=FAR[1], method=DEFAULT_METHOD), tables
 
 
 _MISSING = (
@@ -112,15 +112,6 @@ _DISTANCE: Columns = {
 _NOTE = (
     "Nothing true is known of these scans, so what is right cannot be counted. Explained: share of "
     "the valid beams that have a line or an arc, to which the errors are measured."
-)
-_TEXT = (
-    "The paper does not say which ten frames and which five places of the museum it used. Frames "
-    "are taken from equal parts of the bag. The two corners are a convex one (A) and a concave one "
-    f"(B), {FAR[0]:g} to {FAR[1]:g} m apart, that {DEFAULT_METHOD} follows together over the "
-    "longest way in successive scans; the five places are at equal parts of that way.",
-    "A method’s corners are those nearest to the followed ones, within 0.25 m. The true distance "
-    "is not known: compare standard deviations, and shares of scans. Those of "
-    f"{DEFAULT_METHOD}, which chose the scans, favour it.",
 )
 
 

@@ -18,7 +18,7 @@ from lineament.simulation import SENSORS, Sensor, World, scene, truth
 from ..evaluation.counts import ratio, rms
 from ..evaluation.scores import Scores
 from .contenders import FIGURE_9, LIU, PAPER
-from .experiment import Claim, Experiment, Judged, Measured, Report
+from .experiment import Claim, Experiment, Judged, Measured, Report, prose
 from .findings import Figure, Progress, Setting, Table, log_axis
 from .scans import scene_numbers, scored
 
@@ -110,7 +110,7 @@ def report(n: Any, setting: Setting) -> Report:
         first="liu",
     )
     labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in n["ranges"].items()}
-    smallest, largest = (_size(*SIZES[i]) for i in (0, -1))
+    nearest, farthest = (_size(*SIZES[i]) for i in (0, -1))
     raw, filtered = (
         [
             f"{100 * n['features'][f'{PAPER}, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
@@ -118,17 +118,15 @@ def report(n: Any, setting: Setting) -> Report:
         ]
         for how in ("not filtered", "filtered")
     )
-    text = (
-        "The paper filters noise points away, so that they do not become corners (Figures 2, 3). "
-        "Here every fiftieth beam of scans of rooms and halls is a noise point; the filter has the "
-        "paper’s numbers, σ_d = 4 beams and σ_r = 0.3 m. It halves the noise on planes, pulls in "
-        "noise points that are off by less than σ_r, and leaves those beyond 2 σ_r: the claim "
-        "holds for small errors only. The rest is left to the rule of three points per cluster, "
-        f"which labels {labelled[largest]} of the points off by {largest} as noise, "
-        f"{labelled[smallest]} of those off by {smallest}, and {labelled['planes']} of the good "
-        "points on planes. The filter moves edges and corners by more than the noise.",
-        f"By {PAPER}, {raw[0]} of the corners found are right without the filter, "
-        f"{filtered[0]} with it; {raw[1]} and {filtered[1]} of the true ones are found.",
+    text = prose(
+        *("noise",),
+        near=labelled[nearest],
+        far=labelled[farthest],
+        planes=labelled["planes"],
+        nearest=nearest,
+        farthest=farthest,
+        raw=raw,
+        filtered=filtered,
     )
     return text, (ranges, features)
 

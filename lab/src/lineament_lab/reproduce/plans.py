@@ -14,8 +14,8 @@ from lineament.simulation import SENSORS, World, truth
 from lineament.simulation.surfaces import View
 
 from ..evaluation.scores import Scores
-from .contenders import RIVALS_NOTE, feature_methods
-from .experiment import Experiment, Measured, MissingError, Report
+from .contenders import feature_methods
+from .experiment import Experiment, Measured, MissingError, Report, prose
 from .findings import Columns, Numbers, Progress, Setting, Table
 from .scans import Frame, scored
 
@@ -60,7 +60,8 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 def report(n: Numbers, setting: Setting) -> Report:
     """Make a table of all plans together."""
     title = f"{len(PLANS)} plans, {SCANS_A_FRAME * setting.frames} scans in each"
-    return (_ABOUT, RIVALS_NOTE), (Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE),)
+    about = prose("plans", sensor=SENSOR, area=AREA, long=LONG, bow=1e3 * BOW)
+    return (*about, *prose("rivals")), (Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE),)
 
 
 def frames_on(path: Path, count: int) -> Iterator[Frame]:
@@ -127,14 +128,6 @@ def _over_plans(scores: list[Scores]) -> dict[str, Any]:
 
 _MISSING = (
     "The plans are not at hand: occupancy grids in a folder “plans” beside that of the recordings."
-)
-_ABOUT = (
-    "All other scenes here are of one generator, by the authors of `optimal`. These are of plans "
-    "that others made: two storeys at MIT, mapped by a robot, and three maps that come with nav2. "
-    "Their walls are broken, stepped by the cells of the grid and full of niches. A scanner "
-    f"{SENSOR} stands at free places, among people (one on {AREA:g} m²); walls of over {LONG:g} m "
-    f"bow by up to {1e3 * BOW:g} mm, as in the arena, which the truth does not know. What it "
-    "calls a corner may be a step of a few centimetres."
 )
 _NOTE = "Least and greatest: of one plan."
 

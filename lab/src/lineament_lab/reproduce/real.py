@@ -1,7 +1,6 @@
 """All methods on all recordings, by measures that need no truth; the corners of an arena."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,23 +9,17 @@ from lineament.errors import LogError
 from lineament.extractor import Extractor
 from lineament.logs import find_logs
 from lineament.output import canvas
-from lineament.scan import LaserScan
+from lineament.scan import Array
 
-from ..evaluation.counts import Summable, ratio
+from ..evaluation.arena import ARENAS, Arena, arena_scores, load_arena
+from ..evaluation.counts import Summable
 from ..evaluation.free_space import FreeSpaceScores, free_space_scores
-from ..evaluation.repeatability import (
-    RankedRepeats,
-    Repeatability,
-    ranked_repeats,
-    repeatability,
-    with_edges,
-)
+from ..evaluation.pooling import distinct, pools
+from ..evaluation.repeatability import RankedRepeats, score_pairs
 from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
-from .arena import ARENAS, arena_figure, arena_scores, load_arena
 from .contenders import corner_methods, feature_methods
-from .experiment import NO_RECORDINGS, Experiment, Measured, Report
+from .experiment import NO_RECORDINGS, Experiment, Measured, Report, prose
 from .findings import Columns, Figure, Numbers, Progress, Setting, Table, column, each
-from .recordings import BUILDINGS, by_building, distinct, pooled, pooled_table
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
 #: Method whose quality is compared with the repeats.
@@ -88,6 +81,13 @@ ARENA: Columns = {
     "Corners of the arena: in a scan": "corners_per_scan",
 }
 
+_POOLED: Columns = {
+    "phantom m in 100 m": "phantom_in_100m",
+    "covered [%]": "covered",
+    "NEES still, segments": "segments_nees",
+    "NEES still, corners": "corners_nees",
+}
+
 S = TypeVar("S", bound=Summable)
 #: Scores by recording and method.
 Scored = dict[str, dict[str, S]]
@@ -95,7 +95,7 @@ Scored = dict[str, dict[str, S]]
 
 def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure every method on all recordings."""
-    logs, doubles = distinct(_logs(setting))
+    logs, doubles = distinct(_logs(setting), STANDING)
     if not logs:
         raise NO_RECORDINGS
     methods, frames = feature_methods(setting.methods), setting.frames
@@ -136,7 +136,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     for log, path in setting.recordings(LOGS | FURTHER_LOGS).items():
         pairs = scan_pairs(path, PAIRS_A_FRAME * frames)
         for method, extract in each(methods, progress, f"repeated corners, {log}") if pairs else ():
-            found = _repeats(pairs, extract)
+            found = score_pairs(pairs, extract, RATE)
             ranked.setdefault(log, {})[method], repeats.setdefault(log, {})[method] = found
     arenas = {}
     for name, path in setting.recordings(ARENAS).items():
@@ -144,17 +144,17 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
         arenas[name] = arena, scores
     numbers = {
-        "pooled": _pooled(free, standing),
+        "pooled": pools(free, standing),
         "doubles": doubles,
         "unread": unread,
         "free_space": _numbers(free, FreeSpaceScores.summary),
-        "free_space_all": {m: of.summary() for m, of in _totals(free, FreeSpaceScores).items()},
-        "standing": _numbers(standing, _of_standing(ScatterScores.bins)),
-        "standing_figures": _numbers(standing, _of_standing(ScatterScores.figures)),
-        "standing_all": {
-            method: _of_standing(ScatterScores.bins)(of)
-            for method, of in _totals(standing, StandingScores).items()
-        },
+        "free_space_all": _numbers(
+            {"all": _totals(free, FreeSpaceScores)}, FreeSpaceScores.summary
+        ),
+        "standing": _numbers(
+            standing, lambda of: {"segments": of.segments.bins(), "corners": of.corners.bins()}
+        ),
+        "scatter": {kind: _scatter(standing, kind) for kind in ("segments", "corners")},
         "repeats": repeats,
         "quality": {log: _by_quality(of[SHOWN]) for log, of in ranked.items()},
         "arena": {
@@ -172,7 +172,7 @@ def report(n: Any, _: Setting) -> Report:
     """Make the pooled tables, and one for each measure: recordings are rows, methods columns."""
     unread, doubles = (", ".join(n[key]) for key in ("unread", "doubles"))
     text = (
-        *_TEXT,
+        *prose("real", rate=100 * RATE),
         *([f"Left out, as they hold no scans: {unread}."] if unread else []),
         *([f"Left out, as others have the same scans: {doubles}."] if doubles else []),
     )
@@ -180,8 +180,9 @@ def report(n: Any, _: Setting) -> Report:
     quality = {name: (name, 100.0) for name in next(iter(n["quality"].values()), ())}
     return text, (
         *(pooled_table(_POOLS[about], rows) for about, rows in n["pooled"].items()),
-        *_tables({**n["free_space"], "all": n["free_space_all"]}, FREE_SPACE),
-        *(table for kind in ("segments", "corners") for table in _standing(n, kind)),
+        *_tables(n["free_space"] | n["free_space_all"], FREE_SPACE),
+        *_tables(n["scatter"]["segments"], STANDING_STILL, "Standing still, segments: "),
+        *_tables(n["scatter"]["corners"], STANDING_STILL, "Standing still, corners: "),
         *_tables(n["repeats"], REPEATS),
         *([Table.of_numbers(title, n["quality"], quality, first="recording")] if quality else []),
         *_tables(n["arena"], ARENA),
@@ -193,25 +194,6 @@ _POOLS = {
     "all": "All buildings",
     "nothing chosen": "Recordings on which nothing was chosen",
 }
-_TEXT = (
-    "Free space: segments are sampled every 2 cm. A sample is phantom if the three beams around it "
-    "all continued by more than 0.2 m, or all ended more than 0.2 m before. A measurement is "
-    "covered within 5 cm and 1 % of its range of a segment or an arc.",
-    "Standing still: the same feature in two successive scans, normalised by the sum of their "
-    "covariances. NEES is the median, 1 is right; the 95 % ellipse should hold 95 %. Bins are the "
-    "number of measurements of the feature, or of the shorter arm of a corner.",
-    "Repeated corners: those of one scan found in another from elsewhere within 0.1 m, ranked by "
-    "quality, chance subtracted. The count is how many are repeated among the best of which "
-    f"{100 * RATE:.0f} % are. AUC: probability that a repeated corner has the higher quality. The "
-    "errors of the corrected poses, some 2 to 5 cm, are part of the distances. A method that finds "
-    "a corner at every other point repeats many, as there is always one near, and turns about the "
-    "sensor do not show that: see the corners per scan. ‘Of the fewer’ is the repeatability that "
-    "keypoints are compared by (Mikolajczyk and Schmid 2005): pairs within 0.1 m over the fewer of "
-    "both scans’ corners that the other scan can see; chance is not subtracted.",
-    "Arena: corners of which a scan shows both walls, found within 0.1 m. Walls and poses are "
-    "known to about 1 cm, and the walls bow by 13 to 23 mm rms: smaller errors mean nothing, and "
-    "where a wall bends there may be a corner that is not listed.",
-)
 
 
 def _logs(setting: Setting) -> dict[str, Path]:
@@ -225,11 +207,6 @@ def _logs(setting: Setting) -> dict[str, Path]:
     return {path.relative_to(setting.data).as_posix(): path for path in paths}
 
 
-def _only(scored: Scored[S], unknown: bool) -> Scored[S]:
-    """Return the scores of all recordings, or of those on which nothing was chosen."""
-    return {log: of for log, of in scored.items() if not (unknown and log in BUILDINGS)}
-
-
 def _totals(scored: Scored[S], kind: type[S]) -> dict[str, S]:
     methods = next(iter(scored.values()), {})
     return {m: kind.total(found[m] for found in scored.values()) for m in methods}
@@ -239,18 +216,24 @@ def _numbers(scored: Scored[S], figures: Callable[[S], Any]) -> dict[str, dict[s
     return {log: {m: figures(of) for m, of in found.items()} for log, found in scored.items()}
 
 
-def _of_standing(figures: Callable[[ScatterScores], Any]) -> Callable[[StandingScores], Any]:
-    """Return what takes figures of both kinds of features."""
-    return lambda of: {"segments": figures(of.segments), "corners": figures(of.corners)}
+def _scatter(standing: Scored[StandingScores], kind: str) -> Numbers:
+    """Return the figures of one kind of feature by recording, then of all, by arms."""
+    rows = _numbers(standing, lambda of: getattr(of, kind).figures())
+    bins = {m: getattr(of, kind).bins() for m, of in _totals(standing, StandingScores).items()}
+    for name in ScatterScores().bins() if bins else ():
+        rows[f"all, {name} measurements"] = {method: of[name] for method, of in bins.items()}
+    return rows
 
 
-def _pooled(free: Scored[FreeSpaceScores], standing: Scored[StandingScores]) -> dict[str, Any]:
-    """Pool the scores of all buildings, and of those on which nothing was chosen."""
-    pools = {
-        about: pooled(*(by_building(_only(of, chosen)) for of in (free, standing)))
-        for about, chosen in (("all", False), ("nothing chosen", True))
-    }
-    return {about: rows for about, rows in pools.items() if rows}
+def pooled_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Make the table of what is pooled: a row for each method."""
+    first = next(iter(rows.values()))
+    note = (
+        f"By length, measurements and pairs of {first['buildings']} buildings "
+        f"({first['standing_buildings']} where a sensor stands); in brackets 95 % by a bootstrap "
+        "over the buildings."
+    )
+    return Table.of_numbers(title, rows, _POOLED, note)
 
 
 def _tables(numbers: Numbers, columns: Columns, about: str = "") -> list[Table]:
@@ -267,58 +250,6 @@ def _tables(numbers: Numbers, columns: Columns, about: str = "") -> list[Table]:
         for key, factor in [column(columns, title)]
         if any(numbers.values())
     ]
-
-
-def _standing(n: Any, kind: str) -> list[Table]:
-    """Make the tables of one kind of feature; the last rows are of all recordings, by arms."""
-    rows = {
-        log: {method: figures[kind] for method, figures in found.items()}
-        for log, found in n["standing_figures"].items()
-    }
-    for name in ScatterScores().bins() if n["standing_all"] else ():
-        rows[f"all, {name} measurements"] = {
-            method: bins[kind][name] for method, bins in n["standing_all"].items()
-        }
-    return _tables(rows, STANDING_STILL, f"Standing still, {kind}: ")
-
-
-def _repeats(
-    pairs: Sequence[tuple[LaserScan, LaserScan]], extract: Extractor
-) -> tuple[RankedRepeats, dict[str, float]]:
-    """Return the ranked corners of all pairs both ways, and their numbers."""
-    found = [(a, extract(a), b, extract(b)) for a, b in pairs]
-    views = [view for a, fa, b, fb in found for view in ((a, fa, b, fb), (b, fb, a, fa))]
-    each_way = [repeatability(*view) for view in views]
-    again = Repeatability.total(each_way)
-    both_ways = list(zip(each_way[::2], each_way[1::2], strict=True))
-    every, alone = (
-        RankedRepeats.total(
-            ranked_repeats(a, of(fa), b, of(fb), of(fb).corners["quality"])
-            for a, fa, b, fb in views
-        )
-        for of in (with_edges, replace)
-    )
-    return every, {
-        "expected": len(every.scores),
-        "rate": every.rate,
-        "auc": every.auc,
-        "count": every.count_at(RATE),
-        "chance": float(every.chance.mean()) if len(every.chance) else 0.0,
-        "count_without_edges": alone.count_at(RATE),
-        "auc_without_edges": alone.auc,
-        "rate_without_edges": alone.rate,
-        "corners_per_scan": sum(len(features.corners) for _, features, _, _ in found) / len(found),
-        "corners_expected": again.corners.expected,
-        "corner_rate": again.corners.rate,
-        "corner_rmse": again.corners.rmse,
-        "fewer_rate": ratio(
-            sum(min(a.corners.repeated, b.corners.repeated) for a, b in both_ways),
-            sum(min(a.corners.expected, b.corners.expected) for a, b in both_ways),
-        ),
-        "segments_expected": again.segments.expected,
-        "segment_rate": again.segments.rate,
-        "segment_rmse": again.segments.rmse,
-    }
 
 
 def _by_quality(ranked: RankedRepeats) -> dict[str, float]:
@@ -346,6 +277,28 @@ def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
         "right is better."
     )
     return [Figure("repeated-corners", caption, canvas.figure_bytes(figure))]
+
+
+def arena_figure(
+    name: str, arena: Arena, scores: Mapping[str, tuple[Mapping[str, float], Array]]
+) -> Figure:
+    """Draw the corners that the methods found in all scans, on the map of the arena."""
+    scores = {method: found for method, found in scores.items() if len(found[1])}
+    figure, panels = canvas.new_panels(len(scores), 4)
+    ends = arena.walls.segments.reshape(-1, 2)
+    for axes, (method, (numbers, positions)) in zip(panels, scores.items(), strict=True):
+        about = f"found {100 * numbers['recall']:.0f} %, false {100 * numbers['false']:.0f} %"
+        canvas.style_plane(axes, method, about, ends)
+        axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK)
+        axes.plot(*arena.corners.T, "o", mfc="none", mec=canvas.FAINT)
+        axes.plot(*positions.T, ".", color=canvas.CORNER_COLOR)
+    return Figure(
+        name.replace(", ", "-"),
+        f"{name}: corners that each method found in all scans (red), the fitted walls and the real "
+        "corners (circles); the share of the real ones found, and of those found at no real one. "
+        "Methods that found none are left out.",
+        canvas.figure_bytes(figure),
+    )
 
 
 EXPERIMENT = Experiment("Real scans", measure, report, once=True)

@@ -6,7 +6,7 @@ from typing import Any
 from lineament.methods.liu import Liu
 from lineament.output import canvas
 
-from .experiment import Claim, Experiment, Judged, Measured, Report
+from .experiment import Claim, Experiment, Judged, Measured, Report, prose
 from .findings import Columns, Figure, Progress, Setting, Table
 from .grid import (
     CRITERIA,
@@ -132,25 +132,9 @@ def report(n: Any, _: Setting) -> Report:
         "Precision, recall and F1: corners within 0.1 m of true ones with six beams or more on "
         "both sides. The paper’s values of AR are lost.",
     )
-    readings = (
-        f"{len(FORMS)} forms of equation 22 with {len(HALF_WIDTHS)} half-widths of the filter"
-    )
-    two, one = (f"{_alike(n, criterion):.0f}" for criterion in CRITERIA)
-    text = (
-        "AR is ½ (N_r/N_o + N_r/N_t): N_o corners of a view, N_t of a second one after a turn by a "
-        "part of a beam with fresh noise, N_r of them in both within 0.1 m (Awrangjeb and Lu "
-        "2008), mean over the views. It knows no truth. Where the paper speaks of the actual "
-        "corners, one view is compared with the truth: ½ (precision + recall). Both are measured "
-        "with the paper’s last steps, on simulated scenes of all kinds.",
-        "In the paper AR is largest at radius 6 and threshold 0.66. What its response is, and how "
-        f"wide its filter, it leaves unsaid: {readings}. The paper’s parameters are within {FLAT} "
-        f"of the largest on both lines in {two} of {len(_papers())} by AR of two views, "
-        f"and in {one} by ½ (precision + recall). liu:figure9 has one of the latter, selected "
-        "after the fact: it is a hypothesis, not a reproduction.",
-        "At a fixed radius the corners of a higher threshold are among those of a lower one, so "
-        "recall alone has no largest value inside the grid: the peak needs a term of "
-        "precision (docs/equations.md).",
-    )
+    two, one = (_alike(n, criterion) for criterion in CRITERIA)
+    sizes = {"forms": len(FORMS), "widths": len(HALF_WIDTHS), "readings": len(_papers())}
+    text = prose("repetition", flat=FLAT, two=two, one=one, **sizes)
     return text, (*peaks, choices)
 
 

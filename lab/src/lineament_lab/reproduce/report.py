@@ -21,26 +21,18 @@ from lineament.output.page import (
 )
 
 from ..evaluation.ple import BenchmarkResult
+from ..evaluation.pooling import Interval
 from . import experiment_names, run_experiments
 from .claims import Verdict, bands, verdicts
 from .contenders import PAPER
-from .experiment import BLIND_TOO, WORDS
-from .findings import Findings, Interval, Progress, Setting, Table, cell_text, machine
+from .experiment import BLIND_TOO, WORDS, prose
+from .findings import Findings, Progress, Setting, Table, cell_text, machine
 from .seeds import Spread
 
 #: Names of the files.
 _PAGE, _NUMBERS = "index.html", "figures.json"
 #: Colours of a picture: those of ten methods, and what is between them and the paper.
 _COLORS = 32
-_INTRODUCTION = (
-    "The experiments of Liu et al., Journal of Sensors 2023, article 6991467, and further ones. "
-    "The values of its tables and of its Figure 12 are not available: where one stands only there, "
-    "the column “paper” says “lost”. Its recording, ten frames of the Deutsches Museum, is not "
-    "used, unless a bag of that museum is given: the methods are compared on simulated scans and "
-    "on other recordings if present.",
-    "Simulated experiments are run with several seeds. Where these differ, a number is the median, "
-    "with the least and the greatest in brackets; figures are those of the first seed.",
-)
 
 
 def reproduce(
@@ -103,7 +95,7 @@ def write_report(folder: Path, findings: Mapping[str, Findings], setting: Settin
     entries = {"verdicts": "The paper’s figures and tables"}
     entries |= {name: found.title for name, found in findings.items()}
     parts = [
-        *(list_part(facts), *text_parts(_INTRODUCTION), contents_part(entries.items())),
+        *(list_part(facts), *text_parts(prose("page")), contents_part(entries.items())),
         *(heading_part("verdicts", entries["verdicts"]), _verdicts_part(judged, findings)),
     ]
     for name, found in findings.items():

@@ -163,19 +163,6 @@ def spread_scans(path: str | Path, count: int) -> list[LaserScan]:
     return list(islice(log, step // 2, None, step))[:count]
 
 
-def archived_scans(path: str | Path) -> list[LaserScan]:
-    """Read all scans of an archive of the recordings with a truth, with their best poses."""
-    with np.load(path) as archive:
-        poses = archive["poses_refined" if "poses_refined" in archive else "poses"].tolist()
-        beams = float(archive["angle_min"]), float(archive["angle_increment"])
-        far, ranges = float(archive["range_max"]), archive["ranges"]
-        stamps = archive["stamps"].tolist() if "stamps" in archive else [0.0] * len(ranges)
-    return [
-        LaserScan(row, *beams, range_max=far, pose=tuple(pose), stamp=stamp)
-        for row, pose, stamp in zip(ranges, poses, stamps, strict=True)
-    ]
-
-
 def scan_pairs(path: str | Path, count: int) -> list[Pair]:
     """Read scans at equal steps of a log, each with the first later one from another place."""
     scans = [scan for scan in open_log(path, keep_going=True) if scan.pose is not None]

@@ -12,11 +12,11 @@ from lineament.scan import LaserScan
 
 from ..evaluation.scores import Scores
 from ..evaluation.similarity import SimilarityScores, similarity_scores
-from .compare import COUNTS, SIMILARITY_NOTE, counts_of
 from .contenders import IEPF, LIU, PAPER, PDBS_LINES, by_letter, fitted_methods, is_drawn
-from .experiment import Claim, Experiment, Margins, Measured, Report, better
+from .experiment import Claim, Experiment, Margins, Measured, Report, better, prose
 from .findings import Figure, Progress, Setting, Table, median_of
 from .scans import INDOORS, frames_of, recorded_scans, scored
+from .similarity import COUNTS, SIMILARITY_NOTE, counts_of
 
 TRUE = "true features"
 #: What the first picture of a scan shows; the second one has all others.
@@ -90,17 +90,7 @@ def report(n: Any, setting: Setting) -> Report:
     tables += [
         Table.of_numbers(f"{name}, one scan", n[name], COUNTS, SIMILARITY_NOTE) for name in recorded
     ]
-    return (_ABOUT,), tables
-
-
-_ABOUT = (
-    "The paper compares its method with PDBS and IEPF on one scan. PDBS, which finds clusters "
-    "only, fits one line to each and cuts corners off; IEPF cuts at corners; the paper’s method "
-    "does so within its clusters. By the letter of equation 22 it misses corners nearer than some "
-    "3 m; by the reading of liu:figure9 it also cuts at points beside corners, and at noise on "
-    "near walls. Its results with better last steps (liu), and with the numbers that it was tuned "
-    "to, are shown beside. Of recordings, further methods are in the tables alone."
-)
+    return prose("scenes"), tables
 
 
 def _numbers(scores: Scores) -> dict[str, float]:

@@ -19,7 +19,7 @@ from ..evaluation.counts import Counts
 from ..evaluation.kinds import corner_scores
 from ..evaluation.partition import PartitionScores, partition_scores
 from .contenders import IEPF
-from .experiment import Experiment, Measured, Report
+from .experiment import Experiment, Measured, Report, prose
 from .findings import Columns, Progress, Setting, Table
 from .grid import FORMS, GATE
 from .scans import Frame, batch_of, frames_of
@@ -117,7 +117,7 @@ def report(n: Any, _: Setting) -> Report:
     note = "Least and greatest: over all values of the parameters below, one changed at a time."
     title = "Bands of what the paper leaves open"
     rows, columns = (list(OPEN[name]) for name in TOGETHER)
-    return _TEXT, (
+    return prose("sensitivity"), (
         Table.of_numbers(title, bands, _BANDS, note, first=""),
         *(
             Table.of_numbers(name, found, _COLUMNS, first="value")
@@ -144,18 +144,6 @@ def report(n: Any, _: Setting) -> Report:
             for clusters, about in IEPF_CLUSTERS.items()
         ),
     )
-
-
-_TEXT = (
-    "The paper states σ_d, σ_r, the support radius and the threshold, and leaves open the window "
-    "and the passes of its filter, λ and k of its clusters, the form of its response, whether both "
-    "sides of a corner are searched, and what happens at the ends of clusters. It calls 4 and 0.3 "
-    "variances; we read standard deviations. Each is changed alone here, from liu:paper with the "
-    "values of this implementation; then the two together that matter most for corners.",
-    "PDBS and IEPF have one threshold each, which the paper does not state. IEPF as published "
-    "knows no clusters: it takes breakpoints for points of one line, as the paper says, and loses "
-    "most of its precision. Within clusters it does not.",
-)
 
 
 def _data(setting: Setting) -> _Data:

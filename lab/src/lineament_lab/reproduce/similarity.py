@@ -13,12 +13,25 @@ from lineament.output import canvas, drawing
 from lineament.scan import LaserScan
 
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
-from .compare import SIMILARITY, SIMILARITY_NOTE
 from .contenders import IEPF, LIU, PAPER, PDBS_LINES, Extract, by_letter, fitted_methods
-from .experiment import Claim, Experiment, Margins, Measured, Report
+from .experiment import Claim, Experiment, Margins, Measured, Report, prose
 from .findings import Columns, Figure, Numbers, Progress, Setting, Table, median_of
 from .scans import INDOORS, frames_of, recorded_scans
 
+#: How many measurements a method explains, and how far they are from its lines and arcs.
+SIMILARITY = {
+    "explained [%]": "similarity_explained",
+    "mean error [mm]": "similarity_mean",
+    "RMS [mm]": "similarity_rms",
+    "95 % [mm]": "similarity_p95",
+    "largest [mm]": "similarity_maximum",
+}
+#: The same, and how many features there are.
+COUNTS: Columns = {k: k for k in ("segments", "corners", "arcs", "clusters")} | SIMILARITY
+SIMILARITY_NOTE = (
+    "Explained: share of the valid measurements that a segment or an arc has, as it says itself. "
+    "Error: their distance from it; what a method calls noise has none."
+)
 #: The literal pipeline, by the points that its lines are fitted to.
 FILTERED = f"{PAPER}, filtered points"
 #: What the paper says of its largest errors; its other values are lost.
@@ -38,6 +51,13 @@ _COLUMNS: Columns = {
     "largest, paper": "paper",
     "within 10 mm [%]": "small",
 }
+
+
+def counts_of(scan: LaserScan, features: Features) -> dict[str, Any]:
+    """Return the numbers of `COUNTS` for one scan."""
+    numbers = {kind: len(getattr(features, kind)) for kind in ("segments", "corners", "arcs")}
+    numbers["clusters"] = int(features.clusters.max(initial=-1)) + 1
+    return numbers | similarity_scores(scan, features).summary()
 
 
 def measure(setting: Setting, progress: Progress) -> Measured:
@@ -81,20 +101,14 @@ def report(n: Numbers, _: Setting) -> Report:
         for where, found in n.items()
     )
     true, liu = (n[SIMULATED][method] for method in (TRUE, PAPER))
-    return (
-        "The similarity error of a measurement is its distance from the line or arc that explains "
-        "it. The paper says that it stays within 0.01 m with its method and goes up to 0.25 m with "
-        "PDBS and IEPF; means, variances and peaks are lost.",
-        "The claim says as much about the noise as about the method: at σ = 10 mm, "
-        f"{100 * (1 - true['small']):.0f} % of the points are more than 0.01 m from the true "
-        f"lines, the farthest {1e3 * true['similarity_maximum']:.0f} mm. Nor is a small error good "
-        "by itself: many short pieces have small errors, and measurements without a line have "
-        "none. So there are two numbers: how many are explained, and the error of those. The last "
-        "row is the literal pipeline: filtered points, and lines fitted to them.",
-        f"By {PAPER}, {100 * liu['similarity_explained']:.0f} % are explained, and the largest "
-        f"error is {liu['similarity_maximum']:.2f} m: a cluster whose corners are missed gets one "
-        "line.",
-    ), tables
+    text = prose(
+        "similarity",
+        beyond=100 * (1 - true["small"]),
+        farthest=1e3 * true["similarity_maximum"],
+        explained=100 * liu["similarity_explained"],
+        largest=liu["similarity_maximum"],
+    )
+    return text, tables
 
 
 def _of_filtered_points(scan: LaserScan) -> SimilarityScores:

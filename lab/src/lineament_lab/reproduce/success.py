@@ -9,9 +9,9 @@ from lineament.extractor import Extractor
 from lineament.simulation import SCENES
 
 from ..evaluation.scores import Scores
-from .contenders import BLIND, FIGURE_9, IEPF, LIU, LIU_NOTE, PAPER, by_letter, liu_methods
-from .controls import BlindCut
-from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better
+from ..methods.controls import BlindCut
+from .contenders import BLIND, FIGURE_9, IEPF, LIU, PAPER, by_letter, liu_methods
+from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better, prose
 from .findings import Progress, Setting, Table
 from .scans import frames_of, interleaved_times, scored, time_ratio
 from .seeds import by_seed
@@ -78,7 +78,7 @@ def report(n: Any, setting: Setting) -> Report:
     partition = [name for name in n if name.endswith("no corners") or name.startswith("pdbs")]
     corners = [name for name in n if name not in (*partition, "ratios")]
     ratios = tuple((about, paper, *n["ratios"][about]) for about, paper, *_ in _RATIOS)
-    return _TEXT, (
+    return (*prose("success"), *prose("liu")), (
         Table.of_records(
             "Table 3, partition: correct clusters of the true ones",
             [_row(name, n[name], setting.frames, "clusters") for name in partition],
@@ -100,18 +100,6 @@ def report(n: Any, setting: Setting) -> Report:
             "turns, and each round has its ratio, the median over the frames.",
         ),
     )
-
-
-_TEXT = (
-    "In the paper, over ten frames, the partition succeeds in 95.11 % (PDBS: 83.55 %) and the "
-    "corners in 92.62 % (IEPF: 72.51 %). It does not say how success is counted. Here a true "
-    "cluster counts if a found one has its beams, but for one at each end or a tenth; a corner, if "
-    "one is found within 0.1 m: that is recall, so precision and F1 are given too. As ten frames "
-    "have few corners, ten times as many are measured as well.",
-    "The paper speaks of “about half” of the time of PDBS and IEPF; its own times are 0.61 to 0.70 "
-    "and 0.72 of theirs. They are of MATLAB, those here of compiled kernels: compare ratios.",
-    LIU_NOTE,
-)
 
 
 def _row(name: str, of: Any, few: int, kind: str) -> dict[str, object]:

@@ -14,13 +14,13 @@ from lineament.motion import Tracker, Tracks
 from lineament.scan import LaserScan, Pose
 from lineament.scan.poses import compose, relative
 
+from ..evaluation.arena import archived_scans
 from ..evaluation.counts import ratio
 from ..evaluation.icp import icp
 from ..evaluation.relations import read_relations
 from ..evaluation.tracking import chained, motion_errors, track_scores
-from .experiment import NO_RECORDINGS, Experiment, Measured, Report
+from .experiment import NO_RECORDINGS, Experiment, Measured, Report, prose
 from .findings import Columns, Figure, Numbers, Progress, Setting, Table, cells, dot_chart
-from .scans import archived_scans
 
 #: The recordings, and the share that is left out at the beginning: the first half of fr079 is
 #: where the tracker's roughness was chosen.
@@ -118,7 +118,11 @@ def report(n: Numbers, _: Setting) -> Report:
             ("Motion against the log’s corrected poses", "motion", _MOTION),
         )
     )
-    return _TEXT, (*chain(*motions), *_table("Tracks", kinds, _TRACKS, "tracker: of"))
+    percent = {"way": (1e3 * _WAY[0], 100 * _WAY[1]), "turn": (_TURN[0], 100 * _TURN[1])}
+    return prose("tracking", far=_FAR, **percent), (
+        *chain(*motions),
+        *_table("Tracks", kinds, _TRACKS, "tracker: of"),
+    )
 
 
 def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table]:
@@ -129,25 +133,6 @@ def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table
         for name, numbers in found.items()
     ]
     return [Table.of_records(title, records)] if records else []
-
-
-_TEXT = (
-    "Verified relations come first: relative poses of pairs of scans that people aligned by hand "
-    "(Kümmerle et al. 2009), where both scans are in the log to the millisecond. Motions are put "
-    "together from the one scan to the other. Most relations are between neighbours; over a minute "
-    "and more motions drift, as nothing here closes a loop: those stand by themselves.",
-    "The log’s corrected poses are a reference second to them: they are off the relations by "
-    "themselves, in the two offices by a few centimetres. Those of the arena come from motion "
-    "capture, refined on its walls. Errors are from scan to scan, and over "
-    f"{_FAR} scans. ICP is point-to-line from scan to scan, with all points.",
-    "The odometry in the two office logs repeats the corrected poses. A synthetic one is made of "
-    f"the known poses, with normal errors of {1e3 * _WAY[0]:.0f} mm + {100 * _WAY[1]:.0f} % of the "
-    f"way (in x and y) and {_TURN[0]} rad + {100 * _TURN[1]:.0f} % of the turn in each step. "
-    "Tracker and ICP start from it, or else from the last motion; the tracker also takes from it "
-    "what the features do not determine.",
-    "A feature keeps its number if two successive scans have the same number for what is the same "
-    "by the known poses; a switch is another number that was given before, lost is a new one.",
-)
 
 
 def load_recording(path: Path, count: int, skipped: float = 0.0) -> list[LaserScan]:

@@ -15,8 +15,8 @@ from lineament.scan import Array, LaserScan, Pose
 from lineament.simulation import SENSORS, World, truth
 
 from ..evaluation.counts import rms
-from .contenders import LIU_NOTE, PAPER, by_letter, feature_methods
-from .experiment import Claim, Experiment, Margins, Measured, Report
+from .contenders import PAPER, by_letter, feature_methods
+from .experiment import Claim, Experiment, Margins, Measured, Report, prose
 from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
 from .scans import batch_of
 
@@ -91,17 +91,8 @@ def report(n: Any, setting: Setting) -> Report:
     places = n["places"]
     names = [name for name, of in n["all"].items() if of["found"] == 0]
     absent = [f"{' and '.join(names)}: no scan has both corners."] if names else []
-    text = (
-        "In the paper a convex corner A and a concave corner B of a museum, seen from five places, "
-        "are 2.302 m apart on average; the variance is lost with Table 2, and the true distance is "
-        "not given. Here they belong to a box and a room, 2.302 m apart, with "
-        f"{SCANS_A_FRAME * setting.frames} scans from each place and fresh noise of 1 cm. The "
-        "bound is that of Cramér and Rao for both corners, propagated to their distance; over all "
-        "places it is the root mean square. A biased estimate can spread less: compare the RMS "
-        "error.",
-        LIU_NOTE,
-        *absent,
-    )
+    scans = SCANS_A_FRAME * setting.frames
+    text = (*prose("two_corners", scans=scans), *prose("liu"), *absent)
     rows = {name: _row(of, n["all_bound"], name.startswith("liu")) for name, of in n["all"].items()}
     rows["bound"] = {"here": f"{DISTANCE:.4f}", "over": 1.0}
     rows["bound"] |= dict.fromkeys(("standard_deviation", "error"), n["all_bound"])

@@ -20,36 +20,16 @@ from lineament.output.page import write_parts
 from lineament.progress import Track, untracked
 from lineament.scan import Array, LaserScan
 
-from ..evaluation.similarity import similarity_errors, similarity_scores
-from .findings import Columns, Figure, Findings, Table, machine
-from .report import findings_parts
-from .scans import interleaved_times, time_ratio
+from .evaluation.similarity import similarity_errors
+from .reproduce.findings import Figure, Findings, Table, machine
+from .reproduce.report import findings_parts
+from .reproduce.scans import interleaved_times, time_ratio
+from .reproduce.similarity import COUNTS, SIMILARITY_NOTE, counts_of
 
 #: The endings that `write_comparison` knows.
 ENDINGS = (".html", *canvas.PICTURE_ENDINGS)
 #: Scans of a log that methods are timed on.
 _TIMED = 50
-#: How many measurements a method explains, and how far they are from its lines and arcs.
-SIMILARITY = {
-    "explained [%]": "similarity_explained",
-    "mean error [mm]": "similarity_mean",
-    "RMS [mm]": "similarity_rms",
-    "95 % [mm]": "similarity_p95",
-    "largest [mm]": "similarity_maximum",
-}
-#: The same, and how many features there are.
-COUNTS: Columns = {k: k for k in ("segments", "corners", "arcs", "clusters")} | SIMILARITY
-SIMILARITY_NOTE = (
-    "Explained: share of the valid measurements that a segment or an arc has, as it says itself. "
-    "Error: their distance from it; what a method calls noise has none."
-)
-
-
-def counts_of(scan: LaserScan, features: Features) -> dict[str, Any]:
-    """Return the numbers of `COUNTS` for one scan."""
-    numbers = {kind: len(getattr(features, kind)) for kind in ("segments", "corners", "arcs")}
-    numbers["clusters"] = int(features.clusters.max(initial=-1)) + 1
-    return numbers | similarity_scores(scan, features).summary()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,19 +1,18 @@
 """Recordings pooled: the same data once, by building, with intervals over the buildings."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from lineament.errors import LogError
 from lineament.logs import open_log
 
-from ..evaluation.consistency import NormalisedErrors
-from ..evaluation.counts import ratio
-from ..evaluation.free_space import FreeSpaceScores
-from ..evaluation.standing import StandingScores
-from .findings import Columns, Interval, Table
+from .consistency import NormalisedErrors
+from .counts import ratio
+from .free_space import FreeSpaceScores
+from .standing import StandingScores
 
 #: Where recordings were made, by their path in the folder. All were at hand when the constants of
 #: `optimal` were chosen: nothing was chosen on any other.
@@ -55,16 +54,21 @@ _DRAWS, _TAIL, _LEAST = 1000, 0.025, 3
 #: Fewest and most measurements of the features whose scatter is shown.
 _ARMS = 30, 100
 
-_POOLED: Columns = {
-    "phantom m in 100 m": "phantom_in_100m",
-    "covered [%]": "covered",
-    "NEES still, segments": "segments_nees",
-    "NEES still, corners": "corners_nees",
-}
-
 T = TypeVar("T")
 #: What a method has of one building, by method.
 OfBuilding = Mapping[str, T]
+
+
+class Interval(NamedTuple):
+    """A number and its 95 % interval, whose ends may be NaN: unknown."""
+
+    value: float
+    low: float
+    high: float
+
+    def __rmul__(self, factor: Any) -> "Interval":
+        """Return it in another unit."""
+        return Interval(*(factor * value for value in self))
 
 
 def bootstrap(groups: Sequence[T], figure: Callable[[Sequence[T]], float]) -> Interval:
@@ -85,14 +89,14 @@ def bootstrap(groups: Sequence[T], figure: Callable[[Sequence[T]], float]) -> In
     return Interval(figure(groups), float(ends[0]), float(ends[1]))
 
 
-def distinct(logs: Mapping[str, Path]) -> tuple[dict[str, Path], dict[str, str]]:
+def distinct(
+    logs: Mapping[str, Path], standing: Collection[str]
+) -> tuple[dict[str, Path], dict[str, str]]:
     """Leave out recordings whose scans are in others; return those that stay, and the doubles.
 
     A double has the name of the recording that it is part of. Of equal ones that stays which has
-    poses, or whose sensor is known to stand.
+    poses, or whose sensor is known to be `standing`.
     """
-    from .scans import STANDING
-
     scans, poses = {}, {}
     for name, path in logs.items():
         found, placed = set(), False
@@ -105,7 +109,7 @@ def distinct(logs: Mapping[str, Path]) -> tuple[dict[str, Path], dict[str, str]]
         except LogError:
             pass  # it is reported where it is measured
         scans[name], poses[name] = found, placed
-    order = sorted(logs, key=lambda n: (-len(scans[n]), not poses[n], n not in STANDING, n))
+    order = sorted(logs, key=lambda n: (-len(scans[n]), not poses[n], n not in standing, n))
     kept: list[str] = []
     doubles = {}
     for name in order:
@@ -132,6 +136,22 @@ def by_building(scored: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
         place: {m: type(logs[0][m]).total(of[m] for of in logs) for m in logs[0]}
         for place, logs in places.items()
     }
+
+
+def pools(
+    free: Mapping[str, Mapping[str, FreeSpaceScores]],
+    standing: Mapping[str, Mapping[str, StandingScores]],
+) -> dict[str, dict[str, Any]]:
+    """Pool the scores of all recordings, and of those on which nothing was chosen.
+
+    Scores are by recording, then by method; what has none is left out. See `pooled`.
+    """
+    of_pools = {}
+    for about, known in (("all", ()), ("nothing chosen", BUILDINGS)):
+        parts = ({log: of for log, of in s.items() if log not in known} for s in (free, standing))
+        if rows := pooled(*map(by_building, parts)):
+            of_pools[about] = rows
+    return of_pools
 
 
 def pooled(
@@ -161,17 +181,6 @@ def pooled(
                 row[f"{kind}_nees"] = bootstrap(some, _median_nees)
         rows[method] = row
     return rows
-
-
-def pooled_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Make the table of what is pooled: a row for each method."""
-    first = next(iter(rows.values()))
-    note = (
-        f"By length, measurements and pairs of {first['buildings']} buildings "
-        f"({first['standing_buildings']} where a sensor stands); in brackets 95 % by a bootstrap "
-        "over the buildings."
-    )
-    return Table.of_numbers(title, rows, _POOLED, note)
 
 
 def _in_bin(arms: Any) -> Any:

@@ -8,7 +8,7 @@ from lineament.kernels.cutting import cut
 from lineament.methods.parameters import method, parameter
 from lineament.methods.workspace import Block
 
-from ..methods.lines import PieceMethod
+from .lines import PieceMethod
 
 
 @method

@@ -1,6 +1,6 @@
 """Scans of a real arena whose walls and corners are known: recall, errors, and false corners."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -8,17 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lineament.extractor import Extractor
 from lineament.features import Features
-from lineament.output import canvas
 from lineament.scan import Array, LaserScan, Pose
 from lineament.simulation import Sensor, World, truth
 from lineament.simulation.placing import clearance
 
-from ..evaluation.counts import quantile, ratio
-from ..evaluation.kinds import FeatureScores, corner_scores
-from .findings import Figure
-from .scans import archived_scans, batch_of
+from .counts import quantile, ratio
+from .kinds import FeatureScores, corner_scores
 
 #: Recordings from known poses, with walls that were fitted to all scans, and corners.
 ARENAS = {
@@ -45,6 +41,19 @@ class Arena(NamedTuple):
     truths: list[Features]
     walls: World
     corners: Array
+
+
+def archived_scans(path: str | Path) -> list[LaserScan]:
+    """Read all scans of an archive of the recordings with a truth, with their best poses."""
+    with np.load(path) as archive:
+        poses = archive["poses_refined" if "poses_refined" in archive else "poses"].tolist()
+        beams = float(archive["angle_min"]), float(archive["angle_increment"])
+        far, ranges = float(archive["range_max"]), archive["ranges"]
+        stamps = archive["stamps"].tolist() if "stamps" in archive else [0.0] * len(ranges)
+    return [
+        LaserScan(row, *beams, range_max=far, pose=tuple(pose), stamp=stamp)
+        for row, pose, stamp in zip(ranges, poses, stamps, strict=True)
+    ]
 
 
 def load_arena(path: Path, count: int) -> Arena:
@@ -107,13 +116,15 @@ def _ends_on_walls(ends: Array, corners: Array) -> Array:
     return ends[lonely[np.array(met, dtype=np.bool_)]]
 
 
-def arena_scores(arena: Arena, extractor: Extractor) -> tuple[dict[str, float], Array]:
+def arena_scores(
+    arena: Arena, extract: Callable[[LaserScan], Features]
+) -> tuple[dict[str, float], Array]:
     """Score a method on the scans of the arena.
 
     Returns the numbers, among them `false`, the share of the found corners that are at no real
     one, and the positions of all found corners in the world frame [m], shape (m, 2).
     """
-    found = batch_of(extractor, arena.scans)
+    found = [extract(scan) for scan in arena.scans]
     positions = np.concatenate(
         [
             features.transform(*scan.pose).corners["position"]
@@ -129,25 +140,3 @@ def arena_scores(arena: Arena, extractor: Extractor) -> tuple[dict[str, float], 
         "median_error": quantile(corners.errors["position"], 0.5),
         "corners_per_scan": len(positions) / len(found),
     }, positions
-
-
-def arena_figure(
-    name: str, arena: Arena, scores: Mapping[str, tuple[Mapping[str, float], Array]]
-) -> Figure:
-    """Draw the corners that the methods found in all scans, on the map of the arena."""
-    scores = {method: found for method, found in scores.items() if len(found[1])}
-    figure, panels = canvas.new_panels(len(scores), 4)
-    ends = arena.walls.segments.reshape(-1, 2)
-    for axes, (method, (numbers, positions)) in zip(panels, scores.items(), strict=True):
-        about = f"found {100 * numbers['recall']:.0f} %, false {100 * numbers['false']:.0f} %"
-        canvas.style_plane(axes, method, about, ends)
-        axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK)
-        axes.plot(*arena.corners.T, "o", mfc="none", mec=canvas.FAINT)
-        axes.plot(*positions.T, ".", color=canvas.CORNER_COLOR)
-    return Figure(
-        name.replace(", ", "-"),
-        f"{name}: corners that each method found in all scans (red), the fitted walls and the real "
-        "corners (circles); the share of the real ones found, and of those found at no real one. "
-        "Methods that found none are left out.",
-        canvas.figure_bytes(figure),
-    )
