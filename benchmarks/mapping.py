@@ -80,7 +80,16 @@ def placed(found, frames):
     return [compose(tuple(frames[k]), pose) for k, pose in found.scans]
 
 
-def judged(name, about, poses, truth, relations, doubled=None):
+def by_part(made, truth):
+    """Way of each part [m], its ATE [m] where it is sure, and the deviation that it claims [m]."""
+    part, is_sure = (of[made.frame_of] for of in (made.parts.numbers, made.parts.is_sure))
+    for k, (way, known) in enumerate(zip(made.ways, made.parts.deviations, strict=True)):
+        chosen = np.flatnonzero((part == k) & is_sure).tolist()
+        found = absolute_errors(*([of[i] for i in chosen] for of in (made.poses, truth)))
+        yield f"{way:.0f} m, ATE {found.summary()['way_rmse']:.3f} m, claimed {known:.3f} m"
+
+
+def judged(name, about, poses, truth, relations, doubled=None, parts=1):
     cells = [name, about]
     if relations is None:
         cells += ["–"] * 4
@@ -92,7 +101,9 @@ def judged(name, about, poses, truth, relations, doubled=None):
             f"{math.degrees(every['turn_mean']):.3f} ± {math.degrees(every['turn_std']):.3f}",
             f"{1e3 * far['way_mean']:.1f} ({far['motions']})",
         ]
-    cells.append(f"{absolute_errors(poses, truth).summary()['way_rmse']:.3f}")
+    apart = f"in {parts} parts"  # drawn beside each other: they have no common error
+    error = absolute_errors(poses, truth).summary()["way_rmse"]
+    cells.append(f"{error:.3f}" if parts == 1 else apart)
     cells.append("–" if doubled is None else doubled)
     print("|" + "|".join(cells) + "|", flush=True)
 
@@ -107,15 +118,16 @@ def rows(name, scans, truth, relations, odometry=False):
     length = np.hypot(*(ends[:, 2:] - ends[:, :2]).T).sum()
     about = f"{doubled_walls(ends):.0f} of {length:.0f}"
     judged(name, "motions alone", placed(found, [f.pose for f in found.frames]), truth, relations)
-    judged(name, "`map`", made.poses, truth, relations, about)
+    judged(name, "`map`", made.poses, truth, relations, about, made.parts.count)
     judged(name, "ICP, the same loops", rival(found, made.loops), truth, relations)
     played = scans[-1].stamp - scans[0].stamp
     lost = sum(frame.is_lost for frame in found.frames)
     print(
         f"<!-- {name}: {len(scans)} scans, {len(found.frames)} key frames, lost {lost}, "
-        f"{len(made.loops)} loops, {made.refused} refused; played in {played:.0f} s; "
+        f"{len(made.loops)} loops, {len(made.refused)} refused; played in {played:.0f} s; "
         f"{used:.1f} s of processor: {played / used:.1f} x; "
-        f"{seconds:.1f} s by the clock: {played / seconds:.1f} x -->"
+        f"{seconds:.1f} s by the clock: {played / seconds:.1f} x; not sure on "
+        f"{sum(way for *_, way in made.unsure):.1f} m; parts: {'; '.join(by_part(made, truth))} -->"
     )
     return found, made
 

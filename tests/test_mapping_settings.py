@@ -29,8 +29,8 @@ SETTINGS = {
                "LEAD": 12.0, "FAR": 0.5},
     "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "_TWICE": 25.0,
                "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_SPREADS": ((0.8, 0.12), (0.3, 0.06)),
-               "_UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_APART": 0.015, "_PLACES": 3.0,
-               "_AGREE": (0.5, 0.05), "_VIEWS": 3},
+               "_APART": 0.015, "_PLACES": 3.0, "_AGREE": (0.5, 0.05), "_VIEWS": 3},
+    "parts": {"UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_LEAST": 5.0},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
     "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
 }  # fmt: skip

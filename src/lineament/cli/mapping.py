@@ -46,6 +46,7 @@ _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
     "-o", "--output", required=True, type=PATH, help="The map: .dxf, .svg, .parquet or .yaml."
 )
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
+@click.option("--picture", type=PATH, help="Walls and way, red where it is not sure: .png or .pdf.")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
 @_NO_ODOMETRY
 @extracting
@@ -55,6 +56,7 @@ def map_command(
     log: Path | str,
     output: Path,
     poses: Path | None,
+    picture: Path | None,
     onto: Path | None,
     no_odometry: bool,
     extractor: Extractor,
@@ -63,8 +65,9 @@ def map_command(
 ) -> None:
     """Make a map of the walls of LOG, with its loops closed.
 
-    Poses of the log are taken as odometry: their changes, not where they are. The exit status is 3
-    if there are no walls, or the drive is not on the plan.
+    Poses of the log are taken as odometry: their changes, not where they are. Where nothing shows
+    how parts of the way lie to each other, they are drawn apart. The exit status is 3 if there are
+    no walls, or the drive is not on the plan.
     """
     from ..tasks.mapping import map_log
     from .progress import tracker
@@ -72,11 +75,14 @@ def map_command(
     check_ending(output, _ENDINGS)
     if poses is not None:
         check_ending(poses, (".tum", ".txt"))
+    if picture is not None:
+        check_ending(picture, (".png", ".pdf"))
     done = map_log(
         log,
         output,
         extractor,
         poses=poses,
+        picture=picture,
         onto=onto,
         odometry=not no_odometry,
         track=tracker(quiet),
@@ -84,6 +90,8 @@ def map_command(
     )
     if not quiet:
         click.echo(str(done))
+    if done.warning:
+        complain(f"lineament: {done.warning}")
 
 
 @click.command()

@@ -73,6 +73,10 @@ class Adjusted:
     gain: Any
     matrix: Any
 
+    def solver(self) -> Callable[[Array], Array]:
+        """Return what multiplies columns (3n, k) by the covariance of the poses."""
+        return _solver(self.matrix)
+
     def with_poses(self, sights: Records) -> Records:
         """Return the lines with covariances that hold those of the poses.
 
@@ -102,11 +106,11 @@ def optimise(
     sights: Records | None = None,
     count: int = 0,
     *,
-    held: int = 0,
+    held: int | Numbers = 0,
     rounds: int = _ROUNDS,
     dense: bool = False,
 ) -> Adjusted:
-    """Adjust poses (n, 3) and the lines of `count` walls by Gauss-Newton; one pose is held.
+    """Adjust poses (n, 3) and the lines of `count` walls by Gauss-Newton; some poses are held.
 
     Sights beyond 3 deviations count less. Loops have a weight of k⁴ / (k² + e²)², with e² their
     square (Geman and McClure), which is 1 where they are right and 0 where they are wrong; k comes
@@ -116,7 +120,7 @@ def optimise(
     sights = np.zeros(0, SIGHT) if sights is None else sights
     state, n, lines = poses.copy(), len(poses), lines_of(sights, poses, count)
     information, (a, b) = np.linalg.inv(sights["covariance"]), edges["ends"].T
-    w, frames, every, here = sights["wall"], sights["frame"], np.arange(count), np.array([held])
+    w, frames, every, here = sights["wall"], sights["frame"], np.arange(count), np.atleast_1d(held)
     kernel = _KERNEL * (_WIDE if edges["loop"].any() else 1.0)
     for _ in range(rounds + _WIDER * (kernel > _KERNEL)):
         off, of_pose, of_wall = errors(sights, state, lines)
@@ -135,7 +139,7 @@ def optimise(
         own = _inverse(summed(by_wall @ of_wall, w, count) + 1e-6 * np.eye(2))
         blocks = [(by_a @ of_b, a, b), (by_b @ of_a, b, a), (by_a @ of_a, a, a)]
         blocks += [(by_b @ of_b, b, b), (by_pose @ of_pose, frames, frames)]
-        blocks.append((_HELD * np.eye(3)[None], here, here))
+        blocks.append((np.tile(_HELD * np.eye(3), (len(here), 1, 1)), here, here))
         both = _matrix([(by_pose @ of_wall, frames, w)], n, count, dense)
         gain = both @ _matrix([(own, every, every)], count, count, dense)
         matrix = _matrix(blocks, n, n, dense) - gain @ both.T

@@ -39,6 +39,8 @@ _ODOMETRY = (0.03, 0.02), (0.1, 0.1)
 _CONTINUED = (0.3, 0.3)
 #: A robot is not thought to go on faster [m/s, rad/s]; longest time from scan to scan [s].
 _FAST, _SLOWEST = 1.2, 3.0
+#: Motions off what odometry says by so many deviations contradict it.
+_CONTRADICTED = 5.0
 _ROUNDS = 4
 #: With at least this share of the beams explained, less contradicted, a place is taken at once;
 #: more where the deviation of what is expected is larger than that [m].
@@ -63,7 +65,8 @@ class KeyFrame:
 
     `walls` has the number of the wall that each segment shows, `pose` is that in the frame of the
     first key frame, `motion` that since the one before: a guess where the way is lost, unless it
-    `has_odometry`. `expected` is the covariance of the motion before walls say anything of it.
+    `has_odometry`. `expected` is the covariance of the motion before walls say anything of it, and
+    `off` is what they say beside what was expected since the key frame before [m, m, rad].
     """
 
     index: int
@@ -75,6 +78,13 @@ class KeyFrame:
     expected: Array
     is_lost: bool
     has_odometry: bool
+    off: Array
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether walls and odometry contradict each other: either may be wrong."""
+        most = _CONTRADICTED * np.sqrt(np.diag(self.expected))
+        return self.has_odometry and bool((abs(self.off) > most).any())
 
     @property
     def is_torn(self) -> bool:
@@ -102,6 +112,8 @@ class Drive(InTurn):
         self._step: Pose = (0.0, 0.0, 0.0)
         #: Covariance of the motion since the last key frame, without what walls say.
         self._spread = np.zeros((3, 3))
+        #: Odometry at the last key frame.
+        self._from: Pose | None = None
         #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
         self._pace = 1.0
 
@@ -120,8 +132,12 @@ class Drive(InTurn):
             is_key = way >= SPACING or turn >= TURN or is_lost
             self._go_on(scan.stamp, motion.pose)
         if is_key:
-            self._key(features, motion, scan, is_lost, has_odometry)
-            self._spread = np.zeros((3, 3))
+            off = np.zeros(3)
+            if has_odometry and self._from is not None and odometry is not None:
+                off = np.subtract(motion.pose, relative(self._from, odometry))
+                off[2] = wrapped(off[2])
+            self._key(features, motion, scan, (is_lost, has_odometry, off))
+            self._spread, self._from = np.zeros((3, 3)), odometry
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
         self._last = scan.stamp, odometry, pose
@@ -220,13 +236,12 @@ class Drive(InTurn):
         features: Features,
         motion: Motion,
         scan: LaserScan,
-        is_lost: bool,
-        has_odometry: bool,
+        found: tuple[bool, bool, Array],
     ) -> None:
         """Take a key frame; its segments are walls that are known, or new ones."""
         here = compose(self.frames[-1].pose, motion.pose) if self.frames else motion.pose
         walls = np.full(len(features.segments), -1, np.int64)
-        if is_lost:
+        if found[0]:
             self._first = len(self.frames)
         elif self.frames:
             around = self._around.transform(*inverse(motion.pose))
@@ -238,7 +253,7 @@ class Drive(InTurn):
         is_unknown = walls < 0
         walls[is_unknown] = self._next + np.arange(is_unknown.sum())
         self._next += int(is_unknown.sum())
-        at, known = len(self.scans), (motion, self._spread, is_lost, has_odometry)
+        at, known = len(self.scans), (motion, self._spread, *found)
         key = KeyFrame(at, scan, features, walls, here, *known)
         self.frames.append(key)
         self._look_around()

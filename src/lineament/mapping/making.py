@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import NothingFoundError
 from ..scan import Array, Pose
 from ..scan.poses import compose, inverse
-from ..walls import SHORTEST, Records, cut, lengths_of, moved, unit, wrapped
+from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, moved, unit, wrapped
 from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
 from .adjust import Adjusted, edges_of, optimise
 from .drive_map import KeyFrame
@@ -17,6 +17,7 @@ from .index import MAPPED
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey
+from .parts import UNKNOWN, Parts, apart, beside, boxes_of, parts_of
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -25,8 +26,6 @@ _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
 _TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
-#: Covariance of the motion to a key frame of which nothing is known [m, m, rad].
-_UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Surfaces that are so much off a common line are one wall [m].
@@ -41,17 +40,69 @@ _HIDDEN, _ALONG = 0.15, math.cos(math.radians(10))
 
 @dataclass(slots=True, eq=False)
 class DriveMap:
-    """A map of a drive, in the frame of its first scan, and the poses of all scans.
+    """A map of a drive and the poses of its scans, in the frame of the first scan.
 
-    The covariances of its walls hold those of the poses. `loops` between key frames, of `EDGE`,
-    were closed; those that contradict the others were refused.
+    Attributes
+    ----------
+    map : LineMap
+        Its covariances hold those of the poses, beside the first of their part.
+    walls_of : ndarray, shape (w,)
+        The part of each wall.
+    poses : list of (x, y, theta)
+        Of each scan [m, m, rad].
+    frame_of : ndarray, shape (s,)
+        The key frame of each scan.
+    survey : Survey
+        The key frames, their poses, and what they saw.
+    parts : Parts
+        What hangs together, and where the poses are not sure. Parts lie beside each other: nobody
+        knows where they are to each other.
+    loops, refused : structured arrays of `EDGE`
+        Loops between key frames that were closed, and those that contradict the others.
+    adjusted : Adjusted
+        The last adjustment; `parts.between` has covariances of it.
     """
 
     map: LineMap
+    walls_of: Numbers
     poses: list[Pose]
+    frame_of: Numbers
     survey: Survey
+    parts: Parts
     loops: Records
-    refused: int
+    refused: Records
+    adjusted: Adjusted
+
+    @property
+    def ways(self) -> list[float]:
+        """Way of each part [m]."""
+        return [float(self._steps[self.parts.frames(k)].sum()) for k in range(self.parts.count)]
+
+    @property
+    def unsure(self) -> list[tuple[int, int, float]]:
+        """First and last scan of each stretch on which the poses are not sure, and its way [m]."""
+        index = [frame.index for frame in self.survey.frames]
+        return [
+            (index[a], index[b], float(self._steps[a + 1 : b + 1].sum()))
+            for a, b in self.parts.unsure.tolist()
+        ]
+
+    @property
+    def way(self) -> tuple[Array, Array]:
+        """Steps of the way (n, 2, 2) [m] that are sure, and those that are not."""
+        places = np.array([self.poses[frame.index][:2] for frame in self.survey.frames])
+        steps, is_sure = np.stack((places[:-1], places[1:]), axis=1), np.ones(len(places), bool)
+        for before, after in self.parts.unsure.tolist():
+            is_sure[before + 1 : after + 1] = False
+        is_one, is_sure = np.diff(self.parts.numbers) == 0, is_sure[1:]
+        return steps[is_one & is_sure], steps[is_one & ~is_sure]
+
+    @property
+    def _steps(self) -> Array:
+        """Way to each key frame from the one before, if both are of one part [m]."""
+        poses, numbers = self.survey.poses, self.parts.numbers
+        steps = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
+        return np.where(np.diff(numbers, prepend=0) == 0, steps, 0.0)
 
 
 def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
@@ -75,19 +126,35 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
         weak["information"] /= _TWICE
         weak["loop"] = False
         found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
+    parts = parts_of(found, chain, np.array([f.is_lost or f.is_contradicted for f in frames]))
+    found, chain, sights = apart(found, chain, sights, parts)
+    if len(loops):
         sights = merged(sights, found.poses, found.lines, _APART)
     # Misfits widen the covariances only here: from the start, they have right loops refused.
     bent = [(widened(segments), walls) for segments, walls in seen]
     again = relabelled(sights_of(bent, rough), sights)
     sights = relabelled(sights_of(bent, roughness(again, found.poses, rough)), sights)
-    found = optimise(found.poses, chain, sights, _count(sights), rounds=2)
+    found = optimise(found.poses, chain, sights, _count(sights), held=parts.roots, rounds=2)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights))
-    least = min(_VIEWS, len(frames))
-    walls = single(walls_along(sights, found.poses, survey.lines, views=least))
-    if not len(walls):
-        raise NothingFoundError(f"no wall is seen by {least} of {len(frames)} key frames")
+    walls = walls_by_part(survey, parts)
+    frame_of = np.array([k for k, _ in scans])
     every = [compose(survey.pose(k), pose) for k, pose in scans]
-    return DriveMap(LineMap(walls, sigma=MAPPED), every, survey, loops, refused)
+    of_walls = np.repeat(np.arange(parts.count), [len(of) for of in walls])
+    plan = LineMap(np.concatenate(walls), sigma=MAPPED)
+    return DriveMap(plan, of_walls, every, frame_of, survey, parts, loops, refused, found)
+
+
+def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
+    """Return the walls of each part; NothingFoundError if there are none."""
+    sights, least = survey.sights, min(_VIEWS, len(survey.frames))
+    of = parts.numbers[sights["frame"]]
+    walls = [
+        single(walls_along(sights[of == k], survey.poses, survey.lines, views=least))
+        for k in range(parts.count)
+    ]
+    if not any(map(len, walls)):
+        raise NothingFoundError(f"no wall is seen by {least} of {len(survey.frames)} key frames")
+    return walls
 
 
 def spread_of(frame: KeyFrame) -> Array:
@@ -96,17 +163,19 @@ def spread_of(frame: KeyFrame) -> Array:
     What was expected before counts whole: odometry, or that the motion goes on. In a direction that
     no wall shows nothing else holds the pose.
     """
-    if frame.is_lost:
-        return frame.expected + _LEAST if frame.has_odometry else _UNKNOWN
+    if frame.is_torn:
+        return UNKNOWN
+    if frame.is_contradicted or frame.is_lost:
+        return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
     known = np.linalg.inv(frame.motion.covariance) / _TWICE + np.linalg.inv(frame.expected)
     return np.asarray(np.linalg.inv(known) + _LEAST)
 
 
 def closed(
     frames: list[KeyFrame], chain: Records, found: Adjusted, sights: Records
-) -> tuple[Adjusted, Records, int]:
-    """Return the poses with their loops closed, these loops, and how many others contradict."""
-    loops, refused = edges_of([], [], []), 0
+) -> tuple[Adjusted, Records, Records]:
+    """Return the poses with their loops closed, these loops, and those that contradict them."""
+    loops = refused = edges_of([], [], [])
     for k, spread in enumerate(_SPREADS):
         if k:
             found.poses = joined(Survey(frames, found.poses, sights, found.lines))
@@ -115,7 +184,7 @@ def closed(
         if len(near):
             found = optimise(found.poses, np.append(chain, near), sights, _count(sights))
             right = found.weights[len(chain) :] > 0.5
-            loops, refused = near[right], int((~right).sum())
+            loops, refused = near[right], near[~right]
     return found, loops, refused
 
 
@@ -195,26 +264,26 @@ def joined(survey: Survey) -> Array:
         before = Survey(frames, poses, sights, lines).walls((0.0, 0.0, 0.0), np.arange(first))
         if len(before):
             part = Survey(frames[:last], poses[:last], sights, lines)
-            move = found_on(LineMap(before), part, first)
+            move = found_on(LineMap(before), part, np.arange(first, last))
             if move is not None:
                 poses[first:] = [compose(move, tuple(pose)) for pose in poses[first:].tolist()]
     return poses
 
 
-def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
-    """Return the motion that puts the key frames from `first` on where the plan shows them.
+def found_on(plan: LineMap, survey: Survey, frames: Numbers) -> Pose | None:
+    """Return the motion that puts some key frames where the plan shows what they saw.
 
     Places along the way are looked for without a first guess; most of those that are located agree
     on this motion. None if none is located.
     """
     found = []
     for q, query in survey.queries(_PLACES):
-        if q >= first and (where := locate(query, plan)):
+        if q in frames and (where := locate(query, plan)):
             found.append(compose(where.pose, inverse(survey.pose(q))))
     if not found:
         return None
     # Compared where the key frames are, not at their origin.
-    x, y = survey.poses[first:, :2].mean(axis=0).tolist()
+    x, y = survey.poses[frames, :2].mean(axis=0).tolist()
     moves, places = np.array(found), np.array([compose(move, (x, y, 0.0)) for move in found])
     agree = np.abs(wrapped(moves[:, None, 2] - moves[:, 2])) < _AGREE[1]
     agree &= np.linalg.norm(places[:, None, :2] - places[:, :2], axis=2) < _AGREE[0]
@@ -222,14 +291,32 @@ def found_on(plan: LineMap, survey: Survey, first: int) -> Pose | None:
 
 
 def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
-    """Move a map into the frame of a plan, on which it is located without a first guess.
+    """Move each part of a map into the frame of a plan, on which it is found without a first guess.
 
-    NothingFoundError if no place along the way is located.
+    Parts that are not found lie beside the plan. NothingFoundError if none is found.
     """
-    best = found_on(plan, made.survey, 0)
-    if best is None:
+    count, of_scans = made.parts.count, made.parts.numbers[made.frame_of]
+    found = [found_on(plan, made.survey, made.parts.frames(k)) for k in range(count)]
+    located = [k for k, move in enumerate(found) if move is not None]
+    if not located:
         raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
-    poses = [compose(best, pose) for pose in made.poses]
-    return replace(
-        made, map=LineMap(moved(made.map.walls, inverse(best)), sigma=MAPPED), poses=poses
-    )
+    moves = [move or (0.0, 0.0, 0.0) for move in found]
+    if len(located) < count:
+        ends = [_ends(made, k, move) for k, move in enumerate(moves)]
+        points, sizes = np.concatenate((plan.ends.reshape(-1, 2), *ends)), map(len, ends)
+        labels = np.repeat(np.arange(count + 1), [2 * len(plan.ends), *sizes])
+        shifts = beside(boxes_of(points, labels), np.append(0, np.array(located) + 1))[1:]
+        moves = [
+            compose((x, y, 0.0), of) for (x, y), of in zip(shifts.tolist(), moves, strict=True)
+        ]
+    poses = [compose(moves[k], pose) for k, pose in zip(of_scans, made.poses, strict=True)]
+    walls = [moved(made.map.walls[made.walls_of == k], inverse(moves[k])) for k in range(count)]
+    return replace(made, map=LineMap(np.concatenate(walls), sigma=MAPPED), poses=poses)
+
+
+def _ends(made: DriveMap, part: int, move: Pose) -> Array:
+    """Return ends of walls and places of key frames of a part that is moved, (n, 2) [m]."""
+    walls = moved(made.map.walls[made.walls_of == part], inverse(move))
+    poses = made.survey.poses[made.parts.frames(part)].tolist()
+    places = [compose(move, (x, y, theta))[:2] for x, y, theta in poses]
+    return np.concatenate((walls["start"], walls["end"], places))

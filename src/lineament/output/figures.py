@@ -59,8 +59,12 @@ def plot_walls(
     *,
     title: str = "",
     dark: bool = False,
+    ways: tuple[Array, Array] | None = None,
 ) -> None:
-    """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture."""
+    """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture.
+
+    `ways` are parts of the way (n, 2, 2) on which the poses are sure, and on which they are not.
+    """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
 
@@ -73,6 +77,15 @@ def plot_walls(
     canvas.style_plane(axes, title, about, points)
     theme = canvas.theme_of(axes)
     axes.add_collection(LineCollection(list(lines), colors=theme.ink, linewidths=0.8))
+    if ways is not None:
+        for way, color, wide, name in zip(
+            ways, (theme.way, theme.corner), (1.0, 3.0), ("way", "not sure"), strict=True
+        ):
+            if len(way):
+                axes.add_collection(
+                    LineCollection(list(way), colors=color, linewidths=wide, label=name)
+                )
+        axes.legend(loc="best", fontsize="small", frameon=False, labelcolor=theme.text)
     for center, radius in zip(centers.tolist(), radii.tolist(), strict=True):
         axes.add_patch(Circle(center, radius, fill=False, color=theme.arc))
     canvas.save(figure, path)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,12 @@ from ..mapping.drive_map import Drive
 from ..mapping.grids import GRID_ENDINGS, all_files
 from ..mapping.making import make_map, onto_plan
 from ..output import open_writer
+from ..output.figures import plot_walls
 from ..progress import Track, untracked
 from ..scan import Pose
+
+#: Stretches that are not sure and are named, the longest ones.
+_NAMED = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +33,9 @@ class Mapping:
     """A map that was made of a log.
 
     Numbers of scans, of key frames, of those that were lost, and of loops, closed and left out;
-    way [m]; the map; wall time [s].
+    the map; wall time [s]. `ways` are those of the parts that hang together, and `known` how badly
+    places of them are known at most [m]. `unsure` has the first and last scan of each stretch on
+    which the poses are not sure, and its way [m].
     """
 
     log: str
@@ -38,20 +45,48 @@ class Mapping:
     lost: int
     loops: int
     refused: int
-    way: float
+    ways: list[float]
+    known: list[float]
+    unsure: list[tuple[int, int, float]]
     map: LineMap
     seconds: float
 
     def __str__(self) -> str:
         lost = f", {self.lost} times lost" if self.lost else ""
         refused = f", {self.refused} refused" if self.refused else ""
+        known = ", ".join(f"{deviation:.2g} m" for deviation in self.known)
+        each = " in each part" if len(self.known) > 1 else ""
         return (
             f"{self.log} -> {self.output}\n"
-            f"  {self.scans} scans, {self.frames} key frames, {self.way:.0f} m{lost}\n"
+            f"  {self.scans} scans, {self.frames} key frames, {sum(self.ways):.0f} m{lost}\n"
             f"  {self.loops} loops{refused}\n"
+            f"  by its covariances, places are known to {known}{each} from the start\n"
+            f"{self._unsure()}"
             f"  {self.map}\n"
             f"  {self.seconds:.1f} s, {self.scans / self.seconds:.0f} scans/s"
         )
+
+    @property
+    def warning(self) -> str:
+        """What is wrong with the map as a whole, on one line; empty if it is whole."""
+        if len(self.ways) == 1:
+            return ""
+        ways = ", ".join(f"{way:.0f} m" for way in self.ways)
+        return (
+            f"the map is in {len(self.ways)} parts, drawn beside each other, of {ways} of way: "
+            "nothing shows where they are to each other"
+        )
+
+    def _unsure(self) -> str:
+        """Where poses are not sure: the longest stretches by their scans."""
+        if not self.unsure:
+            return ""
+        longest = sorted(self.unsure, key=lambda stretch: -stretch[2])[:_NAMED]
+        scans = ", ".join(f"{first} to {last}" for first, last, _ in sorted(longest))
+        rest = len(self.unsure) - len(longest)
+        more = f" and {rest} more" if rest else ""
+        way = sum(way for *_, way in self.unsure)
+        return f"  not sure on {way:.1f} m of the way: of scans {scans}{more}\n"
 
 
 def map_log(
@@ -61,6 +96,7 @@ def map_log(
     *,
     poses: str | os.PathLike[str] | None = None,
     onto: str | os.PathLike[str] | None = None,
+    picture: str | os.PathLike[str] | None = None,
     odometry: bool = True,
     track: Track = untracked,
     **reading: Any,
@@ -80,6 +116,8 @@ def map_log(
         Where to write the pose of each scan: ``stamp x y z qx qy qz qw`` [s, m], a line a scan.
     onto : path-like, optional
         A plan in whose frame the map is to be; without, it is that of the first scan.
+    picture : path-like, optional
+        Where to draw the walls and the way, ``.png`` or ``.pdf``: what is not sure of it is red.
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
     track : callable
@@ -110,7 +148,7 @@ def map_log(
     with needed_by("map"):  # now, not when the drive is followed
         import_module("scipy")
     onto_files = [] if onto is None else all_files(onto, is_read=True)
-    written = [*all_files(output), *([] if poses is None else [poses])]
+    written = [*all_files(output), *(path for path in (poses, picture) if path is not None)]
     check_outputs(written, [path, *onto_files])
     plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
@@ -118,37 +156,40 @@ def map_log(
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
-    drive, stamps = Drive(), []
+    drive = Drive()
     # In the order of time, which is not that of every log: scans are all held in memory for that.
     scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
     for scan in track(scans, Path(log.name).name, len(scans)):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
-        stamps.append(scan.stamp)
-    if not stamps:
+    if not scans:
         raise LogError(log.name, "has no scans, expected a drive")
     made = make_map(drive.frames, drive.scans)
     if plan is not None:
         made = onto_plan(made, plan)
+    stamps = [scan.stamp for scan in scans]
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
     with placed:  # All files, or none.
         if is_grid:
-            seen = [(frame.scan, made.poses[frame.index]) for frame in drive.frames]
+            # Free is what sure beams passed through.
+            sure = compress(drive.frames, made.parts.is_sure)
+            seen = [(frame.scan, made.poses[frame.index]) for frame in sure]
             made.map.to_grid(seen=seen).write(output)
         else:
             made.map.write(output)
-    way = sum(
-        math.dist(a[:2], b[:2])
-        for a, b in zip(made.survey.poses, made.survey.poses[1:], strict=False)
-    )
+        if picture is not None:
+            rings = made.map.columns["center"], made.map.columns["radius"]
+            plot_walls(made.map.ends, *rings, picture, title=Path(log.name).name, ways=made.way)
     return Mapping(
         log=str(path),
         output=str(output),
-        scans=len(stamps),
+        scans=len(scans),
         frames=len(drive.frames),
         lost=sum(frame.is_lost for frame in drive.frames),
         loops=len(made.loops),
-        refused=made.refused,
-        way=way,
+        refused=len(made.refused),
+        ways=made.ways,
+        known=made.parts.deviations.tolist(),
+        unsure=made.unsure,
         map=made.map,
         seconds=time.perf_counter() - started,
     )
