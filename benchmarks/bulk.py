@@ -20,7 +20,7 @@ import numba
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
-from lineament_lab.reproduce.findings import machine
+from lineament_lab.reproduce.machine import machine
 
 import lineament as ln
 from lineament.logs import open_log

@@ -44,7 +44,7 @@ def main() -> None:
 
 
 def measure(seconds: float, step: float, minutes: float) -> None:
-    from lineament_lab.reproduce.findings import machine
+    from lineament_lab.reproduce.machine import machine
 
     print(f"{machine()}; scans of {BEAMS} beams, method optimal\n", flush=True)
     print(f"cold start, kernels cached, to first features: {cold_start():.2f} s\n", flush=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from lineament_lab.reproduce.findings import machine
+from lineament_lab.reproduce.machine import machine
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 

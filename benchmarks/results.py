@@ -71,7 +71,7 @@ def is_text(node: object) -> bool:
 
 def stamp(seconds: float, frames: int) -> str:
     """Return commit, date, machine, versions and seeds, and the hash of what was measured."""
-    from lineament_lab.reproduce.findings import machine
+    from lineament_lab.reproduce.machine import machine
 
     git = ["git", "-C", str(ROOT)]
     commit = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)

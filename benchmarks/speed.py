@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from lineament_lab.reproduce.findings import machine
+from lineament_lab.reproduce.machine import machine
 
 import lineament as ln
 from lineament.simulation import SENSORS, building, drive

@@ -7,9 +7,9 @@ import pytest
 from lineament_lab.reproduce import (
     all_methods,
     contenders,
-    definitions,
     grid,
     layers,
+    machine,
     real,
     scans,
     scenes,
@@ -37,7 +37,7 @@ def small(monkeypatch):
     for module, changes in (
         (contenders, few),
         (scans, {"_COPIES": 1, "_BATCHES": 2, "time": SimpleNamespace(perf_counter=clock)}),
-        (definitions, here),
+        (machine, here),
         (grid, {"RADII": (6, 8), "THRESHOLDS": (0.25, 0.66), "SCENES_A_FRAME": 1}),
         (all_methods, {"SENSORS": {"lms181": SENSORS["lms181"]}, "SCENES": ("room", "hall")}),
         (success, {"MORE": 2}),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from lineament_lab.reproduce import definitions
+from lineament_lab.reproduce import definitions, machine
 from panels import angle_of, assert_legible, beside, by_label, drawn, notes, texts_of
 
 
@@ -16,7 +16,7 @@ def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
         (definitions._parabolas, "Figure 7", False),
         (definitions._tangent, "Figure 8", False),
     ):
-        figure = draw()[2]
+        figure = draw()[1]
         assert_legible(figure)
         axes = figure.axes[0]
         assert axes.get_title(loc="left").startswith(name)
@@ -24,7 +24,7 @@ def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
 
 
 def test_figure_1_has_the_field_of_view_and_one_beam_with_its_coordinates():
-    _, _, figure, _ = definitions._scan()
+    _, figure, _ = definitions._scan()
     (axes,) = figure.axes
     noisy_point, sensor, view, beam, down, across, x_axis, y_axis, turn = drawn(axes)[:9]
     assert sensor.tolist() == view[[0]].tolist() == view[[-1]].tolist() == [[0, 0]]
@@ -56,7 +56,7 @@ def test_figure_1_has_the_field_of_view_and_one_beam_with_its_coordinates():
 
 
 def test_figure_4_has_the_spacing_of_neighbours_on_a_wall():
-    plan, curves = definitions._spacing()[2].axes
+    plan, curves = definitions._spacing()[1].axes
     points = next(points for points in drawn(plan) if len(points) > 2)
     steps = np.hypot(*np.diff(points, axis=0).T)
     along = np.array((5.4, 1.6)) - (0.4, -0.75)
@@ -77,7 +77,7 @@ def test_figure_4_has_the_spacing_of_neighbours_on_a_wall():
 
 
 def test_figure_6_has_the_farthest_point_from_each_chord():
-    panels = definitions._chords()[2].axes
+    panels = definitions._chords()[1].axes
     found, ends = [], None
     for k, axes in enumerate(panels, 1):
         cluster, branch, chord, height, at, marked = drawn(axes)
@@ -102,7 +102,7 @@ def test_figure_6_has_the_farthest_point_from_each_chord():
 
 
 def test_figure_7_has_the_distances_of_two_parabolas_and_their_sums():
-    plan, sums = definitions._parabolas()[2].axes
+    plan, sums = definitions._parabolas()[1].axes
     curve = max(drawn(sums), key=len)
     dots = [line[0] for line in drawn(sums) if len(line) == 1]
     parabolas = [points for points in drawn(plan) if len(points) == 2 * definitions.RADIUS + 1]
@@ -128,11 +128,11 @@ def test_figure_7_says_how_far_the_operator_is_off_where_it_is_worst(monkeypatch
     exact = definitions.corner_response
     off = iter(np.linspace(0.0, 0.5, 17))
     monkeypatch.setattr(definitions, "corner_response", lambda *a, **k: exact(*a, **k) + next(off))
-    assert definitions._parabolas()[3]["off"] == pytest.approx(0.5)
+    assert definitions._parabolas()[2]["off"] == pytest.approx(0.5)
 
 
 def test_figure_8_has_the_fits_by_arc_length_and_the_distances_to_the_tangent():
-    _, _, figure, numbers = definitions._tangent()
+    _, figure, numbers = definitions._tangent()
     support_at, *by_arc, last = figure.axes
     cluster, support, (target,) = drawn(support_at)
     assert len(support) == 2 * definitions.RADIUS + 1
@@ -175,6 +175,6 @@ def test_figure_8_has_the_fits_by_arc_length_and_the_distances_to_the_tangent():
 
 def test_table_1_has_the_memory_of_this_machine(monkeypatch):
     sizes = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**21}
-    monkeypatch.setattr(definitions.os, "sysconf", sizes.__getitem__, raising=False)
-    rows = {name: cells for name, *cells in definitions._machines().rows}
+    monkeypatch.setattr(machine.os, "sysconf", sizes.__getitem__, raising=False)
+    rows = {name: cells for name, *cells in machine.machines().rows}
     assert rows["memory"] == ["8 GB", "8 GiB"]

@@ -196,10 +196,10 @@ class TestSensitivity:
 
     def test_ranges_are_filtered_so_many_times(self):
         scan = ln.LaserScan([2.0, 2.0, 2.05, 2.0, 2.0, 2.1], -0.3, 0.1, range_min=0.2, range_max=9)
-        assert sensitivity._filtered([scan], 0) == [scan]
+        assert scans.filtered(scan, 0) is scan
         once = ln.LaserScan(bilateral_filter(scan), -0.3, 0.1, range_min=0.2, range_max=9)
         for times, expected in ((1, once.ranges), (2, bilateral_filter(once))):
-            (found,) = sensitivity._filtered([scan], times)
+            found = scans.filtered(scan, times)
             np.testing.assert_allclose(found.ranges, expected)
             assert np.abs(found.ranges - scan.ranges).max() > 0.01
             assert (found.angle_min, found.angle_increment) == (-0.3, 0.1)

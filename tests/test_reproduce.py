@@ -3,7 +3,10 @@
 import copy
 import json
 import math
+import re
 from html.parser import HTMLParser
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from lineament_lab.reproduce import (
 from lineament_lab.reproduce.claims import bands, claims, verdicts
 from lineament_lab.reproduce.experiment import WORDS, Experiment, Measured, MissingError
 from lineament_lab.reproduce.findings import cell_text, cells, dot_chart, median_of
+from lineament_lab.reproduce.prose import prose
 from lineament_lab.reproduce.report import benchmark_tables, reproduce, write_report
 from lineament_lab.reproduce.seeds import Spread, merged
 from selenium import webdriver
@@ -178,10 +182,10 @@ class TestEngine:
 
     def test_what_is_missing_is_said(self):
         def measure(*_):
-            raise MissingError("No bag is given.")
+            raise MissingError("no recordings")
 
         found = Experiment("A bag", measure, print).run(Setting(), lambda *_: None)
-        assert found == Findings("A bag", ("No bag is given.",))
+        assert found == Findings("A bag", ("The recordings are missing: nothing is measured.",))
 
     def test_experiments_run_by_their_names(self, monkeypatch):
         ran, reports = [], []
@@ -189,6 +193,18 @@ class TestEngine:
         found = run_experiments(["fig2"], Setting(1, 3, seeds=2), reports.append)
         assert (list(found), ran) == (["noise"], [3, 4])
         assert reports[2] == "noise (1/1), seed 4: starting"
+
+
+def test_every_section_of_prose_is_of_a_page():
+    """Each has a name of its own, which the code says, and paragraphs without line breaks."""
+    folder = files("lineament_lab.reproduce")
+    names = re.findall(r"^# (.+)$", (folder / "text.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(names) == len(set(names))
+    assert set(EXPERIMENTS) <= set(names)
+    code = "".join(path.read_text(encoding="utf-8") for path in Path(str(folder)).glob("*.py"))
+    assert [name for name in names if f'"{name}"' not in code] == []
+    assert not [p for name in ("page", "liu", "rivals") for p in prose(name) if "\n" in p]
+    assert prose("two_corners", scans=20)[0].count(" with 20 scans from each place") == 1
 
 
 def test_claims_are_those_of_the_paper_in_its_order():

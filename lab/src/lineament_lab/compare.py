@@ -21,7 +21,8 @@ from lineament.progress import Track, untracked
 from lineament.scan import Array, LaserScan
 
 from .evaluation.similarity import similarity_errors
-from .reproduce.findings import Figure, Findings, Table, machine
+from .reproduce.findings import Figure, Findings, Table
+from .reproduce.machine import machine
 from .reproduce.report import findings_parts
 from .reproduce.scans import interleaved_times, time_ratio
 from .reproduce.similarity import COUNTS, SIMILARITY_NOTE, counts_of

@@ -9,8 +9,9 @@ from lineament.simulation import SCENES, SENSORS
 
 from ..evaluation.scores import Scores
 from .contenders import LIU, PARTITION_ONLY, every_method
-from .experiment import Experiment, Measured, Report, prose
+from .experiment import Experiment, Measured, Report
 from .findings import Figure, Numbers, Progress, Setting, Table, dot_chart
+from .prose import prose
 from .scans import frames_of, interleaved_times, scored, time_ratio
 from .seeds import by_seed
 

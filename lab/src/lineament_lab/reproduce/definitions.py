@@ -1,9 +1,7 @@
 """Figures 1, 4, 6, 7 and 8, which illustrate definitions, from computed geometry; and Table 1."""
 
 import math
-import os
 from collections.abc import Callable
-from importlib.metadata import version
 from itertools import product
 from typing import Any
 
@@ -16,8 +14,10 @@ from lineament.output import canvas, drawing
 from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, Sensor, World
 
-from .experiment import Claim, Experiment, Judged, Measured, Report, prose
-from .findings import Figure, Progress, Setting, Table, machine
+from .experiment import Claim, Experiment, Judged, Measured, Report
+from .findings import Figure, Progress, Setting
+from .machine import machines
+from .prose import prose
 
 #: The support radius of the paper [beams].
 RADIUS = 6
@@ -36,18 +36,18 @@ def measure(_: Setting, __: Progress) -> Measured:
     """Compute the figures that illustrate definitions."""
     drawn = (_scan(), _spacing(), _chords(), _parabolas(), _tangent())
     return Measured(
-        {name: numbers for name, _, _, numbers in drawn},
-        lambda: [Figure(n, caption, canvas.figure_bytes(f)) for n, caption, f, _ in drawn],
+        {name: numbers for name, _, numbers in drawn},
+        lambda: [Figure.of(name, figure) for name, figure, _ in drawn],
     )
 
 
 def report(_: Any, __: Setting) -> Report:
     """Make Table 1."""
-    return prose("definitions"), (_machines(),)
+    return prose("definitions"), (machines(),)
 
 
-#: Short name, caption, drawing, and numbers of a figure.
-Drawn = tuple[str, str, Any, dict[str, float]]
+#: Short name, drawing, and numbers of a figure.
+Drawn = tuple[str, Any, dict[str, float]]
 
 
 def _line(axes: Axes, start: Any, end: Any, style: str = "-", color: str = canvas.INK) -> None:
@@ -99,11 +99,7 @@ def _scan() -> Drawn:
     corners, breaks = found.corners["position"], found.breakpoints["position"]
     off = [_away(corners, _CORNER), *(_away(breaks, edge) for edge in _EDGES)]
     labelled = float(found.clusters[_NOISY] < 0)
-    caption = (
-        "A scan in the coordinates of the paper: beam i with bearing and range, and what it calls "
-        "breakpoints, corners and noise points, as the method finds them (liu:scale_free)."
-    )
-    return "fig1", caption, figure, {"off": max(off), "corners": len(corners), "noise": labelled}
+    return "fig1", figure, {"off": max(off), "corners": len(corners), "noise": labelled}
 
 
 def _away(points: Array, place: tuple[float, float]) -> float:
@@ -142,12 +138,8 @@ def _spacing() -> Drawn:
     axes.plot(far, least, ":", color=canvas.INK, label=r"$\rho\,\Delta\varphi$")
     axes.plot(far, limit, color=_RED, label=r"threshold $T_d$ (equation 10)")
     axes.legend(frameon=False)
-    caption = (
-        "The spacing of neighbouring points grows with their range, and with the incidence on the "
-        "wall: so does the threshold of the clusters."
-    )
     beyond = float((spacing > limit).mean())
-    return "fig4", caption, figure, {"ratio": steps[-1] / steps[0], "beyond": beyond}
+    return "fig4", figure, {"ratio": steps[-1] / steps[0], "beyond": beyond}
 
 
 def _chords() -> Drawn:
@@ -176,14 +168,9 @@ def _chords() -> Drawn:
         axes.plot(*np.transpose([start, end]), "o", color=canvas.INK)
         if candidate["accepted"]:
             ends.append(beam)
-    caption = (
-        "The point of a cluster that is farthest from the chord of its first and last points is a "
-        "candidate. If the operator accepts it, both its sides are searched in turn; a branch ends "
-        "at its first rejected candidate."
-    )
     corners = points[found["beam"][found["accepted"]]]
     off = max(_away(corners, vertex) for vertex in _STEPS[1:-1])
-    return "fig6", caption, figure, {"off": off, "corners": len(corners)}
+    return "fig6", figure, {"off": off, "corners": len(corners)}
 
 
 def _parabolas() -> Drawn:
@@ -211,13 +198,8 @@ def _parabolas() -> Drawn:
     responses = [corner_response(points, **given)[RADIUS] for points in sampled]
     axes.plot(curvatures, responses, color=canvas.INK, label="of sampled parabolas")
     axes.legend(frameon=False)
-    caption = (
-        "Of two parabolas with the same tangent, the more curved one is farther from it at the "
-        "same places: the cumulative distance is proportional to the curvature. The operator’s "
-        "tangent is fitted; for a symmetric support it is the true one."
-    )
     off = float(np.abs(responses - curvatures / 2 * (x**2).sum()).max())
-    return "fig7", caption, figure, {"off": off}
+    return "fig7", figure, {"off": off}
 
 
 def fitted(points: Array, at: int, radius: int) -> tuple[Array, Array, Array]:
@@ -272,33 +254,8 @@ def _tangent() -> Drawn:
     _line(last, feet[0], feet[-1], color=_GREEN)
     for point, foot in zip(support, feet, strict=True):
         _line(last, point, foot, color=_RED)
-    caption = (
-        "The corner detection operator at a target (red), beams 1° apart: support, abscissa and "
-        "ordinate by arc length, their least squares parabolas through the target, whose slopes "
-        "there are the direction of the tangent, and the distances to it, whose sum is the "
-        "response of equation 22."
-    )
     stage = corner_response(points, support_radius=RADIUS, response="tangent")[at]
-    return "fig8", caption, figure, {"sum": total, "stage": float(stage)}
-
-
-def _machines() -> Table:
-    """Table 1: the paper's hardware and software, and that of this page."""
-    memory = None
-    if hasattr(os, "sysconf"):
-        memory = f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.0f} GiB"
-    packages = ", ".join(f"{name} {version(name)}" for name in ("lineament", "numba", "numpy"))
-    return Table(
-        "Table 1: hardware and software",
-        ("", "paper", "here"),
-        (
-            ("machine", "Intel Core i7-7700U", machine()),
-            ("memory", "8 GB", memory),
-            ("software", "MATLAB 2020a", packages),
-            ("scanner", "160°, 0.33°, 481 points", "the same, simulated, with noise of 10 mm"),
-        ),
-        "The table is lost: its values are those of the text around it.",
-    )
+    return "fig8", figure, {"sum": total, "stage": float(stage)}
 
 
 def _claim(figure: str, paper: str, about: str, margin: Callable[[Any], float]) -> Claim:

@@ -3,11 +3,10 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from typing import Any, NamedTuple
 
 from .findings import Figure, Findings, Progress, Setting, Table
+from .prose import prose
 from .seeds import merged
 
 #: What a page says of the numbers: paragraphs, and tables.
@@ -16,30 +15,8 @@ Report = tuple[Iterable[str], Iterable[Table]]
 Margins = Sequence[float]
 
 
-@cache
-def _sections() -> dict[str, list[str]]:
-    """Read the prose of pages: paragraphs by the name of their section."""
-    text = (files(__package__) / "text.md").read_text(encoding="utf-8")
-    parts = (section.split("\n\n") for section in text.removeprefix("# ").split("\n# "))
-    return {name: [" ".join(one.split()) for one in those] for name, *those in parts}
-
-
-def prose(section: str, **values: object) -> tuple[str, ...]:
-    """Return the paragraphs of a section of ``text.md``, with values in their places.
-
-    Examples
-    --------
-    >>> prose("two_corners", scans=20)[0][:62]
-    'In the paper a convex corner A and a concave corner B of a mus'
-    """
-    return tuple(paragraph.format(**values) for paragraph in _sections()[section])
-
-
 class MissingError(Exception):
-    """What an experiment measures is not at hand; the message says what."""
-
-
-NO_RECORDINGS = MissingError("The recordings are missing: nothing is measured.")
+    """What an experiment measures is not at hand: the section of ``text.md`` that says what."""
 
 
 class Measured(NamedTuple):
@@ -154,7 +131,7 @@ class Experiment:
             try:
                 measured = self.measure(one, about)
             except MissingError as missing:
-                return Findings(self.title, (str(missing),))
+                return Findings(self.title, prose(str(missing)))
             draw = draw if numbers else measured.draw
             numbers.append(measured.numbers)
         progress("", "drawing")

@@ -1,8 +1,6 @@
 """What an experiment gets and gives: a setting; text, tables, figures and numbers."""
 
 import math
-import os
-import platform
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,6 +12,7 @@ from lineament.output import canvas
 
 from ..evaluation.counts import plain
 from ..evaluation.pooling import Interval
+from .prose import prose
 from .seeds import Spread
 
 T = TypeVar("T")
@@ -29,8 +28,7 @@ Columns = Mapping[str, Any]
 UNITS = {"mm": 1e3, "%": 100, "µs": 1e6, "mrad": 1e3, "°": math.degrees(1)}
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
+class Table(NamedTuple):
     """A table of a report.
 
     Attributes
@@ -98,12 +96,7 @@ class Table:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for JSON; what is not finite is null."""
-        return {
-            "title": self.title,
-            "columns": list(self.columns),
-            "rows": plain(self.rows),
-            "note": self.note,
-        }
+        return {name: plain(value) for name, value in self._asdict().items()}
 
 
 def cells(numbers: Mapping[Any, Any], columns: Columns) -> dict[str, object]:
@@ -136,6 +129,11 @@ class Figure(NamedTuple):
     caption: str
     png: bytes
 
+    @classmethod
+    def of(cls, name: str, figure: Any, section: str = "", **values: object) -> Self:
+        """Draw a figure; its caption is a section of ``text.md``, by default that of its name."""
+        return cls(name, prose(section or name, **values)[0], canvas.figure_bytes(figure))
+
 
 class Findings(NamedTuple):
     """What an experiment gives: title, paragraphs, tables, figures, and all numbers by name."""
@@ -148,9 +146,7 @@ class Findings(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the pictures, for JSON."""
-        return {
-            "title": self.title,
-            "text": list(self.text),
+        return self._asdict() | {
             "tables": [table.to_dict() for table in self.tables],
             "figures": {figure.name: figure.caption for figure in self.figures},
             "numbers": plain(self.numbers),
@@ -269,21 +265,3 @@ def log_axis(axis: Any) -> None:
     axis.set_major_locator(LogLocator(10, digits))
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_locator(NullLocator())
-
-
-def machine() -> str:
-    """Return processor, cores, system and Python, in a line.
-
-    Examples
-    --------
-    >>> machine().endswith(f"Python {platform.python_version()}")
-    True
-    """
-    name = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        lines = [line for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        name = lines[0].split(":")[1].strip() if lines else name
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}"
-    )

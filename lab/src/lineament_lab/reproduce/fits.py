@@ -4,8 +4,9 @@ from lineament.simulation import SCENES, SENSORS
 
 from ..evaluation.line_fits import FITS, SIGMAS, fit_walls
 from ..evaluation.scores import Scores, evaluate
-from .experiment import Experiment, Measured, Report, prose
+from .experiment import Experiment, Measured, Report
 from .findings import Columns, Numbers, Progress, Setting, Table, each
+from .prose import prose
 from .scans import frames_of
 
 _COLUMNS: Columns = {

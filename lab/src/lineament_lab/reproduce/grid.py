@@ -53,13 +53,6 @@ class Parameters(NamedTuple):
         """Name of the reading."""
         return f"{self.response}, half-width {self.half_width}"
 
-    def __str__(self) -> str:
-        return f"{self.reading}, radius {self.support_radius}, threshold {self.threshold:g}"
-
-    def extractor(self, method: str) -> Extractor:
-        """Make `liu` or one of its presets with these parameters."""
-        return Extractor(method, **self._asdict())
-
 
 #: Numbers of `repetition` by parameters.
 Grid = dict[Parameters, dict[str, float]]
@@ -100,7 +93,7 @@ def repetition(parameters: Parameters, numbers: range) -> dict[str, float]:
     views: one without corners counts as 0, so that a single right corner in each earns little.
     """
     views = _views(numbers)
-    found = batch_of(parameters.extractor("liu:paper"), [scan for scan, _, _ in views])
+    found = batch_of(Extractor("liu:paper", **parameters._asdict()), [scan for scan, _, _ in views])
     counts, repeated, turned = [], [], []
     for (_, turn, true), features in zip(views, found, strict=True):
         if turn == 0:

@@ -14,9 +14,10 @@ from lineament.simulation import SENSORS
 from ..evaluation.partition import PartitionScores, partition_scores
 from ..methods.pdbs import RULES
 from .contenders import LIU, PAPER, by_letter, fitted_methods
-from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better, prose
-from .findings import Figure, Progress, Setting, Table, median_of
-from .scans import Frame, frames_of, scene_numbers, scored, simulated_frames
+from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better
+from .findings import Figure, Progress, Setting, Table
+from .prose import prose
+from .scans import Frame, frames_of, median_scan, scene_numbers, scored, simulated_frames
 from .scenes import TRUE, pictures
 
 #: What the paper reports of ten frames of its recording [%].
@@ -59,19 +60,12 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 
     def draw() -> Iterable[Figure]:
         """Draw the last frame with the median success of all methods, and the scene."""
-        of_frames = [PartitionScores.total(of) for of in zip(*scores.values(), strict=True)]
-        shown = frames[median_of(range(len(frames)), lambda k: of_frames[k].success)]
+        shown = frames[median_scan(scores, lambda of: of.success)]
         few = {name: methods[name](shown.scan) for name in (PAPER, FIXED)}
         yield _clusters(shown.scan, {"true clusters": shown.truth} | few)
-        yield from pictures("fig10", _ALIKE, alike.scan, found)
+        yield from pictures("fig10", prose("fig10")[0], alike.scan, found)
 
     return Measured(numbers, draw)
-
-
-_ALIKE = (
-    "The first of the simulated scenes of layered obstacles that has the 11 clusters and 5 corners "
-    "of the paper’s Figure 10"
-)
 
 
 def report(n: Any, setting: Setting) -> Report:
@@ -120,13 +114,7 @@ def _clusters(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
         shown = drawing.draw_beams(axes, scan, features.clusters)
         canvas.style_plane(axes, name, canvas.count(_count(features), "cluster"), shown)
         drawing.draw_breakpoints(axes, features.breakpoints)
-    return Figure(
-        "fig5",
-        "Layered obstacles with mixed pixels at edges (utm30lx): true clusters, those of the "
-        "paper’s method, and those of PDBS with a fixed distance. Grey crosses are noise, rings "
-        "breakpoints. Of all scans the one with the median success of all methods together.",
-        canvas.figure_bytes(figure),
-    )
+    return Figure.of("fig5", figure)
 
 
 def _judged_layers(n: Any) -> Judged:

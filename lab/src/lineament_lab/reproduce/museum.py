@@ -20,9 +20,10 @@ from lineament.scan.poses import compose
 
 from ..evaluation.similarity import SimilarityScores, similarity_scores
 from .contenders import IEPF, PAPER, PDBS_LINES, Extract, fitted_methods
-from .experiment import Experiment, Measured, MissingError, Report, prose
-from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
-from .scans import frame_times
+from .experiment import Experiment, Measured, MissingError, Report
+from .findings import Columns, Figure, Progress, Setting, Table, each
+from .prose import prose
+from .scans import frame_times, median_scan, spread_scans
 from .scenes import pictures
 from .similarity import error_strips
 from .two_corners import DISTANCE, distance_found, draw_place
@@ -50,7 +51,7 @@ class View(NamedTuple):
 def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure all methods on the bag of the setting."""
     if setting.museum is None:
-        raise MissingError(_MISSING)
+        raise MissingError("no bag")
     progress("reading")
     frames, in_row = read(setting.museum, setting.frames)
     methods = fitted_methods(setting.methods)
@@ -58,8 +59,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     for name, extract in each(methods, progress, f"{len(frames)} scans"):
         scores[name], of_methods[name] = _measured(extract, frames)
     numbers: dict[str, Any] = {"methods": of_methods, "scans": len(frames)}
-    of_scans = [SimilarityScores.total(of).mean for of in zip(*scores.values(), strict=True)]
-    scan = frames[median_of(range(len(frames)), of_scans.__getitem__)]
+    scan = frames[median_scan(scores, lambda of: of.mean)]
     progress("following corners")
     seen = views_of_two(follow(in_row))
     if seen is not None:
@@ -89,11 +89,6 @@ def report(n: Any, _: Setting) -> Report:
     return prose("museum", near=FAR[0], far=FAR[1], method=DEFAULT_METHOD), tables
 
 
-_MISSING = (
-    "No bag is given. The paper’s scans are from the Deutsches Museum, recorded for Cartographer, "
-    "whose bags are public but not part of this report: “lineament reproduce --museum BAG” runs "
-    "this part."
-)
 _COLUMNS = {
     "clusters a scan": "clusters",
     "segments a scan": "segments",
@@ -144,15 +139,13 @@ def read(path: Path, count: int) -> tuple[list[LaserScan], list[LaserScan]]:
     for topic in log.topics:
         if topic.strip("/") == TOPIC:
             log = open_log(path, topic=topic, keep_going=True)
-    step = max(len(log) // count, 1)
-    frames = list(islice(log, step // 2, None, step))[:count]
     in_row: list[LaserScan] = []
     for scan in islice(log, len(log) // 3, None):
         if not in_row or scan.stamp >= in_row[-1].stamp + APART:
             in_row.append(scan)
         if len(in_row) == SCANS_A_FRAME * count:
             break
-    return frames, in_row
+    return spread_scans(log, count), in_row
 
 
 def follow(scans: Iterable[LaserScan]) -> list[View]:
@@ -241,8 +234,7 @@ def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     """Draw the similarity error of each beam, by method."""
     shown = [name for name in (PAPER, IEPF, PDBS_LINES) if name in found]
     figure = error_strips(scan, {name: found[name] for name in shown})
-    caption = "The museum, the same scan: similarity error of each beam. Dashed: 0.01 m."
-    return Figure("museum-fig12", caption, canvas.figure_bytes(figure))
+    return Figure.of("museum-fig12", figure)
 
 
 def _places(views: Sequence[View], a: int, b: int) -> Figure:
@@ -252,10 +244,7 @@ def _places(views: Sequence[View], a: int, b: int) -> Figure:
         places = (view.corners[number][0] for number in (a, b))
         draw_place(axes, k, view.scan, view.features, *places)
     canvas.add_legend(figure)
-    caption = (
-        f"The museum: a convex corner A and a concave one B from five places ({DEFAULT_METHOD})."
-    )
-    return Figure("museum-fig13", caption, canvas.figure_bytes(figure))
+    return Figure.of("museum-fig13", figure, method=DEFAULT_METHOD)
 
 
 EXPERIMENT = Experiment("The paper’s museum", measure, report, once=True)

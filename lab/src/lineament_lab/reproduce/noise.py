@@ -18,8 +18,9 @@ from lineament.simulation import SENSORS, Sensor, World, scene, truth
 from ..evaluation.counts import ratio, rms
 from ..evaluation.scores import Scores
 from .contenders import FIGURE_9, LIU, PAPER
-from .experiment import Claim, Experiment, Judged, Measured, Report, prose
+from .experiment import Claim, Experiment, Judged, Measured, Report
 from .findings import Figure, Progress, Setting, Table, log_axis
+from .prose import prose
 from .scans import scene_numbers, scored
 
 #: The paper's scanner, with a noise point in every fiftieth beam.
@@ -211,11 +212,7 @@ def _figure(seed: int) -> Figure:
     log_axis(spacing.yaxis)
     for axes in (plan, spacing):
         axes.legend(frameon=False)
-    caption = (
-        "Noise points between and on walls. Those close to a wall are pulled towards it; the "
-        "others stay, and their spacing stays above the threshold."
-    )
-    return Figure("fig2-3", caption, canvas.figure_bytes(figure))
+    return Figure.of("fig2-3", figure)
 
 
 EXPERIMENT = Experiment(

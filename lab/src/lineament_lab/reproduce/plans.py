@@ -15,8 +15,9 @@ from lineament.simulation.surfaces import View
 
 from ..evaluation.scores import Scores
 from .contenders import feature_methods
-from .experiment import Experiment, Measured, MissingError, Report, prose
+from .experiment import Experiment, Measured, MissingError, Report
 from .findings import Columns, Numbers, Progress, Setting, Table
+from .prose import prose
 from .scans import Frame, scored
 
 #: Occupancy grids, in a folder beside that of the recordings.
@@ -45,7 +46,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     """Score all methods on scans simulated in each of the plans."""
     folder = None if setting.data is None else setting.data / ".." / "plans"
     if folder is None or not all((folder / f"{name}.yaml").exists() for name in PLANS):
-        raise MissingError(_MISSING)
+        raise MissingError("no plans")
     methods = feature_methods(setting.methods)
     by_plan: list[dict[str, Scores]] = []
     for plan in PLANS:
@@ -126,9 +127,6 @@ def _over_plans(scores: list[Scores]) -> dict[str, Any]:
     return summary
 
 
-_MISSING = (
-    "The plans are not at hand: occupancy grids in a folder “plans” beside that of the recordings."
-)
 _NOTE = "Least and greatest: of one plan."
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from lineament.errors import LogError
 from lineament.extractor import Extractor
-from lineament.logs import find_logs
+from lineament.logs import find_logs, open_log
 from lineament.output import canvas
 from lineament.scan import Array
 
@@ -18,8 +18,9 @@ from ..evaluation.pooling import distinct, pools
 from ..evaluation.repeatability import RankedRepeats, score_pairs
 from ..evaluation.standing import ScatterScores, StandingScores, standing_scores
 from .contenders import corner_methods, feature_methods
-from .experiment import NO_RECORDINGS, Experiment, Measured, Report, prose
+from .experiment import Experiment, Measured, MissingError, Report
 from .findings import Columns, Figure, Numbers, Progress, Setting, Table, column, each
+from .prose import prose
 from .scans import STANDING, scan_pairs, spread_scans, still_pairs
 
 #: Method whose quality is compared with the repeats.
@@ -97,7 +98,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure every method on all recordings."""
     logs, doubles = distinct(_logs(setting), STANDING)
     if not logs:
-        raise NO_RECORDINGS
+        raise MissingError("no recordings")
     methods, frames = feature_methods(setting.methods), setting.frames
     unread: list[str] = []
 
@@ -122,7 +123,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 
     free = scored(
         *("free space", FreeSpaceScores),
-        lambda _, path: spread_scans(path, SCANS_A_FRAME * frames),
+        lambda _, path: spread_scans(open_log(path, keep_going=True), SCANS_A_FRAME * frames),
         lambda scan, extract: free_space_scores(scan, extract(scan)),
     )
     standing = scored(
@@ -271,12 +272,7 @@ def _curves(ranked: Scored[RankedRepeats]) -> list[Figure]:
             axes.plot(count, 100 * rate, color=color, **line)
         axes.set_ylim(0, 100)
     canvas.add_legend(figure)
-    caption = (
-        "Corners found again from another place, less chance, ranked by their quality: how many "
-        f"of the best, and which share of them, from the {FIRST + 1}th on. Further to the upper "
-        "right is better."
-    )
-    return [Figure("repeated-corners", caption, canvas.figure_bytes(figure))]
+    return [Figure.of("repeated-corners", figure, first=FIRST + 1)]
 
 
 def arena_figure(
@@ -292,13 +288,7 @@ def arena_figure(
         axes.plot(*ends.reshape(-1, 2, 2).T, color=canvas.INK)
         axes.plot(*arena.corners.T, "o", mfc="none", mec=canvas.FAINT)
         axes.plot(*positions.T, ".", color=canvas.CORNER_COLOR)
-    return Figure(
-        name.replace(", ", "-"),
-        f"{name}: corners that each method found in all scans (red), the fitted walls and the real "
-        "corners (circles); the share of the real ones found, and of those found at no real one. "
-        "Methods that found none are left out.",
-        canvas.figure_bytes(figure),
-    )
+    return Figure.of(name.replace(", ", "-"), figure, "arena", where=name)
 
 
 EXPERIMENT = Experiment("Real scans", measure, report, once=True)

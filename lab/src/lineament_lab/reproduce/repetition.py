@@ -6,7 +6,7 @@ from typing import Any
 from lineament.methods.liu import Liu
 from lineament.output import canvas
 
-from .experiment import Claim, Experiment, Judged, Measured, Report, prose
+from .experiment import Claim, Experiment, Judged, Measured, Report
 from .findings import Columns, Figure, Progress, Setting, Table
 from .grid import (
     CRITERIA,
@@ -21,6 +21,7 @@ from .grid import (
     repetition_grid,
     repetition_scenes,
 )
+from .prose import prose
 from .seeds import by_seed
 
 _COLORS = dict(zip(FORMS, canvas.PALETTE, strict=False))
@@ -153,24 +154,13 @@ def _judged(n: Any) -> Judged:
 def _figures(setting: Setting, progress: Progress) -> tuple[Figure, ...]:
     """Draw both lines of Figure 9, with bands over the seeds."""
     grids = [repetition_grid(Setting(setting.frames, seed), progress) for seed in _SEEDS]
-    about = (
-        f"at the paper’s {{}}, for each reading: median of {len(_SEEDS)} seeds, and band of the "
-        "least and the greatest. Above AR of two views, below ½ (precision + recall) of one. "
-        "Grey: where the paper has its peak."
-    )
     return (
-        _figure(
-            *(grids, "support_radius", "fig9a", "support radius [beams]"),
-            "Repetition against the support radius " + about.format(f"threshold {THRESHOLD}"),
-        ),
-        _figure(
-            *(grids, "threshold", "fig9b", "threshold [m; m² for product; else none]"),
-            "Repetition against the threshold " + about.format(f"radius {RADIUS}"),
-        ),
+        _figure(grids, "support_radius", "fig9a", "support radius", "[beams]"),
+        _figure(grids, "threshold", "fig9b", "threshold", "[m; m² for product; else none]"),
     )
 
 
-def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) -> Figure:
+def _figure(grids: list[Grid], field: str, name: str, along: str, unit: str) -> Figure:
     """Draw both criteria along one of the two parameters; a column for each half-width."""
     shown = list(product(CRITERIA, HALF_WIDTHS))
     figure, panels = canvas.new_panels(len(shown), len(HALF_WIDTHS), sharey=True)
@@ -180,13 +170,13 @@ def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) 
         for form, color in _COLORS.items():
             paper = Parameters(form, half_width, RADIUS, THRESHOLD)
             # Those that differ from it in this field at most.
-            along = [p for p in grids[0] if p._replace(**{field: getattr(paper, field)}) == paper]
-            x = [getattr(p, field) for p in along]
-            values = [sorted(grid[p][criterion] for grid in grids) for p in along]
+            same = [p for p in grids[0] if p._replace(**{field: getattr(paper, field)}) == paper]
+            x = [getattr(p, field) for p in same]
+            values = [sorted(grid[p][criterion] for grid in grids) for p in same]
             low, middle, high = zip(*((v[0], v[len(v) // 2], v[-1]) for v in values), strict=True)
             axes.fill_between(x, low, high, color=color, alpha=0.15)
             axes.plot(x, middle, color=color, marker="o", label=form)
-        axes.set_xlabel(label)
+        axes.set_xlabel(f"{along} {unit}")
         if field == "threshold":
             axes.set_xscale("log")
             axes.set_xticks([], minor=True)
@@ -195,7 +185,8 @@ def _figure(grids: list[Grid], field: str, name: str, label: str, caption: str) 
     for axes, about in zip(panels[:: len(HALF_WIDTHS)], CRITERIA.values(), strict=True):
         axes.set_ylabel(about)
     canvas.add_legend(figure)
-    return Figure(name, caption, canvas.figure_bytes(figure))
+    fixed = f"threshold {THRESHOLD}" if field == "support_radius" else f"radius {RADIUS}"
+    return Figure.of(name, figure, "fig9", along=along, fixed=fixed, seeds=len(_SEEDS))
 
 
 EXPERIMENT = Experiment(

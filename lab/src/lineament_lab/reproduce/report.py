@@ -24,9 +24,10 @@ from ..evaluation.ple import BenchmarkResult
 from ..evaluation.pooling import Interval
 from . import experiment_names, run_experiments
 from .claims import Verdict, bands, verdicts
-from .contenders import PAPER
-from .experiment import BLIND_TOO, WORDS, prose
-from .findings import Findings, Progress, Setting, Table, cell_text, machine
+from .experiment import WORDS
+from .findings import Findings, Progress, Setting, Table, cell_text
+from .machine import machine
+from .prose import prose
 from .seeds import Spread
 
 #: Names of the files.
@@ -120,12 +121,7 @@ def _verdicts_part(judged: Sequence[Verdict], findings: Mapping[str, Findings]) 
         verdict_cell = Cell(verdict or "–", "verdict")
         rows.append([place, verdict_cell, Cell(claim.paper), Cell(here or "–"), band])
     words = "; ".join(f"{word}: {about}" for word, about in WORDS.items())
-    note = (
-        f"{words[0].upper()}{words[1:]}. Judged is {PAPER}, the letter of the paper. "
-        f"‘{BLIND_TOO[2:].capitalize()}’: cuts at every eighth point, without a detector, hold as "
-        "well, and the measure says nothing of detection. The last column is the range of the same "
-        "number over all values of the parameters that the paper does not state. A dash: not run."
-    )
+    note = prose("verdicts", words=f"{words[0].upper()}{words[1:]}")[0]
     return table_part("Verdicts", _VERDICTS, rows, note)
 
 

@@ -6,19 +6,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from lineament.extractor import Extractor
 from lineament.features import FeatureBatch, Features
-from lineament.logs import open_log
+from lineament.logs import Log, open_log
+from lineament.methods.stages import bilateral_filter
 from lineament.scan import Array, LaserScan, Pose
 from lineament.simulation import SENSORS, Sensor, scene, truth
 
+from ..evaluation.counts import Summable
 from ..evaluation.scores import evaluate
-from .findings import Progress, Setting, each
+from .findings import Progress, Setting, each, median_of
 
+S = TypeVar("S", bound=Summable)
 Extract = Callable[[LaserScan], Features]
 Pair = tuple[LaserScan, LaserScan]
 
@@ -95,6 +98,28 @@ def scored(
     }
 
 
+def median_scan(
+    scores: Mapping[str, Sequence[S]],
+    figure: Callable[[S], float],
+    among: Sequence[int] | None = None,
+) -> int:
+    """Return the scan, of all or `among` some, with the median figure of all methods together."""
+    of_scans = [figure(one[0].total(one)) for one in zip(*scores.values(), strict=True)]
+    return median_of(range(len(of_scans)) if among is None else among, of_scans.__getitem__)
+
+
+def filtered(scan: LaserScan, times: int = 1) -> LaserScan:
+    """Return a scan whose ranges are filtered so many times, as the paper does."""
+    for _ in range(times):
+        scan = LaserScan(
+            bilateral_filter(scan),
+            *(scan.angle_min, scan.angle_increment),
+            range_min=scan.range_min,
+            range_max=scan.range_max,
+        )
+    return scan
+
+
 def batch_of(extractor: Extractor, scans: Iterable[LaserScan]) -> list[Features]:
     """Extract scans of one sensor with evenly spaced beams, all at once."""
     rows = list(scans)
@@ -153,12 +178,11 @@ def _batch(extractor: Extractor, ranges: Array, like: LaserScan) -> FeatureBatch
 def recorded_scans(setting: Setting, count: int) -> Iterator[tuple[str, list[LaserScan]]]:
     """Read so many scans of each recording that exists, from equal parts of it."""
     for name, path in setting.recordings(LOGS).items():
-        yield name, spread_scans(path, count)
+        yield name, spread_scans(open_log(path, keep_going=True), count)
 
 
-def spread_scans(path: str | Path, count: int) -> list[LaserScan]:
+def spread_scans(log: Log, count: int) -> list[LaserScan]:
     """Read so many scans of a log, from equal parts of it."""
-    log = open_log(path, keep_going=True)
     step = max(len(log) // count, 1)
     return list(islice(log, step // 2, None, step))[:count]
 

@@ -11,11 +11,12 @@ from lineament.output.figures import scan_figure
 from lineament.scan import LaserScan
 
 from ..evaluation.scores import Scores
-from ..evaluation.similarity import SimilarityScores, similarity_scores
+from ..evaluation.similarity import similarity_scores
 from .contenders import IEPF, LIU, PAPER, PDBS_LINES, by_letter, fitted_methods, is_drawn
-from .experiment import Claim, Experiment, Margins, Measured, Report, better, prose
-from .findings import Figure, Progress, Setting, Table, median_of
-from .scans import INDOORS, frames_of, recorded_scans, scored
+from .experiment import Claim, Experiment, Margins, Measured, Report, better
+from .findings import Figure, Progress, Setting, Table
+from .prose import prose
+from .scans import INDOORS, frames_of, median_scan, recorded_scans, scored
 from .similarity import COUNTS, SIMILARITY_NOTE, counts_of
 
 TRUE = "true features"
@@ -46,11 +47,9 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         totals = {name: Scores.total(of) for name, of in scores.items()}
         everything = {name: everything[name] + total for name, total in totals.items()}
         numbers[kind] = {name: _numbers(total) for name, total in totals.items()}
-        of_frames = [Scores.total(of) for of in zip(*scores.values(), strict=True)]
         corners = [len(frame.truth.corners) for frame in frames]
         full = [k for k, count in enumerate(corners) if count >= np.median(corners)]
-        f1 = [scores.segments.counts.f1 for scores in of_frames]
-        frame = frames[median_of(full, f1.__getitem__)]
+        frame = frames[median_scan(scores, lambda of: of.segments.counts.f1, full)]
         about = (
             f"Simulated {kind}: of {len(full)} of {len(frames)} scans, those with most corners, "
             "the one with the median F1 of the segments of all methods together"
@@ -59,11 +58,11 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         drawn.append((f"fig11-{kind}", about, frame.scan, {TRUE: frame.truth} | found))
     for name, scans in recorded_scans(setting, CHOICE):
         progress(f"{name}: all methods")
-        errors = [
-            SimilarityScores.total(similarity_scores(scan, e(scan)) for e in methods.values()).mean
-            for scan in scans
-        ]
-        scan = scans[median_of(range(len(scans)), errors.__getitem__)]
+        errors = {
+            method: [similarity_scores(scan, extract(scan)) for scan in scans]
+            for method, extract in methods.items()
+        }
+        scan = scans[median_scan(errors, lambda of: of.mean)]
         found = {method: extract(scan) for method, extract in methods.items()}
         numbers[name] = {m: counts_of(scan, of) for m, of in found.items()}
         about = (

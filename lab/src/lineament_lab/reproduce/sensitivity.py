@@ -11,19 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lineament.extractor import Extractor
-from lineament.methods.stages import bilateral_filter
+from lineament.features import Features
 from lineament.scan import LaserScan
-from lineament.simulation import SCENES, SENSORS
+from lineament.simulation import SCENES
 
 from ..evaluation.counts import Counts
 from ..evaluation.kinds import corner_scores
 from ..evaluation.partition import PartitionScores, partition_scores
 from .contenders import IEPF
-from .experiment import Experiment, Measured, Report, prose
+from .experiment import Experiment, Measured, Report
 from .findings import Columns, Progress, Setting, Table
 from .grid import FORMS, GATE
-from .scans import Frame, batch_of, frames_of
-from .two_corners import POSES, WORLD, found_distances
+from .prose import prose
+from .scans import Frame, batch_of, filtered, frames_of
+from .two_corners import POSES, found_distances, views
 
 #: Changes of `liu:paper` by parameter and value. PASSES is how often the ranges are filtered.
 PASSES = "passes"
@@ -70,13 +71,16 @@ SCANS_A_FRAME, VIEWS_A_FRAME = 6, 4
 
 
 class _Data(NamedTuple):
+    """Frames of mixed scenes, and scans from each of the five places."""
+
     frames: list[Frame]
     views: list[list[LaserScan]]
 
 
 def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure the claims of the paper for all values of what it leaves open."""
-    data = _data(setting)
+    frames = frames_of(setting, SCENES, SCANS_A_FRAME)
+    data = _Data(frames, views(setting.seed, 14, VIEWS_A_FRAME * setting.frames))
     alone: dict[str, dict[str, dict[str, float]]] = {}
     for name, values in OPEN.items():
         progress(name)
@@ -146,27 +150,22 @@ def report(n: Any, _: Setting) -> Report:
     )
 
 
-def _data(setting: Setting) -> _Data:
-    """Simulate mixed scenes, and the two corners from five places."""
-    sensor, views = SENSORS["paper"], []
-    for k, pose in enumerate(POSES):
-        rng = np.random.default_rng([setting.seed, k, 14])
-        count = VIEWS_A_FRAME * setting.frames
-        views.append([sensor.scan(WORLD, pose, rng) for _ in range(count)])
-    return _Data(frames_of(setting, SCENES, SCANS_A_FRAME), views)
-
-
 def _measured(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str, float]:
     """Measure a method by the names in `SHOWN` [%]."""
     own = {name: value for name, value in changes.items() if name != PASSES}
     extractor, passes = Extractor(method, **own), int(changes.get(PASSES, 1))
     truths = [frame.truth for frame in data.frames]
-    found = batch_of(extractor, _filtered((frame.scan for frame in data.frames), passes - 1))
+
+    def found_in(scans: Iterable[LaserScan]) -> list[Features]:
+        """Filter scans, which the method does once more, and extract."""
+        return batch_of(extractor, (filtered(scan, passes - 1) for scan in scans))
+
+    found = found_in(frame.scan for frame in data.frames)
     pairs = list(zip(found, truths, strict=True))
     clusters = PartitionScores.total(partition_scores(*pair) for pair in pairs)
     corners = Counts.total(corner_scores(*pair).by_gate[GATE] for pair in pairs)
     both = sum(
-        len(found_distances(batch_of(extractor, _filtered(scans, passes - 1)), pose))
+        len(found_distances(found_in(scans), pose))
         for scans, pose in zip(data.views, POSES, strict=True)
     )
     shares = {
@@ -176,23 +175,6 @@ def _measured(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str,
         "both": both / sum(map(len, data.views)),
     }
     return {name: 100 * share for name, share in shares.items()}
-
-
-def _filtered(scans: Iterable[LaserScan], times: int) -> list[LaserScan]:
-    """Filter the ranges of scans so many times; the method does it once more."""
-    filtered = list(scans)
-    for _ in range(times):
-        filtered = [
-            LaserScan(
-                bilateral_filter(scan),
-                scan.angle_min,
-                scan.angle_increment,
-                range_min=scan.range_min,
-                range_max=scan.range_max,
-            )
-            for scan in filtered
-        ]
-    return filtered
 
 
 def _bands(

@@ -8,15 +8,15 @@ import numpy as np
 from lineament.extractor import Extractor
 from lineament.features import Features
 from lineament.methods import DEFAULT_METHOD
-from lineament.methods.stages import bilateral_filter
 from lineament.output import canvas, drawing
 from lineament.scan import LaserScan
 
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
 from .contenders import IEPF, LIU, PAPER, PDBS_LINES, Extract, by_letter, fitted_methods
-from .experiment import Claim, Experiment, Margins, Measured, Report, prose
-from .findings import Columns, Figure, Numbers, Progress, Setting, Table, median_of
-from .scans import INDOORS, frames_of, recorded_scans
+from .experiment import Claim, Experiment, Margins, Measured, Report
+from .findings import Columns, Figure, Numbers, Progress, Setting, Table
+from .prose import prose
+from .scans import INDOORS, filtered, frames_of, median_scan, recorded_scans
 
 #: How many measurements a method explains, and how far they are from its lines and arcs.
 SIMILARITY = {
@@ -74,12 +74,12 @@ def measure(setting: Setting, progress: Progress) -> Measured:
             name: [similarity_scores(scan, extract(scan)) for scan in some]
             for name, extract in methods.items()
         }
-        parts[FILTERED] = list(map(_of_filtered_points, some))
+        literal = Extractor(PAPER)
+        parts[FILTERED] = [similarity_scores(filtered(scan), literal(scan)) for scan in some]
         if where == SIMULATED:
             parts = {TRUE: [similarity_scores(f.scan, f.truth) for f in frames]} | parts
         numbers[where] = {name: _numbers(SimilarityScores.total(of)) for name, of in parts.items()}
-        errors = [score.maximum for score in parts[PAPER]]
-        drawn[where] = some[median_of(range(len(some)), errors.__getitem__)]
+        drawn[where] = some[median_scan({PAPER: parts[PAPER]}, lambda of: of.maximum)]
     return Measured(
         numbers, lambda: [_figure(where, scan, methods) for where, scan in drawn.items()]
     )
@@ -111,12 +111,6 @@ def report(n: Numbers, _: Setting) -> Report:
     return text, tables
 
 
-def _of_filtered_points(scan: LaserScan) -> SimilarityScores:
-    """Errors of the filtered points from the lines that the literal pipeline fits to them."""
-    filtered = LaserScan(bilateral_filter(scan), angles=scan.angles)
-    return similarity_scores(filtered, Extractor(PAPER)(scan))
-
-
 def error_strips(scan: LaserScan, found: Mapping[str, Features]) -> Any:
     """Draw the similarity error of each beam, a strip for each method."""
     figure, panels = canvas.new_panels(len(found), 1, height=0.25, sharex=True)
@@ -135,13 +129,8 @@ def error_strips(scan: LaserScan, found: Mapping[str, Features]) -> Any:
 def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:
     figure = error_strips(scan, {name: methods[name](scan) for name in SHOWN})
     least = f"{1e3 * drawing.LEAST_ERROR:g} mm"
-    caption = (
-        f"Similarity error of each explained measurement of a scan, {where}: that whose largest "
-        f"error with {PAPER} is the median. Dashed: the 0.01 m of the paper. All axes are the "
-        f"same and logarithmic; errors below {least} are drawn at {least}."
-    )
     name = "-".join(["fig12", *where.lower().replace(",", "").split()[:2]])
-    return Figure(name, caption, canvas.figure_bytes(figure))
+    return Figure.of(name, figure, "fig12", where=where, least=least)
 
 
 def _judged(n: Any, method: str) -> tuple[str, Margins]:

@@ -11,8 +11,9 @@ from lineament.simulation import SCENES
 from ..evaluation.scores import Scores
 from ..methods.controls import BlindCut
 from .contenders import BLIND, FIGURE_9, IEPF, LIU, PAPER, by_letter, liu_methods
-from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better, prose
+from .experiment import Claim, Experiment, Judged, Margins, Measured, Report, better
 from .findings import Progress, Setting, Table
+from .prose import prose
 from .scans import frames_of, interleaved_times, scored, time_ratio
 from .seeds import by_seed
 

@@ -19,8 +19,9 @@ from ..evaluation.counts import ratio
 from ..evaluation.icp import icp
 from ..evaluation.relations import read_relations
 from ..evaluation.tracking import chained, motion_errors, track_scores
-from .experiment import NO_RECORDINGS, Experiment, Measured, Report, prose
+from .experiment import Experiment, Measured, MissingError, Report
 from .findings import Columns, Figure, Numbers, Progress, Setting, Table, cells, dot_chart
+from .prose import prose
 
 #: The recordings, and the share that is left out at the beginning: the first half of fr079 is
 #: where the tracker's roughness was chosen.
@@ -84,7 +85,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     paths = setting.recordings({name: file for name, (file, _) in LOGS.items()})
     verified = setting.recordings(RELATIONS)
     if not paths:
-        raise NO_RECORDINGS
+        raise MissingError("no recordings")
     found = {}
     for log, path in paths.items():
         progress(f"{log}: reading")

@@ -16,8 +16,9 @@ from lineament.simulation import SENSORS, World, truth
 
 from ..evaluation.counts import rms
 from .contenders import PAPER, by_letter, feature_methods
-from .experiment import Claim, Experiment, Margins, Measured, Report, prose
+from .experiment import Claim, Experiment, Margins, Measured, Report
 from .findings import Columns, Figure, Progress, Setting, Table, each, median_of
+from .prose import prose
 from .scans import batch_of
 
 #: Distance between the corners: the mean that the paper measured, here the truth [m].
@@ -65,12 +66,8 @@ _BY_PLACE = (
 
 def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure the distance between two corners from five places, many times."""
-    scans = []
-    for k, pose in enumerate(POSES):
-        progress(f"simulating place {k + 1}")
-        rng = np.random.default_rng([setting.seed, k, 13])
-        count = SCANS_A_FRAME * setting.frames
-        scans.append([SENSORS["paper"].scan(WORLD, pose, rng) for _ in range(count)])
+    progress("simulating")
+    scans = views(setting.seed, 13, SCANS_A_FRAME * setting.frames)
     methods = feature_methods(setting.methods)
     bounds = np.array([distance_bound(pose) for pose in POSES])
     places, overall = {}, {}
@@ -112,6 +109,13 @@ def report(n: Any, setting: Setting) -> Report:
         note = "The paper’s values of single places are lost."
         tables.append(Table.of_numbers(f"{title}, by place", of_places, columns, note))
     return text, tables
+
+
+def views(seed: int, experiment: int, count: int) -> list[list[LaserScan]]:
+    """Simulate so many scans from each of the five places, with noise of the experiment's own."""
+    rngs = (np.random.default_rng([seed, k, experiment]) for k in range(len(POSES)))
+    places = zip(POSES, rngs, strict=True)
+    return [[SENSORS["paper"].scan(WORLD, p, rng) for _ in range(count)] for p, rng in places]
 
 
 def distance_bound(pose: Pose) -> float:
@@ -193,13 +197,7 @@ def _figure(views: list[tuple[LaserScan, Features]]) -> Figure:
         turn = np.array([[c, -s], [s, c]])
         draw_place(axes, k, scan, features, *((vertex - (x, y)) @ turn for vertex in (A, B)))
     canvas.add_legend(figure)
-    return Figure(
-        "fig13",
-        "The convex corner A and the concave corner B from five places: the room, and what liu "
-        "finds by the letter of the paper in the scan from each whose distance has the "
-        "median error, not found being the largest.",
-        canvas.figure_bytes(figure),
-    )
+    return Figure.of("fig13", figure)
 
 
 def draw_place(axes: Axes, k: int, scan: LaserScan, features: Features, a: Array, b: Array) -> None:
