@@ -22,6 +22,7 @@ from locating import RIGHT, places, storey
 import lineament as ln
 from lineament.mapping import LineMap, locate
 from lineament.mapping.grids import Grid
+from lineament.mapping.locate import AMBIGUOUS, LOCATED, LOST
 from lineament.simulation import SENSORS, World
 
 #: A wall is there within [m]; points of walls are looked at each so much [m].
@@ -111,7 +112,7 @@ def walls(storeys: int, seed: int) -> None:
 
 def located(storeys: int, seed: int, most: int, sigmas: list[float]) -> None:
     """Print how often places are found on the drawings of storeys, and on their grids."""
-    rows: dict[str, list[tuple[int, bool, bool]]] = {}
+    rows: dict[str, list[tuple[int, str, bool, float]]] = {}
     for k in range(seed, seed + storeys):
         building, other, angle = (
             storey(k),
@@ -140,16 +141,17 @@ def located(storeys: int, seed: int, most: int, sigmas: list[float]) -> None:
                     turn = abs(math.remainder(off[2], 2 * math.pi))
                     right = number < 2 and math.hypot(*off[:2]) < RIGHT[0] and turn < RIGHT[1]
                     rows.setdefault(name, []).append(
-                        (number, bool(where), right, math.hypot(*off[:2]))
+                        (number, where.verdict, right, math.hypot(*off[:2]))
                     )
     print(f"{storeys} storeys from seed {seed} on, {most} places each at most")
     for name, judged in rows.items():
-        number, is_located, right, off = np.array(judged).T
-        own, hit = number == 0, (is_located * right) > 0
+        number, verdict, right, off = map(np.array, zip(*judged, strict=True))
+        own, hit = number == 0, (verdict == LOCATED) & right
+        of_own = " | ".join(str((verdict[own] == kind).sum()) for kind in (AMBIGUOUS, LOST))
         print(
-            f"| {name} | {own.sum()} | {100 * hit[own].mean():.1f} % | "
+            f"| {name} | {own.sum()} | {100 * hit[own].mean():.1f} % | {of_own} | "
             f"{100 * hit[number == 1].mean():.1f} % | {len(number)} | "
-            f"{int((is_located > hit).sum())} | {1000 * np.median(off[own & hit]):.1f} mm |"
+            f"{((verdict == LOCATED) & ~hit).sum()} | {1000 * np.median(off[own & hit]):.1f} mm |"
         )
 
 
