@@ -11,6 +11,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -21,10 +22,12 @@ from ruamel.yaml import YAML
 
 import lineament as ln
 from lineament.live import LiveConfig, RosSink
-from lineament.live.received import RELOCATE
+from lineament.live.received import LINKS, MOUNTINGS, RELOCATE
 from lineament.output.markers import markers_of
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment, layers_of
+from lineament.rosmsg.poses import StampedPose
+from lineament.simulation import SENSORS, Wheels, office
 
 ROS = Path(__file__).parents[1] / "ros"
 SCAN = ln.LaserScan([2.0, 2.0, 2.0], -0.01, 0.01, stamp=5.5, frame_id="laser")
@@ -416,3 +419,21 @@ def test_what_is_wrong_is_one_line(package, monkeypatch, capsys):
     assert package.node.main() == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("lineament: method 'nonsense' is unknown")
+
+
+def test_a_map_is_written_when_the_node_is_cleaned_up(package, tmp_path):
+    node = package.node.Scanner()
+    path = tmp_path / "made.svg"
+    assert changed(node, mapping=str(path)) == ""
+    assert node.trigger_configure() == DONE.SUCCESS
+    storey = office(1, (30, 20))
+    scans, _ = storey.drive(SENSORS["lms181"], seed=1, speed=0.7, rate=2.0, wheels=Wheels())
+    for scan in islice(scans, 12):
+        node._pipeline.hear([StampedPose(scan.stamp, "odom", "base_link", scan.pose)], LINKS)
+        mounted = StampedPose(0.0, "base_link", "laser", (0.0, 0.0, 0.0))
+        node._pipeline.hear([mounted], MOUNTINGS)
+        node._pipeline("scanner", scan.with_pose(None))
+    node.on_cleanup(None)
+    (line,) = node.get_logger().info.call_args.args
+    assert line.startswith(f"{path}: LineMap(")
+    assert path.read_text().startswith("<svg")

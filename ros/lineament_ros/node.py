@@ -100,6 +100,7 @@ class Scanner(LifecycleNode):
                 else:
                     executor.spin_once(timeout_sec=0.1)
         finally:
+            self._finish()
             executor.shutdown()
 
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
@@ -126,13 +127,14 @@ class Scanner(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: Any) -> TransitionCallbackReturn:
-        """Forget all that was seen."""
-        self._config = self._pipeline = None
+        """Write the map that was made, if any, and forget all that was seen."""
+        self._finish()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: Any) -> TransitionCallbackReturn:
         """End listening for good."""
         self._is_active = False
+        self._finish()
         return super().on_shutdown(state)
 
     def on_set(self, changed: Iterable[Any]) -> SetParametersResult:
@@ -153,6 +155,20 @@ class Scanner(LifecycleNode):
         others = (*OF_ROS, AUTOSTART)
         own = {name: v for name, v in given.items() if name.partition(".")[0] not in others}
         return config_of(own, name=self.get_name())
+
+    def _finish(self) -> None:
+        """Write the map that was made, if any, and end what runs beside the pipeline."""
+        pipeline, self._pipeline, self._config = self._pipeline, None, None
+        if pipeline is None:
+            return
+        with closing(pipeline):
+            try:
+                line = pipeline.save()
+            except LineamentError as error:
+                self.get_logger().error(str(error))
+                return
+        if line:
+            self.get_logger().info(line)
 
     def _work(self, executor: SingleThreadedExecutor, is_stopped: Callable[[], bool]) -> None:
         """Find features until it is stopped."""

@@ -80,6 +80,12 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
 )
 @click.option("--dock-track", type=click.IntRange(min=0), help="The same, by its track.")
 @click.option("--map", type=TEXT_PATH, metavar="PLAN", help="Publish the pose on this plan.")
+@click.option(
+    "--mapping",
+    type=TEXT_PATH,
+    metavar="MAP",
+    help="Make a map, and write it at the end: .dxf, .svg, .parquet or .yaml.",
+)
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
 @click.option("--units", type=UNITS, help="Units of the plan.  [default: those that it names]")
 @click.option(

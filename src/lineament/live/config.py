@@ -15,6 +15,8 @@ from ..scan.changes import Mask, checked_mask
 from ..scan.fields import checked_mounting
 from .checking import FRAMES, Names, Point, check
 
+#: Formats that a map is written in.
+MAPS = (".dxf", ".svg", ".parquet", ".yaml")
 #: Values of `LiveConfig.deskew` that are not topics.
 _NOT_TOPICS = ("off", "scans", "poses")
 
@@ -87,6 +89,10 @@ class LiveConfig:
     map : str, optional
         A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``. A name without an
         ending, ``/map``, is a topic of ``nav_msgs/OccupancyGrid``, unless a log is played.
+    mapping : str, optional
+        Where the map is written that is made of the scans, once it stops: ``.dxf``, ``.svg``,
+        ``.parquet`` or ``.yaml``. Meanwhile the sensor is followed on it as on a plan, and its
+        walls go to ``TOPIC/plan``.
     layers : str
         Layers of the plan that hold walls, by commas, as in `LineMap.read`.
     units : str, optional
@@ -163,6 +169,7 @@ class LiveConfig:
     dock_track: int | None = None
     dock_shape: str | None = None
     map: str | None = None
+    mapping: str | None = None
     layers: str = ""
     units: str | None = None
     odometry: str | None = None
@@ -202,6 +209,7 @@ class LiveConfig:
         checked_mounting(self.laser_pose)
         object.__setattr__(self, "mask", checked_mask(self.mask))
         self._check_together()
+        self._check_mapping()
         self._check_merged()
 
     def _check_together(self) -> None:
@@ -228,6 +236,18 @@ class LiveConfig:
             raise ValueError("two of map_frame, odom_frame and base_frame are one, expected three")
         if self.log is None and self.ros == 0:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
+
+    def _check_mapping(self) -> None:
+        """Check what goes with a map that is made."""
+        if self.mapping is None:
+            return
+        for name in ("map", "judge"):
+            if getattr(self, name) is not None:
+                raise ValueError(f"{name} and mapping are given, expected one of them")
+        if Path(self.mapping).suffix.lower() not in MAPS:
+            raise ValueError(
+                f"mapping is {self.mapping!r}, expected an ending of {', '.join(MAPS)}"
+            )
 
     def _check_merged(self) -> None:
         """Check what several scanners leave no room for."""
@@ -273,6 +293,11 @@ class LiveConfig:
         return None if self.odometry is None else self.resolved(self.odometry)
 
     @property
+    def has_map(self) -> bool:
+        """Whether the sensor is followed on a map: one that there is, or one that is made."""
+        return self.map is not None or self.mapping is not None
+
+    @property
     def map_topic(self) -> str | None:
         """Full name of the topic of the plan, where it is one."""
         is_topic = self.map is not None and self.log is None and not Path(self.map).suffix
@@ -286,7 +311,7 @@ class LiveConfig:
     @property
     def is_broadcasting(self) -> bool:
         """Whether the transform of the odometry is published."""
-        return self.broadcast and self.map is not None and self.judge is None
+        return self.broadcast and self.has_map and self.judge is None
 
     @property
     def is_localiser(self) -> bool:
@@ -294,7 +319,7 @@ class LiveConfig:
 
         A log that is played has poses in their place.
         """
-        return self.map is not None and self.log is None
+        return self.has_map and self.log is None
 
     def resolved(self, topic: str) -> str:
         """Return the full name of a topic; one that begins with ``/`` is full already, in ROS."""

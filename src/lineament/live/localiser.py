@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -54,6 +54,20 @@ class Placed(NamedTuple):
     base: Pose
     covariance: Array
     odom: Pose | None
+
+
+class Following(Protocol):
+    """What follows a scanner: a `Follower`, or what makes a map meanwhile."""
+
+    @property
+    def twist(self) -> Twist | None:
+        """Velocity of the sensor in the last scans; None if unknown."""
+
+    def __call__(self, features: Features, odometry: Pose | None, skew: Pose) -> Whereabouts:
+        """Take in the next scan."""
+
+    def suppose(self, pose: Pose, covariance: Array | None) -> None:
+        """Look for the sensor near a pose."""
 
 
 class Localiser:
@@ -126,7 +140,7 @@ class Localiser:
         Only the name of its frame, its time, its pose and the times of its beams are taken of it.
         Nothing is known before there is a plan.
         """
-        if self._plan is None:
+        if not self._is_ready:
             return None, None, None
         mounting, travelled = self._mounting(scan), self._travelled(scan)
         if mounting is not None and mounting.is_upside_down:
@@ -154,6 +168,22 @@ class Localiser:
         covariance = carried(where.covariance, where.pose, base)
         return where, Placed(base, covariance, odom), judgement
 
+    @property
+    def plan(self) -> LineMap | None:
+        """The plan, where it is one that grows: here it does not."""
+        return None
+
+    def save(self) -> str:
+        """Write what was made; return a line about it: here nothing."""
+        return ""
+
+    def close(self) -> None:
+        """End what runs beside it."""
+
+    @property
+    def _is_ready(self) -> bool:
+        return self._plan is not None
+
     def _take(self, grid: OccupancyGrid) -> None:
         """Take a map, unless it is the same again: who was followed is looked for where it was."""
         if frame_of(grid.frame) != self._map:
@@ -173,7 +203,7 @@ class Localiser:
             if where.is_known and frame in self._followers:
                 self._followers[frame].suppose(where.pose, where.covariance)
 
-    def _follower(self, frame: str) -> Follower:
+    def _follower(self, frame: str) -> Following:
         assert self._plan is not None
         if frame not in self._followers:
             if len(self._followers) >= _MOST_SCANNERS:
@@ -211,7 +241,7 @@ class Localiser:
         self._problems.pop(what, None)
         return found
 
-    def _suppose(self, follower: Follower, travelled: Pose | None, mounting: Pose) -> None:
+    def _suppose(self, follower: Following, travelled: Pose | None, mounting: Pose) -> None:
         """Let a scanner be looked for where the robot is said to be, and has gone since."""
         if (guess := self._guess) is None:
             return

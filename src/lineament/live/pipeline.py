@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..mapping import LineMap
     from ..mapping.following import Whereabouts
     from ..mapping.judging import Judgement
-    from .localiser import Placed
+    from .localiser import Localiser, Placed
 
 #: The last stamp that a message of ROS 2 holds [ns]; those of ROS 1 go on for longer.
 _LATEST = 2**31 * NANO - 1
@@ -75,6 +75,8 @@ class Frame(NamedTuple):
         Where the robot is on the plan; None without one, and where it is lost.
     judgement : Judgement or None
         Whether the pose of another localiser is right; None unless it is asked, and has one.
+    plan : LineMap or None
+        The map so far; None unless one is made.
     """
 
     scan: LaserScan
@@ -86,6 +88,7 @@ class Frame(NamedTuple):
     where: Whereabouts | None = None
     placed: Placed | None = None
     judgement: Judgement | None = None
+    plan: LineMap | None = None
 
 
 class Pipeline(InTurn):
@@ -116,8 +119,12 @@ class Pipeline(InTurn):
         self._config, self._limits = config, Limits.of(config.limits)
         self._publishers: dict[str, _Publisher] = {}
         self._publisher("")  # An unknown method is an error at once.
-        self._localiser = None
-        if config.map is not None:
+        self._localiser: Localiser | None = None
+        if config.mapping is not None:
+            from .mapping import LiveMapper
+
+            self._localiser = LiveMapper(config, self._extract)
+        elif config.map is not None:
             from .localiser import Localiser
 
             self._localiser = Localiser(config, plan_of(config), self._extract)
@@ -175,7 +182,17 @@ class Pipeline(InTurn):
         if self._localiser is None:
             return frame
         where, placed, judgement = self._localiser(features, scan, straight)
-        return frame._replace(where=where, placed=placed, judgement=judgement)
+        plan = self._localiser.plan
+        return frame._replace(where=where, placed=placed, judgement=judgement, plan=plan)
+
+    def save(self) -> str:
+        """Write the map that was made; return a line about it, empty if none was to be made."""
+        return "" if self._localiser is None else self._localiser.save()
+
+    def close(self) -> None:
+        """End what runs beside it."""
+        if self._localiser is not None:
+            self._localiser.close()
 
     def _as_configured(self, scan: LaserScan) -> LaserScan:
         """Return a scan with its times, in metres, without what sees the robot."""

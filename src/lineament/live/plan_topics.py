@@ -7,12 +7,13 @@ import time
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..output.ros_messages import RosMessages
-from ..output.scene import Message, Moment
+from ..output.scene import Layer, Message, Moment
 from ..scan.fields import NANO
 from .config import LiveConfig
 from .pipeline import Frame, stamp_of
 
 if TYPE_CHECKING:
+    from ..mapping import LineMap
     from ..mapping.evidence import Evidence
     from ..mapping.following import Whereabouts
     from ..mapping.judging import Judgement
@@ -45,6 +46,11 @@ class Status(NamedTuple):
         )
 
 
+def plan_layers(plan: LineMap) -> tuple[Layer, ...]:
+    """Return the walls of a plan as they are drawn."""
+    return (Layer("plan", (0.5, 0.5, 0.5, 1.0), 0.02, plan.ends),)
+
+
 class PlanTopics:
     """Publishes poses, the transform of the odometry and verdicts, and nothing that is not known.
 
@@ -55,7 +61,8 @@ class PlanTopics:
         Makes the messages.
     config : LiveConfig
         The pose of the scanner goes to ``TOPIC/pose``. That of the robot goes to ``amcl_pose``, and
-        the transform from `map_frame` to `odom_frame` to ``/tf``; or the verdict on each pose of
+        the transform from `map_frame` to `odom_frame` to ``/tf``, the walls of a map that is made
+        to ``TOPIC/plan``; or the verdict on each pose of
         the topic `judge` to ``JUDGE/verdict``, and where it is wrong ours to ``JUDGE/ours``.
     """
 
@@ -68,6 +75,9 @@ class PlanTopics:
             self._topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
         elif config.is_broadcasting:
             self._topics["/tf"] = "tf2_msgs/TFMessage"
+        self._walls = f"{config.scan_topic}/plan"
+        if config.mapping is not None:
+            self._topics[self._walls] = "visualization_msgs/MarkerArray"
         for topic, kind in self._topics.items():
             publisher.advertise(topic, messages.kind(kind))
         if judged is None:  # As of AMCL, whose listeners ask for the last one.
@@ -102,6 +112,10 @@ class PlanTopics:
             if is_stale:
                 status = status._replace(level=3, summary="no scans")
             self._publisher.publish(status.message(self._make, self._config, DIAGNOSTICS, time))
+        if self._frame.plan is not None and self._is_heard(self._walls):
+            on_map = Moment(*time, self._config.map_frame, self._config.map_frame)
+            walls = plan_layers(self._frame.plan)
+            self._publisher.publish(self._make.features(self._walls, on_map, walls))
 
     def _publish_judgement(self, frame: Frame, on_plan: Moment) -> None:
         """Publish the verdict on somebody else's pose, and where it is wrong ours, if known."""

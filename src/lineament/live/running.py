@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -57,14 +58,21 @@ def run_live(
             # Other nodes are discovered while the kernels are loaded.
             source, sinks = _ends(config, stack, write)
             pipeline = make_pipeline(config)
+            # Of the wall that the kernels are tried on there is to be no map.
+            trial = pipeline if config.mapping is None else Pipeline(replace(config, mapping=None))
             # The motion of tracks is estimated from the second scan on.
             with compiling():
-                for frame in (pipeline("", WALL), pipeline("", WALL)):
+                for frame in (trial("", WALL), trial("", WALL)):
                     feature_points(frame.features, frame.tracks)
+        stack.enter_context(closing(pipeline))
         is_stopped()  # From here on a signal ends a node that runs, and not a start.
         topics = ", ".join(config.rig.topics) if config.merge else config.scan_topic
         write(f"{config.name} finds features on {topics} by {config.method}")
-        return Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
+        report = Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
+        if config.mapping is not None:
+            write("stopped: the map is made of all scans")
+            write(pipeline.save())
+        return report
 
 
 def make_pipeline(config: LiveConfig) -> Pipeline:

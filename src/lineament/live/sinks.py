@@ -11,7 +11,7 @@ from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, lay
 from .config import LiveConfig
 from .counters import Report
 from .pipeline import Frame, plan_of, time_of
-from .plan_topics import DIAGNOSTICS, PlanTopics, Status
+from .plan_topics import DIAGNOSTICS, PlanTopics, Status, plan_layers
 from .publisher import Publisher
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class RosSink:
         self._publishes_scan = config.log is not None
         self._topic = topic = config.scan_topic
         self._docked = config.resolved("detected_dock_pose")
-        self._plan = None if config.map is None else PlanTopics(publisher, messages, config)
+        self._plan = PlanTopics(publisher, messages, config) if config.has_map else None
         topics = {
             f"{topic}/features": "sensor_msgs/PointCloud2",
             f"{topic}/corners": "geometry_msgs/PoseArray",
@@ -149,7 +149,8 @@ class FoxgloveSink:
         }
         self._plan: tuple[Layer, ...] = ()
         if (plan := plan_of(config)) is not None:
-            self._plan = (Layer("plan", (0.5, 0.5, 0.5, 1.0), 0.02, plan.ends),)
+            self._plan = plan_layers(plan)
+        if config.mapping is not None or self._plan:
             self._topics[f"{topic}/plan"] = "SceneUpdate"
         for name, kind in self._topics.items():
             publisher.advertise(name, kind)
@@ -161,6 +162,8 @@ class FoxgloveSink:
 
     def publish(self, frame: Frame) -> None:
         """Publish the deskewed scan and its features, if anybody listens to any of the topics."""
+        if frame.plan is not None:
+            self._plan = plan_layers(frame.plan)
         if not any(map(self._publisher.listeners, self._topics)):
             return
         scan, where = frame.straight, frame.where

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,8 @@ _WIDE, _TIGHT = 0.12, 0.04
 _APART = (0.15, 0.06)
 #: With less than this share of the beams explained, less contradicted, the way is lost.
 _LOST = 0.38
+#: Covariance of a motion of which nothing is known [m, m, rad].
+UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Covariance of a pose that beams found [m, m, rad].
 _NEAR = np.diag((0.05, 0.05, 0.02)) ** 2
 #: A plan of one wall where no beam ends [m], for where there are no walls.
@@ -92,6 +95,19 @@ class KeyFrame:
         return self.is_lost and not self.has_odometry
 
 
+class Step(NamedTuple):
+    """Where a scan was taken.
+
+    The pose is in the frame of the first scan; its covariance, on the axes of that frame, is that
+    beside the walls around. `evidence` has log odds and the shares of beams that are explained,
+    short and contradicted.
+    """
+
+    pose: Pose
+    covariance: Array
+    evidence: Array
+
+
 class Drive(InTurn):
     """Places the scans of a log, one after the other, by the walls of the last metres.
 
@@ -112,14 +128,16 @@ class Drive(InTurn):
         self._step: Pose = (0.0, 0.0, 0.0)
         #: Covariance of the motion since the last key frame, without what walls say.
         self._spread = np.zeros((3, 3))
+        #: What the last beams say.
+        self._evidence = np.array((0.0, 1.0, 0.0, 0.0))
         #: Odometry at the last key frame.
         self._from: Pose | None = None
         #: Time from scan to scan, on average: stamps of logs come in bunches, or are all the same.
         self._pace = 1.0
 
     @in_turn
-    def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> None:
-        """Add the next scan."""
+    def add(self, scan: LaserScan, features: Features, odometry: Pose | None = None) -> Step:
+        """Add the next scan; return where it was taken."""
         motion, is_key, is_lost = Motion(0.0, 0.0, 0.0, np.zeros((3, 3))), True, False
         has_odometry = odometry is not None and self._last[1] is not None
         if self.frames:
@@ -141,6 +159,10 @@ class Drive(InTurn):
         pose = (0.0, 0.0, 0.0) if is_key else motion.pose
         self.scans.append((len(self.frames) - 1, pose))
         self._last = scan.stamp, odometry, pose
+        here = compose(self.frames[-1].pose, pose)
+        unsure = UNKNOWN if is_lost and not has_odometry else motion.covariance
+        # The axes of the motion are those of the key frame before it.
+        return Step(here, turned(unsure, here[2] - motion.theta), self._evidence)
 
     def _go_on(self, stamp: float, pose: Pose) -> None:
         duration = stamp - self._last[0]
@@ -209,6 +231,7 @@ class Drive(InTurn):
     def _explained(self, motion: Motion, beams: Array, less: float) -> float:
         """Return the share of the beams that are explained, less those that pass through walls."""
         found = evidence_of(np.array([motion.pose]), beams, self._index, _TIGHT)[0]
+        self._evidence = found
         return float(found[1] - less * found[3])
 
     def _tried(self, features: Features, prior: Pose, way: float, turn: float) -> Array:
@@ -279,6 +302,13 @@ class Drive(InTurn):
         )
         walls = as_walls(segments)
         self._index = (LineMap(walls) if len(walls) else _NOWHERE).index
+
+
+def turned(covariance: Array, angle: float) -> Array:
+    """Return the covariance of a pose on other axes, turned back by so much [rad]."""
+    turn = np.eye(3)
+    turn[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    return np.asarray(turn @ covariance @ turn.T)
 
 
 def _likely_turns(around: Features, features: Features, expected: float, spread: float) -> Array:

@@ -79,6 +79,18 @@ class Whereabouts:
         return self.verdict == LOCATED
 
 
+def unsure(covariance: Array) -> float:
+    """Return the largest deviation of the place of a pose [m]."""
+    return math.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[1])
+
+
+def verdict_of(covariance: Array) -> str:
+    """Return the verdict on a pose that was located, as well as it is known now."""
+    if unsure(covariance) > WORST or covariance[2, 2] > WORST_TURN**2:
+        return LOST
+    return UNOBSERVED if unsure(covariance) > UNSURE else LOCATED
+
+
 class Follower(InTurn):
     """Follows a sensor on a plan from scan to scan, without a first guess.
 
@@ -205,18 +217,12 @@ class Follower(InTurn):
         self._since += way
         self._turned += turn
         if self._verdict in (LOCATED, UNOBSERVED):
-            self._verdict = self._by_covariance()
+            self._verdict = verdict_of(self._covariance)
 
     @property
     def _unsure(self) -> float:
         """Largest deviation of the place [m]."""
-        return math.sqrt(np.linalg.eigvalsh(self._covariance[:2, :2])[1])
-
-    def _by_covariance(self) -> str:
-        """Return the verdict on a pose that was located, as it is known now."""
-        if self._unsure > WORST or self._covariance[2, 2] > WORST_TURN**2:
-            return LOST
-        return UNOBSERVED if self._unsure > UNSURE else LOCATED
+        return unsure(self._covariance)
 
     def _judge(self, features: Features) -> Evidence:
         """Return what the beams of a scan alone say of the pose."""
@@ -253,7 +259,7 @@ class Follower(InTurn):
         if found.verdict in (LOCATED, UNOBSERVED):
             known, other = (self._pose, self._covariance), (found.pose, found.covariance + blurred)
             self._pose, self._covariance = combined(known, other)
-            self._verdict = self._by_covariance()
+            self._verdict = verdict_of(self._covariance)
         return found
 
 

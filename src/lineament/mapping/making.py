@@ -1,8 +1,10 @@
 """`make_map`: a drive to a map, with its loops closed and its walls adjusted."""
 
 import math
+import os
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import compress, pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -12,12 +14,13 @@ from ..scan.poses import compose, inverse
 from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, moved, unit, wrapped
 from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
 from .adjust import Adjusted, edges_of, optimise
-from .drive_map import KeyFrame
+from .drive_map import UNKNOWN, KeyFrame
+from .grids import GRID_ENDINGS
 from .index import MAPPED
 from .line_map import LineMap
 from .locate import locate
 from .loops import Survey
-from .parts import UNKNOWN, Parts, apart, beside, boxes_of, parts_of
+from .parts import Parts, apart, beside, boxes_of, parts_of
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -72,6 +75,14 @@ class DriveMap:
     loops: Records
     refused: Records
     adjusted: Adjusted
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the walls, or for ``.yaml`` a grid, in which free is what sure beams pass."""
+        if Path(path).suffix.lower() not in GRID_ENDINGS:
+            self.map.write(path)
+            return
+        sure = compress(self.survey.frames, self.parts.is_sure)
+        self.map.to_grid(seen=[(of.scan, self.poses[of.index]) for of in sure]).write(path)
 
     @property
     def ways(self) -> list[float]:
@@ -137,7 +148,7 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     found = optimise(found.poses, chain, sights, _count(sights), held=parts.roots, rounds=2)
     survey = Survey(frames, found.poses, sights, found.with_poses(sights))
     walls = walls_by_part(survey, parts)
-    frame_of = np.array([k for k, _ in scans])
+    frame_of = np.array([k for k, _ in scans], np.int64)
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     of_walls = np.repeat(np.arange(parts.count), [len(of) for of in walls])
     plan = LineMap(np.concatenate(walls), sigma=MAPPED)

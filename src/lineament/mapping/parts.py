@@ -11,14 +11,13 @@ from ..scan import Array
 from ..walls import Numbers, Records, unit
 from ..walls.sights import placed
 from .adjust import Adjusted, edges_of, errors_of_motions
+from .drive_map import UNKNOWN
 from .following import UNSURE, WORST, WORST_TURN
 
 #: A part is of so much way; less is not sure of itself [m].
 _LEAST = 5.0
 #: Parts are drawn so far from each other [m].
 _BESIDE = 6.0
-#: Covariance of a motion of which nothing is known [m, m, rad].
-UNKNOWN = np.diag((10.0, 10.0, 1.0)) ** 2
 #: Pairs of poses whose covariances are found at a time.
 _BATCH = 100
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from importlib import import_module
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -142,8 +141,7 @@ def map_log(
     (60, True)
     """
     extractor = Extractor() if extractor is None else extractor
-    is_grid = Path(output).suffix.lower() in GRID_ENDINGS
-    if not is_grid:
+    if Path(output).suffix.lower() not in GRID_ENDINGS:
         open_writer(output)
     with needed_by("map"):  # now, not when the drive is followed
         import_module("scipy")
@@ -169,13 +167,7 @@ def map_log(
     stamps = [scan.stamp for scan in scans]
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
     with placed:  # All files, or none.
-        if is_grid:
-            # Free is what sure beams passed through.
-            sure = compress(drive.frames, made.parts.is_sure)
-            seen = [(frame.scan, made.poses[frame.index]) for frame in sure]
-            made.map.to_grid(seen=seen).write(output)
-        else:
-            made.map.write(output)
+        made.write(output)
         if picture is not None:
             rings = made.map.columns["center"], made.map.columns["radius"]
             plot_walls(made.map.ends, *rings, picture, title=Path(log.name).name, ways=made.way)
