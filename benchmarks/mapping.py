@@ -12,7 +12,7 @@ import math
 import os
 import sys
 import time
-from itertools import pairwise
+from itertools import islice, pairwise, permutations
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -229,6 +229,30 @@ def storeys(first, count, rate):
     print_truth(*(np.concatenate(of) for of in zip(*parts, strict=True)))
 
 
+def floors(seeds):
+    """Print how often two floors in one log are parts of their own, without odometry and with.
+
+    Odometry stands still in the lift.
+    """
+    drives = {}
+    for seed in seeds:
+        storey = office(seed, (24.0, 16.0), visits=0.1)
+        scans, _ = storey.drive(SENSORS["utm30lx"], seed=1, rate=2, people=2, wheels=Wheels())
+        drives[seed] = list(islice(scans, 80))
+    pairs = list(permutations(drives.values(), 2))
+    for odometry in (False, True):
+        apart = 0
+        for below, above in pairs:
+            lift = compose(below[-1].pose, inverse(above[0].pose))
+            both = [*below, *(scan.with_pose(compose(lift, scan.pose)) for scan in above)]
+            found = drive(both, odometry)
+            made = make_map(found.frames, found.scans)
+            of = made.parts.numbers[made.frame_of].tolist()
+            apart += not set(of[: len(below)]) & set(of[len(below) :])
+        about = "with odometry" if odometry else "without"
+        print(f"{len(pairs)} pairs of floors {about}: {apart} in parts of their own", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--storey", type=int, help="seed of a simulated storey of 60 m x 40 m")
@@ -237,7 +261,11 @@ def main() -> None:
     parser.add_argument("--log", choices=LOGS, help="this log alone")
     parser.add_argument("--odometry", action="store_true", help="the poses of the log are it")
     parser.add_argument("--pictures", type=Path, help="folder for maps beside what they are of")
+    parser.add_argument("--floors", type=int, nargs="+", help="seeds of floors, each two one log")
     chosen = parser.parse_args()
+    if chosen.floors:
+        floors(chosen.floors)
+        return
     if chosen.storeys is not None:
         storeys(chosen.storey or 1, chosen.storeys, chosen.rate)
         return
