@@ -16,7 +16,9 @@ SETTINGS = {
                   "REMEMBERED": 30, "_SLOWEST": 3.0, "_ROUNDS": 4, "_SURE": 0.75, "_SURER": 0.97,
                   "_NARROW": 0.1, "_BEAMS": 120, "_SIFTED": ((12, 100), (40, 32)), "_WIDE": 0.12,
                   "_TIGHT": 0.04, "_APART": (0.15, 0.06), "_LOST": 0.38,
-                  "_NEAR": np.diag((0.05, 0.05, 0.02)) ** 2},
+                  "_NEAR": np.diag((0.05, 0.05, 0.02)) ** 2,
+                  "UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_CONTRADICTED": 5.0},
+    "parts": {"_LEAST": 5.0},
     "evidence": {"RIGHT_ON_MAP": (0.76, 0.13, 0.11), "WRONG_ON_MAP": (0.10, 0.42, 0.48),
                  "OF_MAPS": ((0.73, 0.15, 0.12), (0.33, 0.34, 0.33)), "DENSITY": 0.3},
     "following": {"DENIED": 0.12, "DENIED_ON_MAP": 0.3, "SEEN": 1.0, "_TIGHT": 0.03},
@@ -30,7 +32,6 @@ SETTINGS = {
     "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "_TWICE": 25.0,
                "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_SPREADS": ((0.8, 0.12), (0.3, 0.06)),
                "_APART": 0.015, "_PLACES": 3.0, "_AGREE": (0.5, 0.05), "_VIEWS": 3},
-    "parts": {"UNKNOWN": np.diag((10.0, 10.0, 1.0)) ** 2, "_LEAST": 5.0},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
     "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
 }  # fmt: skip

@@ -24,7 +24,8 @@ class LiveMapper(Localiser):
     def __init__(self, config: LiveConfig, extract: Callable[[LaserScan], Features]) -> None:
         super().__init__(config, None, extract)
         assert config.mapping is not None
-        check_outputs(all_files(config.mapping), [])
+        read = [path for path in (config.log, config.dock_shape) if path is not None]
+        check_outputs(all_files(config.mapping), read)
         self._following: _Following | None = None
 
     @property

@@ -33,11 +33,14 @@ _PERIOD, _PATIENCE = 1.0, 2.0
 
 
 class Draft(NamedTuple):
-    """The map of the first key frames; where it has the last of these, and in which part."""
+    """The map of the first key frames; where it has the last of these, and whether that is sure.
+
+    It is if it hangs together with the first.
+    """
 
     frames: int
     pose: Pose
-    part: int
+    is_sure: bool
     map: LineMap
 
 
@@ -87,8 +90,10 @@ class Mapper:
 
     def _is_joined(self) -> bool:
         """Whether it is known how the last key frame lies to the first."""
-        known, part = (0, 0) if self.draft is None else (self.draft.frames, self.draft.part)
-        return part == 0 and not any(
+        known, is_sure = 0, True
+        if self.draft is not None:
+            known, is_sure = self.draft.frames, self.draft.is_sure
+        return is_sure and not any(
             frame.is_torn or verdict_of(frame.motion.covariance) == LOST
             for frame in self.drive.frames[known:]
         )
@@ -136,5 +141,5 @@ def _make(frames: Queue[KeyFrame | None], drafts: Connection) -> None:
             made = len(known)
             with suppress(NothingFoundError):
                 done = make_map(known, [])
-                part = int(done.parts.numbers[-1])
-                drafts.send(Draft(made, done.survey.pose(made - 1), part, done.map))
+                is_sure = bool(done.parts.is_sure[-1] and done.parts.numbers[-1] == 0)
+                drafts.send(Draft(made, done.survey.pose(made - 1), is_sure, done.map))
