@@ -24,9 +24,10 @@ from lineament.live import (
     ReplaySource,
     RosSink,
 )
-from lineament.live.pipeline import time_of, twist_of_laser
+from lineament.live.pipeline import time_of
 from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, received_scan
+from lineament.live.twists import twist_of_laser
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
 from lineament.scan.poses import compose, poses_along, twist_between
@@ -509,7 +510,7 @@ def test_odometry_knows_how_long_a_sweep_took_that_is_not_deskewed(deskew, scan_
 def test_the_dock_is_looked_for_where_the_odometry_is(monkeypatch):
     poses = []
     monkeypatch.setattr(
-        "lineament.live.pipeline.Dock", lambda *_, **__: lambda *at: poses.append(at)
+        "lineament.live.configured.Dock", lambda *_, **__: lambda *at: poses.append(at)
     )
     pipeline = Pipeline(LiveConfig(dock=(5.0, 2.0)))
     walk = [(-2.0, 0.0), (-1.0, 0.0)]

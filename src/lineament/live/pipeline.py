@@ -8,11 +8,9 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, NamedTuple
 
 from .._copies import InTurn, in_turn
-from ..extractor import Extractor
 from ..features import Features
 from ..limits import Limits
-from ..methods import get_method
-from ..motion import CornerPose, Dock, Odometer, Tracker, Tracks, Travel
+from ..motion import CornerPose, Odometer, Tracker, Tracks, Travel
 from ..motion.deskew import beam_times, deskew
 from ..motion.tracker import FASTEST
 from ..rosmsg.poses import Odometry
@@ -20,10 +18,12 @@ from ..scan import LaserScan, Pose
 from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
+from .configured import dock_of, extractor_of, plan_of
 from .received import ODOMETRY, Heard
+from .twists import turned_over, twist_of_laser
 
 if TYPE_CHECKING:
-    from ..docking import ShapeDock, ShapePose
+    from ..docking import ShapePose
     from ..mapping import LineMap
     from ..mapping.following import Whereabouts
     from ..mapping.judging import Judgement
@@ -299,46 +299,3 @@ class _Publisher:
         self.odometer = Odometer()
         self.dock = dock_of(config) if config.is_docking else None
         self.last: LaserScan | None = None
-
-
-def extractor_of(config: LiveConfig) -> Extractor:
-    """Make the extractor that is configured."""
-    return Extractor(get_method(config.method, **config.parameters), noise=config.noise)
-
-
-def plan_of(config: LiveConfig) -> LineMap | None:
-    """Read the plan that is configured, if it is a file."""
-    if config.map is None or config.map_topic is not None:
-        return None
-    from ..mapping import LineMap
-
-    layers = config.layers.split(",") if config.layers else None
-    return LineMap.read(config.map, layers, units=config.units, limits=config.limits)
-
-
-def dock_of(config: LiveConfig) -> Dock | ShapeDock:
-    """Make what follows the corner, or the shape, that is configured."""
-    if config.dock_shape is None:
-        return Dock(config.dock, track=config.dock_track)
-    from ..docking import Shape, ShapeDock
-
-    assert config.dock is not None
-    return ShapeDock(Shape.read(config.dock_shape), config.dock)
-
-
-def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:
-    """Twist of a scanner in its own frame [m/s, m/s, rad/s], by that of the body that carries it.
-
-    A point at p of a rigid body moves with v + ω × p. `laser_pose` is in the frame of the body.
-    """
-    forward, left, turn_rate = twist
-    x, y, theta = laser_pose
-    vx, vy = forward - turn_rate * y, left + turn_rate * x
-    c, s = math.cos(theta), math.sin(theta)
-    return c * vx + s * vy, c * vy - s * vx, turn_rate
-
-
-def turned_over(twist: Twist) -> Twist:
-    """Twist of a scanner that is mounted upside down: turned about its x axis."""
-    forward, left, turn_rate = twist
-    return forward, -left, -turn_rate

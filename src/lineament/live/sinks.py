@@ -9,8 +9,9 @@ from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
 from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of
 from .config import LiveConfig
+from .configured import plan_of
 from .counters import Report
-from .pipeline import Frame, plan_of, time_of
+from .pipeline import Frame, time_of
 from .plan_topics import DIAGNOSTICS, PlanTopics, Status, plan_layers
 from .publisher import Publisher
 

@@ -172,7 +172,7 @@ def _numbers(distances: Array, count: int) -> dict[str, float | None]:
 
 
 def _row(of: Any, bound: float, is_papers: bool) -> dict[str, Any]:
-    """Return the row of a method, with what the paper has of its own."""
+    """Return the row of a method, with what the paper says of it."""
     mean = None if of["mean"] is None else f"{of['mean']:.4f}"
     paper = {"paper": f"{DISTANCE}", "lost": "lost"} if is_papers else {}
     return {**of, **paper, "here": mean, "over": of["error"] / bound}
