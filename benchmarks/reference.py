@@ -11,6 +11,7 @@ import griffe
 import numpy as np
 from click import Context, Group
 
+import lineament
 from lineament.cli import cli
 from lineament.features.records import FIELDS, TABLES
 
@@ -124,7 +125,10 @@ def _fields(dtype: np.dtype[Any]) -> str:
 def _columns(name: str, package: Any) -> str:
     """Return the comment above a record that no table of features has, and its fields."""
     dtype, comments = getattr(package, name), re.compile(rf"((?:^#: .*\n)+){name} = ", re.MULTILINE)
-    sources = (path.read_text("utf-8") for path in Path(package.__file__).parent.glob("*.py"))
+    # In the package itself, or in the one that it has the record from.
+    home, every = Path(package.__file__).parent, Path(lineament.__file__).parent
+    files = (*home.glob("*.py"), *every.rglob("*.py"))
+    sources = (path.read_text("utf-8") for path in files)
     about = next(found[1] for source in sources if (found := comments.search(source)))
     rows = [f"| `{field}` | `{dtype[field]}` |" for field in dtype.names]
     return "\n".join([about.replace("#: ", ""), "| field | type |", "|---|---|", *rows])
