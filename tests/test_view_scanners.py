@@ -107,6 +107,7 @@ def test_the_path_is_that_of_the_robot(session):
 def test_mountings_are_given_where_the_log_does_not_say(tmp_path):
     path = made(tmp_path, frames=False)
     with Session(path, METHOD) as session:
+        assert session.wait(60)
         offered = session.topics(0)
         assert offered["chosen"] == [0]
         assert (
@@ -117,6 +118,7 @@ def test_mountings_are_given_where_the_log_does_not_say(tmp_path):
         assert status == 404
         assert found["error"].startswith("where the scanner of /front is on the robot is not known")
     with Session(path, METHOD, mountings=MOUNTINGS) as session:
+        assert session.wait(60)
         assert session.topics(0)["chosen"] == [0, 1]
         places = [part["place"] for part in session.scan(0, 0, "optimal", (0, 1))["parts"]]
         np.testing.assert_allclose(places, list(MOUNTINGS.values()))
