@@ -2,8 +2,8 @@
 # # Many logs on Dask
 #
 # A folder of logs becomes one data set: a file for each log, and a manifest
-# that says what became of each. Here two processes on this machine do the work;
-# on a cluster, its workers have to see the same paths.
+# that says how each ended. Here two processes on this machine do the work; the
+# workers of a cluster have to see the same paths.
 
 # %%
 from pathlib import Path
@@ -34,8 +34,8 @@ with cluster, dask_executor(cluster.scheduler_address) as executor:
     print(extract_logs("logs", "features", ln.Extractor(), executor=executor))
 
 # %% [markdown]
-# One log is broken. It stops no other, and its line in the manifest says what
-# is wrong:
+# One log is broken. It stops no other, and the manifest says what is wrong
+# with it:
 
 # %%
 import pandas as pd
@@ -73,13 +73,13 @@ _ = axes.set_ylabel("good corners a scan")
 # %% [markdown]
 # ## Again
 #
-# With `resume=True` (`--resume`) a run does only what is missing, has changed,
-# or was done by another version or with other parameters. Here that is the
-# broken log:
+# With `resume=True` (`--resume`) a run takes only the logs that are missing,
+# have changed, or were done by another version or with other parameters. Here
+# that is the broken one:
 
 # %%
 print(extract_logs("logs", "features", ln.Extractor(), resume=True))
 
 # %% [markdown]
-# [Many logs](../scale.md) says what happens when a worker dies or a disk is
-# full, and what a day of a fleet of 10,000 robots costs.
+# [Many logs](../scale.md) says what happens if a worker dies or a disk is full,
+# and what a day of a fleet of 10,000 robots costs.

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # A docking pose
 #
-# A robot that drives to a dock needs the pose of the dock in its own frame, ten
-# times a second, with a covariance that its controller can rely on. A corner of
-# two walls gives one: its position is where their lines meet, its x axis is
-# their bisector. lineament follows the corner by its track, so that it is not
-# mistaken for another.
+# A robot that drives to a dock needs the pose of the dock in its frame, ten
+# times a second, with a covariance that its controller can rely on. A corner
+# gives such a pose: the position is where two walls meet, the x axis their
+# bisector. lineament follows the corner by its track, and so mistakes no other
+# corner for it.
 
 # %%
 import lineament as ln
@@ -18,7 +18,7 @@ scans = list(drive(world, way, SENSORS["utm30lx"], speed=0.5, rate=10, seed=3))
 print(len(scans), "scans, the first from", scans[0].pose)
 
 # %% [markdown]
-# The drive is simulated, so the truth is known: the corner is at (3, 2) of the
+# The drive is simulated, so we know the truth: the corner is at (3, 2) of the
 # room. On a robot the scans come from a log or a topic.
 #
 # ## Choose a corner
@@ -63,9 +63,9 @@ print("standard deviations [mm, mm, mrad]:", (1000 * sigma).round(2))
 #
 # ## Is the covariance right?
 #
-# In a simulation the true pose of the scanner puts the corner into the room.
-# Errors should stay within two standard deviations in 19 of 20 scans. The band
-# narrows as the robot comes closer.
+# The true pose of the scanner puts the corner into the room. Errors should stay
+# within two standard deviations in 19 of 20 scans. The band narrows as the robot
+# comes closer.
 
 # %% alt="Errors of the pose of the corner along the drive, within two standard deviations"
 from matplotlib import pyplot as plt
@@ -102,4 +102,4 @@ print(f"within two standard deviations: {(np.abs(errors) < 2 * sigma).mean():.0%
 #
 # The covariance is that of the noise alone. Real walls are not straight: the
 # field `misfit` of both segments says how far off they are, and
-# [live](../live.md#topics) has what was measured on a robot.
+# [live](../live.md#topics) what was measured on a robot.

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # A bag to a data frame
 #
-# From a recording to the questions that one asks of it with pandas. The log is
-# a ROS 1 bag of two Hokuyo scanners in an office where people walk by. Where it
-# is not at hand, a simulated drive takes its place; the code is the same for
-# every [format](../logs.md).
+# A recording becomes a table, and pandas answers questions about it. The log is
+# a ROS 1 bag of two Hokuyo scanners in an office where people walk by, or a
+# simulated drive if the bag is not at hand; the code is the same for every
+# [format](../logs.md).
 
 # %%
 import os
@@ -24,9 +24,9 @@ print(len(log), "scans on", *log.topics)
 # %% [markdown]
 # ## Look first
 #
-# `ln.plot` draws a scan (and `lineament info` prints what a log holds).
+# `lineament info` prints what a log contains; `ln.plot` draws a scan.
 # Measurements have the colour of their cluster. Diamonds are corners; smaller,
-# lighter ones are edges, where a wall ends before what is behind it.
+# lighter ones are edges, where a wall ends before something farther away.
 
 # %% alt="A scan of the log, with segments, corners and clusters"
 axes = ln.plot(path, scan=40)
@@ -35,8 +35,8 @@ axes = ln.plot(path, scan=40)
 # ## Extract
 #
 # From the shell this is `lineament extract LOG -o features.parquet`: all scans,
-# one row for each feature, in memory that does not grow with the log. Where a
-# log has several topics, a column names that of each row.
+# one row for each feature. If a log has several topics, the column `topic` names
+# that of each row.
 
 # %%
 from lineament.tasks.extract import extract_log
@@ -60,7 +60,7 @@ frame.groupby("kind", observed=True)[
 #
 # ## Ask
 #
-# How much wall does each scan see, and how many corners that can be relied on?
+# How much wall does each scan see, and how many reliable corners?
 
 # %%
 scans = pd.DataFrame(
@@ -75,8 +75,8 @@ scans.describe().loc[["mean", "std", "min", "max"]].round(2)
 
 # %% [markdown]
 # How well are the corners known? The covariance is in `cov_00`, `cov_01` and
-# `cov_11`; the square root of its trace is the error to expect. Near corners of
-# long walls are known to a millimetre, others to some centimetres. The axis is
+# `cov_11`; the square root of its trace is the error to expect: a millimetre for
+# near corners of long walls, some centimetres for others. The axis is
 # logarithmic.
 
 # %% alt="Histogram of the standard deviations of the corners"

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Live on a robot
 #
-# `lineament live` listens to a scanner and publishes what it finds over DDS:
-# all that speaks ROS 2 hears it, and ROS need not be installed. Here a log
+# `lineament live` listens to a scanner and publishes its features over DDS.
+# Every ROS 2 node can subscribe, and ROS need not be installed. Here a log
 # plays the robot, in a process beside this notebook, which subscribes to the
 # features as a program on the robot would.
 
@@ -30,14 +30,13 @@ node = Popen(command, stdout=PIPE, stderr=STDOUT, text=True)
 print(next(line for line in node.stdout if "finds features" in line))
 
 # %% [markdown]
-# On a robot, `lineament live --track` is all of it: it takes the scans of
-# `/scan`.
+# On a robot, `lineament live --track` is enough: it takes the scans of `/scan`.
 #
 # ## Subscribe
 #
-# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`.
-# A node of ROS 2 gets it by `create_subscription`. Without ROS, the type is
-# written down for Cyclone DDS (`pip install 'lineament[live]'`):
+# The features of a scan are one `sensor_msgs/PointCloud2` on `/scan/features`. A
+# ROS 2 node subscribes by `create_subscription`. Without ROS, write the type
+# down for Cyclone DDS (`pip install 'lineament[live]'`):
 
 # %%
 import numpy as np
@@ -70,9 +69,9 @@ reader = DataReader(participant, topic)
 # %% [markdown]
 # ## Read
 #
-# A point is a feature, and its numbers are the named
+# Each point is a feature, and its numbers are the named
 # [fields](../formats.md#feature-cloud-sensor_msgspointcloud2) of the message.
-# NumPy sees them as they are:
+# NumPy reads them as they are:
 
 # %%
 TYPES = {5: "<i4", 6: "<u4", 7: "<f4"}  # of PointField.datatype
@@ -91,10 +90,10 @@ for stamp, points in clouds[::10]:
 # %% [markdown]
 # ## Tracks
 #
-# With `--track` the field `track` is a number that lasts from scan to scan.
-# Here are the walls of the last scan, and where its corners have been before,
-# in the frame of the scanner: the robot drives down a corridor, and the corners
-# come towards it.
+# With `--track` the field `track` is a number that lasts from scan to scan. This
+# draws the walls of the last scan, and where its corners were before, in the
+# frame of the scanner: the robot drives down a corridor, and the corners come
+# towards it.
 
 # %% alt="Walls of the last scan, and the ways of its corners in the frame of the scanner"
 from matplotlib import pyplot as plt
@@ -117,7 +116,7 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # %% [markdown]
 # ## Stop
 #
-# SIGINT and SIGTERM end the node cleanly; its last lines say what it has done.
+# SIGINT and SIGTERM end the node cleanly. Its last lines count what it did.
 
 # %%
 node.terminate()
@@ -125,6 +124,6 @@ print(node.stdout.read().strip())
 print("exit status", node.wait(20))
 
 # %% [markdown]
-# There are also `/scan/corners`, `/scan/markers` for RViz, `/scan/odometry` and
-# `/scan/dock`. [Live](../live.md) describes them, the options, and how to see
-# the same in Foxglove.
+# [Live](../live.md) describes the other topics (`/scan/corners`,
+# `/scan/markers` for RViz, `/scan/odometry`, `/scan/dock`), the options, and how
+# to see the same in Foxglove.

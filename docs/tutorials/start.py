@@ -1,9 +1,8 @@
 # %% [markdown]
 # # lineament in five minutes
 #
-# lineament finds lines, corners, arcs and clusters in the scans of a 2-D LiDAR,
-# each with its covariance. It reads the logs that robots write, and runs in
-# real time beside a scanner, without ROS.
+# In five minutes you find the walls and corners of a scan, look at them, and
+# write those of a whole log into a table.
 #
 # ## Install
 #
@@ -16,8 +15,8 @@
 #
 # ## A scan
 #
-# You give ranges and the geometry of the scanner. Here they come from a
-# simulated Hokuyo UTM-30LX in a hall with round columns:
+# You give ranges and the geometry of the scanner. Here a simulated Hokuyo
+# UTM-30LX stands in a hall with round columns:
 
 # %%
 import lineament as ln
@@ -33,10 +32,11 @@ features = ln.extract(
 features
 
 # %% [markdown]
-# A scan takes well below a millisecond. A notebook shows this table and
-# picture. Each kind is an array with named
-# [fields](../reference/lineament.features.md#lineament.features.CORNER). Here are
-# the corners with a [quality](../optimal.md) above 0.9:
+# A scan takes well below a millisecond. A notebook shows this table and picture.
+# Each kind of feature is an array with named
+# [fields](../reference/lineament.features.md#lineament.features.CORNER). These
+# are the corners that will most likely be found again from another place, those
+# with a [quality](../optimal.md#quality) above 0.9:
 
 # %%
 corners = features.corners[features.corners["quality"] > 0.9]
@@ -58,7 +58,7 @@ axes = features.plot()
 # ## Your own log
 #
 # Bags of ROS 1 and ROS 2, MCAP, CARMEN, g2o, CSV, npz and [others](../logs.md)
-# open alike. Put yours in place of this one:
+# open alike. Put yours in the place of this simulated one:
 
 # %%
 from lineament.simulation import simulate_log
@@ -81,7 +81,7 @@ log
 # ## A table
 #
 # `lineament extract drive.bag -o features.parquet` writes a row for each
-# feature; a folder takes [many logs](../scale.md) at once. In Python:
+# feature. In Python:
 
 # %%
 import pyarrow as pa

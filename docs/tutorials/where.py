@@ -3,7 +3,7 @@
 #
 # A robot drives through a building once, and its bag becomes a plan. From then
 # on a few metres of way show where on the plan the robot is, without a first
-# guess, and how sure that is. The building is simulated, so the truth is known;
+# guess, and how sure that is. The building is simulated, so we know the truth;
 # people walk in it, and the wheels slip. Any other [log](../logs.md) does as
 # well.
 
@@ -51,10 +51,10 @@ where = locate(local, plan)
 where
 
 # %% [markdown]
-# The verdict is one of four: located, ambiguous, a direction unobserved, or not
-# on this map. Rely on a pose only if it is *located*. `sigma` says that the
-# walls of the plan may be 1 cm off. The frame of the plan is that of Monday's
-# first scan:
+# The [verdict](../locate.md) is one of four: located, ambiguous, a direction
+# unobserved, or not on this map. Rely on a pose only if it is *located*. `sigma`
+# says that the walls of the plan may be 1 cm off. The frame of the plan is that
+# of Monday's first scan:
 
 # %%
 import numpy as np
@@ -65,8 +65,8 @@ x, y, turn = relative(truth, where.pose)
 print(f"off by {1000 * np.hypot(x, y):.1f} mm and {np.degrees(turn):.2f}°")
 
 # %% [markdown]
-# A `LocalMap` keeps the last 5 m of the way. A single scan holds less; where
-# rooms are alike, it may be ambiguous:
+# A `LocalMap` keeps the last 5 m of the way. A single scan shows less; if rooms
+# are alike, it may be ambiguous:
 
 # %%
 print(locate(features, plan))
@@ -74,9 +74,9 @@ print(locate(features, plan))
 # %% [markdown]
 # ## A whole log
 #
-# From the shell it is two commands. The second follows the robot, and reports
-# where it is lost. It deskews scans that say how long a sweep takes; those of
-# this simulation are taken at once.
+# From the shell two commands do this. The second follows the robot, and reports
+# where it is lost. `--no-deskew` says that a scan is taken at once, as in this
+# simulation.
 #
 # ```sh
 # lineament map monday.ros2.mcap -o plan.dxf
@@ -124,15 +124,15 @@ print(f"{located.mean():.0%} located; median {1000 * np.median(off):.0f} mm,")
 print(f"largest {1000 * off.max():.0f} mm")
 
 # %% [markdown]
-# The plan holds Monday’s furniture. When all of it has moved, too many beams
-# pass through what was there, and the verdict is that this is not the map:
+# The plan has Monday’s furniture. If all of it has moved, too many beams pass
+# through where it was, and the verdict is that this is not the map:
 
 # %%
 wednesday, _ = record("wednesday", storey.refurnished(7), seed=3)
 print(locate_log(wednesday, "plan.dxf", "wednesday.csv", deskewed=False).verdicts)
 
 # %% [markdown]
-# On the plan of another building it is nowhere:
+# On the plan of another building the robot is nowhere:
 
 # %%
 other = LineMap.from_lines(office(5, (30, 20)).plan.segments)

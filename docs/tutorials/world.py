@@ -1,12 +1,11 @@
 # %% [markdown]
 # # Corners in the world
 #
-# Features are found in the frame of the scanner. Where a log has poses,
-# lineament moves them into the world and turns their covariances. This tutorial
-# makes a map of corners from a drive, and asks how well a corner is known that
-# has been seen many times. The log is a drive through an office building in
-# Freiburg with the poses of a SLAM system, or a simulated one where that is not
-# at hand.
+# Features are found in the frame of the scanner. If a log has poses, lineament
+# moves the features into the world and turns their covariances. This tutorial
+# makes a map of corners from a drive, and asks how well one knows a corner that
+# was seen many times. The log is a drive through an office building in Freiburg
+# with the poses of a SLAM system, or a simulated one if that is not at hand.
 
 # %%
 import os
@@ -68,8 +67,8 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 #
 # Take the corner with the most neighbours within 10 cm, and draw each sighting
 # with the ellipse that should hold 95 % of its errors. The ellipses point in
-# different directions: a wall seen at a grazing angle says little about where
-# along it the corner is.
+# different directions: a wall at a grazing angle shows little of where along it
+# the corner is.
 
 # %% alt="The sightings of one corner, with their 95 % ellipses"
 from matplotlib.patches import Ellipse
@@ -94,10 +93,11 @@ _ = axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 # %% [markdown]
 # ## What the ellipses leave out
 #
-# The ellipses are those of the noise of the scanner. What the sightings are off
-# their weighted mean should be χ² with two degrees of freedom, with a median of
-# 1.39. In a simulation it is. On a real drive it is far more: the poses are off
-# by centimetres, and that limits the map.
+# The ellipses show the noise of the scanner. The squared distances of the
+# sightings from their weighted mean, over their covariances, should be χ² with
+# two degrees of freedom, whose median is 1.39. In a simulation they are. On a
+# real drive they are far larger: the poses are off by centimetres, and that
+# limits the map.
 
 # %%
 weights = np.linalg.inv(covariances[place])
@@ -109,8 +109,7 @@ print(f"{place.sum()} sightings of ({mean[0]:.3f}, {mean[1]:.3f}) m")
 print(f"scatter {1000 * off.std():.1f} mm, median of χ² {chi2:.1f}, expected 1.4")
 
 # %% [markdown]
-# Bags say how well their poses are known, as `PoseWithCovarianceStamped` or
-# `Odometry`. `--world` adds that to the covariance of each feature; in Python
-# `features.transform(*scan.pose, scan.pose_covariance)` does. The error is
-# common to all features of a scan: [formats](../formats.md#in-the-world-world)
-# has the formula.
+# The poses of a bag may have covariances (`PoseWithCovarianceStamped`,
+# `Odometry`). `--world` adds them to the covariance of each feature; in Python
+# `features.transform(*scan.pose, scan.pose_covariance)` does.
+# [Formats](../formats.md#in-the-world-world) has the formula.
