@@ -35,6 +35,7 @@ MOMENT = Moment(5, 500_000_000, "laser", "map")
 DATA = RosMessages("cdr").scan("/scan", MOMENT, SCAN).data
 MODULES = "rclpy event_handler executors node lifecycle qos signals"
 DONE = SimpleNamespace(SUCCESS="success", FAILURE="failure")
+STATIC = SimpleNamespace(description="", dynamic_typing=False)
 
 
 class Node(MagicMock):
@@ -47,6 +48,8 @@ class Node(MagicMock):
         assert given.get("automatically_declare_parameters_from_overrides", True)
         assert given.get("allow_undeclared_parameters", True)
         self.parameters: dict[str, object] = dict(self.overrides)
+        # As rclpy declares what is given at the start: of one type for good.
+        self.descriptors: dict[str, object] = dict.fromkeys(self.overrides, STATIC)
         self.services: dict[str, Callable] = {}
         self.callbacks: dict[str, Callable] = {}
         self.published: dict[str, list[bytes]] = {}
@@ -60,9 +63,14 @@ class Node(MagicMock):
     def _get_child_mock(self, **given: object) -> MagicMock:
         return MagicMock(**given)
 
-    def declare_parameter(self, name: str, value: object, about: object = None) -> None:  # noqa: ARG002
+    def declare_parameter(self, name: str, value: object, about: object = None) -> None:
         assert value != ()
         assert self.parameters.setdefault(name, value) is value
+        self.descriptors[name] = about or STATIC
+
+    def set_descriptor(self, name: str, about: object) -> None:
+        assert name in self.parameters
+        self.descriptors[name] = about
 
     def create_service(self, kind: object, name: str, callback: Callable) -> str:
         assert kind is std_srvs_srv.Empty
@@ -138,6 +146,7 @@ def package(monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
     sys.modules["rclpy.lifecycle"].LifecycleNode = LifecycleNode
     sys.modules["rclpy.lifecycle"].TransitionCallbackReturn = DONE
     sys.modules["rcl_interfaces.msg"].SetParametersResult = SimpleNamespace
+    sys.modules["rcl_interfaces.msg"].ParameterDescriptor = SimpleNamespace
     monkeypatch.setitem(sys.modules, "std_srvs.srv", std_srvs_srv)
     monkeypatch.setitem(sys.modules, "rosidl_runtime_py.utilities", utilities)
     bridge = importlib.import_module("lineament_ros.bridge")
@@ -318,6 +327,16 @@ def test_parameters_change_while_the_node_runs(package):
     assert changed(node, topic="/rear/scan").startswith("topic is read at the start, expected a ch")
     node.on_cleanup(None)
     assert changed(node, topic="/rear/scan") == ""
+
+
+def test_what_was_given_at_the_start_may_get_another_type_and_is_described(package, monkeypatch):
+    monkeypatch.setattr(Node, "overrides", {"scale": 1, "parameters.evidence": 12})
+    node = package.node.Scanner()
+    assert node._asked() == LiveConfig(name="scanner", scale=1, parameters={"evidence": 12})
+    for name in package.parameters.FIELDS:
+        about = node.descriptors[name]
+        assert about.dynamic_typing
+        assert about.description == package.parameters.DESCRIPTIONS[name]
 
 
 def test_a_manager_leads_the_node_from_state_to_state(package, monkeypatch):

@@ -73,8 +73,11 @@ class Scanner(LifecycleNode):
         self._is_active = False
         self._why = ""
         for name, field in FIELDS.items():
-            if not self.has_parameter(name):
-                about = ParameterDescriptor(description=DESCRIPTIONS[name], dynamic_typing=True)
+            about = ParameterDescriptor(description=DESCRIPTIONS[name], dynamic_typing=True)
+            if self.has_parameter(name):
+                # What was given at the start would keep its type: 1, and never 1.5.
+                self.set_descriptor(name, about)
+            else:
                 # An empty list has no type in ROS.
                 self.declare_parameter(name, None if field.default == () else field.default, about)
         if not self.has_parameter(AUTOSTART):
