@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import warn
+from ..errors import one_line, warn
 from ..limits import LIMITS, Limits
 from ..rosmsg.frames import frame_of
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, StampedPose, stamped_poses
@@ -22,6 +22,8 @@ STATIC = "/tf_static"
 #: Poses that are held of each track, and scans that wait for a pose after theirs.
 MAX_POSES = 4096
 MAX_WAITING = 64
+#: Links that a warning lists.
+MAX_LISTED = 20
 #: Poses are nearer [m, rad]: what is computed from them stays finite.
 FARTHEST = 1e100
 
@@ -42,7 +44,8 @@ class PoseFinder:
 
     Where the frame of the scans is in that of the poses is looked up among `mountings`, the topics
     of transforms of the log; where it is not known, that is warned of, and the poses are taken for
-    those of the scanner. With `is_given`, whoever asks knows it.
+    those of the scanner. With `is_given`, whoever asks knows it. A link of a chain that never came
+    is warned of at the end: no scan has a pose then.
     """
 
     def __init__(
@@ -69,6 +72,8 @@ class PoseFinder:
         self._body = frames[-1] if chain else ""
         self._links: dict[str, StampedPose] = {}
         self._is_warned = False
+        #: Links that came, for a warning.
+        self._came: set[str] = set()
         #: Types of messages that the topic may have.
         self.types = TRANSFORMS if chain else tuple(POSE_TYPES)
         self._tracks = {edge: _Track() for edge in pairwise(frames)} or {("", ""): _Track()}
@@ -88,6 +93,8 @@ class PoseFinder:
             elif not self._is_chain:
                 self._body = child
             edge = (frame, child) if self._is_chain or is_static else ("", "")
+            if len(self._came) < MAX_LISTED:
+                self._came.add("->".join(edge))
             if edge in self._tracks:
                 stamp = -math.inf if is_static else found.stamp
                 self._tracks[edge].add(stamp, found.pose, found.covariance)
@@ -101,6 +108,13 @@ class PoseFinder:
 
     def finish(self) -> list[tuple[str, LaserScan]]:
         """Return the scans that are left."""
+        missing = [edge for edge, track in self._tracks.items() if not track.is_known]
+        if missing and self._is_chain:
+            links = one_line(", ".join(sorted(self._came)) or "none")
+            warn(
+                f"no scan has a pose: {self.topic} has no {'->'.join(missing[0])}, expected a link "
+                f"as it is published; links there are: {links}"
+            )
         return self._release(0)
 
     def _release(self, most: int) -> list[tuple[str, LaserScan]]:
@@ -184,6 +198,11 @@ class _Track:
         self._poses.insert(i, (pose, covariance))
         if len(self._stamps) >= 2 * MAX_POSES:
             del self._stamps[:MAX_POSES], self._poses[:MAX_POSES]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it has any pose."""
+        return bool(self._stamps)
 
     def covers(self, stamp: float) -> bool:
         """Whether waiting for more would not change the pose at `stamp`."""
