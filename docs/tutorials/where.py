@@ -141,3 +141,74 @@ print(locate(local, other).verdict)
 # %% [markdown]
 # [Where on a plan](../locate.md) says how the pose is found and how often it is
 # right, [Maps](../maps.md) how the plan is made.
+
+# %% [markdown]
+# ## As nav2 has it
+#
+# Monday's bag also becomes an occupancy grid, `map.yaml` and its image, which
+# map_server and AMCL load. Tuesday's bag is played to the node, which takes
+# AMCL's place ([lineament in nav2](../nav2.md)):
+#
+# ```sh
+# lineament map monday.ros2.mcap -o map.yaml
+# lineament live --from tuesday.ros2.mcap --map map.yaml
+# ```
+#
+# Here a program without ROS subscribes to `amcl_pose`, as in
+# [Live on a robot](live.md). The bag is played five times as fast.
+
+# %%
+import os
+import sys
+from subprocess import PIPE, STDOUT, Popen
+
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.idl.annotations import final
+from cyclonedds.idl.types import array, float64, int32, uint32
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+map_log(monday, "map.yaml")
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
+<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""  # this machine alone; on a robot it is left out
+domain = 101 + os.getpid() % 100  # the ROS_DOMAIN_ID of the robot
+
+
+def message(package, kind, **fields):
+    return final(make_idl_struct(kind, f"{package}::msg::dds_::{kind}_", fields))
+
+
+# fmt: off
+f8 = float64
+Time = message("builtin_interfaces", "Time", sec=int32, nanosec=uint32)
+Header = message("std_msgs", "Header", stamp=Time, frame_id=str)
+Point = message("geometry_msgs", "Point", x=f8, y=f8, z=f8)
+Quaternion = message("geometry_msgs", "Quaternion", x=f8, y=f8, z=f8, w=f8)
+Pose = message("geometry_msgs", "Pose", position=Point, orientation=Quaternion)
+Spread = message("geometry_msgs", "PoseWithCovariance", pose=Pose, covariance=array[f8, 36])
+Placed = message("geometry_msgs", "PoseWithCovarianceStamped", header=Header, pose=Spread)
+# fmt: on
+topic = Topic(DomainParticipant(domain), "rt/amcl_pose", Placed)
+wanted = Qos(Policy.Reliability.Reliable(duration(seconds=1)))
+reader = DataReader(topic.participant, topic, wanted)
+
+options = f"live --from {tuesday} --map map.yaml --rate 5 --domain {domain}"
+command = [sys.executable, "-m", "lineament", *options.split()]
+node = Popen(command, stdout=PIPE, stderr=STDOUT, text=True)
+off = []
+for placed in reader.take_iter(timeout=duration(seconds=30)):
+    stamp = placed.header.stamp.sec + placed.header.stamp.nanosec / 1e9
+    at = placed.pose.pose.position
+    truth = true[round(5 * stamp)]  # 5 scans a second
+    off.append(np.hypot(at.x - truth[0], at.y - truth[1]))
+    if len(off) == 200:
+        break
+node.terminate()
+print(node.communicate(timeout=20)[0].splitlines()[-1])
+print(f"median {1000 * np.median(off):.0f} mm, largest {1000 * max(off):.0f} mm")
