@@ -23,8 +23,8 @@ from lineament.errors import LineamentError
 from lineament.live import LiveConfig, Pipeline
 from lineament.live.pipeline import time_of
 from lineament.live.plan_topics import PlanTopics
-from lineament.live.received import GUESS, LINKS, MOUNTINGS
-from lineament.live.sinks import Publisher
+from lineament.live.publisher import Publisher
+from lineament.live.received import LINKS, MOUNTINGS, SCAN, wanted
 from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.drive_map import Drive
@@ -176,14 +176,29 @@ def test_a_node_publishes_poses_and_walls_and_saves_the_map(tmp_path):
         eventually(lambda: seen(scans[-1]).plan)
         topics.diagnose((9, 0))
         assert kept.messages[-1].topic == "/scan/plan"
-        pipeline.hear([StampedPose(0.0, "map", "", (9.0, 9.0, 0.0))], GUESS)
-        assert off(seen(scans[-1]).where.pose, truth, k) < 0.1
         with pytest.raises(ValueError, match="a map is made of 'laser' alone"):
             pipeline("another", ln.LaserScan([2.0] * 9, 0.0, 0.1, frame_id="rear"))
         said = pipeline.save()
     assert "map.yaml: LineMap(" in said
     assert "not sure on 0.0 m of" in said
     assert len(LineMap.read(path).walls) > 10
+
+
+def test_a_process_that_dies_is_a_line_and_the_map_is_made_at_the_end(tmp_path):
+    """One that the system kills, for want of memory say: poses go on, but no loop is closed."""
+    path = tmp_path / "made.svg"
+    pipeline = Pipeline(LiveConfig(log="played.npz", mapping=str(path)))
+    with closing(pipeline):
+        scans, _ = driven(12)
+        pipeline("front", scans[0])
+        assert not list(pipeline.problems())
+        pipeline._localiser._following.mapper._process.kill()
+        eventually(lambda: list(pipeline.problems()))
+        (problem,) = pipeline.problems()
+        assert problem.startswith("the process that closes loops has ended")
+        for scan in scans[1:]:
+            assert pipeline("front", scan).where
+        assert pipeline.save().startswith(f"{path}: LineMap(")
 
 
 def test_a_node_without_scans_saves_nothing(tmp_path):
@@ -193,6 +208,11 @@ def test_a_node_without_scans_saves_nothing(tmp_path):
         pipeline("", ln.LaserScan([math.inf] * len(scan), scan.angle_min, scan.angle_increment))
         assert pipeline.save().startswith("no map: no walls are seen")
     assert not list(tmp_path.iterdir())
+
+
+def test_nobody_says_where_a_robot_is_on_a_map_that_is_made():
+    told = {one.what for one in wanted(LiveConfig(mapping="a.dxf"))}
+    assert told == {SCAN, LINKS, MOUNTINGS}
 
 
 def test_what_does_not_go_with_a_map_that_is_made():

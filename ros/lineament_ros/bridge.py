@@ -49,7 +49,7 @@ class RclpySource:
         self._subscribed = {one.topic: self._subscribe(one) for one in wanted(config)}
         _, self._scans = self._subscribed[config.scan_topic]
         self._service = None
-        if config.is_localiser:
+        if config.can_relocate:
             self._service = node.create_service(Empty, RELOCATION, self._relocate)
 
     @property

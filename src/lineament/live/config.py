@@ -321,6 +321,11 @@ class LiveConfig:
         """
         return self.has_map and self.log is None
 
+    @property
+    def can_relocate(self) -> bool:
+        """Whether a robot can be looked for anew: on a map that there is, not one that is made."""
+        return self.is_localiser and self.mapping is None
+
     def resolved(self, topic: str) -> str:
         """Return the full name of a topic; one that begins with ``/`` is full already, in ROS."""
         if topic.startswith("/"):

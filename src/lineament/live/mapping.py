@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from ..errors import NothingFoundError
 from ..features import Features
@@ -15,7 +15,6 @@ from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist
 from .config import LiveConfig
 from .localiser import Localiser
-from .received import GUESS, JUDGED, MAP, RELOCATE, Heard
 
 
 class LiveMapper(Localiser):
@@ -34,10 +33,11 @@ class LiveMapper(Localiser):
         draft = None if self._following is None else self._following.mapper.draft
         return None if draft is None else draft.map
 
-    def hear(self, message: Heard, what: str) -> None:
-        """Take frames and odometry; that a robot is elsewhere on a plan says nothing here."""
-        if what not in (GUESS, JUDGED, MAP, RELOCATE):
-            super().hear(message, what)
+    def problems(self) -> Iterator[str]:
+        """Yield what keeps the robot from being placed, and whether no loops are closed."""
+        yield from super().problems()
+        if self._following is not None and not self._following.mapper.is_making:
+            yield "the process that closes loops has ended: the map is made when the node stops"
 
     def save(self) -> str:
         """Write the map; return a line about it."""

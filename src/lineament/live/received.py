@@ -99,8 +99,9 @@ def wanted(config: LiveConfig) -> list[Wanted]:
         mountings = partial(read, kind=links)
         found.append(Wanted("/tf_static", links, MOUNTINGS, mountings, is_latched=True))
     if config.is_localiser:
+        found.append(Wanted("/tf", links, LINKS, partial(read, kind=links)))
+    if config.can_relocate:
         found += [
-            Wanted("/tf", links, LINKS, partial(read, kind=links)),
             Wanted(config.resolved("initialpose"), placed, GUESS, partial(read, kind=placed)),
             Wanted(f"{config.scan_topic}/relocate", "std_msgs/Empty", RELOCATE, _nothing),
         ]

@@ -104,7 +104,7 @@ class Ros1Source:
         scans = [one.topic for one in wanted(config) if one.what == SCAN]
         self._scans = [self._subscribed[topic][1] for topic in scans]
         self._service = None
-        if config.is_localiser:  # The service that AMCL has.
+        if config.can_relocate:  # The service that AMCL has.
             name = config.resolved("global_localization")
             self._service = node.serve(name, "std_srvs/Empty", self._relocate)
 

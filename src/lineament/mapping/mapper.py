@@ -88,6 +88,11 @@ class Mapper:
         verdict = verdict_of(covariance) if self._is_joined() else LOST
         return Whereabouts(verdict, compose(self._moved, at.pose), covariance, evidence)
 
+    @property
+    def is_making(self) -> bool:
+        """Whether the process that makes the map runs; without it poses go on, but drift."""
+        return self._process.is_alive()
+
     def _is_joined(self) -> bool:
         """Whether it is known how the last key frame lies to the first."""
         known, is_sure = 0, True
