@@ -271,14 +271,14 @@ def test_all_topics_go_into_one_table_with_a_column(two_topics, tmp_path):
     assert [line["topic"] for line in lines] == ["/front", "/rear"] * 3
 
 
-def test_one_topic_is_chosen_and_tables_need_not_tell_it(two_topics, tmp_path):
+def test_one_topic_is_chosen(two_topics, tmp_path):
     found = extract_log(two_topics, tmp_path / "rear.parquet", IEPF, topic="/rear")
     assert (found.scans, found.topics) == (3, ["/rear"])
     table = pq.read_table(tmp_path / "rear.parquet")
-    assert "topic" not in table.column_names
+    assert set(table["topic"].to_pylist()) == {"/rear"}
     assert max(table["scan"].to_pylist()) == 2
     extract_log(two_topics, tmp_path / "rear.jsonl", IEPF, topic="/rear")
-    assert "topic" not in json.loads((tmp_path / "rear.jsonl").read_text().splitlines()[0])
+    assert json.loads((tmp_path / "rear.jsonl").read_text().splitlines()[0])["topic"] == "/rear"
     with pytest.raises(ln.LogError, match="on '/up'; topics there are"):
         extract_log(two_topics, tmp_path / "up.parquet", IEPF, topic="/up")
     assert not (tmp_path / "up.parquet").exists()

@@ -89,13 +89,6 @@ class Latin(Plain):
         super()._write(found, first)
 
 
-class Greedy(Plain):
-    """It takes scans of any topic."""
-
-    def __init__(self, path, _=()):
-        super().__init__(path)
-
-
 class Copied(Plain):
     def __deepcopy__(self, _):
         return self
@@ -103,7 +96,7 @@ class Copied(Plain):
 
 def test_a_writer_of_somebody():
     check_writer(Plain, ending=".plain", read=read)
-    check_writer(lambda path, topics=(): Plain(path, topics))
+    check_writer(lambda path: Plain(path))
 
 
 @pytest.mark.parametrize(
@@ -116,7 +109,6 @@ def test_a_writer_of_somebody():
         (Unnamed, "Unnamed: nowhere/.* is a FileNotFoundError, expected a LineamentError"),
         (Empty, "Empty: scans without features: raised LineamentError: "),
         (Latin, "Latin: with topics .*: raised UnicodeEncodeError: 'ascii' codec"),
-        (Greedy, "Greedy: an unknown topic is no ValueError"),
         (Copied, "Copied: a copy of it while it is open is no TypeError"),
         (".xlsx", "^.xlsx is unknown, expected one of: .parquet, .csv"),
     ],

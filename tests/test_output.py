@@ -28,7 +28,7 @@ from lineament import LaserScan, LineamentError, RangeNoise
 from lineament.features.tables import SCHEMA, features_table
 from lineament.files import written_beside
 from lineament.output import ENDINGS, canvas, open_writer, page
-from lineament.output.tables import POSE, TOPIC
+from lineament.output.tables import WRITTEN
 from lineament.output.writer import Writer
 
 try:
@@ -42,13 +42,12 @@ SCAN = LaserScan([2.0] * 40, angle_min=-1.0, angle_increment=0.05, pose=(1.0, 2.
 TOPICS = ("/front", '/re"ar,\n')
 
 
-#: Columns of the tables that are written, and their poses, those of SCAN.
-WRITTEN = pa.schema([*SCHEMA, *POSE])
+#: The pose of SCAN, in the columns that a file has besides.
 AT = {"pose_x": 1.0, "pose_y": 2.0, "pose_theta": 0.5}
 
 
 def write(path, scans, topics=()):
-    with open_writer(path, topics) as writer:
+    with open_writer(path) as writer:
         for i, found in enumerate(scans):
             writer.write(found, SCAN, topics[i % len(topics)] if topics else "")
 
@@ -241,16 +240,16 @@ def test_poses_are_those_of_the_scans_where_they_are_known(tmp_path, ending):
     assert table.num_rows == sum(random_features(i).to_arrow().num_rows for i in range(5))
 
 
-def test_parquet_has_a_column_of_topics_where_there_are_several(tmp_path):
+@pytest.mark.parametrize("topics", [("",), ("", TOPICS[0]), TOPICS])
+def test_parquet_has_a_column_of_topics(tmp_path, topics):
     scans = [random_features(i) for i in range(1005)]
-    write(tmp_path / "one.parquet", scans[:3], TOPICS[:1])
-    assert set(pq.read_table(tmp_path / "one.parquet")["topic"].to_pylist()) == {TOPICS[0]}
-    write(tmp_path / "two.parquet", scans, TOPICS)
-    table = pq.read_table(tmp_path / "two.parquet")
-    assert table.schema.names == [*WRITTEN.names, "topic"]
+    write(tmp_path / "a.parquet", scans, topics)
+    table = pq.read_table(tmp_path / "a.parquet")
+    assert table.schema == WRITTEN
     assert table.schema.metadata == SCHEMA.metadata
     assert table.select(SCHEMA.names).combine_chunks().equals(features_table(scans))
-    assert table["topic"].to_pylist() == [TOPICS[k % 2] for k in table["scan"].to_pylist()]
+    known = [topics[k % len(topics)] or None for k in table["scan"].to_pylist()]
+    assert table["topic"].to_pylist() == known
 
 
 @pytest.mark.parametrize("topics", [(), TOPICS])
@@ -258,14 +257,14 @@ def test_csv_reads_back_the_same(tmp_path, topics):
     scans = [random_features(i) for i in range(1010)]
     scans[7].segments["rms"] = [np.nan, np.inf, -np.inf]
     write(tmp_path / "a.csv", scans, topics)
-    schema = WRITTEN.append(TOPIC) if topics else WRITTEN
-    types = pa.csv.ConvertOptions(column_types=schema, strings_can_be_null=True, null_values=[""])
+    types = pa.csv.ConvertOptions(column_types=WRITTEN, strings_can_be_null=True, null_values=[""])
     lines = pa.csv.ParseOptions(newlines_in_values=True)
     found = pa.csv.read_csv(tmp_path / "a.csv", parse_options=lines, convert_options=types)
-    assert found.schema.names == schema.names
-    expected = [row | AT for row in features_table(scans).to_pylist()]
-    if topics:
-        expected = [row | {"topic": topics[row["scan"] % 2]} for row in expected]
+    assert found.schema.names == WRITTEN.names
+    expected = [
+        row | AT | {"topic": topics[row["scan"] % 2] if topics else None}
+        for row in features_table(scans).to_pylist()
+    ]
     assert list(map(str, found.to_pylist())) == list(map(str, expected))  # NaN is "nan"
 
 
@@ -316,7 +315,7 @@ def rerun(*arguments):
 def test_recording_is_whole_and_has_everything(tmp_path):
     pytest.importorskip("rerun")
     path = tmp_path / "a.rrd"
-    with open_writer(path, ["/a/scan"]) as writer:
+    with open_writer(path) as writer:
         for k in range(250):
             scan = LaserScan([2.0] * 6, 0.0, 0.1, stamp=0.5 * k, pose=(k, 4.0, 0.5))
             writer.write(FOUND, scan, "/a/scan")

@@ -38,8 +38,8 @@ def scan_of(**fields):
     return LaserScan(RANGES, range_min=0.1, range_max=8.0, **fields)
 
 
-def write(path, *written, topics=()):
-    with open_writer(path, topics) as writer:
+def write(path, *written):
+    with open_writer(path) as writer:
         for found, scan, *topic in written:
             writer.write(found, scan, *topic)
     return path
@@ -164,7 +164,7 @@ def test_irregular_bearings_become_points(tmp_path, name, read):
 def test_topics_keep_their_names(tmp_path, name, read):
     topics = ["/front", "/rear"]
     scans = [(FOUND, scan_of(stamp=float(i)), topics[i % 2]) for i in range(4)]
-    found = [topic for topic, _, _ in read(write(tmp_path / name, *scans, topics=topics))]
+    found = [topic for topic, _, _ in read(write(tmp_path / name, *scans))]
     assert found == ["/tf", "/front", "/front/features", "/tf", "/rear", "/rear/features"] * 2
     with (tmp_path / name).open("rb") as file:
         summary = make_reader(file).get_summary()

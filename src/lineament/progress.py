@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager, suppress
 from typing import Any
 
-#: ``track(items, about, total)`` gives the items, and shows how far they are.
-Track = Callable[[Any, str, int], Iterable[Any]]
+#: ``track(items, about, whole)`` gives the items, and shows how far they are. Their number is
+#: ``len(whole)``, which some logs are read for: it is asked for only where it is shown.
+Track = Callable[[Any, str, Sized], Iterable[Any]]
 #: Takes a line about what is compiled.
 Say = Callable[[str], None]
 
@@ -18,12 +19,12 @@ Say = Callable[[str], None]
 _PATIENCE = 0.5
 
 
-def untracked(items: Iterable[Any], about: str, total: int) -> Iterable[Any]:  # noqa: ARG001
+def untracked(items: Iterable[Any], about: str, whole: Sized) -> Iterable[Any]:  # noqa: ARG001
     """Give the items, and show nothing.
 
     Examples
     --------
-    >>> list(untracked("ab", "letters", 2))
+    >>> list(untracked("ab", "letters", "ab"))
     ['a', 'b']
     """
     return items

@@ -42,16 +42,16 @@ def check_writer(
     and nothing beside it; so does a target that cannot be written, by a LineamentError of one line.
     Through a link, the file behind it is replaced, and the link stays. No scans, and scans without
     features, make a file; names of files, frames and topics may have any letters. It refuses what
-    it cannot take by a ValueError: a scan outside its block, of another topic, or none where it
-    needs one; and to be copied while it is open. What is written is read again where a reader is
+    it cannot take by a ValueError: a scan outside its block, or none where it needs one; and to be
+    copied while it is open. What is written is read again where a reader is
     known. That a writer is given a file that is read, it cannot know: commands ask
     `lineament.files.check_outputs`.
 
     Parameters
     ----------
     writer : str or callable
-        One of `lineament.output.ENDINGS`, or what makes a writer of a path and topics: a subclass
-        of `lineament.output.Writer`.
+        One of `lineament.output.ENDINGS`, or what makes a writer of a path: a subclass of
+        `lineament.output.Writer`.
     ending : str
         What names of such files end with, for a class.
     read : callable, optional
@@ -121,7 +121,7 @@ def _beside(path: Path) -> list[str]:
 def _appears_whole(make: Maker, path: Path, found: Found, read: Reading | None) -> None:
     for topics in ((), _TOPICS):
         with during(f"with topics {topics}" if topics else "in a block"):
-            with make(path, topics) as writer:
+            with make(path) as writer:
                 is_there = path.exists() and not topics
                 _write(writer, found, topics or ("",))
                 claim(not is_there, "the file appears before its block ends")
@@ -203,17 +203,16 @@ def _names_what_cannot_be(make: Maker, path: Path, found: Found) -> None:
 
 
 def _refuses(make: Maker, path: Path, found: Found) -> None:
-    (features, scan), topics = found[0], _TOPICS
-    writer = make(path, topics)
-    _raises(ValueError, lambda: writer.write(features, scan, topics[0]), "a scan before its block")
+    (features, scan), topic = found[0], _TOPICS[0]
+    writer = make(path)
+    _raises(ValueError, lambda: writer.write(features, scan, topic), "a scan before its block")
     with writer:
-        _raises(ValueError, lambda: writer.write(features, scan, "/other"), "an unknown topic")
         _raises(TypeError, lambda: copy.deepcopy(writer), "a copy of it while it is open")
         if writer.needs_scan:
-            _raises(ValueError, lambda: writer.write(features, None, topics[0]), "no scan")
+            _raises(ValueError, lambda: writer.write(features, None, topic), "no scan")
         else:
-            writer.write(features, None, topics[0])
-    _raises(ValueError, lambda: writer.write(features, scan, topics[0]), "a scan after its block")
+            writer.write(features, None, topic)
+    _raises(ValueError, lambda: writer.write(features, scan, topic), "a scan after its block")
 
 
 def _raises(kind: type[Exception], call: Callable[[], object], doing: str) -> None:

@@ -40,7 +40,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
     from .progress import tracker
 
     opened = open_log(log, **reading)
-    items = tracker(quiet)(opened.items(), Path(opened.name).name, len(opened))
+    items = tracker(quiet)(opened.items(), Path(opened.name).name, opened)
     summary = summarize(opened, items)
     click.echo(str(summary))
     if not any(topic.ranges for topic in summary.topics):

@@ -1,8 +1,11 @@
-"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet."""
+"""Progress: a bar on a terminal, a line every two seconds elsewhere, nothing when quiet.
+
+What is done at once needs no progress: until then nobody counts what there is to do.
+"""
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import TypeVar
 
@@ -11,8 +14,8 @@ from .options import complain
 
 T = TypeVar("T")
 
-#: Seconds between two plain lines, and before the first.
-_PATIENCE = 2.0
+#: Seconds between two plain lines, and before the first; and before there is a bar.
+_PATIENCE, _AT_ONCE = 2.0, 0.2
 
 
 def tracker(quiet: bool) -> Track:
@@ -22,27 +25,38 @@ def tracker(quiet: bool) -> Track:
     return _with_bar if sys.stderr.isatty() else _with_lines
 
 
-def _with_bar(items: Iterable[T], about: str, total: int) -> Iterator[T]:
+def _with_bar(items: Iterable[T], about: str, whole: Sized) -> Iterator[T]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task
     from rich.text import Text
 
     class Pace(ProgressColumn):
         def render(self, task: Task) -> Text:
-            return Text(_pace(int(task.completed), total, task.elapsed or 0.0))
+            return Text(_pace(int(task.completed), total, time.monotonic() - started))
 
+    started, done, items = time.monotonic(), 0, iter(items)
+    for item in items:
+        yield item
+        done += 1
+        if time.monotonic() - started > _AT_ONCE:
+            break
+    else:
+        return
+    total = len(whole)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Pace())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        yield from progress.track(items, total, description=about)
+        bar = progress.add_task(about, total=total, completed=done)
+        yield from progress.track(items, task_id=bar)
 
 
-def _with_lines(items: Iterable[T], about: str, total: int) -> Iterator[T]:
+def _with_lines(items: Iterable[T], about: str, whole: Sized) -> Iterator[T]:
     started = last = time.monotonic()
     for done, item in enumerate(items, 1):
         yield item
         now = time.monotonic()
         if now - last >= _PATIENCE:
             last = now
+            total = len(whole)
             complain(f"{about}: {done}/{total}, {_pace(done, total, now - started)}")
 
 

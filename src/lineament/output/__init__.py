@@ -1,7 +1,6 @@
 """Features to files: one writer a format, imported when it is used."""
 
 import os
-from collections.abc import Sequence
 from importlib import import_module
 
 from ..errors import needed_by
@@ -27,7 +26,7 @@ _WRITERS = {
 ENDINGS = tuple(_WRITERS)
 
 
-def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Writer:
+def open_writer(path: str | os.PathLike[str]) -> Writer:
     """Make a writer of features for a file, in the format of its ending.
 
     Parameters
@@ -37,8 +36,6 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
         ``.jsonl`` (one line a scan), ``.mcap`` (for Foxglove), ``.ros2.mcap`` (for RViz), ``.rrd``
         (for rerun), ``.svg``, ``.dxf`` or ``.geojson`` (a plan). They are described in
         ``docs/formats.md``.
-    topics : sequence of str
-        The topics that the scans come from, where a log has several: tables have a column then.
 
     Returns
     -------
@@ -61,5 +58,5 @@ def open_writer(path: str | os.PathLike[str], topics: Sequence[str] = ()) -> Wri
     """
     module, name = _WRITERS[ending_of(path, ENDINGS)]
     with needed_by(f"{path}:"):
-        writer: Writer = getattr(import_module(f".{module}", __name__), name)(path, topics)
+        writer: Writer = getattr(import_module(f".{module}", __name__), name)(path)
     return writer

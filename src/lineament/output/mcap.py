@@ -1,7 +1,6 @@
 """MCAP files: the scans, what is found in them, and where they were taken, by topic."""
 
 import os
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -22,10 +21,8 @@ class McapWriter(Writer):
 
     needs_scan = True
 
-    def __init__(
-        self, path: str | os.PathLike[str], topics: Sequence[str], scene: SceneMessages
-    ) -> None:
-        super().__init__(path, topics)
+    def __init__(self, path: str | os.PathLike[str], scene: SceneMessages) -> None:
+        super().__init__(path)
         self._scene = scene
 
     def _open(self, temporary: Path, files: ExitStack) -> None:
@@ -64,16 +61,16 @@ class McapWriter(Writer):
 class FoxgloveWriter(McapWriter):
     """Writes Foxglove's own messages: the file opens in its 3D panel as it is."""
 
-    def __init__(self, path: str | os.PathLike[str], topics: Sequence[str] = ()) -> None:
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         from .foxglove import FoxgloveMessages
 
-        super().__init__(path, topics, FoxgloveMessages())
+        super().__init__(path, FoxgloveMessages())
 
 
 class Ros2Writer(McapWriter):
     """Writes the messages of ROS 2, in CDR: for RViz, ``ros2 bag play`` and Foxglove."""
 
-    def __init__(self, path: str | os.PathLike[str], topics: Sequence[str] = ()) -> None:
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         from .ros_messages import RosMessages
 
-        super().__init__(path, topics, RosMessages("cdr"))
+        super().__init__(path, RosMessages("cdr"))

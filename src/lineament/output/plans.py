@@ -2,7 +2,6 @@
 
 import os
 from abc import abstractmethod
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
@@ -38,14 +37,8 @@ class PlanWriter(Writer):
 
     needs_scan = True
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        topics: Sequence[str] = (),
-        *,
-        min_views: int | None = None,
-    ) -> None:
-        super().__init__(path, topics)
+    def __init__(self, path: str | os.PathLike[str], *, min_views: int | None = None) -> None:
+        super().__init__(path)
         self.min_views = min_views
 
     def _open(self, temporary: Path, files: ExitStack) -> None:  # noqa: ARG002  (open at the end)

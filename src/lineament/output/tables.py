@@ -14,7 +14,7 @@ from ..features.tables import SCHEMA, array_of, features_table, numbers_of, text
 from ..files import strict_json
 from .writer import Found, Writer
 
-#: The column that a table has besides those of `SCHEMA` where its scans come from several topics.
+#: Topic of the scan, null where it is not known.
 TOPIC = pa.field(
     "topic",
     pa.dictionary(pa.int32(), pa.string()),
@@ -28,16 +28,14 @@ POSE = [
     for name, unit in (("x", "m"), ("y", "m"), ("theta", "rad"))
 ]
 
+#: Columns of a file: the same, whatever log they are of.
+WRITTEN = pa.schema([*SCHEMA, *POSE, TOPIC], SCHEMA.metadata)
+
 
 class _RowWriter(Writer):
     """A writer of rows; its `_table` makes those of some scans."""
 
     chunk = 1000
-
-    @property
-    def _schema(self) -> pa.Schema:
-        fields = [*SCHEMA, *POSE, *([TOPIC] if self.topics else ())]
-        return pa.schema(fields, SCHEMA.metadata)
 
     def _table(self, found: list[Found], first_scan: int) -> pa.Table:
         table = features_table([one.features for one in found], first_scan)
@@ -45,10 +43,12 @@ class _RowWriter(Writer):
         poses = np.array([one.pose or (np.nan,) * 3 for one in found]).reshape(-1, 3)[scan]
         for field, values in zip(POSE, poses.T, strict=True):
             table = table.append_column(field, array_of(values, np.isnan(values)))
-        if self.topics:
-            of_scan = np.array([self.topics.index(one.topic) for one in found], dtype=np.int32)
-            topics = pa.DictionaryArray.from_arrays(array_of(of_scan[scan]), texts(self.topics))
-            table = table.append_column(TOPIC, topics)
+        of_scan = [one.topic for one in found]
+        topics = [*dict.fromkeys(of_scan)]
+        row = np.array([*map(topics.index, of_scan)], dtype=np.int32)[scan]
+        known = array_of(row, np.array([not topic for topic in topics], dtype=np.bool_)[row])
+        column = pa.DictionaryArray.from_arrays(known, texts(topics))
+        table = table.append_column(TOPIC, column)
         return table.replace_schema_metadata(SCHEMA.metadata)
 
 
@@ -56,7 +56,7 @@ class CsvWriter(_RowWriter):
     """Writes a line of names, then the rows; a column that a kind does not fill is empty."""
 
     def _open(self, temporary: Path, files: ExitStack) -> None:
-        self._file = files.enter_context(pa.csv.CSVWriter(temporary, self._schema))
+        self._file = files.enter_context(pa.csv.CSVWriter(temporary, WRITTEN))
 
     def _write(self, found: list[Found], first_scan: int) -> None:
         self._file.write_table(self._table(found, first_scan))
@@ -74,7 +74,7 @@ class ParquetWriter(_RowWriter):
         self._file = files.enter_context(
             pq.ParquetWriter(
                 temporary,
-                self._schema,
+                WRITTEN,
                 compression="zstd",
                 # Of numbers a dictionary costs more time than it saves space.
                 use_dictionary=["kind", "corner", "breakpoint", "topic"],

@@ -2,7 +2,6 @@
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
@@ -39,8 +38,6 @@ class Writer(InTurn, ABC):
     ----------
     path : path-like
         The file.
-    topics : sequence of str
-        The topics that the scans come from, where a log has several.
     """
 
     #: Scans that are kept before they are written.
@@ -48,8 +45,8 @@ class Writer(InTurn, ABC):
     #: Whether the format draws the scans, and not only what is found in them.
     needs_scan: ClassVar[bool] = False
 
-    def __init__(self, path: str | os.PathLike[str], topics: Sequence[str] = ()) -> None:
-        self.path, self.topics = path, tuple(topics)
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = path
         self._stack, self._files = ExitStack(), ExitStack()
         self._is_open = False
 
@@ -86,22 +83,19 @@ class Writer(InTurn, ABC):
         """Take the features of the next scan.
 
         They must not change until the block ends. The scan is what they were found in: formats that
-        draw it need it, tables have its pose. The topic is that of the scan, where its log has
-        several.
+        draw it need it, tables have its pose. The topic is that of the scan in its log.
 
         Raises
         ------
         LineamentError
             If the file cannot be written, or cannot hold this scan.
         ValueError
-            If the writer is not open or needs the scan, or its topics do not have the topic.
+            If the writer is not open or needs the scan.
         """
         if not self._is_open:
             raise ValueError(f"the writer of {self.path} is not open: use it as a context manager")
         if self.needs_scan and scan is None:
             raise ValueError(f"the writer of {self.path} needs the scan: write(features, scan)")
-        if self.topics and topic not in self.topics:
-            raise ValueError(f"topic is {topic!r}, expected one of {', '.join(self.topics)}")
         # Tables keep no ranges until they are written.
         pose = None if scan is None else scan.pose
         found = Found(features, scan if self.needs_scan else None, topic, pose)

@@ -48,7 +48,7 @@ def simulate_log(
     speed, rate, seed, moving
         As for `drive`; the seed is of the scene, too.
     track : callable
-        ``track(scans, about, total)`` yields the scans, and shows the progress.
+        ``track(scans, about, whole)`` yields the scans, and shows the progress.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def simulate_log(
         plan, pose = scene(world, seed)
         rngs = (np.random.default_rng([seed, i]) for i in range(total))
         taken = (sensor.scan(plan, pose, rng, i / rate) for i, rng in enumerate(rngs))
-    save_log(path, track(taken, "simulating", total))
+    save_log(path, track(taken, "simulating", range(total)))
 
 
 def sensor_like(name: str, *, sigma: float | None = None, **changes: float | None) -> Sensor:

@@ -127,7 +127,7 @@ def calibrate_log(
     roughness : float
         How far walls are from straight [m]; 0 in a simulation.
     track : callable
-        ``track(items, name, total)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`, without `laser_pose`.
 
@@ -167,7 +167,7 @@ def calibrate_log(
             raise LogError(log.name, f"{against} has no scans around those of {log.topic}")
     elif not any(pose is not None for pose in poses):
         raise LogError(log.name, "has no poses, expected odometry (--odometry names its topic)")
-    shown = track(scans, Path(log.name).name, len(scans))
+    shown = track(scans, Path(log.name).name, scans)
     features = _features(shown, extractor, deskewed=deskewed)
     try:
         steps, found = _calibrated(

@@ -42,7 +42,7 @@ def run_demo(
     """Simulate a drive (or take a log), extract its features, and make a page of pictures.
 
     Returns names and values: files and figures. The page is ``index.html``, the table
-    ``features.parquet``. ``track(items, about, total)`` yields the items and shows the progress;
+    ``features.parquet``. ``track(items, about, whole)`` yields the items and shows the progress;
     `limits` are as for `lineament.open_log`.
 
     Raises
@@ -71,7 +71,7 @@ def run_demo(
         raise LineamentError(f"{log}: has no scans")
     for path in drawn:  # of another log
         path.unlink(missing_ok=True)
-    pictures = list(track(_draw(target, log, extractor, summary.scans, limits), "drawing", 5))
+    pictures = list(track(_draw(target, log, extractor, summary.scans, limits), "drawing", drawn))
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
         ("log", str(log)),

@@ -61,7 +61,6 @@ def extract_log(
     output: str | os.PathLike[str],
     extractor: Extractor,
     *,
-    topic_column: bool | None = None,
     world: bool = False,
     track: Track = untracked,
     **reading: Any,
@@ -78,14 +77,12 @@ def extract_log(
         A file of any ending that `lineament.output.open_writer` knows.
     extractor : Extractor
         The method.
-    topic_column : bool, optional
-        Whether tables have the topic of each row; by default where the log has several.
     world : bool
         Whether a table has the features in the frame of the poses, ``map``, with covariances that
         are turned and, where it is known, have the covariance of the pose in them. A scan without a
         pose has no features then.
     track : callable
-        ``track(items, name, total)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
         ``limits``, ``scale``.
@@ -115,22 +112,20 @@ def extract_log(
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
-    topics = log.topics if log.topic is None else [log.topic]
-    if topic_column is None:
-        topic_column = len(topics) > 1
+    topics: dict[str, None] = {}
     scans, beams, valid, unplaced = 0, 0, 0, 0
     found = dict.fromkeys(TABLES, 0)
-    writer = open_writer(output, topics if topic_column else ())
+    writer = open_writer(output)
     if world and writer.needs_scan:
         raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
     with writer:
-        for topic, scan in track(log.measured(), Path(log.name).name, len(log)):
+        for topic, scan in track(log.measured(), Path(log.name).name, log):
             features = extractor(scan)
             if world:
                 unplaced += scan.pose is None
                 features = in_world(features, scan)
-            # Drawings of scans are named after the topic; tables need not repeat the only one.
-            writer.write(features, scan, topic if topic_column or writer.needs_scan else "")
+            writer.write(features, scan, topic)
+            topics[topic] = None
             scans += 1
             beams += len(scan)
             valid += int(np.count_nonzero(scan.valid))
@@ -141,7 +136,7 @@ def extract_log(
     return Extraction(
         log=str(path),
         output=str(output),
-        topics=topics,
+        topics=[*topics],
         scans=scans,
         features=found,
         invalid=1 - valid / beams if beams else 0.0,

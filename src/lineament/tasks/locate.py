@@ -101,7 +101,7 @@ def locate_log(
     deskewed : bool
         Whether scans are deskewed that say how long their sweep takes.
     track : callable
-        ``track(items, name, total)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`.
 
@@ -139,7 +139,7 @@ def locate_log(
     def followed(on: LineMap, most: int | None = None) -> Iterator[tuple[LaserScan, Whereabouts]]:
         items = islice(log.items(), most) if most else log.measured()
         scans = (scan for _, scan in items)
-        shown = scans if most else track(scans, Path(log.name).name, len(log))
+        shown = scans if most else track(scans, Path(log.name).name, log)
         return follow(shown, on, extractor, odometry=odometry, deskewed=deskewed)
 
     def located(on: LineMap) -> float:

@@ -120,7 +120,7 @@ def map_log(
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
     track : callable
-        ``track(items, name, total)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`.
 
@@ -157,7 +157,7 @@ def map_log(
     drive = Drive()
     # In the order of time, which is not that of every log: scans are all held in memory for that.
     scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
-    for scan in track(scans, Path(log.name).name, len(scans)):
+    for scan in track(scans, Path(log.name).name, scans):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
     if not scans:
         raise LogError(log.name, "has no scans, expected a drive")

@@ -150,7 +150,7 @@ def merge_log(
     world : bool
         Whether a table has the features in the frame of the poses, as for `extract_log`.
     track : callable
-        ``track(items, name, total)`` yields the scans and shows the progress.
+        ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
         As for `lineament.open_log`, without `topic` and `laser_pose`.
 
@@ -215,7 +215,7 @@ def _together(
 ) -> Iterator[list[tuple[_Scanner, LaserScan]]]:
     """Yield each scan of the first scanner with those of the others that are near in time."""
     first, *others = scanners
-    for _, scan in track(first.log.measured(), Path(first.log.name).name, len(first.log)):
+    for _, scan in track(first.log.measured(), Path(first.log.name).name, first.log):
         parts = [(first, scan)]
         for other in others:
             mate = other.nearest(scan.stamp)

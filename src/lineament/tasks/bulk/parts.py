@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from ...extractor import Extractor
 from ...files import made_folder
 from ...logs.sources import is_address
 from ...methods import Method
+from ...progress import Track
 from ...scan import RangeNoise
 from ..extract import extract_log
 from .manifest import Row
@@ -59,7 +60,6 @@ def extract_part(task: Task, report: Report = lambda scans, total: None) -> Row:
                 row.log,
                 part,
                 Extractor(task.method, noise=task.noise),
-                topic_column=True,
                 world=task.world,
                 track=_reporting(report),
                 **task.reading,
@@ -84,14 +84,14 @@ def failed(row: Row, error: str) -> Row:
     return replace(row, outcome="failed", error=" ".join(error.split()))
 
 
-def _reporting(report: Report) -> Callable[[Any, str, int], Iterable[Any]]:
-    def track(items: Iterable[Any], about: str, total: int) -> Iterator[Any]:  # noqa: ARG001
-        last = -_PERIOD
+def _reporting(report: Report) -> Track:
+    def track(items: Iterable[Any], about: str, whole: Sized) -> Iterator[Any]:  # noqa: ARG001
+        last = time.monotonic()
         for done, item in enumerate(items):
             now = time.monotonic()
             if now - last >= _PERIOD:
                 last = now
-                report(done, total)
+                report(done, len(whole))
             yield item
 
     return track
