@@ -6,7 +6,7 @@ What is done at once needs no progress: until then nobody counts what there is t
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TypeVar
 
 from ..progress import Track, untracked
@@ -14,7 +14,7 @@ from .options import complain
 
 T = TypeVar("T")
 
-#: Seconds between two plain lines, and before the first; and before there is a bar.
+#: Seconds between two plain lines, and before the first; the same of changes of a bar.
 _PATIENCE, _AT_ONCE = 2.0, 0.2
 
 
@@ -32,21 +32,24 @@ def _with_bar(items: Iterable[T], about: str, whole: Sized) -> Iterator[T]:
 
     class Pace(ProgressColumn):
         def render(self, task: Task) -> Text:
-            return Text(_pace(int(task.completed), total, time.monotonic() - started))
+            return Text(_pace(int(task.completed), int(task.total or 0), last - started))
 
-    started, done, items = time.monotonic(), 0, iter(items)
-    for item in items:
-        yield item
-        done += 1
-        if time.monotonic() - started > _AT_ONCE:
-            break
-    else:
-        return
-    total = len(whole)
+    started = last = time.monotonic()
+    done, bar = 0, None
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn(), Pace())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task(about, total=total, completed=done)
-        yield from progress.track(items, task_id=bar)
+    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    with ExitStack() as stack:
+        for done, item in enumerate(items, 1):
+            yield item
+            if time.monotonic() - last < _AT_ONCE:
+                continue
+            last = time.monotonic()
+            if bar is None:
+                stack.enter_context(progress)
+                bar = progress.add_task(about, total=len(whole))
+            progress.update(bar, completed=done)
+        if bar is not None:
+            progress.update(bar, completed=done, refresh=True)
 
 
 def _with_lines(items: Iterable[T], about: str, whole: Sized) -> Iterator[T]:
