@@ -2,7 +2,7 @@
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from itertools import islice
 from operator import itemgetter
 from typing import Any
@@ -61,8 +61,8 @@ class _Csv(Log):
             )
         super()._open()
 
-    def _lines(self) -> Iterator[tuple[int, bytes]]:
-        """Yield each row below the header with the number of its line."""
+    def _lines(self, _: Collection[str] = ()) -> Iterator[tuple[int, bytes]]:
+        """Yield each row below the header with the number of its line; no row names its kind."""
         lines = numbered_lines(self.source, self.limits)
         rows = ((number, line) for number, line in lines if _ROW(line))
         return islice(rows, 1 if self._names else 0, None)

@@ -19,6 +19,9 @@ from .lines import numbered_lines
 #: word of a list shows whether it has such.
 _SHORT, _MOST, _EVERY = 5, 1 << 14, 16
 
+#: What may stand before the first word.
+_BLANKS = tuple(bytes((code,)) for code in b" \t\r\v\f")
+
 #: Makes a scan of a line of some kind; None where the line holds what later scans need.
 Parser = Callable[[str, bytes], LaserScan | None]
 
@@ -63,13 +66,15 @@ class LineLog(Log):
         words = line[:24].split(None, 1)
         return self._known.get(words[0], "") if words else ""
 
-    def _lines(self) -> Iterator[tuple[int, bytes]]:
-        return numbered_lines(self.source, self.limits)
+    def _lines(self, kinds: Collection[str] = ()) -> Iterator[tuple[int, bytes]]:
+        """Yield numbered lines: of some kinds, and a few others, or all."""
+        begins = (*map(str.encode, kinds), *_BLANKS) if kinds else ()
+        return numbered_lines(self.source, self.limits, begins)
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         parse = self._parser()
         needed = {*self._wanted, *self.other_kinds}
-        for number, line in self._until_broken(self._lines()):
+        for number, line in self._until_broken(self._lines(needed)):
             kind = self._kind(line)
             if kind not in needed:
                 continue

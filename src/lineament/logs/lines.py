@@ -5,7 +5,8 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from operator import itemgetter
+from itertools import compress
+from operator import methodcaller
 from pathlib import Path
 
 from ..errors import LogError
@@ -127,11 +128,12 @@ def _up_to_fault(stream: "zlib._Decompress", data: bytes) -> bytes:
 
 
 def numbered_lines(
-    path: str | os.PathLike[str], limits: Limits = LIMITS
+    path: str | os.PathLike[str], limits: Limits = LIMITS, begins: tuple[bytes, ...] = ()
 ) -> Iterator[tuple[int, bytes]]:
     """Yield each line of a file that is not empty, with its number, from 1, as LogErrors have.
 
-    A last line without an end is delivered, unless the stream broke within it.
+    If `begins` are given, those alone that begin so, and maybe the last one. A last line without an
+    end is delivered, unless the stream broke within it.
     """
     number, rest = 1, b""
     try:
@@ -140,8 +142,9 @@ def numbered_lines(
             if number == 1:
                 lines[0] = lines[0].removeprefix(BOM)
             rest = lines.pop()
-            # A file may be full of empty lines: these cost next to nothing.
-            yield from filter(itemgetter(1), enumerate(lines, number))
+            # A file may be full of lines that nobody wants: these cost next to nothing.
+            wanted = map(methodcaller("startswith", begins), lines) if begins else lines
+            yield from compress(enumerate(lines, number), wanted)
             number += len(lines)
             limits.check("line", len(rest), partial(LogError, path))
     except LogError as error:
