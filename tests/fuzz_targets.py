@@ -8,7 +8,6 @@ import dataclasses
 import json
 import math
 import time
-from collections.abc import Iterator
 from functools import lru_cache, partial
 from pathlib import Path
 from random import Random
@@ -20,6 +19,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import ros_bags
 from equality import assert_sound
+from in_memory import Given, Taken
 from mutations import damaged
 from test_optimal_properties import assert_sound as assert_optimal_sound
 from test_optimal_properties import hostile_scans
@@ -28,13 +28,11 @@ from worlds import degenerate_scans, random_scan
 from lineament import Extractor, LaserScan, RangeNoise, open_log
 from lineament.features import TABLES
 from lineament.live import LiveConfig, Node, Pipeline, RosSink
-from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, Received, received_scan
 from lineament.logs import save_log
 from lineament.methods import get_method, method_names
 from lineament.output import ENDINGS, open_writer
 from lineament.output.ros_messages import RosMessages
-from lineament.output.scene import Message
 from lineament.rosmsg.poses import odometry
 from lineament.view import Session
 from lineament.view.api import RequestError, answer
@@ -312,50 +310,14 @@ class Messages(Target):
         else:
             received = received_scan("a", data, encoding, f"sensor_msgs/{kind}")
         lines: list[str] = []
-        sink = RosSink(_Taken(), RosMessages("cdr"), LiveConfig(log="played.npz"))
-        node = Node(_Given([received]), self._pipelines[option], [sink], write=lines.append)
+        sink = RosSink(Taken(), RosMessages("cdr"), LiveConfig(log="played.npz"))
+        node = Node(Given([received]), self._pipelines[option], [sink], write=lines.append)
         total = node.run().total
         assert all(line.isprintable() for line in lines), lines
         assert total.malformed == sum("makes no sense" in line for line in lines)
         if kind != "Odometry":
             assert total.scans + total.malformed == 1
         return f"{kind}: {'malformed' if total.malformed else 'taken'}"
-
-
-class _Given:
-    """A source of messages that are there already."""
-
-    lost, publishers = 0, 1
-
-    def __init__(self, batch: list[Any]) -> None:
-        self._batch = batch
-
-    @property
-    def ended(self) -> bool:
-        return not self._batch
-
-    def receive(self, _: float) -> list[Any]:
-        batch, self._batch = self._batch, []
-        return batch
-
-    def problems(self) -> Iterator[str]:
-        return iter(())
-
-
-class _Taken(Publisher):
-    """A publisher that everybody listens to."""
-
-    def _open(self, topic: str, kind: str) -> str:
-        assert topic.startswith("/")
-        assert kind
-        return topic
-
-    def _send(self, topic: str, message: Message) -> None:
-        assert topic == message.topic
-        assert isinstance(message.data, bytes)
-
-    def _count(self, topic: str) -> int:  # noqa: ARG002
-        return 1
 
 
 def _refuse(constant: str) -> None:

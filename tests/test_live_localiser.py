@@ -11,31 +11,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from in_memory import Taken
 from live_driving import Running, eventually, heard
-from robot_driving import (
-    MOUNTING,
-    Moment,
-    driven,
-    link_message,
-    message_of,
-    off,
-    pose_of,
-    written,
-)
+from robot_driving import MOUNTING, Moment, driven, link_message, message_of, off, pose_of, written
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig, Pipeline, RosSink
-from lineament.live.publisher import Publisher
-from lineament.live.received import (
-    GUESS,
-    JUDGED,
-    LINKS,
-    MAP,
-    MOUNTINGS,
-    ODOMETRY,
-    RELOCATE,
-    wanted,
-)
+from lineament.live.received import GUESS, JUDGED, LINKS, MAP, MOUNTINGS, ODOMETRY, RELOCATE, wanted
 from lineament.mapping import LineMap
 from lineament.output.ros_messages import RosMessages
 from lineament.rosmsg.frames import Frames
@@ -44,6 +26,8 @@ from lineament.rosmsg.poses import Odometry, StampedPose, stamped_poses
 from lineament.scan import Pose
 from lineament.scan.poses import compose
 from lineament.simulation import office
+
+POSE = "geometry_msgs/PoseWithCovarianceStamped"
 
 
 @pytest.fixture(scope="module")
@@ -282,28 +266,21 @@ def test_poses_to_judge_that_make_no_sense(plan):
 
 
 def test_what_is_published_of_a_pose_that_is_judged(plan):
-    config, robot, moments = (
-        LiveConfig(map=plan, judge="amcl_pose"),
-        Robot(plan, judge="x"),
-        driven(),
-    )
-    config, taken = LiveConfig(map=plan, judge="amcl_pose"), Taken()
-    topics = ("/amcl_pose/verdict", "/amcl_pose/ours")
-    taken.heard = (*topics, "/tf")
+    config, robot = LiveConfig(map=plan, judge="amcl_pose"), Robot(plan, judge="x")
+    taken = Taken(("/amcl_pose/verdict", "/amcl_pose/ours", "/tf"))
     sink = RosSink(taken, RosMessages("cdr"), config)
     assert not {"/tf", "/amcl_pose"} & set(taken._topics)  # that is for the other one
-    for k, moment in enumerate(moments[:40]):
+    for k, moment in enumerate(driven()[:40]):
         believes(robot, moment, (0.0, 0.0, 0.0) if k < 38 else (5.0, 1.0, 1.5))
         robot.move(moment)
         sink.publish(robot.see(moment))
         if k == 37:
-            assert "/amcl_pose/ours" not in taken.sent
-            assert b"right\0" in taken.sent["/amcl_pose/verdict"][-1]
-    assert len(taken.sent["/amcl_pose/verdict"]) == 40
-    assert b"wrong\0" in taken.sent["/amcl_pose/verdict"][-1]
-    assert b"wrong\0" in taken.sent["/diagnostics"][-1]
-    kind = "geometry_msgs/PoseWithCovarianceStamped"
-    (ours,) = stamped_poses(taken.sent["/amcl_pose/ours"][-1], "cdr", kind)
+            assert not taken.data("/amcl_pose/ours")
+            assert b"right\0" in taken.data("/amcl_pose/verdict")[-1]
+    assert len(taken.data("/amcl_pose/verdict")) == 40
+    assert b"wrong\0" in taken.data("/amcl_pose/verdict")[-1]
+    assert b"wrong\0" in taken.data("/diagnostics")[-1]
+    (ours,) = stamped_poses(taken.data("/amcl_pose/ours")[-1], "cdr", POSE)
     assert off(ours.pose, moment.base)[0] < 0.05
 
 
@@ -351,30 +328,10 @@ def test_a_tree_that_is_a_ring_or_leads_elsewhere_is_refused():
 # What is published.
 
 
-class Taken(Publisher):
-    """Keeps messages by topic; nobody listens but to those that are `heard`."""
-
-    heard = "/tf", "/scan/pose"
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.sent: dict[str, list[bytes]] = {}
-
-    def _open(self, topic: str, kind: str) -> str:
-        assert "/" in kind
-        return topic
-
-    def _send(self, topic: str, message) -> None:
-        self.sent.setdefault(topic, []).append(message.data)
-
-    def _count(self, topic: str) -> int:
-        return topic in self.heard
-
-
 @pytest.mark.parametrize("broadcast", [True, False])
 def test_what_is_published_of_a_robot_that_is_found_and_lost(plan, broadcast):
     config = LiveConfig(map=plan, broadcast=broadcast, transform_tolerance=0.25, map_frame="floor")
-    robot, taken = Robot(plan, map_frame="floor"), Taken()
+    robot, taken = Robot(plan, map_frame="floor"), Taken(("/tf", "/scan/pose"))
     sink = RosSink(taken, RosMessages("cdr"), config)
     counts = []
     moments = driven()[:40]
@@ -385,20 +342,19 @@ def test_what_is_published_of_a_robot_that_is_found_and_lost(plan, broadcast):
             robot.move(moment)
         frame = robot.see(moment)
         sink.publish(frame)
-        counts.append((len(taken.sent.get("/tf", ())), len(taken.sent.get("/amcl_pose", ()))))
+        counts.append((len(taken.data("/tf")), len(taken.data("/amcl_pose"))))
         assert (counts[-1] != (counts[-2] if k else (0, 0))) == bool(frame.placed)
         if k == 29:
-            statuses = len(taken.sent["/diagnostics"])
+            statuses = len(taken.data("/diagnostics"))
         if k == 30:  # at once, not with the next report
-            assert len(taken.sent["/diagnostics"]) == statuses + 1
-            assert b"not on this map" in taken.sent["/diagnostics"][-1] or frame.placed is None
+            assert len(taken.data("/diagnostics")) == statuses + 1
+            assert b"not on this map" in taken.data("/diagnostics")[-1] or frame.placed is None
         if k == 29 and broadcast:
-            (link,) = stamped_poses(taken.sent["/tf"][-1], "cdr", "tf2_msgs/TFMessage")
+            (link,) = stamped_poses(taken.data("/tf")[-1], "cdr", "tf2_msgs/TFMessage")
             assert (link.frame, link.child_frame) == ("floor", "odom")
             assert link.stamp == pytest.approx(moment.scan.stamp + 0.25)
             assert link.pose == pytest.approx(frame.placed.odom)
-    kind = "geometry_msgs/PoseWithCovarianceStamped"
-    (base,) = stamped_poses(taken.sent["/amcl_pose"][29 - 1], "cdr", kind)
+    (base,) = stamped_poses(taken.data("/amcl_pose")[29 - 1], "cdr", POSE)
     assert base.frame == "floor"
     assert (counts[-1][0] > 0) == broadcast
     assert "/amcl_pose" in taken._latched
@@ -467,10 +423,9 @@ def test_a_map_on_a_topic_and_another_one_that_follows():
     robot, moments = Robot("/map"), driven()
     frame = robot.drive(moments[:1])[0]
     assert (frame.where, frame.placed) == (None, None)
-    taken = Taken()
-    taken.heard = ()
+    taken = Taken(())
     RosSink(taken, RosMessages("cdr"), LiveConfig(map="/map")).publish(frame)
-    assert b"no map on /map\0" in taken.sent["/diagnostics"][-1]
+    assert b"no map on /map\0" in taken.data("/diagnostics")[-1]
     robot.pipeline.hear(grid_of(1), MAP)
     frames = robot.drive(moments[1:30])
     assert_right(frames[-1], moments[29], 0.1)

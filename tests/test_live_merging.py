@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ros_bags
+from in_memory import Kept
 from live_driving import Running, eventually, points_of
+from robot_driving import link_message
 
 import lineament as ln
 from lineament.cli import run
@@ -141,21 +143,6 @@ def test_topics_and_mountings_have_the_namespace():
 # A log
 
 
-class Kept:
-    """A sink that keeps frames."""
-
-    unsent = 0
-
-    def __init__(self):
-        self.frames = []
-
-    def publish(self, frame):
-        self.frames.append(frame)
-
-    def diagnose(self, report, time):
-        pass
-
-
 @pytest.fixture
 def log(tmp_path):
     """A log of two scanners whose scans have the same stamps, the rear ones before."""
@@ -209,17 +196,10 @@ def test_the_command_plays_it(log, capsys):
 
 
 def test_two_topics_over_dds(peer, domain):
-    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "base_link"}
     fixed = [
-        {
-            "header": header,
-            "child_frame_id": name[1:],
-            "transform": {
-                "translation": {"x": x, "y": y},
-                "rotation": {"z": math.sin(theta / 2), "w": math.cos(theta / 2)},
-            },
-        }
-        for name, (x, y, theta) in PLACES.items()
+        link
+        for name, at in PLACES.items()
+        for link in link_message(0.0, "base_link", name[1:], at)["transforms"]
     ]
     peer.publish("/tf_static", "TFMessage", True, True)
     for topic in PLACES:

@@ -16,16 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from live_driving import Remote, eventually
-from robot_driving import (
-    MOUNTING,
-    Moment,
-    driven,
-    link_message,
-    message_of,
-    off,
-    pose_of,
-    written,
-)
+from robot_driving import MOUNTING, Moment, driven, link_message, message_of, off, pose_of, written
 
 from lineament.mapping import LineMap
 from lineament.scan import Pose
@@ -36,11 +27,7 @@ pytestmark = pytest.mark.slow
 
 RATE = 40.0
 #: What the node listens to, and its types.
-HEARD = {
-    "/scan": "LaserScan",
-    "/tf": "TFMessage",
-    "/initialpose": "PoseWithCovarianceStamped",
-}
+HEARD = {"/scan": "LaserScan", "/tf": "TFMessage", "/initialpose": "PoseWithCovarianceStamped"}
 #: Levels of the status.
 LOCATED, NOT_KNOWN, NO_SCANS = 0, 2, 3
 

@@ -3,7 +3,6 @@
 import math
 import struct
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -11,6 +10,8 @@ from random import Random
 
 import numpy as np
 import pytest
+from fuzz_targets import Messages
+from in_memory import Given, Kept, Taken
 from live_driving import garbage
 
 import lineament as ln
@@ -25,11 +26,9 @@ from lineament.live import (
     RosSink,
 )
 from lineament.live.pipeline import time_of
-from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, received_scan
 from lineament.live.twists import twist_of_laser
 from lineament.output.ros_messages import RosMessages
-from lineament.output.scene import Message
 from lineament.scan.poses import compose, poses_along, twist_between
 from lineament.simulation import SENSORS, building, cast_rays, drive, room
 
@@ -69,43 +68,6 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr("lineament.live.node.time", clock)
     return clock
-
-
-class Given:
-    """A source of given batches of messages; a callable makes one when it is received."""
-
-    lost, publishers = 0, 1
-
-    def __init__(self, *batches: list[Received] | Callable[[], list[Received]]) -> None:
-        self.batches = list(batches)
-        self.lines: list[str] = []
-
-    @property
-    def ended(self) -> bool:
-        return not self.batches
-
-    def receive(self, timeout: float) -> list[Received]:
-        assert 0 < timeout <= 0.1
-        batch = self.batches.pop(0)
-        return batch() if callable(batch) else batch
-
-    def problems(self) -> list[str]:
-        return self.lines
-
-
-class Kept:
-    """A sink that keeps what it is given."""
-
-    unsent = 0
-
-    def __init__(self) -> None:
-        self.frames, self.reports = [], []
-
-    def publish(self, frame) -> None:
-        self.frames.append(frame)
-
-    def diagnose(self, report, time) -> None:
-        self.reports.append((report, time))
 
 
 def run(*batches, source=None, **options):
@@ -260,28 +222,6 @@ def test_a_stop_ends_it():
     assert Node(source, Pipeline(LiveConfig()), []).run(lambda: next(asked)).total.scans == 2
 
 
-class Taken(Publisher):
-    """Takes messages as a transport does, and checks that they are bytes on an open topic."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.sent: list[str] = []
-        self.heard: list[str] | None = None  # the topics that have listeners; all, if None
-
-    def _open(self, topic: str, kind: str) -> str:
-        assert topic.startswith("/")
-        assert kind
-        return topic
-
-    def _send(self, topic: str, message: Message) -> None:
-        assert topic == message.topic
-        assert isinstance(message.data, bytes)
-        self.sent.append(topic)
-
-    def _count(self, topic: str) -> int:
-        return int(self.heard is None or topic in self.heard)
-
-
 #: What a message may hold that no scanner means.
 NUMBERS = (0, -0.0, 1e-45, 1e-38, 1e-7, 0.1, 1, -1, 5, 6.2831855, 1e6, 1e15, -1e20, 1e30, 3.4e38)
 NUMBERS += (math.inf, -math.inf, math.nan)
@@ -307,16 +247,7 @@ def spoilt(chance: Random) -> Received:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"track": True, "deskew": "scans"},
-        {"deskew": "/odom", "laser_pose": (0.2, 0.1, 1.0)},
-        {"track": True, "method": "liu", "noise": 0.01},
-    ],
-    ids=["optimal", "scans", "odom", "liu"],
-)
+@pytest.mark.parametrize("options", Messages.OPTIONS, ids=["optimal", "scans", "odom", "liu"])
 @pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
 def test_no_message_ends_a_node(options):
     chance, n = Random(3), 800
@@ -338,7 +269,7 @@ def test_no_message_ends_a_node(options):
     total = Node(Given(*[batch] * n), pipeline, sinks, write=lines.append).run().total
     assert n // 4 < total.scans <= n
     assert total.malformed > n // 10
-    assert len(taken.sent) >= 3 * total.scans
+    assert len(taken.messages) >= 3 * total.scans
     faults = [line.partition(" makes no sense: ")[0] for line in lines if "sense" in line]
     assert sorted(faults) == ["a scan of a", "a scan of b", "an odometry of o"]
     assert not any("\n" in line for line in lines)
@@ -369,25 +300,17 @@ def test_what_is_published_of_a_scan_and_only_where_somebody_listens(log, scan, 
     made = below + topics if log else below
     for heard in (None, [], *([topic] for topic in made)):
         publisher.heard = heard
-        publisher.sent.clear()
+        publisher.messages.clear()
         sink.publish(frame)
-        assert publisher.sent == (made if heard is None else heard)
+        assert [one.topic for one in publisher.messages] == (made if heard is None else heard)
 
 
 # The pipeline.
 
 
-@pytest.mark.parametrize(
-    ("stamp", "time"),
-    [
-        (7.25, (7, 250_000_000)),
-        (-1.0, (0, 0)),
-        (1e300, (2**31 - 1, 999_999_999)),
-        (1.9999999999, (2, 0)),
-    ],
-)
-def test_stamps_that_no_message_holds_are_clipped(stamp, time):
-    assert time_of(sweep(stamp)) == time
+def test_stamps_that_no_message_holds_are_clipped():
+    times = [time_of(sweep(stamp)) for stamp in (7.25, -1.0, 1e300, 1.9999999999)]
+    assert times == [(7, 250_000_000), (0, 0), (2**31 - 1, 999_999_999), (2, 0)]
 
 
 def test_each_publisher_has_tracks_of_the_last_eight():
@@ -598,8 +521,8 @@ def test_a_method_changes_while_the_node_runs_and_tracks_stay():
     before = [pipeline("front", scan).tracks.segments for scan in scans[:2]]
     pipeline.change(replace(config, noise=0.02, scale=1.0, parameters={"evidence": 14.0}))
     frame = pipeline("front", scans[2])
-    known = ln.Extractor("optimal", noise=0.02, evidence=14.0)(scans[2])
-    assert frame.features.segments.tobytes() == known.segments.tobytes()
+    known = ln.Extractor("optimal", noise=0.02, evidence=14.0)
+    assert frame.features.segments.tobytes() == known(scans[2]).segments.tobytes()
     assert set(frame.tracks.segments) & set(before[1])
     for other, why in (
         (replace(config, topic="other"), "topic is read at the start, expected a change of one of"),
@@ -608,7 +531,4 @@ def test_a_method_changes_while_the_node_runs_and_tracks_stay():
         with pytest.raises(ValueError, match=why):
             pipeline.change(other)
     again = pipeline("front", scans[3]).features
-    assert (
-        again.segments.tobytes()
-        == ln.Extractor("optimal", noise=0.02, evidence=14.0)(scans[3]).segments.tobytes()
-    )
+    assert again.segments.tobytes() == known(scans[3]).segments.tobytes()

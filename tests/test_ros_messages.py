@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import ros_bags
 from handmade import arc, corner, edge, features, random_features, segment
+from in_memory import Taken
 from mcap.reader import make_reader
 
 import lineament as ln
 from lineament import LaserScan
 from lineament.live import Counts, LiveConfig, Pipeline, Report, RosSink
-from lineament.live.publisher import Publisher
 from lineament.motion import CornerPose, Tracks, Travel
 from lineament.output.feature_points import FEATURE_POINT, feature_points
 from lineament.output.markers import markers_of
@@ -293,26 +293,9 @@ def test_messages_of_ros1_in_a_file(tmp_path):
     assert found == [(name, "ros1msg", "ros1") for name in names]
 
 
-class Kept(Publisher):
-    """Keeps what is published, as others would receive it."""
-
-    def __init__(self):
-        super().__init__()
-        self.opened, self.sent = {}, {}
-
-    def _open(self, topic, kind):
-        self.opened[topic] = kind
-
-    def _send(self, _, message):
-        self.sent[message.topic] = message
-
-    def _count(self, _):
-        return 1
-
-
 def test_all_that_is_published_is_read_by_rosbags(make):
     """Of a log with poses, with odometry, a dock, diagnostics: each topic, by its type."""
-    publisher, config = Kept(), LiveConfig(log="a.npz", dock=(5.0, 2.0))
+    publisher, config = Taken(), LiveConfig(log="a.npz", dock=(5.0, 2.0))
     sink, pipeline = RosSink(publisher, make, config), Pipeline(config)
     walk = [(-2, 0), (-1.9, 0)]
     for scan in drive(room(), walk, SENSORS["lms181"], speed=1.0, rate=20):
@@ -320,9 +303,9 @@ def test_all_that_is_published_is_read_by_rosbags(make):
     irregular = LaserScan(scan.ranges, angles=scan.angles).stamped("first", MOMENT.time)
     sink.publish(pipeline("a", irregular))
     sink.diagnose(Report(1.0, Counts(), Counts(3, 2, 1), (0, 0), 0, {}, 0), MOMENT[:2])
-    assert set(publisher.sent) == set(publisher.opened)
-    for topic, message in publisher.sent.items():
-        assert message.kind == publisher.opened[topic]
+    assert {message.topic for message in publisher.messages} == set(publisher.kinds)
+    for message in publisher.messages:
+        assert message.kind == publisher.kinds[message.topic]
         read(make, message)
 
 

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import ros_bags
+from in_memory import Given, Taken
 from mcap.reader import make_reader
 from pyarrow import csv, parquet
 
 import lineament as ln
 from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, RosSink
-from lineament.live.publisher import Publisher
 from lineament.live.received import ODOMETRY, received_scan
 from lineament.logs import open_log, save_npz
 from lineament.motion import Tracker
@@ -193,42 +193,6 @@ def test_nanoseconds_are_whole_in_every_output(name, tmp_path):
     assert times == {EPOCH}
 
 
-class Heard(Publisher):
-    """Takes the messages of a node."""
-
-    def __init__(self):
-        super().__init__()
-        self.sent = []
-
-    def _open(self, topic: str, kind: str) -> str:  # noqa: ARG002
-        return topic
-
-    def _send(self, topic: str, message) -> None:  # noqa: ARG002
-        self.sent.append(message)
-
-    def _count(self, topic: str) -> int:  # noqa: ARG002
-        return 1
-
-
-class Given:
-    """A source of one message after the other."""
-
-    lost, publishers = 0, 1
-
-    def __init__(self, messages):
-        self.waiting = list(messages)
-
-    @property
-    def ended(self):
-        return not self.waiting
-
-    def receive(self, timeout: float):  # noqa: ARG002
-        return [self.waiting.pop(0)]
-
-    def problems(self):
-        return []
-
-
 @every
 @pytest.mark.parametrize("deskew", ["/odom", "scans"])
 def test_what_a_node_publishes_is_where_the_walls_are_at_the_stamp(scanner, deskew):
@@ -238,15 +202,15 @@ def test_what_a_node_publishes_is_where_the_walls_are_at_the_stamp(scanner, desk
     came = []
     for k in range(6):
         moving = Odometry((EPOCH + k * NANO / RATE) / NANO, TWIST, (0, 0, 0), "odom", "base")
-        came.append(Received("o", lambda moving=moving: moving, 0.0, ODOMETRY))
-        came.append(received_scan("s", scanner.data(k, 0.002), "cdr", "sensor_msgs/LaserScan"))
-    publisher = Heard()
+        came.append([Received("o", lambda moving=moving: moving, 0.0, ODOMETRY)])
+        came.append([received_scan("s", scanner.data(k, 0.002), "cdr", "sensor_msgs/LaserScan")])
+    publisher = Taken()
     sink = RosSink(publisher, RosMessages("cdr"), config)
-    total = Node(Given(came), Pipeline(config), [sink]).run().total
+    total = Node(Given(*came), Pipeline(config), [sink]).run().total
     assert (total.scans, total.malformed) == (6, 0)
-    clouds = [m for m in publisher.sent if m.topic == "/scan/features"]
-    for k, message in enumerate(clouds):
-        cloud = ros_bags.store(2).deserialize_cdr(message.data, message.kind)
+    kind = publisher.kinds["/scan/features"]
+    for k, data in enumerate(publisher.data("/scan/features")):
+        cloud = ros_bags.store(2).deserialize_cdr(data, kind)
         stamp = cloud.header.stamp
         assert stamp.sec * NANO + stamp.nanosec == EPOCH + k * NANO // 10
         if k == 0 and deskew == "scans":
