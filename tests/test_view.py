@@ -53,11 +53,18 @@ def log(tmp_path_factory):
     return path
 
 
+@contextmanager
+def read(*paths, **options):
+    """Yield a session that has read its log."""
+    with Session(*paths, **options) as session:
+        assert session.wait(60)
+        yield session
+
+
 @pytest.fixture
 def session(log):
     extractors = {"pdbs": Extractor("pdbs"), "tight": Extractor("pdbs", noise_factor=1.0)}
-    with Session(log, extractors) as session:
-        assert session.wait(30)
+    with read(log, extractors) as session:
         yield session
 
 
@@ -82,13 +89,10 @@ def server(session):
 def ask(server, target, method="GET", **headers):
     """Status, headers and body of the answer to one request."""
     host = "127.0.0.1" if server.host == "0.0.0.0" else server.host
-    connection = http.client.HTTPConnection(host, server.server_port, timeout=30)
-    try:
+    with closing(http.client.HTTPConnection(host, server.server_port, timeout=30)) as connection:
         connection.request(method, target, headers=headers)
         reply = connection.getresponse()
         return reply.status, reply.headers, reply.read()
-    finally:
-        connection.close()
 
 
 def asked(server, target):
@@ -133,10 +137,8 @@ def test_a_trace_is_the_explanation_of_its_beam(server, log):
 def test_stamps_come_in_blocks(server):
     stamps = [10 + 0.1 * k for k in range(9)]
     assert asked(server, "/api/stamps?log=0&first=0&count=4096")[1]["stamps"] == stamps
-    assert asked(server, "/api/stamps?log=0&first=7&count=1")[1] == {
-        "first": 7,
-        "stamps": [stamps[7]],
-    }
+    seventh = {"first": 7, "stamps": stamps[7:8]}
+    assert asked(server, "/api/stamps?log=0&first=7&count=1")[1] == seventh
     assert asked(server, "/api/stamps?log=0&first=99&count=1")[1]["stamps"] == []
 
 
@@ -158,8 +160,7 @@ def test_poses_and_points_of_the_drive(server, log):
 def test_a_scan_behind_others_has_few_points(tmp_path, beams):
     path = tmp_path / "many.npz"
     save_npz(path, [LaserScan(np.ones(beams), 0.0, 1e-3, pose=(0, 0, 0))])
-    with Session(path, {}) as session:
-        assert session.wait(30)
+    with read(path, {}) as session:
         (scan,) = session.drive(0, 0, 1, 32)["scans"]
     assert len(scan["points"]) == 2 * len(range(0, beams, -(-beams // 360)))
 
@@ -242,23 +243,11 @@ def test_a_session_takes_many_paths_and_one_bad_log_is_an_error(folder, tmp_path
         ("/api/scan?log=0&i=%EF%BC%91&method=pdbs", 400, "expected a whole number"),
         (f"/api/scan?log=0&i={'9' * 5000}&method=pdbs", 400, "expected a whole number"),
         ("/api/scan?log=0&i=9&method=pdbs", 404, "scan 9 is not there: 0 to 8 have been read"),
-        (
-            "/api/scan?log=0&i=0&method=lui",
-            404,
-            "method 'lui' is not there, expected one of: pdbs, ",
-        ),
+        ("/api/scan?log=0&i=0&method=lui", 404, "'lui' is not there, expected one of: pdbs, "),
         ("/api/scan?log=0&i=0&i=1&method=pdbs", 400, "a parameter is given twice"),
-        (
-            "/api/scan?log=0&i=0&method=pdbs&x=1",
-            400,
-            "parameter 'x' is unknown, expected log, i, method",
-        ),
+        ("/api/scan?log=0&i=0&method=pdbs&x=1", 400, "'x' is unknown, expected log, i, method"),
         ("/api/logs?x=", 400, "parameter 'x' is unknown, expected none"),
-        (
-            "/api/trace?log=0&i=0&method=pdbs&beam=31",
-            404,
-            "beam is 31, expected a whole number from 0",
-        ),
+        ("/api/trace?log=0&i=0&method=pdbs&beam=31", 404, "beam is 31, expected a whole number"),
         ("/api/trace?log=0&i=9&method=pdbs&beam=0", 404, "scan 9 is not there"),
         ("/api/stamps?log=0&first=0&count=0", 400, "count is 0, expected 1 to 4096"),
         ("/api/poses?log=0&first=0&count=4097", 400, "count is 4097"),
@@ -420,14 +409,12 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(write):
     lines = [flaser([2.0] * 181, stamp=stamp) for stamp in (1, 2, 3, 4)]
     lines[2] = lines[2].replace(" 181 ", " 190 ")
     path = write("".join(lines), "broken.log")
-    with Session(path, {"pdbs": Extractor("pdbs")}) as session:
-        assert session.wait(30)
+    with read(path, {"pdbs": Extractor("pdbs")}) as session:
         facts = session.facts(0)
         assert facts["scans"] == 2
         assert "broken.log:3: " in facts["error"]
         assert session.scan(0, 1, "pdbs")["stamp"] == 2
-    with Session(path, {"pdbs": Extractor("pdbs")}, keep_going=True) as session:
-        assert session.wait(30)
+    with read(path, {"pdbs": Extractor("pdbs")}, keep_going=True) as session:
         facts = session.facts(0)
         assert (facts["scans"], facts["error"], facts["skipped"]) == (3, "", 1)
         assert session.scan(0, 2, "pdbs")["stamp"] == 4

@@ -15,11 +15,12 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
+from test_view import served as serving
 
 from lineament import Extractor, LaserScan, progress
 from lineament.explain.explain import explain
 from lineament.logs import open_log, save_npz
-from lineament.view import Session, ViewServer
+from lineament.view import Session
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -97,14 +98,8 @@ def log(folder):
 @contextmanager
 def served(path, methods):
     extractors = {name: Extractor(name) for name in methods}
-    with Session(path, extractors) as session, ViewServer(session) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            yield session, server.address
-        finally:
-            server.shutdown()
-            thread.join()
+    with Session(path, extractors) as session, serving(session) as server:
+        yield session, server.address
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +180,13 @@ class Page:
         never = f"{script} never was {expected!r}"
         waiting.until(lambda _: self.seen(script) == expected, never)
 
+    def pixels(self) -> Any:
+        """Return what is drawn in the first panel: rows of red, green, blue and opacity."""
+        canvas = "const c = document.querySelector('canvas');"
+        width, height = self.run(f"{canvas} return [c.width, c.height]")
+        data = "[...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
+        return np.reshape(self.run(f"{canvas} return {data}"), (height, width, 4))
+
 
 @contextmanager
 def new_browser(folder) -> Iterator[Page]:
@@ -229,7 +231,6 @@ def found(log, index, method=METHODS[0]):
     return Extractor(method)(open_log(log).scan(index))
 
 
-@pytest.mark.slow
 def test_the_page_shows_the_log_and_its_first_scan(page, log):
     features = found(log, 0)
     assert page.text("#log option:checked") == "corner.npz"
@@ -238,16 +239,9 @@ def test_the_page_shows_the_log_and_its_first_scan(page, log):
     label = page.run("return document.querySelector('canvas').ariaLabel")
     assert label.startswith("Scan 0 by liu:scale_free: ")
     # Something is drawn: far more colours than those of a grid.
-    colours = page.run(
-        "const c = document.querySelector('canvas'), d = c.getContext('2d')"
-        ".getImageData(0, 0, c.width, c.height).data;"
-        "const seen = new Set(); for (let i = 0; i < d.length; i += 4)"
-        " seen.add((d[i] << 16) | (d[i + 1] << 8) | d[i + 2]); return seen.size"
-    )
-    assert colours > 20
+    assert len(np.unique(page.pixels()[..., :3].reshape(-1, 3), axis=0)) > 20
 
 
-@pytest.mark.slow
 def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
     """A scan of a method that is being compiled."""
     monkeypatch.setattr(progress._compiler, "reason", "it is a test")
@@ -362,7 +356,6 @@ def test_wheel_and_drag_move_the_view(page):
     assert page.run(state) == pytest.approx([x - 40 / scale, y - 20 / scale, scale])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [NARROW, WIDE])
 @pytest.mark.parametrize(
     ("scheme", "color"), [("dark", "rgb(13, 17, 23)"), ("light", "rgb(255, 255, 255)")]
@@ -469,7 +462,6 @@ KEYS = [
 ]
 
 
-@pytest.mark.slow
 def test_all_that_can_be_clicked_has_a_key(page):
     for keys, script, expected in KEYS:
         page.press(keys)
@@ -603,7 +595,6 @@ def test_a_scan_is_drawn_the_same_at_any_pose(page):
     assert np.count_nonzero(abs(moved) > 100) < 300  # the end of the beam that goes out of it
 
 
-@pytest.mark.slow
 def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
     page.open(f"{address}#log=drive.npz&scan=7")
     page.press("cmw+lvv46")
@@ -618,31 +609,22 @@ def test_a_link_shows_the_same_in_another_browser(page, address, tmp_path):
         "document.querySelector('#why').innerText, app.panels.map((p) => p.caption.innerText)]"
     )
     view = "[app.plane.x, app.plane.y, app.plane.scale]"
-    pixels = (
-        "const c = document.querySelector('canvas');"
-        "return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
-    )
     with new_browser(tmp_path) as other:
         other.resize(1366, 768)
         other.open(page.driver.current_url)
         other.wait("document.querySelector('#why .summary')")
         for one in (page, other):
-            WebDriverWait(one.driver, 20).until(
-                lambda _, p=one: p.seen("app.drive.scans.length") == 40
-            )
+            one.until("app.drive.scans.length", 40)
         time.sleep(0.5)
         assert other.seen(state) == page.seen(state)
         assert page.seen(state)[:7] == [
             "drive.npz", 12, ["pdbs", "pdbs"], ["segments", "edges"], 60, True, 33,
         ]  # fmt: skip
         assert other.seen(view) == pytest.approx(page.seen(view), rel=1e-4, abs=1e-4)
-        first, second = (np.array(one.run(pixels), int) for one in (page, other))
-        assert first.shape == second.shape
-        assert np.mean(abs(first - second) > 64) < 0.002
+        assert np.mean(abs(page.pixels() - other.pixels()) > 64) < 0.002
         assert other.driver.get_log("browser") == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("touch", [False, True])
 def test_what_is_shared_is_saved(page, address, folder, tmp_path, touch):
     page.resize(*(NARROW if touch else WIDE), touch=touch)
@@ -661,20 +643,12 @@ def test_what_is_shared_is_saved(page, address, folder, tmp_path, touch):
     for name in ("ranges", "angles", "intensities", "pose", "stamp", "range_max"):
         np.testing.assert_array_equal(getattr(scan, name), getattr(original, name))
     # It is what the page shows, under a title.
-    size = page.run("const c = document.querySelector('canvas'); return [c.width, c.height]")
-    picture = image.imread(tmp_path / "drive.npz-scan-17.png")
-    assert picture.shape[1] == size[0]
-    assert 40 < picture.shape[0] - size[1] < 120
-    canvas = np.reshape(
-        page.run(
-            "const c = document.querySelector('canvas');"
-            "return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
-        ),
-        (size[1], size[0], 4),
-    )
+    canvas, picture = page.pixels(), image.imread(tmp_path / "drive.npz-scan-17.png")
+    title = len(picture) - len(canvas)
+    assert 40 < title < 120
     on_page = canvas[..., 0] * (canvas[..., 3] / 255) + 255 - canvas[..., 3]
-    np.testing.assert_allclose(255 * picture[-size[1] :, :, 0], on_page, atol=2)
-    assert np.unique(picture[: picture.shape[0] - size[1], :, 0]).size > 5  # words
+    np.testing.assert_allclose(255 * picture[title:, :, 0], on_page, atol=2)
+    assert np.unique(picture[:title, :, 0]).size > 5  # words
     page.click("#copy")
     page.wait("document.querySelector('#shared').innerText === 'Copied the link'")
     copied = page.run("return navigator.clipboard.readText()")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import ros_bags
 from test_merge_command import MOUNTINGS, made
-from test_view import asked, served
+from test_view import asked, read, served
 
 from lineament import Extractor
 from lineament.cli import run
@@ -29,8 +29,7 @@ def log(tmp_path_factory):
 
 @pytest.fixture
 def session(log):
-    with Session(log, METHOD, pose_topic="/odom") as session:
-        assert session.wait(60)
+    with read(log, METHOD, pose_topic="/odom") as session:
         yield session
 
 
@@ -60,8 +59,7 @@ def test_several_are_merged_as_the_command_does_in_the_frame_of_the_robot(sessio
     assert [first["topic"], second["topic"], found["missing"]] == [FRONT, REAR, []]
     assert first["index"] == 20
     scans = [
-        open_log(log, part["topic"], pose_topic="/odom").scan(part["index"])
-        for part in (first, second)
+        open_log(log, of["topic"], pose_topic="/odom").scan(of["index"]) for of in (first, second)
     ]
     assert abs(scans[1].stamp - scans[0].stamp) <= 0.055
     # Each has its own features; where its scanner is differs by the way between the two scans.
@@ -106,28 +104,22 @@ def test_the_path_is_that_of_the_robot(session):
 
 def test_mountings_are_given_where_the_log_does_not_say(tmp_path):
     path = made(tmp_path, frames=False)
-    with Session(path, METHOD) as session:
-        assert session.wait(60)
-        offered = session.topics(0)
+    with read(path, METHOD) as session:
+        offered, expected = session.topics(0), "/tf_static, or --mounting /rear=X,Y,DEGREES"
         assert offered["chosen"] == [0]
-        assert (
-            "expected /tf_static, or --mounting /rear=X,Y,DEGREES" in offered["topics"][1]["alone"]
-        )
+        assert f"expected {expected}" in offered["topics"][1]["alone"]
         with served(session) as server:
             status, found = asked(server, "/api/scan?log=0&i=0&method=optimal&topics=0,1")
         assert status == 404
         assert found["error"].startswith("where the scanner of /front is on the robot is not known")
-    with Session(path, METHOD, mountings=MOUNTINGS) as session:
-        assert session.wait(60)
+    with read(path, METHOD, mountings=MOUNTINGS) as session:
         assert session.topics(0)["chosen"] == [0, 1]
         places = [part["place"] for part in session.scan(0, 0, "optimal", (0, 1))["parts"]]
         np.testing.assert_allclose(places, list(MOUNTINGS.values()))
 
 
 def test_a_scanner_without_a_scan_at_that_time_is_left_out(tmp_path):
-    path = made(tmp_path, missing=range(21, 60, 2))
-    with Session(path, METHOD) as session:
-        assert session.wait(60)
+    with read(made(tmp_path, missing=range(21, 60, 2)), METHOD) as session:
         found = session.scan(0, 20, "optimal", (0, 1))
     assert ([part["topic"] for part in found["parts"]], found["missing"]) == ([FRONT], [REAR])
 
@@ -147,8 +139,7 @@ def test_an_upside_down_scanner_is_turned_over(tmp_path):
             0.05 * k, [1.0, 2.0, 3.0], frame=name, angle_min=0.1, angle_increment=0.2
         )
         items.append((f"/{name}", int(5e7 * k), scan))
-    with Session(ros_bags.write(tmp_path, "mcap", items), METHOD) as session:
-        assert session.wait(60)
+    with read(ros_bags.write(tmp_path, "mcap", items), METHOD) as session:
         front, rear = (session.scan(0, 0, "optimal", (k,)) for k in (0, 1))
     assert front["ranges"] == [1.0, 2.0, 3.0]
     assert rear["ranges"] == [3.0, 2.0, 1.0]
