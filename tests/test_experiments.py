@@ -263,6 +263,20 @@ class TestTexts:
         assert "100 % are explained, and the largest error is 0.50 m" in text[-1]
         assert "50 % of the points are more than 0.01 m" in text[1]
 
+    def test_a_method_that_explains_nothing_has_no_verdict(self):
+        some, none = (
+            similarity._numbers(SimilarityScores(errors, 4))
+            for errors in (np.array([0.001]), np.empty(0))
+        )
+        found = dict.fromkeys(("liu:paper", "liu:figure9", "liu", "iepf:paper"), none)
+        found |= {similarity.TRUE: some, "pdbs, fitted": some, contenders.BLIND: some}
+        (claim,) = similarity.EXPERIMENT.claims
+        judged = claim.judge({similarity.SIMULATED: found})
+        assert judged.verdict == "undecided"
+        assert judged.here.startswith("Largest error: nothing explained (beside it: ")
+        text, _ = similarity.report({similarity.SIMULATED: found}, Setting())
+        assert "nan" not in " ".join(text)
+
     def test_table_of_similarity(self):
         scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
         true = similarity._numbers(SimilarityScores(np.array([0.0]), 1))

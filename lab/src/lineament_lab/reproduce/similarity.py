@@ -1,5 +1,6 @@
 """Figure 12: how many measurements are explained, and how far they are from their lines."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,7 @@ from lineament.methods import DEFAULT_METHOD
 from lineament.output import canvas, drawing
 from lineament.scan import LaserScan
 
+from ..evaluation.counts import ratio
 from ..evaluation.similarity import SimilarityScores, similarity_errors, similarity_scores
 from .contenders import IEPF, LIU, PAPER, PDBS_LINES, Extract, by_letter, fitted_methods
 from .experiment import Claim, Experiment, Margins, Measured, Report
@@ -86,7 +88,8 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 
 
 def _numbers(scores: SimilarityScores) -> dict[str, float]:
-    return scores.summary() | {"small": float((scores.errors <= SMALL).mean())}
+    small = ratio(int((scores.errors <= SMALL).sum()), len(scores.errors))
+    return scores.summary() | {"small": small}
 
 
 def report(n: Numbers, _: Setting) -> Report:
@@ -106,9 +109,10 @@ def report(n: Numbers, _: Setting) -> Report:
         beyond=100 * (1 - true["small"]),
         farthest=1e3 * true["similarity_maximum"],
         explained=100 * liu["similarity_explained"],
-        largest=liu["similarity_maximum"],
+        largest=liu.get("similarity_maximum", math.nan),
     )
-    return text, tables
+    # Of nothing that is explained there is no largest error to speak of.
+    return text if "similarity_maximum" in liu else text[:-1], tables
 
 
 def error_strips(scan: LaserScan, found: Mapping[str, Features]) -> Any:
@@ -134,8 +138,8 @@ def _figure(where: str, scan: LaserScan, methods: dict[str, Extract]) -> Figure:
 
 
 def _judged(n: Any, method: str) -> tuple[str, Margins]:
-    most = n[SIMULATED][method]["similarity_maximum"]
-    return f"{most:.2f} m", [0.01 - most]
+    most = n[SIMULATED][method].get("similarity_maximum", math.nan)
+    return "nothing explained" if math.isnan(most) else f"{most:.2f} m", [SMALL - most]
 
 
 EXPERIMENT = Experiment(
