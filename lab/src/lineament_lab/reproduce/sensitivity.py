@@ -18,19 +18,18 @@ from lineament.simulation import SCENES
 from ..evaluation.counts import Counts
 from ..evaluation.kinds import corner_scores
 from ..evaluation.partition import PartitionScores, partition_scores
-from .contenders import IEPF
+from .contenders import IEPF, PAPER
 from .experiment import Experiment, Measured, Report
-from .findings import Columns, Progress, Setting, Table
+from .findings import Columns, Progress, Setting, Table, each
 from .grid import FORMS, GATE
 from .prose import prose
 from .scans import Frame, batch_of, filtered, frames_of
 from .two_corners import POSES, found_distances, views
 
-#: Changes of `liu:paper` by parameter and value. PASSES is how often the ranges are filtered.
-PASSES = "passes"
+#: Changes of `liu:paper` by parameter and value.
 OPEN: dict[str, dict[str, dict[str, Any]]] = {
     "half-width of the filter [beams]": {str(h): {"half_width": h} for h in (0, 1, 2, 4, 8)},
-    "passes of the filter": {str(n): {PASSES: n} for n in (1, 2, 3)},
+    "passes of the filter": {str(n): {"passes": n} for n in (1, 2, 3)},
     "4 and 0.3 of the filter": {
         "standard deviations": {},
         "variances": {"sigma_d": 2.0, "sigma_r": 0.3**0.5},
@@ -81,35 +80,29 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     """Measure the claims of the paper for all values of what it leaves open."""
     frames = frames_of(setting, SCENES, SCANS_A_FRAME)
     data = _Data(frames, views(setting.seed, 14, VIEWS_A_FRAME * setting.frames))
-    alone: dict[str, dict[str, dict[str, float]]] = {}
-    for name, values in OPEN.items():
-        progress(name)
-        alone[name] = {v: _measured(data, "liu:paper", changes) for v, changes in values.items()}
-    rows, columns = (OPEN[name] for name in TOGETHER)
-    together = {}
-    for row, column in product(rows, columns):
-        progress(f"half-width {row}, {column}")
-        both = _measured(data, "liu:paper", rows[row] | columns[column])
-        together[f"{row}, {column}"] = both
-    progress("PDBS and IEPF")
-    default = _measured(data, "liu:paper", {})
+
+    def measured(what: str, variants: Mapping[str, Any], method: str = PAPER) -> dict[str, Any]:
+        some = each(variants, progress, what)
+        return {name: _measured(data, method, **changes) for name, changes in some}
+
+    alone = {name: measured(name, values) for name, values in OPEN.items()}
+    pairs = product(*(OPEN[name].items() for name in TOGETHER))
+    both = {f"{row}, {column}": changes | more for (row, changes), (column, more) in pairs}
+    default = _measured(data, PAPER)
+    distances = {f"{d:g} m": {"rule": "fixed", "distance": d} for d in DISTANCES}
     return Measured(
         {
             "default": default,
             "bands": _bands(default, alone),
             "alone": alone,
-            "together": together,
-            "pdbs": {f"{d:g} m": _measured(data, "pdbs", {"rule": "fixed", "distance": d})
-                     for d in DISTANCES},
+            "together": measured("together", both),
+            "pdbs": measured("PDBS", distances, "pdbs"),
             "iepf": {
-                clusters: {
-                    f"{t:g} m": _measured(data, IEPF, {"threshold": t, "clusters": clusters})
-                    for t in TOLERANCES
-                }
-                for clusters in IEPF_CLUSTERS
+                clusters: measured(f"IEPF {about}", _tolerances(clusters), IEPF)
+                for clusters, about in IEPF_CLUSTERS.items()
             },
         }
-    )  # fmt: skip
+    )
 
 
 def report(n: Any, _: Setting) -> Report:
@@ -119,55 +112,40 @@ def report(n: Any, _: Setting) -> Report:
         for label, (key, paper) in SHOWN.items()
     }
     note = "Least and greatest: over all values of the parameters below, one changed at a time."
-    title = "Bands of what the paper leaves open"
+    tables = [Table.of_numbers("Bands of what the paper leaves open", bands, _BANDS, note, "")]
+    tables += [Table.of_numbers(name, of, _COLUMNS, "", "value") for name, of in n["alone"].items()]
     rows, columns = (list(OPEN[name]) for name in TOGETHER)
-    return prose("sensitivity"), (
-        Table.of_numbers(title, bands, _BANDS, note, first=""),
-        *(
-            Table.of_numbers(name, found, _COLUMNS, first="value")
-            for name, found in n["alone"].items()
-        ),
-        *(
-            Table.of_numbers(
-                f"{title} by half-width of the filter and form of the response",
-                {row: {c: n["together"][f"{row}, {c}"][key] for c in columns} for row in rows},
-                {column: (column, 1) for column in columns},
-                first="half-width",
-            )
-            for title, key in (("Corners found [%]", "recall"), ("Both corners found [%]", "both"))
-        ),
-        Table.of_numbers(
-            *("PDBS by its distance D_0", n["pdbs"]),
-            {"clusters right [%]": ("clusters", 1)},
-            first="D_0",
-        ),
-        *(
-            Table.of_numbers(
-                f"IEPF by its tolerance, {about}", n["iepf"][clusters], _COLUMNS, first="tolerance"
-            )
-            for clusters, about in IEPF_CLUSTERS.items()
-        ),
-    )
+    for title, key in (("Corners found [%]", "recall"), ("Both corners found [%]", "both")):
+        found = {row: {c: n["together"][f"{row}, {c}"][key] for c in columns} for row in rows}
+        title = f"{title} by half-width of the filter and form of the response"
+        shown = {column: (column, 1) for column in columns}
+        tables.append(Table.of_numbers(title, found, shown, "", "half-width"))
+    clusters = {label: _COLUMNS[label] for label in list(SHOWN)[:1]}
+    tables.append(Table.of_numbers("PDBS by its distance D_0", n["pdbs"], clusters, "", "D_0"))
+    for key, about in IEPF_CLUSTERS.items():
+        title = f"IEPF by its tolerance, {about}"
+        tables.append(Table.of_numbers(title, n["iepf"][key], _COLUMNS, "", "tolerance"))
+    return prose("sensitivity"), tables
 
 
-def _measured(data: _Data, method: str, changes: Mapping[str, Any]) -> dict[str, float]:
-    """Measure a method by the names in `SHOWN` [%]."""
-    own = {name: value for name, value in changes.items() if name != PASSES}
-    extractor, passes = Extractor(method, **own), int(changes.get(PASSES, 1))
-    truths = [frame.truth for frame in data.frames]
+def _tolerances(clusters: str) -> dict[str, dict[str, Any]]:
+    return {f"{t:g} m": {"threshold": t, "clusters": clusters} for t in TOLERANCES}
+
+
+def _measured(data: _Data, method: str, passes: int = 1, **changes: Any) -> dict[str, float]:
+    """Measure a method by the names in `SHOWN` [%]; ranges are filtered `passes` times."""
+    extractor = Extractor(method, **changes)
 
     def found_in(scans: Iterable[LaserScan]) -> list[Features]:
         """Filter scans, which the method does once more, and extract."""
         return batch_of(extractor, (filtered(scan, passes - 1) for scan in scans))
 
     found = found_in(frame.scan for frame in data.frames)
-    pairs = list(zip(found, truths, strict=True))
+    pairs = [(features, frame.truth) for features, frame in zip(found, data.frames, strict=True)]
     clusters = PartitionScores.total(partition_scores(*pair) for pair in pairs)
     corners = Counts.total(corner_scores(*pair).by_gate[GATE] for pair in pairs)
-    both = sum(
-        len(found_distances(found_in(scans), pose))
-        for scans, pose in zip(data.views, POSES, strict=True)
-    )
+    seen = zip(data.views, POSES, strict=True)
+    both = sum(len(found_distances(found_in(scans), pose)) for scans, pose in seen)
     shares = {
         "clusters": clusters.success,
         "recall": corners.recall,
