@@ -54,7 +54,7 @@ def _text(text: bytes) -> bytes:
     return struct.pack("<I", len(text)) + text
 
 
-def _mcap_record(code: int, data: bytes) -> bytes:
+def mcap_record(code: int, data: bytes) -> bytes:
     return struct.pack("<BQ", code, len(data)) + data
 
 
@@ -71,8 +71,8 @@ def mcap(
     """Write a message many times, in chunks packed by zstd or as it is; without an end."""
     schema = struct.pack("<H", 1) + _text(_TYPES[kind]) + _text(b"ros2msg") + _text(b"")
     channel = struct.pack("<HH", 1, 1) + _text(topic) + _text(b"cdr") + _text(b"")
-    begin = _mcap_record(3, schema) + _mcap_record(4, channel)
-    record = _mcap_record(5, bytes([1]) + bytes(21) + message)
+    begin = mcap_record(3, schema) + mcap_record(4, channel)
+    record = mcap_record(5, bytes([1]) + bytes(21) + message)
     with path.open("wb") as file:
         file.write(b"\x89MCAP0\r\n")
         if not packed:
@@ -82,28 +82,30 @@ def mcap(
         data = b"".join(map(packer.compress, (begin, *repeat(record, many)))) + packer.flush()
         size = len(begin) + len(record) * many
         head = struct.pack("<QQQI", 0, 0, size, 0) + _text(b"zstd") + struct.pack("<Q", len(data))
-        file.write(_mcap_record(6, head + data) * chunks)
+        file.write(mcap_record(6, head + data) * chunks)
 
 
-def _field(name: bytes, value: bytes) -> bytes:
+def field(name: bytes, value: bytes) -> bytes:
     return struct.pack("<I", len(name) + 1 + len(value)) + name + b"=" + value
 
 
-def _record(header: bytes, data: bytes) -> bytes:
-    return struct.pack("<I", len(header)) + header + struct.pack("<I", len(data)) + data
+def record(header: bytes, data: bytes, says: int | None = None) -> bytes:
+    """Make a record of a bag of ROS 1, which may say that it has another length than it has."""
+    size = len(data) if says is None else says
+    return struct.pack("<I", len(header)) + header + struct.pack("<I", size) + data
 
 
 def rosbag1(path: Path, message: bytes, pack: str = "none") -> None:
     """Write a message in a chunk."""
-    number, time = _field(b"conn", bytes(4)), _field(b"time", bytes(8))
-    names = _field(b"topic", b"/scan") + _field(b"type", b"sensor_msgs/LaserScan")
-    chunk = _record(_field(b"op", b"\7") + number + _field(b"topic", b"/scan"), names)
-    chunk += _record(_field(b"op", b"\2") + number + time, message)
-    size = _field(b"size", struct.pack("<I", len(chunk)))
-    head = _field(b"op", b"\5") + _field(b"compression", pack.encode()) + size
-    start = _field(b"op", b"\3") + _field(b"index_pos", bytes(8))
+    number, time = field(b"conn", bytes(4)), field(b"time", bytes(8))
+    names = field(b"topic", b"/scan") + field(b"type", b"sensor_msgs/LaserScan")
+    chunk = record(field(b"op", b"\7") + number + field(b"topic", b"/scan"), names)
+    chunk += record(field(b"op", b"\2") + number + time, message)
+    size = field(b"size", struct.pack("<I", len(chunk)))
+    head = field(b"op", b"\5") + field(b"compression", pack.encode()) + size
+    start = field(b"op", b"\3") + field(b"index_pos", bytes(8))
     data = bz2.compress(chunk) if pack == "bz2" else chunk
-    path.write_bytes(b"#ROSBAG V2.0\n" + _record(start, b"") + _record(head, data))
+    path.write_bytes(b"#ROSBAG V2.0\n" + record(start, b"") + record(head, data))
 
 
 def database(path: Path, rows: int = 40, size: int = 1000, message: bytes | None = None) -> None:
@@ -203,7 +205,7 @@ def _sparse(path: Path) -> None:
     """A record of 2 GiB that is there, and takes no room on disk."""
     rosbag1(path, laser_scan(3, ros=1))
     data = path.read_bytes()
-    head = _field(b"op", b"\5") + _field(b"compression", b"none") + _field(b"size", bytes(4))
+    head = field(b"op", b"\5") + field(b"compression", b"none") + field(b"size", bytes(4))
     start = data + struct.pack("<I", len(head)) + head + struct.pack("<I", 1 << 31)
     path.write_bytes(start)
     os.truncate(path, len(start) + (1 << 31))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from equality import assert_directed, assert_positive_definite, direction_of
 from hostile import hard_scans, hostile_scans
-from worlds import degenerate_scans, full_circle, random_scan, seen
+from worlds import degenerate_scans, full_circle, random_scan
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.features import TABLES
@@ -263,35 +263,3 @@ def test_a_workspace_full_of_poison_gives_the_same_features(name):
                 np.testing.assert_array_equal(one, other, err_msg=f"{table} {field}")
         assert fresh.clusters.tolist() == again.clusters.tolist()
         assert fresh.noise == again.noise
-
-
-# Directions and sides
-
-
-@pytest.mark.parametrize("name", method_names())
-def test_no_direction_is_special(name, recorded_scans):
-    """A scanner that is turned sees the same, but where rounding decides between equals."""
-    extractor, same, turn = Extractor(name), 0, 0.7
-    rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    # The fits of the paper's formula are of y over x: they do not turn.
-    if name in ("liu:paper", "liu:figure9"):
-        pytest.skip("y = kx + b has a direction")
-    for scan in recorded_scans:
-        one, two = extractor(scan), extractor(seen(scan, scan.ranges, scan.angles + turn))
-        alike = len(one.segments) == len(two.segments) and len(one.corners) == len(two.corners)
-        if alike and one.clusters.tolist() == two.clusters.tolist():
-            same += all(
-                np.allclose(one.segments[end] @ rotation, two.segments[end], atol=1e-6)
-                for end in ("start", "end")
-            )
-    assert same >= len(recorded_scans) - 1
-
-
-def test_no_side_is_special(recorded_scans):
-    """Of the methods, `optimal` is the same in the mirror; others go along the beams."""
-    extractor, same = Extractor("optimal"), 0
-    for scan in recorded_scans:
-        one, two = extractor(scan), extractor(seen(scan, scan.ranges[::-1], -scan.angles[::-1]))
-        ends = one.segments["end"] * (1, -1), two.segments["start"]
-        same += len(ends[0]) == len(ends[1]) and np.allclose(ends[0][::-1], ends[1], atol=1e-6)
-    assert same >= 0.98 * len(recorded_scans)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import ros_bags
 import zstandard
+from crafted import field, mcap_record, record
 from mcap.writer import Writer
 from ros_bags import every_kind, ranges_of, read
 from text_logs import at_most, zipped
@@ -173,15 +174,6 @@ def test_an_empty_ros_1_bag(tmp_path):
     assert "ends without an index: it is cut off, or still recorded" in read(path)[1]
 
 
-def field(name, value):
-    return struct.pack("<I", len(name) + 1 + len(value)) + name + b"=" + value
-
-
-def record(header, data, length=None):
-    size = len(data) if length is None else length
-    return struct.pack("<I", len(header)) + header + struct.pack("<I", size) + data
-
-
 def test_the_index_records_of_early_recorders(altered):
     """They have the length that those of the version before would have, or lack their count."""
 
@@ -218,13 +210,8 @@ def mcap_bomb(path, codec, data, size, shorter=0):
     with path.open("wb") as file:
         Writer(file, use_chunking=False).start("ros2")
         name = struct.pack("<I", len(codec)) + codec
-        body = (
-            struct.pack("<QQQI", 0, 0, size, 0)
-            + name
-            + struct.pack("<Q", len(data) - shorter)
-            + data
-        )
-        file.write(b"\6" + struct.pack("<Q", len(body)) + body)
+        body = struct.pack("<QQQI", 0, 0, size, 0) + name + struct.pack("<Q", len(data) - shorter)
+        file.write(mcap_record(6, body + data))
 
 
 PACK = {b"bz2": bz2.compress, b"lz4": lz4.frame.compress, b"zstd": zstandard.compress}
