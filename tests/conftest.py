@@ -9,7 +9,7 @@ import random
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
@@ -21,6 +21,7 @@ import pytest
 from hypothesis import settings
 
 from lineament import LaserScan, open_log
+from lineament.cli import run
 from lineament.plugins import plugins
 
 # A program for a Python that has ROS 1.
@@ -104,6 +105,25 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write_log
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Run a command that must end with a status and one line, which is returned.
+
+    A slow machine also has lines of the progress and of the compiler.
+    """
+
+    def line_of(command: str | Sequence[str], status: int = 1) -> str:
+        capsys.readouterr()
+        assert run(command.split() if isinstance(command, str) else list(command)) == status
+        output, errors = capsys.readouterr()
+        assert output == ""
+        assert "Traceback" not in errors
+        (line,) = (line for line in errors.splitlines() if line.startswith("lineament"))
+        return line
+
+    return line_of
 
 
 @pytest.fixture

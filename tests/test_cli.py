@@ -45,12 +45,9 @@ def npz(tmp_path):
     return tmp_path / "wall.npz"
 
 
-@pytest.fixture
-def benchmark(tmp_path):
-    """One scan of a wall, and made-up scores of two methods."""
-    path = tmp_path / "bench.npz"
+def save_benchmark(path, scores):
+    """One scan of a wall, and made-up scores of methods."""
     azimuth = np.linspace(-0.5, 0.5, 31)[np.newaxis]
-    scores = np.array([[[0.1, 0.2], [0.3, 0.4]]])
     np.savez(
         path,
         azimuth=azimuth,
@@ -58,10 +55,15 @@ def benchmark(tmp_path):
         beams=np.array([31]),
         radius_limits=np.array([[0.0, 30.0]]),
         max_vertices=np.array([10, 20]),
-        methods=np.array(["ple", "iepf"]),
-        **dict.fromkeys(("rmse", "f", "fnr"), scores),
+        methods=np.array(list(scores)),
+        **dict.fromkeys(("rmse", "f", "fnr"), np.array([list(scores.values())])),
     )
     return path
+
+
+@pytest.fixture
+def benchmark(tmp_path):
+    return save_benchmark(tmp_path / "bench.npz", {"ple": [0.1, 0.2], "iepf": [0.3, 0.4]})
 
 
 def test_extract_writes_a_table_and_says_what_it_found(npz, tmp_path, capsys):
@@ -175,7 +177,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("command", "status", "words"), WRONG)
 @pytest.mark.usefixtures("npz", "benchmark")
-def test_bad_input_gets_one_clear_line(command, status, words, tmp_path, monkeypatch, capsys):
+def test_bad_input_gets_one_clear_line(command, status, words, tmp_path, monkeypatch, refused):
     whole = gzip.compress("".join(flaser([2.0] * 181) for _ in range(99)).encode())
     (tmp_path / "cut.log.gz").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "empty.log").touch()
@@ -184,12 +186,7 @@ def test_bad_input_gets_one_clear_line(command, status, words, tmp_path, monkeyp
     np.savez(tmp_path / "other.npz", radius=np.ones(3))
     before = set(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
-    assert run(command.split()) == status
-    output, errors = capsys.readouterr()
-    assert words in errors
-    assert errors.count("\n") == 1
-    assert "Traceback" not in errors
-    assert output == ""
+    assert words in refused(command, status)
     assert set(tmp_path.rglob("*")) - before <= {tmp_path / "demo"}
 
 
@@ -300,14 +297,8 @@ def test_memory_does_not_grow_with_the_log(output, tmp_path):
     for scans in (3_000, 30_000):
         (tmp_path / f"{scans}.log").write_text(line * scans)
         arguments = ["extract", f"{scans}.log", "-q", "-o", output[0].format(scans), *output[1:]]
-        done = subprocess.run(
-            [sys.executable, "-c", code, *arguments],
-            capture_output=True,
-            text=True,
-            check=True,
-            cwd=tmp_path,
-        )
-        peaks.append(int(done.stdout))
+        command = [sys.executable, "-c", code, *arguments]
+        peaks.append(int(subprocess.check_output(command, text=True, cwd=tmp_path)))
     assert peaks[1] < 1.15 * peaks[0]
 
 
@@ -321,12 +312,8 @@ def test_progress_is_a_bar_on_a_terminal_and_lines_elsewhere(monkeypatch, capsys
     with progress.status(quiet=False) as show:
         for about in "abcd":
             show(about)
-    assert capsys.readouterr().err.splitlines() == [
-        "reading: 2/4, 1.0/s, 2 s left",
-        "reading: 4/4, 1.0/s, 0 s left",
-        "b",
-        "d",
-    ]
+    lines = ["reading: 2/4, 1.0/s, 2 s left", "reading: 4/4, 1.0/s, 0 s left", "b", "d"]
+    assert capsys.readouterr().err.splitlines() == lines
     assert progress._pace(994, 1000, 100.0) == "9.9/s, 1 s left"
     assert progress._pace(1000, 900, 100.0) == "10/s, 0 s left"
     assert progress._pace(0, 900, 100.0) == ""
@@ -399,24 +386,15 @@ def test_options_become_what_open_log_takes(capsys):
     options = {"topic": None, "keep_going": False, **vars(ReadOptions()), "limits": None}
     # Nothing is deskewed by a command that reads a log so.
     assert {**plain, "stamp": "first"} == options
-    limited = {"beams": 3, "ratio": 1000}
-    assert all_given == {
-        "topic": "/scan",
-        "keep_going": True,
-        "echo": "last",
-        "ring": 0,
-        "pose_topic": "/odom",
-        "limits": limited,
-        "scale": 0.001,
-        "laser_pose": (1.0, 2.0, 3.0),
-        "mask": ((-1.0, 0.5), (3.0, -3.0)),
-    }
+    read = {"topic": "/scan", "keep_going": True, "echo": "last", "ring": 0, "pose_topic": "/odom"}
+    read |= {"limits": {"beams": 3, "ratio": 1000}, "scale": 0.001, "laser_pose": (1.0, 2.0, 3.0)}
+    assert all_given == read | {"mask": ((-1.0, 0.5), (3.0, -3.0))}
     for option in show.params:
         if option.name == "echo":
             assert tuple(option.type.choices) == ECHOES
 
 
-def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys):
+def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys, refused):
     fsspec = pytest.importorskip("fsspec")
     (tmp_path / "a.zip").write_bytes(zipped(**{"x.log": FLASER, "y.log": FLASER}))
     fsspec.filesystem("memory").pipe("/cli/a.log", FLASER)
@@ -425,10 +403,8 @@ def test_info_of_what_is_behind_archives_and_addresses(tmp_path, capsys):
         out = capsys.readouterr().out
         assert out.startswith(f"log      {log} (carmen: FLASER)\n")
         assert "ranges   1.50 to 2.50 m, median 2.00 m, 66.7 % valid" in out
-    assert run(["info", str(tmp_path / "a.zip")]) == 1
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert f"holds several logs, expected a log file: {tmp_path}/a.zip/x.log" in error
+    line = f"holds several logs, expected a log file: {tmp_path}/a.zip/x.log"
+    assert line in refused(["info", str(tmp_path / "a.zip")])
 
 
 def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
@@ -444,21 +420,19 @@ def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("code", "heavy"),
     [
-        (
-            "from lineament.cli import run; run(['--help'])",
-            "numba numpy pyarrow matplotlib rich lineament.tasks.bulk",
-        ),
+        ("from lineament.cli import run; run(['--help'])", "numpy rich"),
         (
             "import lineament as ln, lineament.logs; ln.LaserScan([1.0], 0, 1);"
             "import lineament.output.figures, lineament.output.page",
-            "numba pyarrow matplotlib rosbags mcap ezdxf rerun lineament.tasks.bulk",
+            "rosbags mcap ezdxf rerun",
         ),
     ],
 )
 def test_imports_are_light(code, heavy):
-    code = f"import sys; {code}; print(sorted({{*{heavy.split()}}} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
+    heavy = f"numba pyarrow matplotlib lineament.tasks.bulk {heavy}".split()
+    code = f"import sys; {code}; print(sorted({{*{heavy}}} & set(sys.modules)))"
+    done = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert done.splitlines()[-1] == "[]"
 
 
 @pytest.mark.slow

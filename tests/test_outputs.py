@@ -7,6 +7,7 @@ import click
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from test_cli import save_benchmark
 from test_output import files_up_to, resource
 
 import lineament as ln
@@ -23,11 +24,6 @@ def names_of(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def status_of(line):
-    """Run a command; return its exit status."""
-    return run(line.split())
-
-
 def complaints(err):
     """Lines on stderr but those of the progress and the compiler, which a slow machine has."""
     return [line for line in err.splitlines() if line.startswith("lineament: ")]
@@ -42,17 +38,7 @@ def files(tmp_path, monkeypatch):
     scans = [SENSORS["utm30lx"].scan(room(), pose, rng, k / 10) for k, pose in enumerate(at)]
     save_log(tmp_path / "log.npz", scans)
     LineMap.from_lines(room().segments).write(tmp_path / "plan.dxf")
-    azimuth = np.linspace(-0.5, 0.5, 31)[np.newaxis]
-    np.savez(
-        tmp_path / "bench.npz",
-        azimuth=azimuth,
-        radius=3.0 / np.cos(azimuth),
-        beams=np.array([31]),
-        radius_limits=np.array([[0.0, 30.0]]),
-        max_vertices=np.array([10]),
-        methods=np.array(["ple"]),
-        **dict.fromkeys(("rmse", "f", "fnr"), np.array([[[0.1]]])),
-    )
+    save_benchmark(tmp_path / "bench.npz", {"ple": [0.1, 0.2]})
     return tmp_path
 
 
@@ -146,7 +132,7 @@ def test_no_command_is_forgotten():
 @pytest.mark.parametrize("link", [os.symlink, os.link])
 @pytest.mark.parametrize("case", [case for case, command in SAME.items() if command])
 @pytest.mark.usefixtures("idle")
-def test_an_output_that_is_an_input_is_refused(files, capsys, case, link):
+def test_an_output_that_is_an_input_is_refused(files, refused, case, link):
     command = SAME[case].format("link")
     *_, source, _ = case.split()
     read = {"data": "bench.npz", "onto": "plan.dxf", "plan": "plan.dxf"}.get(source, "log.npz")
@@ -156,10 +142,7 @@ def test_an_output_that_is_an_input_is_refused(files, capsys, case, link):
         (files / "out").mkdir()
     link(files / read, files / target)
     before = (files / read).read_bytes()
-    assert run(command.split()) == 1
-    said = capsys.readouterr()
-    assert complaints(said.err) == [f"lineament: {target}: would replace {read}, which is read"]
-    assert said.out == ""
+    assert refused(command) == f"lineament: {target}: would replace {read}, which is read"
     assert (files / read).read_bytes() == (files / target).read_bytes() == before
     assert not (files / "m.svg").exists()
 
@@ -186,7 +169,7 @@ def test_an_output_that_is_an_input_is_refused(files, capsys, case, link):
     ],
 )
 @pytest.mark.usefixtures("idle")
-def test_what_cannot_be_written_is_refused_before_any_work(files, capsys, command, target):
+def test_what_cannot_be_written_is_refused_before_any_work(files, refused, command, target):
     folder, _, name = target.rpartition("/")
     harms = []
     if target == "out":  # a folder: a file is in its place
@@ -200,9 +183,7 @@ def test_what_cannot_be_written_is_refused_before_any_work(files, capsys, comman
         harms.append((command.format(f"log.npz/{target}"), "log.npz does not exist"))
     before = sorted(files.rglob("*"))
     for line, problem in harms:
-        assert run(line.split()) == 1, line
-        (said,) = complaints(capsys.readouterr().err)
-        assert problem in said
+        assert problem in refused(line)
         assert sorted(files.rglob("*")) == before
 
 
@@ -218,30 +199,27 @@ def test_what_cannot_be_written_is_refused_before_any_work(files, capsys, comman
     ],
 )
 @pytest.mark.usefixtures("idle")
-def test_a_log_that_is_missing_is_named_before_kernels_are_compiled(files, capsys, command):
+def test_a_log_that_is_missing_is_named_before_kernels_are_compiled(files, refused, command):
     before = names_of(files)
-    assert run(command.split()) == 1
-    (said,) = complaints(capsys.readouterr().err)
-    assert "none.log: there is no such file" in said
+    assert "none.log: there is no such file" in refused(command)
     assert names_of(files) == before
 
 
 @pytest.mark.usefixtures("files", "idle")
-def test_a_map_names_the_smallest_extra_before_the_drive(capsys, monkeypatch):
+def test_a_map_names_the_smallest_extra_before_the_drive(refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "scipy", None)
-    assert run(["map", "log.npz", "-o", "a.svg"]) == 1
-    (said,) = complaints(capsys.readouterr().err)
-    assert "map needs scipy, which is not installed: pip install 'lineament[mapping]'" in said
+    line = "map needs scipy, which is not installed: pip install 'lineament[mapping]'"
+    assert line in refused("map log.npz -o a.svg")
 
 
 @pytest.mark.usefixtures("idle")
-def test_two_outputs_are_two_files(files, capsys):
+def test_two_outputs_are_two_files(files, refused):
     (files / "b.tum").symlink_to("a.dxf")
     for poses in ("a.dxf", "./b.tum"):
         with pytest.raises(LineamentError, match=r"would replace a\.dxf, which is written too$"):
             check_outputs(["a.dxf", poses])
-    assert status_of("map log.npz -o a.dxf --poses b.tum") == 1
-    assert "b.tum: would replace a.dxf, which is written too" in capsys.readouterr().err
+    line = refused("map log.npz -o a.dxf --poses b.tum")
+    assert "b.tum: would replace a.dxf, which is written too" in line
     assert not (files / "a.dxf").exists()
 
 
@@ -274,13 +252,13 @@ def test_a_file_is_known_by_all_its_names(tmp_path, monkeypatch):
     spare_inputs(others, ["a.log", "day/a.zip/b.log", "day/bag", "s3://day/b.zip", 300 * "a"])
 
 
-def test_a_data_set_does_not_replace_a_log(files, capsys):
+def test_a_data_set_does_not_replace_a_log(files, refused):
     part = files / "out" / "log=log.npz" / "part-0.parquet"
     part.parent.mkdir(parents=True)
     part.symlink_to(files / "log.npz")
     before = (files / "log.npz").read_bytes()
-    assert run(["extract", "log.npz", "-o", "out/"]) == 1
-    assert f"{part}: would replace {files}/log.npz, which is read" in capsys.readouterr().err
+    line = f"{part}: would replace {files}/log.npz, which is read"
+    assert line in refused("extract log.npz -o out/")
     assert (files / "log.npz").read_bytes() == before
     part.unlink()
     # Its parts, which may be logs themselves, are none of the next run.
@@ -288,8 +266,7 @@ def test_a_data_set_does_not_replace_a_log(files, capsys):
     (files / "bench.npz").unlink()
     assert run(given) == 0
     parts = {path: path.read_bytes() for path in files.glob("out/*/part-0.ros2.mcap")}
-    assert run(given) == 1
-    assert "part-0.ros2.mcap, which is read" in capsys.readouterr().err
+    assert "part-0.ros2.mcap, which is read" in refused(given)
     assert {path: path.read_bytes() for path in parts} == parts
 
 
@@ -319,17 +296,13 @@ def test_a_file_that_is_read_only_stays(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.skipif(resource is None, reason="no limits of files on this system")
-def test_a_full_disk_leaves_map_and_poses_or_none(files, capsys):
-    assert status_of("map log.npz -o b.svg --poses b.tum -q") == 0
+def test_a_full_disk_leaves_map_and_poses_or_none(files, refused):
+    assert run(["map", "log.npz", "-o", "b.svg", "--poses", "b.tum", "-q"]) == 0
     assert (files / "b.tum").stat().st_size < 1000 < (files / "b.svg").stat().st_size
-    with files_up_to(100):
-        assert status_of("map log.npz -o a.svg --poses a.tum -q") == 1
-    (said,) = complaints(capsys.readouterr().err)
-    assert said.startswith("lineament: a.tum: cannot be written: ")
-    with files_up_to(1000):
-        assert status_of("map log.npz -o a.svg --poses a.tum -q") == 1
-    (said,) = complaints(capsys.readouterr().err)
-    assert said.startswith("lineament: a.svg: cannot be written: ")
+    for size, name in ((100, "a.tum"), (1000, "a.svg")):
+        with files_up_to(size):
+            line = refused("map log.npz -o a.svg --poses a.tum -q")
+        assert line.startswith(f"lineament: {name}: cannot be written: ")
     assert not set(names_of(files)) & {"a.tum", "a.svg"}
 
 
@@ -362,13 +335,11 @@ def test_no_feature_is_status_3(capsys, target):
         assert run(["extract", "bare.log", "log.npz", *given, "--resume"]) == 0
 
 
-def test_no_wall_is_status_3(files, capsys):
+def test_no_wall_is_status_3(files, refused):
     save_log("bare.log", [sparse(k) for k in range(3)])
-    assert status_of("map bare.log -o a.svg --poses a.tum -q") == 3
-    (said,) = complaints(capsys.readouterr().err)
-    assert said == "lineament: no walls are seen in 3 key frames, expected some"
-    assert not (files / "a.svg").exists()
-    assert not (files / "a.tum").exists()
+    line = refused("map bare.log -o a.svg --poses a.tum -q", 3)
+    assert line == "lineament: no walls are seen in 3 key frames, expected some"
+    assert not set(names_of(files)) & {"a.svg", "a.tum"}
 
 
 #: Metres of the units that a plan may be drawn in.
@@ -382,10 +353,8 @@ def test_never_located_is_status_3_and_names_the_units_of_the_plan(files, capsys
     command = f"locate log.npz --map drawn.dxf -o a.tum -q --units {given}".split()
     assert run(command) == 3
     *size, never = complaints(capsys.readouterr().err)
-    assert never == (
-        "lineament: log.npz: never located: drawn.dxf: shows where the scans were if it is drawn "
-        f"in {drawn}: --units {drawn}"
-    )
+    shows = f"shows where the scans were if it is drawn in {drawn}: --units {drawn}"
+    assert never == f"lineament: log.npz: never located: drawn.dxf: {shows}"
     # A room of 6 m, of 20 if feet are taken for metres, may be one; 600 and 1.8 m are none.
     assert [said.endswith("drawn in other units? (units=, --units)") for said in size] == (
         [True] if (drawn, given) in (("cm", "m"), ("m", "ft")) else []
@@ -400,7 +369,7 @@ def test_never_located_is_status_3_and_names_the_units_of_the_plan(files, capsys
 def test_a_plan_of_another_building_says_the_usual_causes(files, capsys, ending):
     walls = [[0, 0, 30, 0], [30, 0, 30, 4], [30, 4, 12, 9], [12, 9, 0, 0]]
     LineMap.from_lines(walls).write(files / f"other{ending}")
-    assert status_of(f"locate log.npz --map other{ending} -o a.csv") == 3
+    assert run(f"locate log.npz --map other{ending} -o a.csv".split()) == 3
     said = capsys.readouterr()
     assert "never located" in said.out
     (line,) = complaints(said.err)
@@ -419,9 +388,8 @@ def test_hardly_located_in_the_wrong_units_is_a_warning(files, capsys):
     assert run(["locate", "both.npz", "--map", "both.dxf", "-o", "a.csv"]) == 0
     said = capsys.readouterr()
     assert "13 scans: 7.7 % located" in said.out
-    assert complaints(said.err) == [
-        "lineament: both.dxf: shows where the scans were if it is drawn in ft: --units ft"
-    ]
+    line = "both.dxf: shows where the scans were if it is drawn in ft: --units ft"
+    assert complaints(said.err) == [f"lineament: {line}"]
 
 
 def test_a_plan_of_no_size_is_a_warning(files, capsys):
@@ -433,8 +401,7 @@ def test_a_plan_of_no_size_is_a_warning(files, capsys):
     assert said.endswith("is it drawn in other units? (units=, --units)")
 
 
-def test_what_is_no_plan_says_how_to_make_one(files, capsys):
+def test_what_is_no_plan_says_how_to_make_one(files, refused):
     (files / "plan.ifc").touch()
-    assert status_of("locate log.npz --map plan.ifc -o a.tum") == 1
-    (said,) = complaints(capsys.readouterr().err)
-    assert said.endswith("not .ifc: `lineament map LOG -o plan.dxf` makes one of a drive")
+    line = refused("locate log.npz --map plan.ifc -o a.tum")
+    assert line.endswith("not .ifc: `lineament map LOG -o plan.dxf` makes one of a drive")

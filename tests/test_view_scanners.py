@@ -10,7 +10,6 @@ from test_merge_command import MOUNTINGS, made
 from test_view import asked, read, served
 
 from lineament import Extractor
-from lineament.cli import run
 from lineament.logs import open_log
 from lineament.mapping import LineMap, merge_features
 from lineament.motion.rig import Rig
@@ -176,8 +175,6 @@ def test_topics_that_are_not_there(session, topics, status, words):
     assert json.dumps(answer).count("\\n") == 0
 
 
-def test_a_mounting_of_no_topic_is_one_line(log, capfd):
-    assert run(["view", str(log), "--mounting", "/left=0,0,0", "--no-browser"]) == 2
-    out, err = capfd.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert "the mounting is of /left, expected one of /front, /rear" in err
+def test_a_mounting_of_no_topic_is_one_line(log, refused):
+    line = refused(["view", str(log), "--mounting", "/left=0,0,0", "--no-browser"], 2)
+    assert "the mounting is of /left, expected one of /front, /rear" in line
