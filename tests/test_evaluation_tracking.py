@@ -112,7 +112,14 @@ def test_switches_losses_and_lengths_by_hand():
     assert (segments.pairs, segments.switched, segments.lost) == (2, 2, 0)
     assert (corners.pairs, corners.switched, corners.lost) == (2, 0, 1)
     assert corners.summary() == pytest.approx(
-        {"pairs": 2, "kept": 0.5, "switches": 0, "length_mean": 4 / 3, "length_p90": 1.8}
+        {
+            "pairs": 2,
+            "kept": 0.5,
+            "switched": 0,
+            "lost": 0.5,
+            "length_mean": 4 / 3,
+            "length_p90": 1.8,
+        }
     )
     assert (segments + corners).summary()["kept"] == 0.25
 

@@ -22,7 +22,7 @@ from lineament.methods.stages import bilateral_filter
 from lineament.simulation import truth
 
 #: A row of the table of choices.
-CHOICE = dict.fromkeys(repetition._COLUMNS.values(), 0)
+CHOICE = dict.fromkeys(("reading", "chosen_by", *repetition._COLUMNS.values()), 0)
 
 
 class TestRepetition:

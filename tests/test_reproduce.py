@@ -101,11 +101,11 @@ def test_cells():
     given = {"length": 0.5, "text": "lost", "none": None}
     columns = {"[m]": "length", "a [mm]": "length", "of b [%]": "length", "a": ("length", 2)}
     units = {"[µs]": "length", "[mrad]": "length", "[°]": "length", "[%]": "text", "b": "none"}
-    assert list(cells(given, columns | units).values()) == [
+    assert list(cells(given, columns | units)) == [
         *(0.5, 500.0, 50.0, 1.0, 5e5, 500.0, pytest.approx(90 / math.pi), "lost", None)
     ]
-    with pytest.raises(ValueError, match=r"has columns .*'b'.*, then .*'c'"):
-        Table.of_records("A", [{"b": 1}, {"c": 1}])
+    of_two = Table.of_numbers("A", {("x", "y"): {"n": 2}}, {"n": "n"}, first=("a", "b"))
+    assert (of_two.columns, of_two.rows) == (("a", "b", "n"), (("x", "y", 2),))
 
 
 @pytest.mark.parametrize("field", [{"frames": 0}, {"seed": -1}, {"seeds": 0}])

@@ -89,7 +89,8 @@ class TrackScores(Summable):
         return {
             "pairs": self.pairs,
             "kept": ratio(self.pairs - self.switched - self.lost, self.pairs),
-            "switches": self.switched,
+            "switched": ratio(self.switched, self.pairs),
+            "lost": ratio(self.lost, self.pairs),
             "length_mean": ratio(float(self.lengths.sum()), len(self.lengths)),
             "length_p90": quantile(self.lengths, 0.9),
         }

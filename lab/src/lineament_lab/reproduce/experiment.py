@@ -116,8 +116,8 @@ class Experiment:
     def run(self, setting: Setting, progress: Callable[[str, str], None]) -> Findings:
         """Measure with each seed, pool the numbers, report them, and draw those of the first.
 
-        Numbers that differ between the seeds have median and range: see `Spread`. Progress is
-        given the seed, or nothing if there is one, and a few words.
+        Numbers that differ between the seeds have median and range: see `Spread`. A table without
+        rows is left out. Progress is given the seed, or nothing if there is one, and a few words.
         """
         numbers: list[dict[str, Any]] = []
         draw = Measured({}).draw
@@ -137,4 +137,5 @@ class Experiment:
         progress("", "drawing")
         pooled = merged(numbers) if len(numbers) > 1 else numbers[0]
         text, tables = self.report(pooled, setting)
-        return Findings(self.title, tuple(text), tuple(tables), tuple(draw()), pooled)
+        shown = tuple(table for table in tables if table.rows)
+        return Findings(self.title, tuple(text), shown, tuple(draw()), pooled)

@@ -48,33 +48,17 @@ class Table(NamedTuple):
     note: str = ""
 
     @classmethod
-    def of_records(
-        cls, title: str, records: Iterable[Mapping[str, object]], note: str = ""
-    ) -> Self:
-        """Make a table of at least one row; each row names its cells, all the same way.
-
-        Examples
-        --------
-        >>> Table.of_records("Corners", [{"method": "liu", "F1": 0.9}]).columns
-        ('method', 'F1')
-        """
-        rows = list(records)
-        columns = tuple(rows[0])
-        for row in rows:
-            if tuple(row) != columns:
-                raise ValueError(f"table {title!r} has columns {columns!r}, then {tuple(row)!r}")
-        return cls(title, columns, tuple(tuple(row.values()) for row in rows), note)
-
-    @classmethod
     def of_numbers(
         cls,
         title: str,
-        numbers: Mapping[str, Mapping[Any, Any]],
+        numbers: Mapping[Any, Mapping[Any, Any]],
         columns: Columns,
         note: str = "",
-        first: str = "method",
+        first: str | tuple[str, ...] = "method",
     ) -> Self:
         """Make a table of named numbers: a row for each name, empty where a number is missing.
+
+        The parts of a name that is a tuple are in so many first columns.
 
         Examples
         --------
@@ -82,8 +66,8 @@ class Table(NamedTuple):
         >>> Table.of_numbers("Errors", found, {"RMSE [mm]": "rmse"}).rows
         (('liu', 4.0), ('pdbs', None))
         """
-        rows = ((name, *cells(of, columns).values()) for name, of in numbers.items())
-        return cls(title, (first, *columns), tuple(rows), note)
+        rows = ((*_parts(name), *cells(of, columns)) for name, of in numbers.items())
+        return cls(title, (*_parts(first), *columns), tuple(rows), note)
 
     def __str__(self) -> str:
         """Write the table as plain text, in columns."""
@@ -99,14 +83,16 @@ class Table(NamedTuple):
         return {name: plain(value) for name, value in self._asdict().items()}
 
 
-def cells(numbers: Mapping[Any, Any], columns: Columns) -> dict[str, object]:
-    """Return the cells of a row by their columns: numbers by the factor, texts, None if missing."""
-    shown = {}
+def _parts(name: Any) -> tuple[Any, ...]:
+    return name if isinstance(name, tuple) else (name,)
+
+
+def cells(numbers: Mapping[Any, Any], columns: Columns) -> Iterator[object]:
+    """Yield the cells of a row by its columns: numbers by the factor, texts, None if missing."""
     for label in columns:
         key, factor = column(columns, label)
         value = numbers.get(key)
-        shown[label] = value if value is None or isinstance(value, str) else factor * value
-    return shown
+        yield value if value is None or isinstance(value, str) else factor * value
 
 
 def column(columns: Columns, label: str) -> tuple[Any, float]:

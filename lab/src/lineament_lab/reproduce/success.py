@@ -25,8 +25,11 @@ PAPER_CORNERS: Paper = {"liu": (0.9262, (21.6, 38.2)), "iepf": (0.7251, (29.9, 5
 MORE = 10
 #: No corner has such a response: `liu` then makes clusters and nothing else, as PDBS does.
 _NO_CORNERS = 1e9
-#: The number of each success.
-_SUCCESS = {"clusters": "partition_success", "corners": "corner_recall_0.10"}
+#: What is counted: title, the number of its success, and what the paper says.
+_KINDS = {
+    "clusters": ("partition: correct clusters", "partition_success", PAPER_PARTITION),
+    "corners": ("corners: correct corners", "corner_recall_0.10", PAPER_CORNERS),
+}
 #: A ratio of times is another one if it is off by this factor in all rounds and seeds.
 CLEAR = 2.0
 #: IEPF within clusters that end at 0.3 m.
@@ -76,41 +79,32 @@ def _numbers(scores: Scores) -> dict[str, float]:
 
 def report(n: Any, setting: Setting) -> Report:
     """Make the tables of partition and of corners, and that of the ratios of times."""
-    partition = [name for name in n if name.endswith("no corners") or name.startswith("pdbs")]
-    corners = [name for name in n if name not in (*partition, "ratios")]
+    *notes, of_times = prose("notes of success")
+    tables = []
+    for (kind, (title, *_)), note in zip(_KINDS.items(), notes, strict=True):
+        names = (name for name in n if name != "ratios" and _kind(name) == kind)
+        rows = {name: _row(name, n[name], setting.frames, kind) for name in names}
+        columns = {label: label for label in next(iter(rows.values()))}
+        tables.append(Table.of_numbers(f"Table 3, {title} of the true ones", rows, columns, note))
+    heads = ("", "paper", "here", "least round", "slowest round")
     ratios = tuple((about, paper, *n["ratios"][about]) for about, paper, *_ in _RATIOS)
-    return (*prose("success"), *prose("liu")), (
-        Table.of_records(
-            "Table 3, partition: correct clusters of the true ones",
-            [_row(name, n[name], setting.frames, "clusters") for name in partition],
-            "The paper’s PDBS has a fixed threshold, whose value is not given; pdbs has that of "
-            "Borges and Aldon. Times are those of the fastest and the slowest frame.",
-        ),
-        Table.of_records(
-            "Table 3, corners: correct corners of the true ones",
-            [_row(name, n[name], setting.frames, "corners") for name in corners],
-            "iepf:paper is IEPF as published: of the whole scan, with a fixed tolerance. It takes "
-            "breakpoints for corners, as the paper says, which clusters that end at 0.3 m mend. "
-            "iepf has steps in common with other methods; ‘blind cut’ has these alone.",
-        ),
-        Table(
-            "Ratio of times",
-            ("", "paper", "here", "least round", "slowest round"),
-            ratios,
-            "The paper’s range is of its fastest and its slowest frames. Here the methods run in "
-            "turns, and each round has its ratio, the median over the frames.",
-        ),
-    )
+    tables.append(Table("Ratio of times", heads, ratios, of_times))
+    return (*prose("success"), *prose("liu")), tables
+
+
+def _kind(name: str) -> str:
+    is_partition = name.endswith("no corners") or name.startswith("pdbs")
+    return "clusters" if is_partition else "corners"
 
 
 def _row(name: str, of: Any, few: int, kind: str) -> dict[str, object]:
     """Return the row of a method: the paper’s success and time, and those here."""
-    papers = PAPER_CORNERS if kind == "corners" else PAPER_PARTITION
+    _, key, papers = _KINDS[kind]
     success, paper = papers.get(name.split(":")[0].split(",")[0], (None, None))
-    row: dict[str, object] = {"method": name, "paper: success": success}
+    row: dict[str, object] = {"paper: success": success}
     for frames, part in ((few, "few"), (MORE * few, "many")):
         some = of[part]
-        row[f"here: success, {frames} frames"] = some.get(_SUCCESS[kind])
+        row[f"here: success, {frames} frames"] = some.get(key)
         right, true = (some[f"{kind}_{which}"] for which in ("right", "true"))
         row[f"{kind} in {frames}"] = f"{right:.0f} of {true:.0f}"
         if kind == "corners":

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from lineament.extractor import Extractor
 from lineament.methods import DEFAULT_METHOD
-from lineament.motion import Tracker, Tracks
+from lineament.motion import Tracker
 from lineament.scan import LaserScan, Pose
 from lineament.scan.poses import compose, relative
 
@@ -20,7 +20,7 @@ from ..evaluation.icp import icp
 from ..evaluation.relations import read_relations
 from ..evaluation.tracking import chained, motion_errors, track_scores
 from .experiment import Experiment, Measured, MissingError, Report
-from .findings import Columns, Figure, Numbers, Progress, Setting, Table, cells, dot_chart
+from .findings import Figure, Numbers, Progress, Setting, Table, dot_chart
 from .prose import prose
 
 #: The recordings, and the share that is left out at the beginning: the first half of fr079 is
@@ -73,6 +73,13 @@ _TRACKS = {
     "length of tracks, mean [scans]": "length_mean",
     "90 %": "length_p90",
 }
+#: The tables of motions: titles, their numbers, columns.
+_TABLES = (
+    ("Motion against verified relations", "relations", _RELATIONS),
+    ("Of these, those up to a minute apart", "near", _RELATIONS),
+    ("Of these, those over a minute apart", "far_apart", _RELATIONS),
+    ("Motion against the log’s corrected poses", "motion", _MOTION),
+)
 _PANELS = {
     "error of the way, median [mm]": "way_median",
     "95 % [mm]": "way_p95",
@@ -102,38 +109,19 @@ def _chart(found: Numbers) -> Figure:
 
 def report(n: Numbers, _: Setting) -> Report:
     """Make a table for each reference of motion, and that of tracks."""
+    tables = []
+    for title, key, columns in _TABLES:
+        rows = {(log, source): of for log, every in n.items() for source, of in every[key].items()}
+        tables.append(Table.of_numbers(title, rows, columns, first=("log", "motion from")))
     kinds = {
-        log: {
-            f"{name}: {kind}": of_kind
-            for name, of in every["tracks"].items()
-            for kind, of_kind in of.items()
-        }
+        (log, f"{source}: {kind}"): of
         for log, every in n.items()
+        for source, tracks in every["tracks"].items()
+        for kind, of in tracks.items()
     }
-    motions = (
-        _table(title, {log: of[key] for log, of in n.items()}, columns, "motion from")
-        for title, key, columns in (
-            ("Motion against verified relations", "relations", _RELATIONS),
-            ("Of these, those up to a minute apart", "near", _RELATIONS),
-            ("Of these, those over a minute apart", "far_apart", _RELATIONS),
-            ("Motion against the log’s corrected poses", "motion", _MOTION),
-        )
-    )
+    tables.append(Table.of_numbers("Tracks", kinds, _TRACKS, first=("log", "tracker: of")))
     percent = {"way": (1e3 * _WAY[0], 100 * _WAY[1]), "turn": (_TURN[0], 100 * _TURN[1])}
-    return prose("tracking", far=_FAR, **percent), (
-        *chain(*motions),
-        *_table("Tracks", kinds, _TRACKS, "tracker: of"),
-    )
-
-
-def _table(title: str, logs: Numbers, columns: Columns, what: str) -> list[Table]:
-    """Make a table with a row for each log and source; none without a row."""
-    records = [
-        {"log": log, what: name, **cells(numbers, columns)}
-        for log, found in logs.items()
-        for name, numbers in found.items()
-    ]
-    return [Table.of_records(title, records)] if records else []
+    return prose("tracking", far=_FAR, **percent), tables
 
 
 def load_recording(path: Path, count: int, skipped: float = 0.0) -> list[LaserScan]:
@@ -181,7 +169,8 @@ def measure_log(
         moved = [track.motion for track in found if track.motion is not None]
         motions[features] = [motion.pose for motion in moved]
         unobserved[features] = ratio(sum(not motion.observable for motion in moved), len(moved))
-        tracks[features] = _track_numbers(frames, found, poses)
+        scores = track_scores(frames, found, poses)
+        tracks[features] = {kind: score.summary() for kind, score in scores.items()}
         progress(f"{name}: ICP{about}")
         motions[ICP + about] = _icp_motions(scans, None if about else steps)
     numbers: dict[str, dict[str, Any]] = {key: {} for key in RELATION_KEYS} | {"tracks": tracks}
@@ -200,23 +189,12 @@ def measure_log(
     return numbers
 
 
-def _track_numbers(frames: Any, tracks: Sequence[Tracks], poses: Any) -> dict[str, Any]:
-    return {
-        kind: score.summary()
-        | {
-            "switched": ratio(score.switched, score.pairs),
-            "lost": ratio(score.lost, score.pairs),
-        }
-        for kind, score in track_scores(frames, tracks, poses).items()
-    }
-
-
 def _icp_motions(scans: Sequence[LaserScan], starts: Sequence[Pose] | None) -> list[Pose]:
     """Return the motion from scan to scan; without starts, each search begins with the last one."""
     motions: list[Pose] = []
-    for i in range(len(scans) - 1):
+    for i, pair in enumerate(pairwise(scans)):
         last = motions[-1] if motions else (0.0, 0.0, 0.0)
-        motions.append(icp(scans[i], scans[i + 1], last if starts is None else starts[i]))
+        motions.append(icp(*pair, last if starts is None else starts[i]))
     return motions
 
 
