@@ -95,7 +95,13 @@ class TestMuseum:
         assert none["found"] == 0
         assert [math.isnan(of["deviation"]) for of in (one, none)] == [True, True]
         assert math.isnan(none["mean"])
-        table = museum._distance_table({contenders.PAPER: two, "none": none}, 9)
+        n = {
+            "methods": {},
+            "scans": 2,
+            "views": 9,
+            "distance": {contenders.PAPER: two, "none": none},
+        }
+        _, (_, table) = museum.report(n, Setting())
         first, last = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
         assert (first["here: mean [m]"], first["place 1 [m]"]) == ("2.320", "2.300")
         assert first["standard deviation [mm]"] == pytest.approx(40 / math.sqrt(2))

@@ -25,7 +25,7 @@ from .findings import Columns, Figure, Progress, Setting, Table, each
 from .prose import prose
 from .scans import frame_times, median_scan, spread_scans
 from .scenes import pictures
-from .similarity import error_strips
+from .similarity import error_strips, feature_counts
 from .two_corners import DISTANCE, distance_found, draw_place
 
 #: The topic of the scans in a bag of the Deutsches Museum, 2-D, by Cartographer.
@@ -73,20 +73,12 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         )
         found = {name: extract(scan) for name, extract in methods.items()}
         yield from pictures("museum-fig11", about, scan, found)
-        yield _errors(scan, found)
+        strips = {name: found[name] for name in (PAPER, IEPF, PDBS_LINES)}
+        yield Figure.of("museum-fig12", error_strips(scan, strips))
         if seen is not None:
             yield _places(*seen)
 
     return Measured(numbers, draw)
-
-
-def report(n: Any, _: Setting) -> Report:
-    """Make a table of all scans, and that of the distance."""
-    title = f"Figure 12 and Table 3, as far as they need no truth: {n['scans']} scans"
-    tables = [Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE)]
-    if "distance" in n:
-        tables.append(_distance_table(n["distance"], n["views"]))
-    return prose("museum", near=FAR[0], far=FAR[1], method=DEFAULT_METHOD), tables
 
 
 _COLUMNS = {
@@ -103,11 +95,27 @@ _DISTANCE: Columns = {
     "here: mean [m]": "here",
     "standard deviation [mm]": "deviation",
     "found in [%]": "found",
+    **{f"place {k} [m]": f"place {k}" for k in range(1, PLACES + 1)},
 }
-_NOTE = (
-    "Nothing true is known of these scans, so what is right cannot be counted. Explained: share of "
-    "the valid beams that have a line or an arc, to which the errors are measured."
-)
+
+
+def report(n: Any, _: Setting) -> Report:
+    """Make a table of all scans, and that of the distance."""
+    title = f"Figure 12 and Table 3, as far as they need no truth: {n['scans']} scans"
+    note, of_distance = prose("notes of museum")
+    tables = [Table.of_numbers(title, n["methods"], _COLUMNS, note)]
+    if "distance" in n:
+        title = f"Table 2: distance of A and B in {n['views']} scans"
+        rows = {name: _row(name, of) for name, of in n["distance"].items()}
+        tables.append(Table.of_numbers(title, rows, _DISTANCE, of_distance))
+    return prose("museum", near=FAR[0], far=FAR[1], method=DEFAULT_METHOD), tables
+
+
+def _row(name: str, of: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row of a method in the table of the distance."""
+    metres = {"here": of["mean"]} | {f"place {k}": at for k, at in enumerate(of["places"], 1)}
+    shown = {key: None if math.isnan(at) else f"{at:.3f}" for key, at in metres.items()}
+    return {**of, **shown, "paper": f"{DISTANCE}" if name == PAPER else None}
 
 
 def _measured(
@@ -115,18 +123,16 @@ def _measured(
 ) -> tuple[list[SimilarityScores], dict[str, float]]:
     """Return the similarity of each scan, and the numbers of a method over all scans."""
     found = [extract(scan) for scan in scans]
-    scores = list(map(similarity_scores, scans, found))
+    scores, counts = list(map(similarity_scores, scans, found)), list(map(feature_counts, found))
     total = SimilarityScores.total(scores)
+    time = np.median(frame_times(extract, scans)) if isinstance(extract, Extractor) else math.nan
+    kinds = ("clusters", "segments", "corners")
     return scores, {
-        "clusters": float(np.mean([f.clusters.max(initial=-1) + 1 for f in found])),
-        "segments": float(np.mean([len(f.segments) for f in found])),
-        "corners": float(np.mean([len(f.corners) for f in found])),
+        **{kind: float(np.mean([of[kind] for of in counts])) for kind in kinds},
         "mean": total.mean,
         "largest": total.maximum,
         "explained": total.explained,
-        "time": float(np.median(frame_times(extract, scans)))
-        if isinstance(extract, Extractor)
-        else math.nan,
+        "time": float(time),
     }
 
 
@@ -212,29 +218,6 @@ def _distances(
             "places": places,
         }
     return numbers
-
-
-def _distance_table(numbers: Mapping[str, Mapping[str, Any]], count: int) -> Table:
-    """Make the table of the distance, which every method measures in so many scans."""
-    rows = {}
-    for name, of in numbers.items():
-        metres = (None if math.isnan(at) else f"{at:.3f}" for at in of["places"])
-        places = {f"place {k}": at for k, at in enumerate(metres, 1)}
-        mean = None if math.isnan(of["mean"]) else f"{of['mean']:.3f}"
-        paper = f"{DISTANCE}" if name == PAPER else None
-        rows[name] = {**of, **places, "here": mean, "paper": paper}
-    columns = {**_DISTANCE, **{f"place {k} [m]": f"place {k}" for k in range(1, PLACES + 1)}}
-    title = f"Table 2: distance of A and B in {count} scans"
-    return Table.of_numbers(
-        title, rows, columns, "The paper’s corners are others; its variance is lost."
-    )
-
-
-def _errors(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
-    """Draw the similarity error of each beam, by method."""
-    shown = [name for name in (PAPER, IEPF, PDBS_LINES) if name in found]
-    figure = error_strips(scan, {name: found[name] for name in shown})
-    return Figure.of("museum-fig12", figure)
 
 
 def _places(views: Sequence[View], a: int, b: int) -> Figure:

@@ -55,11 +55,15 @@ _COLUMNS: Columns = {
 }
 
 
+def feature_counts(features: Features) -> dict[str, int]:
+    """Return how many features and clusters there are, by kind."""
+    numbers = {kind: len(getattr(features, kind)) for kind in ("segments", "corners", "arcs")}
+    return numbers | {"clusters": int(features.clusters.max(initial=-1)) + 1}
+
+
 def counts_of(scan: LaserScan, features: Features) -> dict[str, Any]:
     """Return the numbers of `COUNTS` for one scan."""
-    numbers = {kind: len(getattr(features, kind)) for kind in ("segments", "corners", "arcs")}
-    numbers["clusters"] = int(features.clusters.max(initial=-1)) + 1
-    return numbers | similarity_scores(scan, features).summary()
+    return feature_counts(features) | similarity_scores(scan, features).summary()
 
 
 def measure(setting: Setting, progress: Progress) -> Measured:
