@@ -89,9 +89,18 @@ _POOLED: Columns = {
     "NEES still, corners": "corners_nees",
 }
 
+#: Titles of the pooled tables.
+_POOLS = {
+    "all": "All buildings",
+    "nothing chosen": "Recordings on which nothing was chosen",
+}
+
+T = TypeVar("T")
+U = TypeVar("U")
 S = TypeVar("S", bound=Summable)
 #: Scores by recording and method.
 Scored = dict[str, dict[str, S]]
+Figures = dict[str, dict[str, Any]]
 
 
 def measure(setting: Setting, progress: Progress) -> Measured:
@@ -99,17 +108,17 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     logs, doubles = distinct(_logs(setting), STANDING)
     if not logs:
         raise MissingError("no recordings")
-    methods, frames = feature_methods(setting.methods), setting.frames
-    unread: list[str] = []
+    frames, unread = setting.frames, list[str]()
 
     def scored(
         what: str,
-        kind: type[S],
-        read: Callable[[str, Path], Sequence[Any]],
-        measured: Callable[[Any, Extractor], S],
-    ) -> Scored[S]:
-        """Score all methods on what is read of each log."""
-        found: Scored[S] = {}
+        logs: Mapping[str, Path],
+        methods: Mapping[str, Extractor],
+        read: Callable[[str, Path], Sequence[T]],
+        score: Callable[[Sequence[T], Extractor], U],
+    ) -> dict[str, dict[str, U]]:
+        """Score methods on what is read of each log."""
+        found: dict[str, dict[str, U]] = {}
         for log, path in logs.items():
             try:
                 items = [] if log in unread else read(log, path)
@@ -117,55 +126,49 @@ def measure(setting: Setting, progress: Progress) -> Measured:
                 unread.append(log)
                 continue
             for method, extract in each(methods, progress, f"{what}, {log}") if items else ():
-                total = kind.total(measured(item, extract) for item in items)
-                found.setdefault(log, {})[method] = total
+                found.setdefault(log, {})[method] = score(items, extract)
         return found
 
+    methods = feature_methods(setting.methods)
     free = scored(
-        *("free space", FreeSpaceScores),
+        *("free space", logs, methods),
         lambda _, path: spread_scans(open_log(path, keep_going=True), SCANS_A_FRAME * frames),
-        lambda scan, extract: free_space_scores(scan, extract(scan)),
+        lambda scans, of: FreeSpaceScores.total(free_space_scores(s, of(s)) for s in scans),
     )
     standing = scored(
-        *("standing still", StandingScores),
+        *("standing still", logs, methods),
         lambda log, path: still_pairs(path, STILL_A_FRAME * frames, standing=log in STANDING),
-        lambda pair, extract: standing_scores(map(extract, pair)),
+        lambda pairs, of: StandingScores.total(standing_scores(map(of, pair)) for pair in pairs),
     )
     methods = corner_methods(setting.methods)
-    repeats: dict[str, dict[str, dict[str, float]]] = {}
-    ranked: Scored[RankedRepeats] = {}
-    for log, path in setting.recordings(LOGS | FURTHER_LOGS).items():
-        pairs = scan_pairs(path, PAIRS_A_FRAME * frames)
-        for method, extract in each(methods, progress, f"repeated corners, {log}") if pairs else ():
-            found = score_pairs(pairs, extract, RATE)
-            ranked.setdefault(log, {})[method], repeats.setdefault(log, {})[method] = found
-    arenas = {}
+    again = scored(
+        *("repeated corners", setting.recordings(LOGS | FURTHER_LOGS), methods),
+        lambda _, path: scan_pairs(path, PAIRS_A_FRAME * frames),
+        lambda pairs, of: score_pairs(pairs, of, RATE),
+    )
+    arenas, found = {}, {}
     for name, path in setting.recordings(ARENAS).items():
-        arena = load_arena(path, ARENA_A_FRAME * frames)
-        scores = {m: arena_scores(arena, e) for m, e in each(methods, progress, name)}
-        arenas[name] = arena, scores
+        arenas[name] = arena = load_arena(path, ARENA_A_FRAME * frames)
+        found[name] = {m: arena_scores(arena, of) for m, of in each(methods, progress, name)}
+    ranked = _numbers(again, lambda of: of[0])
+    every = {"all": _totals(free, FreeSpaceScores)} if free else {}
     numbers = {
         "pooled": pools(free, standing),
         "doubles": doubles,
         "unread": unread,
         "free_space": _numbers(free, FreeSpaceScores.summary),
-        "free_space_all": _numbers(
-            {"all": _totals(free, FreeSpaceScores)}, FreeSpaceScores.summary
-        ),
+        "free_space_all": _numbers(every, FreeSpaceScores.summary),
         "standing": _numbers(
             standing, lambda of: {"segments": of.segments.bins(), "corners": of.corners.bins()}
         ),
         "scatter": {kind: _scatter(standing, kind) for kind in ("segments", "corners")},
-        "repeats": repeats,
+        "repeats": _numbers(again, lambda of: of[1]),
         "quality": {log: _by_quality(of[SHOWN]) for log, of in ranked.items()},
-        "arena": {
-            name: {method: of for method, (of, _) in scores.items()}
-            for name, (_, scores) in arenas.items()
-        },
+        "arena": _numbers(found, lambda of: of[0]),
     }
     return Measured(
         numbers,
-        lambda: [*_curves(ranked), *(arena_figure(name, *of) for name, of in arenas.items())],
+        lambda: [*_curves(ranked), *(arena_figure(n, arenas[n], of) for n, of in found.items())],
     )
 
 
@@ -185,16 +188,9 @@ def report(n: Any, _: Setting) -> Report:
         *_tables(n["scatter"]["segments"], STANDING_STILL, "Standing still, segments: "),
         *_tables(n["scatter"]["corners"], STANDING_STILL, "Standing still, corners: "),
         *_tables(n["repeats"], REPEATS),
-        *([Table.of_numbers(title, n["quality"], quality, first="recording")] if quality else []),
+        Table.of_numbers(title, n["quality"], quality, first="recording"),
         *_tables(n["arena"], ARENA),
     )
-
-
-#: Titles of the pooled tables.
-_POOLS = {
-    "all": "All buildings",
-    "nothing chosen": "Recordings on which nothing was chosen",
-}
 
 
 def _logs(setting: Setting) -> dict[str, Path]:
@@ -213,7 +209,8 @@ def _totals(scored: Scored[S], kind: type[S]) -> dict[str, S]:
     return {m: kind.total(found[m] for found in scored.values()) for m in methods}
 
 
-def _numbers(scored: Scored[S], figures: Callable[[S], Any]) -> dict[str, dict[str, Any]]:
+def _numbers(scored: Mapping[str, Mapping[str, T]], figures: Callable[[T], Any]) -> Figures:
+    """Return figures of the scores by recording and method."""
     return {log: {m: figures(of) for m, of in found.items()} for log, found in scored.items()}
 
 
@@ -240,17 +237,13 @@ def pooled_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
 def _tables(numbers: Numbers, columns: Columns, about: str = "") -> list[Table]:
     """Make one table for each measure: recordings are its rows, methods its columns."""
     methods = next(iter(numbers.values()), ())
-    return [
-        Table.of_numbers(
-            f"{about}{title}",
-            {log: {m: of.get(key) for m, of in found.items()} for log, found in numbers.items()},
-            {method: (method, factor) for method in methods},
-            first="recording",
-        )
-        for title in columns
-        for key, factor in [column(columns, title)]
-        if any(numbers.values())
-    ]
+    tables = []
+    for title in columns:
+        key, factor = column(columns, title)
+        rows = {log: {m: of.get(key) for m, of in found.items()} for log, found in numbers.items()}
+        shown = {method: (method, factor) for method in methods}
+        tables.append(Table.of_numbers(about + title, rows, shown, first="recording"))
+    return tables
 
 
 def _by_quality(ranked: RankedRepeats) -> dict[str, float]:
