@@ -17,7 +17,8 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.making import make_map, onto_plan, roughness, single, widened
+from lineament.mapping.making import make_map, roughness, single, widened
+from lineament.mapping.sessions import onto_plan, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
 from lineament.walls import walls_of, wrapped
@@ -239,11 +240,11 @@ def test_a_drive_becomes_a_map(driven, storey):
     made = make_map(placed.frames, placed.scans)
     assert absolute_errors(made.poses, truth).summary()["way_rmse"] < 0.03
     plan = LineMap.from_lines(storey.plan.segments, side=1)
-    moved = onto_plan(made, plan)
+    moved = onto_plan(made, plan, placements(made, plan))
     off = np.array([relative(a, b) for a, b in zip(truth, moved.poses, strict=True)])
     assert np.hypot(*off[:, :2].T).max() < 0.1
     with pytest.raises(LineamentError, match="not on the plan"):
-        onto_plan(made, LineMap.from_lines([[0, 0, 1, 0], [0, 5, 3, 9]]))
+        placements(made, LineMap.from_lines([[0, 0, 1, 0], [0, 5, 3, 9]]))
 
 
 @pytest.mark.slow

@@ -10,10 +10,11 @@ from small_room import scans_on
 
 from lineament import Extractor, Tracker
 from lineament.features import SEGMENT
-from lineament.mapping import LocalMap, making
+from lineament.mapping import LocalMap, placing
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
-from lineament.mapping.making import found_on, single
+from lineament.mapping.making import single
+from lineament.mapping.placing import is_sure, placed_on
 from lineament.scan.poses import compose
 from lineament.simulation import World
 from lineament.walls import walls_of
@@ -71,10 +72,16 @@ def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
     seen = [(9.0, 0.0, 0.0), (1.0, 2.0, 0.0), (1.1, 2.0, 0.0), (-7.0, 4.0, 0.0), (1.0, 2.1, 1.0)]
     queries = [(k, compose(move, survey.pose(k))) for k, move in enumerate(seen)]
     monkeypatch.setattr(Survey, "queries", lambda *_: queries)
-    monkeypatch.setattr(making, "locate", lambda pose, _: SimpleNamespace(pose=pose))
-    assert found_on(None, survey, np.arange(6)) in (seen[1], seen[2])
-    assert found_on(None, survey, np.arange(3, 6)) in (seen[3], seen[4])
-    assert found_on(None, survey, np.arange(5, 6)) is None
+    monkeypatch.setattr(placing, "locate", lambda pose, _: SimpleNamespace(pose=pose))
+    found = placed_on(None, survey, np.arange(6))
+    assert found.move in (seen[1], seen[2])
+    assert (sorted(found.places), found.others) == ([1, 2], 3)
+    assert placed_on(None, survey, np.arange(3, 6)).move in (seen[3], seen[4])
+    assert placed_on(None, survey, np.arange(5, 6)) is None
+
+
+def test_three_places_that_agree_are_sure_and_thrice_those_that_do_not():
+    assert [is_sure(*of) for of in ((2, 0), (3, 0), (3, 1), (5, 2), (6, 2))] == [0, 1, 1, 0, 1]
 
 
 def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():

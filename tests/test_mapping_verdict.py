@@ -11,8 +11,9 @@ from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
-from lineament.mapping.making import make_map, onto_plan
+from lineament.mapping.making import make_map
 from lineament.mapping.parts import apart, beside, between, boxes_of, parts_of
+from lineament.mapping.sessions import onto_plan, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, office
 from lineament.walls.sights import SIGHT
@@ -227,7 +228,8 @@ def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
     assert ends[0][:, 0].max() < ends[1][:, 0].min()
     # Of the upper floor the plan of the lower one says nothing: it stays beside it.
     plan = LineMap.from_lines(ground.plan.segments, side=1)
-    placed = onto_plan(made, plan)
+    placed = onto_plan(made, plan, placements(made, plan))
+    assert placed.located == (0,)
     off = [relative(a, b) for a, b in zip(truth, placed.poses, strict=False)]
     assert np.hypot(*np.array(off)[:, :2].T).max() < 0.1
     beyond = placed.map.ends[placed.walls_of == 1].reshape(-1, 2)[:, 0]

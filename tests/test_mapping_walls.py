@@ -9,7 +9,7 @@ from small_room import RING, plan_of, query_at
 from lineament.errors import LineamentError
 from lineament.features import ARC
 from lineament.mapping import LineMap
-from lineament.mapping.drive_map import _passed
+from lineament.mapping.drive_map import passed
 from lineament.mapping.hypotheses import anchors, beside, meetings
 from lineament.scan.poses import compose, inverse
 from lineament.walls import COLUMN, as_walls, cut, moved, segments_of, walls_of, wrapped
@@ -278,9 +278,9 @@ def test_a_wall_that_three_beams_pass_is_gone(ys, ranges, gone):
     bearings = np.arctan2(ys, 2.0)
     beams[:, 2], beams[:, 3] = np.cos(bearings), np.sin(bearings)
     beams[:, 4] = np.array(ranges) / np.cos(bearings)
-    assert _passed(wall, beams).tolist() == [gone]
+    assert passed(wall, beams).tolist() == [gone]
     other_side = segments_of(walls_of(np.array([[(2.0, 1.0), (2.0, -1.0)]])))
-    assert not _passed(other_side, beams).any()
+    assert not passed(other_side, beams).any()
 
 
 @pytest.mark.parametrize(("across", "parts"), [(4, 2), (6, 1)])

@@ -48,6 +48,7 @@ _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
 @click.option("--picture", type=PATH, help="Walls and way, red where it is not sure: .png or .pdf.")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
+@click.option("--merge", is_flag=True, help="With the walls of the plan of --onto, as one map.")
 @_NO_ODOMETRY
 @extracting
 @reading
@@ -58,6 +59,7 @@ def map_command(
     poses: Path | None,
     picture: Path | None,
     onto: Path | None,
+    merge: bool,
     no_odometry: bool,
     extractor: Extractor,
     reading: dict[str, Any],
@@ -67,7 +69,7 @@ def map_command(
 
     Poses of the log are taken as odometry: their changes, not where they are. Where nothing shows
     how parts of the way lie to each other, they are drawn apart. The exit status is 3 if there are
-    no walls, or the drive is not on the plan.
+    no walls, or the drive is not surely on the plan.
     """
     from ..tasks.mapping import map_log
     from .progress import tracker
@@ -77,6 +79,8 @@ def map_command(
         check_ending(poses, (".tum", ".txt"))
     if picture is not None:
         check_ending(picture, (".png", ".pdf"))
+    if merge and onto is None:
+        raise click.UsageError("--merge is for the plan of --onto, which is not given")
     done = map_log(
         log,
         output,
@@ -84,6 +88,7 @@ def map_command(
         poses=poses,
         picture=picture,
         onto=onto,
+        merge=merge,
         odometry=not no_odometry,
         track=tracker(quiet),
         **reading,

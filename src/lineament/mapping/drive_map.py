@@ -270,7 +270,7 @@ class Drive(InTurn):
             around = self._around.transform(*inverse(motion.pose))
             before, now = associate(around, features, roughness=_ROUGHNESS).segments.T
             walls[now] = self._numbers[before]
-            is_gone = _passed(around.segments, beams_of(features, scan))
+            is_gone = passed(around.segments, beams_of(features, scan))
             is_gone[before] = False
             self._gone.update(self._numbers[is_gone].tolist())
         is_unknown = walls < 0
@@ -327,7 +327,7 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
     return np.asarray(turns[order[votes[order] > 0]])
 
 
-def _passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
+def passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
     """Whether beams pass through each wall, away from its ends, and end far behind."""
     ends, passes = np.concatenate((walls["start"], walls["end"]), axis=1), np.empty(len(walls), int)
     count_passes(beams, ends, (0.1, 0.2, 0.3), passes)

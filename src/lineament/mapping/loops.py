@@ -23,7 +23,7 @@ _EVERY, _BEFORE = 2.0, 12.0
 #: Stretches of the way that are looked at for each; key frames whose beams a query has.
 _STRETCHES, _SCANS = 2, 6
 #: Errors of a loop beside those that `locate` knows [m, rad].
-_FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
+FLOOR = np.diag((0.02, 0.02, 0.005)) ** 2
 
 
 @dataclass(slots=True, eq=False)
@@ -93,7 +93,7 @@ class Survey:
                     if where:
                         ends.append((j, q))
                         motions.append(where.pose)
-                        spreads.append(where.covariance + _FLOOR)
+                        spreads.append(where.covariance + FLOOR)
         return edges_of(ends, motions, spreads, loop=True)
 
     def _passed(self, q: int, reach: float) -> list[int]:

@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import compress, pairwise
 from pathlib import Path
 
@@ -10,17 +10,17 @@ import numpy as np
 
 from ..errors import NothingFoundError
 from ..scan import Array, Pose
-from ..scan.poses import compose, inverse
-from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, moved, unit, wrapped
+from ..scan.poses import compose
+from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
 from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
 from .adjust import Adjusted, edges_of, optimise
 from .drive_map import UNKNOWN, KeyFrame
 from .grids import GRID_ENDINGS
 from .index import MAPPED
 from .line_map import LineMap
-from .locate import locate
 from .loops import Survey
-from .parts import Parts, apart, beside, boxes_of, parts_of
+from .parts import Parts, apart, parts_of
+from .placing import placed_on
 
 #: Surfaces are thought to be off straight lines by so much at first [m].
 _ROUGH = 0.01
@@ -28,15 +28,13 @@ _ROUGH = 0.01
 _OFTEN, _SMOOTHEST, _ROUGHEST, _MEDIAN = 8, 1e-5, 0.05, 0.4549
 #: What walls say of motions and loops is known by the walls already: a 25th of it counts, and
 #: nothing of motions below these deviations [m, m, rad].
-_TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
+TWICE, _LEAST = 25.0, np.diag((0.02, 0.02, 0.01)) ** 2
 #: Where loops are looked for at first, and once they are closed [m, rad].
 _SPREADS = (0.8, 0.12), (0.3, 0.06)
 #: Surfaces that are so much off a common line are one wall [m].
-_APART = 0.015
-#: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
-_PLACES, _AGREE = 3.0, (0.5, 0.05)
+APART = 0.015
 #: A wall was seen by so many key frames.
-_VIEWS = 3
+VIEWS = 3
 #: Surfaces that lie so close, and along each other (10°), hide each other [m].
 _HIDDEN, _ALONG = 0.15, math.cos(math.radians(10))
 
@@ -62,8 +60,12 @@ class DriveMap:
         knows where they are to each other.
     loops, refused : structured arrays of `EDGE`
         Loops between key frames that were closed, and those that contradict the others.
+    chain : structured array of `EDGE`
+        The motions between key frames.
     adjusted : Adjusted
         The last adjustment; `parts.between` has covariances of it.
+    located : tuple of int
+        The parts whose place on a plan is known, where there is one.
     """
 
     map: LineMap
@@ -74,7 +76,9 @@ class DriveMap:
     parts: Parts
     loops: Records
     refused: Records
+    chain: Records
     adjusted: Adjusted
+    located: tuple[int, ...] = ()
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the walls, or for ``.yaml`` a grid, in which free is what sure beams pass."""
@@ -134,13 +138,13 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     found, loops, refused = closed(frames, chain, found, sights)
     if len(loops):
         weak = loops.copy()
-        weak["information"] /= _TWICE
+        weak["information"] /= TWICE
         weak["loop"] = False
         found = optimise(found.poses, np.append(chain, weak), sights, _count(sights), rounds=2)
     parts = parts_of(found, chain, np.array([f.is_lost or f.is_contradicted for f in frames]))
     found, chain, sights = apart(found, chain, sights, parts)
     if len(loops):
-        sights = merged(sights, found.poses, found.lines, _APART)
+        sights = merged(sights, found.poses, found.lines, APART)
     # Misfits widen the covariances only here: from the start, they have right loops refused.
     bent = [(widened(segments), walls) for segments, walls in seen]
     again = relabelled(sights_of(bent, rough), sights)
@@ -152,12 +156,12 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
     every = [compose(survey.pose(k), pose) for k, pose in scans]
     of_walls = np.repeat(np.arange(parts.count), [len(of) for of in walls])
     plan = LineMap(np.concatenate(walls), sigma=MAPPED)
-    return DriveMap(plan, of_walls, every, frame_of, survey, parts, loops, refused, found)
+    return DriveMap(plan, of_walls, every, frame_of, survey, parts, loops, refused, chain, found)
 
 
 def walls_by_part(survey: Survey, parts: Parts) -> list[Records]:
     """Return the walls of each part; NothingFoundError if there are none."""
-    sights, least = survey.sights, min(_VIEWS, len(survey.frames))
+    sights, least = survey.sights, min(VIEWS, len(survey.frames))
     of = parts.numbers[sights["frame"]]
     walls = [
         single(walls_along(sights[of == k], survey.poses, survey.lines, views=least))
@@ -178,7 +182,7 @@ def spread_of(frame: KeyFrame) -> Array:
         return UNKNOWN
     if frame.is_contradicted or frame.is_lost:
         return np.asarray(frame.expected + np.outer(frame.off, frame.off) + _LEAST)
-    known = np.linalg.inv(frame.motion.covariance) / _TWICE + np.linalg.inv(frame.expected)
+    known = np.linalg.inv(frame.motion.covariance) / TWICE + np.linalg.inv(frame.expected)
     return np.asarray(np.linalg.inv(known) + _LEAST)
 
 
@@ -275,59 +279,7 @@ def joined(survey: Survey) -> Array:
         before = Survey(frames, poses, sights, lines).walls((0.0, 0.0, 0.0), np.arange(first))
         if len(before):
             part = Survey(frames[:last], poses[:last], sights, lines)
-            move = found_on(LineMap(before), part, np.arange(first, last))
-            if move is not None:
-                poses[first:] = [compose(move, tuple(pose)) for pose in poses[first:].tolist()]
+            found = placed_on(LineMap(before), part, np.arange(first, last))
+            if found is not None:
+                poses[first:] = [compose(found.move, tuple(of)) for of in poses[first:].tolist()]
     return poses
-
-
-def found_on(plan: LineMap, survey: Survey, frames: Numbers) -> Pose | None:
-    """Return the motion that puts some key frames where the plan shows what they saw.
-
-    Places along the way are looked for without a first guess; most of those that are located agree
-    on this motion. None if none is located.
-    """
-    found = []
-    for q, query in survey.queries(_PLACES):
-        if q in frames and (where := locate(query, plan)):
-            found.append(compose(where.pose, inverse(survey.pose(q))))
-    if not found:
-        return None
-    # Compared where the key frames are, not at their origin.
-    x, y = survey.poses[frames, :2].mean(axis=0).tolist()
-    moves, places = np.array(found), np.array([compose(move, (x, y, 0.0)) for move in found])
-    agree = np.abs(wrapped(moves[:, None, 2] - moves[:, 2])) < _AGREE[1]
-    agree &= np.linalg.norm(places[:, None, :2] - places[:, :2], axis=2) < _AGREE[0]
-    return found[int(agree.sum(axis=1).argmax())]
-
-
-def onto_plan(made: DriveMap, plan: LineMap) -> DriveMap:
-    """Move each part of a map into the frame of a plan, on which it is found without a first guess.
-
-    Parts that are not found lie beside the plan. NothingFoundError if none is found.
-    """
-    count, of_scans = made.parts.count, made.parts.numbers[made.frame_of]
-    found = [found_on(plan, made.survey, made.parts.frames(k)) for k in range(count)]
-    located = [k for k, move in enumerate(found) if move is not None]
-    if not located:
-        raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
-    moves = [move or (0.0, 0.0, 0.0) for move in found]
-    if len(located) < count:
-        ends = [_ends(made, k, move) for k, move in enumerate(moves)]
-        points, sizes = np.concatenate((plan.ends.reshape(-1, 2), *ends)), map(len, ends)
-        labels = np.repeat(np.arange(count + 1), [2 * len(plan.ends), *sizes])
-        shifts = beside(boxes_of(points, labels), np.append(0, np.array(located) + 1))[1:]
-        moves = [
-            compose((x, y, 0.0), of) for (x, y), of in zip(shifts.tolist(), moves, strict=True)
-        ]
-    poses = [compose(moves[k], pose) for k, pose in zip(of_scans, made.poses, strict=True)]
-    walls = [moved(made.map.walls[made.walls_of == k], inverse(moves[k])) for k in range(count)]
-    return replace(made, map=LineMap(np.concatenate(walls), sigma=MAPPED), poses=poses)
-
-
-def _ends(made: DriveMap, part: int, move: Pose) -> Array:
-    """Return ends of walls and places of key frames of a part that is moved, (n, 2) [m]."""
-    walls = moved(made.map.walls[made.walls_of == part], inverse(move))
-    poses = made.survey.poses[made.parts.frames(part)].tolist()
-    places = [compose(move, (x, y, theta))[:2] for x, y, theta in poses]
-    return np.concatenate((walls["start"], walls["end"], places))

@@ -17,7 +17,8 @@ from ..logs import open_log
 from ..mapping import LineMap
 from ..mapping.drive_map import Drive
 from ..mapping.grids import GRID_ENDINGS, all_files
-from ..mapping.making import make_map, onto_plan
+from ..mapping.making import make_map
+from ..mapping.sessions import Merged, merge_onto, onto_plan, placements
 from ..output import open_writer
 from ..output.figures import plot_walls
 from ..progress import Track, untracked
@@ -34,7 +35,8 @@ class Mapping:
     Numbers of scans, of key frames, of those that were lost, and of loops, closed and left out;
     the map; wall time [s]. `ways` are those of the parts that hang together, and `known` how badly
     places of them are known at most [m]. `unsure` has the first and last scan of each stretch on
-    which the poses are not sure, and its way [m].
+    which the poses are not sure, and its way [m]. `located` are the parts that were found on a
+    plan, where there is one; `merged` has what became of its walls, where it is one map with them.
     """
 
     log: str
@@ -49,6 +51,8 @@ class Mapping:
     unsure: list[tuple[int, int, float]]
     map: LineMap
     seconds: float
+    located: tuple[int, ...] = ()
+    merged: Merged | None = None
 
     def __str__(self) -> str:
         lost = f", {self.lost} times lost" if self.lost else ""
@@ -61,6 +65,7 @@ class Mapping:
             f"  {self.loops} loops{refused}\n"
             f"  by its covariances, places are known to {known}{each} from the start\n"
             f"{self._unsure()}"
+            f"{'' if self.merged is None else f'  {self.merged}'}"
             f"  {self.map}\n"
             f"  {self.seconds:.1f} s, {self.scans / self.seconds:.0f} scans/s"
         )
@@ -68,11 +73,15 @@ class Mapping:
     @property
     def warning(self) -> str:
         """What is wrong with the map as a whole, on one line; empty if it is whole."""
-        if len(self.ways) == 1:
+        count, rest = len(self.ways), [k for k in range(len(self.ways)) if k not in self.located]
+        if not rest or count == 1:
             return ""
-        ways = ", ".join(f"{way:.0f} m" for way in self.ways)
+        ways = ", ".join(f"{self.ways[k]:.0f} m" for k in rest)
+        if self.located:
+            where = "are left out" if self.merged else "lie beside it"
+            return f"parts of the drive are not found on the plan, and {where}: {ways} of way"
         return (
-            f"the map is in {len(self.ways)} parts, drawn beside each other, of {ways} of way: "
+            f"the map is in {count} parts, drawn beside each other, of {ways} of way: "
             "nothing shows where they are to each other"
         )
 
@@ -95,6 +104,7 @@ def map_log(
     *,
     poses: str | os.PathLike[str] | None = None,
     onto: str | os.PathLike[str] | None = None,
+    merge: bool = False,
     picture: str | os.PathLike[str] | None = None,
     odometry: bool = True,
     track: Track = untracked,
@@ -115,6 +125,8 @@ def map_log(
         Where to write the pose of each scan: ``stamp x y z qx qy qz qw`` [s, m], a line a scan.
     onto : path-like, optional
         A plan in whose frame the map is to be; without, it is that of the first scan.
+    merge : bool
+        Whether the map has the walls of that plan too, those that are one as one wall.
     picture : path-like, optional
         Where to draw the walls and the way, ``.png`` or ``.pdf``: what is not sure of it is red.
     odometry : bool
@@ -129,6 +141,8 @@ def map_log(
     LineamentError
         If the log cannot be read or has no scans, no walls are found, the drive is not on the plan,
         or an output cannot be written or is one of the files that are read.
+    ValueError
+        If it is to be merged, and there is no plan.
 
     Examples
     --------
@@ -140,6 +154,8 @@ def map_log(
     >>> made.scans, len(made.map.walls) > 10
     (60, True)
     """
+    if merge and onto is None:
+        raise ValueError("merge is for a plan, which `onto` names")
     extractor = Extractor() if extractor is None else extractor
     if Path(output).suffix.lower() not in GRID_ENDINGS:
         open_writer(output)
@@ -161,9 +177,11 @@ def map_log(
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
     if not scans:
         raise LogError(log.name, "has no scans, expected a drive")
-    made = make_map(drive.frames, drive.scans)
+    made, merged = make_map(drive.frames, drive.scans), None
     if plan is not None:
-        made = onto_plan(made, plan)
+        found = placements(made, plan)
+        merged = merge_onto(made, plan, found) if merge else None
+        made = onto_plan(made, plan, found) if merged is None else merged.made
     stamps = [scan.stamp for scan in scans]
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
     with placed:  # All files, or none.
@@ -184,6 +202,8 @@ def map_log(
         unsure=made.unsure,
         map=made.map,
         seconds=time.perf_counter() - started,
+        located=made.located,
+        merged=merged,
     )
 
 

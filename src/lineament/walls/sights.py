@@ -138,23 +138,39 @@ def walls_along(
     ends where hardly any sight goes on: at a grazing angle, a few cross doorways.
     """
     low, high = extents(sights, poses, lines)
-    w, places = np.tile(sights["wall"], 2), np.concatenate((low, high + gap))
+    runs = stretches(sights["wall"], low, high, gap, views, everywhere)
+    return on_lines(lines, *runs)
+
+
+def stretches(
+    w: Numbers, low: Array, high: Array, gap: float = GAP, views: int = 1, everywhere: int = 1
+) -> tuple[Numbers, Array, Array, Numbers]:
+    """Return what parts of each wall w (m,), from low to high [m], cover together.
+
+    These are the wall, from where to where, and how many parts, in the order of walls and places;
+    limits are those of `walls_along`.
+    """
+    w, places = np.tile(w, 2), np.concatenate((low, high + gap))
     order = np.lexsort((places, w))
     w, places, begins = w[order], places[order], order < len(low)
-    cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(len(lines))
+    cover, most = np.cumsum(np.where(begins, 1, -1)), np.zeros(int(w.max(initial=-1)) + 1)
     np.maximum.at(most, w, cover)
     least = np.maximum(_SHARE * most[w] if views > 1 else 0, everywhere - 1)
     edges = np.flatnonzero(np.diff(cover > least, prepend=False))
     seen: Numbers = np.cumsum(begins)[edges[1::2]] - np.cumsum(~begins)[edges[::2]]
     first, last = edges.reshape(-1, 2)[seen >= views].T
-    walls: Records = lines[w[first]]
-    begin, end = places[first], places[last] - gap
+    return w[first], places[first], places[last] - gap, seen[seen >= views]
+
+
+def on_lines(lines: Records, w: Numbers, begin: Array, end: Array, views: Numbers) -> Records:
+    """Return walls along lines w (m,), from where to where from their centroids on [m]."""
+    walls: Records = lines[w]
     middle = np.where((begin < 0) & (end > 0), 0.0, (begin + end) / 2)
     u, origin = unit(walls["angle"]), walls["centroid"].copy()
     for name, along in (("start", begin), ("end", end), ("centroid", middle)):
         walls[name] = origin + along[:, None] * u
     walls["covariance"] = covariance_at(walls["covariance"], middle)
-    walls["side"], walls["views"] = 1, seen[seen >= views]
+    walls["side"], walls["views"] = 1, views
     return walls
 
 
@@ -219,15 +235,15 @@ def bowed(walls: Records, sights: Records) -> Records:
     return walls
 
 
-def joined(sights: Records, apart: float = 0.0) -> tuple[Records, Records]:
+def joined(sights: Records, apart: float = 0.0, poses: Array = _HERE) -> tuple[Records, Records]:
     """Return sights with the numbers of their walls, `merged` until none are one, and the lines.
 
-    The sights, at least one, are in the frame of the walls.
+    There is at least one sight; without poses, they are in the frame of the walls.
     """
     before = -1
     while (count := int(sights["wall"].max()) + 1) != before:
-        lines, before = lines_of(sights, _HERE, count), count
-        sights = merged(sights, _HERE, lines, apart)
+        lines, before = lines_of(sights, poses, count), count
+        sights = merged(sights, poses, lines, apart)
     return sights, lines
 
 

@@ -1,0 +1,63 @@
+"""Where a drive lies on a plan: places along the way that are located there, and agree."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scan import Pose
+from ..scan.poses import compose, inverse
+from ..walls import Numbers, wrapped
+from .line_map import LineMap
+from .locate import Location, locate
+from .loops import Survey
+
+#: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
+_PLACES, _AGREE = 3.0, (0.5, 0.05)
+#: So many places agree at least, and so many times as many as are located elsewhere.
+_FEWEST, _MORE = 3, 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """The motion that puts key frames onto a plan.
+
+    `places` are those that were located and agree, by key frame; `others` are located elsewhere.
+    """
+
+    move: Pose
+    places: dict[int, Location]
+    others: int
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether enough places agree, and few enough do not."""
+        return is_sure(len(self.places), self.others)
+
+
+def is_sure(agree: int, others: int) -> bool:
+    """Whether that many places that agree are enough, beside others."""
+    return agree >= max(_FEWEST, _MORE * others)
+
+
+def placed_on(plan: LineMap, survey: Survey, frames: Numbers) -> Placement | None:
+    """Find the motion that puts some key frames where the plan shows what they saw.
+
+    Places along the way are looked for without a first guess; most of those that are located agree
+    on it. None if none is located.
+    """
+    places = {}
+    for q, query in survey.queries(_PLACES):
+        if q in frames and (where := locate(query, plan)):
+            places[q] = where
+    if not places:
+        return None
+    moves = [compose(where.pose, inverse(survey.pose(q))) for q, where in places.items()]
+    # Compared where the key frames are, not at their origin.
+    x, y = survey.poses[frames, :2].mean(axis=0).tolist()
+    ends, turns = np.array([compose(m, (x, y, 0.0)) for m in moves]), np.array(moves)[:, 2]
+    agree = np.abs(wrapped(turns[:, None] - turns)) < _AGREE[1]
+    agree &= np.linalg.norm(ends[:, None, :2] - ends[:, :2], axis=2) < _AGREE[0]
+    best = int(agree.sum(axis=1).argmax())
+    chosen = [q for q, is_one in zip(places, agree[best].tolist(), strict=True) if is_one]
+    others = len(places) - len(chosen)
+    return Placement(moves[best], {q: places[q] for q in chosen}, others)

@@ -1,0 +1,268 @@
+"""A drive on a plan that is there already: in its frame, and one map with it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import NothingFoundError
+from ..scan import Array, Pose
+from ..scan.poses import compose, inverse, relative
+from ..walls import (
+    SHORT,
+    Numbers,
+    Records,
+    bent,
+    covariance_at,
+    lengths_of,
+    moved,
+    segments_of,
+    turned_back,
+    unit,
+)
+from ..walls.sights import extents, joined, on_lines, sights_of, stretches
+from .adjust import Adjusted, edges_of, optimise
+from .drive_map import passed
+from .index import MAPPED
+from .line_map import LineMap
+from .local_map import beams_of, some
+from .loops import FLOOR, Survey
+from .making import APART, TWICE, VIEWS, DriveMap, single
+from .parts import beside, boxes_of
+from .placing import Placement, is_sure, placed_on
+
+#: Walls that are one are looked for so often, poses and walls adjusted in between.
+_ROUNDS = 3
+#: Walls of a plan are looked through by pieces so long [m]; by so many beams of a key frame.
+_PIECE, _BEAMS = 0.5, 360
+#: A piece is gone if at least so many key frames look through it, and more than see it.
+_THROUGH = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Merged:
+    """A drive and a plan as one map, in the frame of the plan.
+
+    How many walls the plan had, and how many of these were seen again; what of them the drive
+    looked through [m].
+    """
+
+    made: DriveMap
+    before: int
+    again: int
+    gone: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.again} of the {self.before} walls of the plan seen again, "
+            f"{self.gone:.1f} m of them looked through and left out\n"
+        )
+
+
+def placements(made: DriveMap, plan: LineMap) -> list[Placement | None]:
+    """Find each part of a map on a plan without a first guess; None where that is not sure.
+
+    NothingFoundError if none is found.
+    """
+    found = [placed_on(plan, made.survey, made.parts.frames(k)) for k in range(made.parts.count)]
+    sure = [where if where is not None and where.is_sure else None for where in found]
+    if not any(sure):
+        raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
+    return sure
+
+
+def onto_plan(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> DriveMap:
+    """Move each part of a map into the frame of a plan; those not found lie beside the plan."""
+    count, of_scans = made.parts.count, made.parts.numbers[made.frame_of]
+    located = tuple(k for k, where in enumerate(found) if where is not None)
+    moves = [(0.0, 0.0, 0.0) if where is None else where.move for where in found]
+    if len(located) < count:
+        ends = [_ends(made, k, move) for k, move in enumerate(moves)]
+        points, sizes = np.concatenate((plan.ends.reshape(-1, 2), *ends)), map(len, ends)
+        labels = np.repeat(np.arange(count + 1), [2 * len(plan.ends), *sizes])
+        shifts = beside(boxes_of(points, labels), np.append(0, np.array(located) + 1))[1:]
+        moves = [
+            compose((x, y, 0.0), of) for (x, y), of in zip(shifts.tolist(), moves, strict=True)
+        ]
+    poses = [compose(moves[k], pose) for k, pose in zip(of_scans, made.poses, strict=True)]
+    walls = [moved(made.map.walls[made.walls_of == k], inverse(moves[k])) for k in range(count)]
+    return replace(
+        made,
+        map=LineMap(np.concatenate(walls), sigma=MAPPED),
+        walls_of=np.repeat(np.arange(count), [len(of) for of in walls]),
+        poses=poses,
+        located=located,
+    )
+
+
+def _ends(made: DriveMap, part: int, move: Pose) -> Array:
+    """Return ends of walls and places of key frames of a part that is moved, (n, 2) [m]."""
+    walls = moved(made.map.walls[made.walls_of == part], inverse(move))
+    poses = made.survey.poses[made.parts.frames(part)].tolist()
+    places = [compose(move, (x, y, theta))[:2] for x, y, theta in poses]
+    return np.concatenate((walls["start"], walls["end"], places))
+
+
+def merge_onto(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> Merged:
+    """Make one map of a plan and a drive that was found on it.
+
+    The plan is one more key frame, at the origin, that saw all its walls. From there, loops lead to
+    the places that were located; poses and walls are adjusted together, and walls that are one by
+    χ² are merged. What the drive looked through, and did not see, is left out; so are parts that
+    were not found. NothingFoundError if the places contradict each other once they are adjusted.
+    """
+    placed = onto_plan(made, plan, found)
+    old, loose = _seen_before(plan)
+    adjusted, sights = _adjusted(placed, loose, found)
+    label, known = np.full(len(old), -1), lengths_of(loose) > SHORT
+    label[known] = sights["wall"][sights["frame"] == len(made.survey.frames)]
+    lines = adjusted.with_poses(sights)
+    # What the walls around are off as well, a wall is off in any case.
+    arm = ((lines["centroid"][label] - old["centroid"]) * unit(old["angle"])).sum(axis=1)
+    common = covariance_at(old["covariance"] - loose["covariance"], arm)
+    lines["covariance"][label[known]] += common[known]
+    survey = Survey(placed.survey.frames, adjusted.poses, sights, lines)
+    walls, again, gone = _united(survey, old, label, placed.parts.is_sure)
+    frames = zip(made.frame_of.tolist(), made.poses, strict=True)
+    poses = [compose(survey.pose(k), relative(made.survey.pose(k), pose)) for k, pose in frames]
+    united = LineMap(walls, plan.columns, sigma=MAPPED)
+    return Merged(replace(placed, map=united, poses=poses), len(plan.walls), again, gone)
+
+
+def _seen_before(plan: LineMap) -> tuple[Records, Records]:
+    """Return the walls of a plan, then those that may be seen from either side turned back.
+
+    Both as they are, and as they are beside the walls around them: known to `MAPPED`, also those of
+    drawings, which say nothing of it.
+    """
+    old = np.append(plan.walls, turned_back(plan.walls[plan.walls["side"] == 0]))
+    is_drawn = ~old["covariance"].any(axis=(1, 2))
+    old["covariance"][is_drawn] = bent(MAPPED**2, lengths_of(old))[is_drawn]
+    loose = old.copy()
+    loose["covariance"] /= np.maximum(old["covariance"][:, :1, :1] / MAPPED**2, 1.0)
+    return old, loose
+
+
+def _adjusted(
+    placed: DriveMap, loose: Records, found: list[Placement | None]
+) -> tuple[Adjusted, Records]:
+    """Adjust the poses of a drive, the last of which is the plan, and the walls of both."""
+    parts, sights, n = placed.parts, placed.survey.sights, len(placed.survey.frames)
+    sights = sights[np.isin(parts.numbers[sights["frame"]], placed.located)]
+    of_plan = sights_of([(segments_of(loose), np.arange(len(loose)))])
+    of_plan["frame"], of_plan["wall"] = n, of_plan["wall"] + sights["wall"].max() + 1
+    sights = np.append(sights, of_plan)
+    sights["wall"] = np.unique(sights["wall"], return_inverse=True)[1]
+    places = {q: where for of in found if of is not None for q, where in of.places.items()}
+    spreads = [where.covariance + FLOOR for where in places.values()]
+    motions = [where.pose for where in places.values()]
+    ties = edges_of([(n, q) for q in places], motions, spreads, loop=True)
+    apart = np.setdiff1d(np.arange(parts.count), placed.located)
+    poses = np.array([*(placed.poses[of.index] for of in placed.survey.frames), (0.0, 0.0, 0.0)])
+    held = np.append(parts.roots[apart], n)
+    edges, count = np.append(placed.chain, ties), int(sights["wall"].max()) + 1
+    adjusted = optimise(poses, edges, sights, count, held=held)
+    right = adjusted.weights[-len(ties) :] > 0.5
+    if not is_sure(int(right.sum()), int((~right).sum())):
+        raise NothingFoundError("places of the drive on the plan contradict each other")
+    ties = ties[right]
+    ties["information"], ties["loop"] = ties["information"] / TWICE, False
+    edges = np.append(placed.chain, ties)
+    for _ in range(_ROUNDS):
+        sights, _ = joined(sights, APART, adjusted.poses)
+        count = int(sights["wall"].max()) + 1
+        adjusted = optimise(adjusted.poses, edges, sights, count, held=held, rounds=2)
+    return adjusted, sights
+
+
+def _united(
+    survey: Survey, old: Records, label: Numbers, is_sure: NDArray[np.bool_]
+) -> tuple[Records, int, float]:
+    """Return the walls of both, how many of the old ones were seen again, and the length gone [m].
+
+    The last pose of the survey is that of the plan; `label` is the line of each old wall.
+    """
+    is_new = survey.sights["frame"] < len(survey.frames)
+    low, high = (of[is_new] for of in extents(survey.sights, survey.poses, survey.lines))
+    w, views = survey.sights["wall"][is_new], min(VIEWS, len(survey.frames))
+    new, begin, end, counts = stretches(w, low, high, views=views)
+    is_again = np.isin(label, new)
+    is_left, either = _again(old, is_again)
+    pieces, of = _pieces(old)
+    along = _along(survey.lines[label[of]], pieces)
+    through = _looked_through(survey, pieces, is_sure)
+    sees = _covering((w, low, high), label[of], along.mean(axis=1))
+    is_gone = (through >= _THROUGH) & (through > sees)
+    both, left = is_again[of] & ~is_gone, is_left[of] & ~is_gone
+    # Where both saw a wall, it goes as far as either did.
+    at, first, last, _ = stretches(
+        np.append(new, label[of][both]),
+        np.append(begin, along[both, 0]),
+        np.append(end, along[both, 1]),
+    )
+    seen = np.zeros(len(at), np.int64)
+    np.add.at(seen, np.searchsorted(_keys(at, first), _keys(new, begin), side="right") - 1, counts)
+    walls = on_lines(survey.lines, at, first, last, np.maximum(seen, 1))
+    by_wall = _along(old[of], pieces)[left]
+    at, first, last, _ = stretches(of[left], by_wall[:, 0], by_wall[:, 1], gap=1e-6)
+    rest = on_lines(old, at, first, last, old["views"][at])
+    rest["side"] = old["side"][at]
+    is_one = rest["side"] == 1
+    walls = np.append(single(np.append(walls, rest[is_one])), rest[~is_one])
+    gone = lengths_of(pieces[is_gone & (is_left | is_again)[of]]).sum()
+    return walls, either, float(gone)
+
+
+def _again(old: Records, is_again: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], int]:
+    """Return which old walls stay as they are, and how many were seen again.
+
+    Of one that may be seen from either side, only the sides that were seen count, if any was.
+    """
+    is_both = old["side"] == 0
+    m = len(old) - int(is_both.sum()) // 2
+    either, is_left = is_again[:m].copy(), np.zeros(len(old), bool)
+    either[is_both[:m]] |= is_again[m:]
+    is_left[:m] = ~either
+    return is_left, int(either.sum())
+
+
+def _along(lines: Records, pieces: Records) -> Array:
+    """Return where pieces begin and end along lines, one for each, from their centroids on [m]."""
+    arms = np.stack((pieces["start"], pieces["end"]), axis=1) - lines["centroid"][:, None]
+    return np.asarray((arms * unit(lines["angle"])[:, None]).sum(axis=2))
+
+
+def _pieces(walls: Records) -> tuple[Records, Numbers]:
+    """Return pieces of walls, along each, and the number of the wall of each."""
+    counts = np.maximum(np.ceil(lengths_of(walls) / _PIECE), 1).astype(np.int64)
+    of = np.repeat(np.arange(len(walls)), counts)
+    k = np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
+    pieces, along = walls[of], walls["end"][of] - walls["start"][of]
+    for name, at in (("start", k), ("end", k + 1)):
+        pieces[name] = walls["start"][of] + (at / counts[of])[:, None] * along
+    return pieces, of
+
+
+def _looked_through(survey: Survey, pieces: Records, is_sure: NDArray[np.bool_]) -> Numbers:
+    """Return how many key frames whose poses are sure look through each piece."""
+    counts, is_both = np.zeros(len(pieces), np.int64), pieces["side"] == 0
+    for k in np.flatnonzero(is_sure).tolist():
+        frame, here = survey.frames[k], moved(pieces, survey.pose(k))
+        beams = some(beams_of(frame.features, frame.scan), _BEAMS)
+        (x, y), (to_x, to_y) = here["start"].T, here["end"].T
+        is_back = x * to_y <= y * to_x  # seen from its right: no beam of this frame is for it
+        here[is_back & is_both] = turned_back(here[is_back & is_both])
+        counts += passed(here, beams) & (~is_back | is_both)
+    return counts
+
+
+def _covering(spans: tuple[Numbers, Array, Array], walls: Numbers, along: Array) -> Numbers:
+    """Return how many sights of walls w, from low to high, cover places along walls."""
+    w, *tips = spans
+    before = [np.searchsorted(np.sort(_keys(w, of)), _keys(walls, along)) for of in tips]
+    return before[0] - before[1]
+
+
+def _keys(w: Numbers, along: Array) -> Array:
+    """Return numbers in the order of walls, and of places along each [m]."""
+    return np.asarray(1e5 * w + along)
