@@ -164,23 +164,6 @@ def test_nothing_found():
         assert len(features.breakpoints) == 2
 
 
-def test_a_batch_is_its_scans():
-    extractor = ln.Extractor(lambda scan: [(0, int(scan.ranges[60] * 50))])
-    rows = np.stack((RANGES, RANGES * 0.9, RANGES * 0.5))
-    batch = extractor.batch(rows, angles=BEARINGS, workers=2)
-    for k, row in enumerate(rows):
-        alone = extractor(ln.LaserScan(row, angles=BEARINGS))
-        assert batch[k].segments.tobytes() == alone.segments.tobytes()
-        assert batch[k].clusters.tobytes() == alone.clusters.tobytes()
-
-
-def test_a_trace():
-    trace = ln.trace(SCAN, method=lambda _: [(0, 120)])
-    assert trace.method == "<lambda>"
-    assert len(trace.features.segments) == 1
-    assert len(trace.candidates) == 0
-
-
 @dataclass(frozen=True)
 class Cut:
     """Every so many beams."""

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lineament import LaserScan
-from lineament.motion import beam_times
 from lineament.rosmsg import definitions
 from lineament.rosmsg.poses import Odometry, odometry
 from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
@@ -150,27 +149,6 @@ def test_laser_scan_is_what_rosbags_makes_of_it(
         big = bytes(types.serialize_cdr(message, kind, little_endian=False))
         assert big[:2] != data[:2]
         assert_same(laser_scan(big, encoding), expected)
-
-
-@both
-def test_a_scanner_that_turns_clockwise(ros, encoding):
-    def read(*beams):
-        fields = {"angle_min": 1.0, "angle_increment": -0.5, "time_increment": 0.25}
-        fields["scan_time"] = 2.0
-        message = ros_bags.Messages(ros).scan(10.0, *beams, **fields)
-        return laser_scan(ros_bags.serialized(message, ros), encoding)
-
-    scan = read([1.0, 2.0, 4.0], [10.0, 20.0, 40.0])
-    assert scan.ranges.tolist() == [4.0, 2.0, 1.0]
-    assert scan.intensities.tolist() == [40.0, 20.0, 10.0]
-    assert scan.angles.tolist() == [0.0, 0.5, 1.0]
-    # The beam at bearing 1 is the first in time: 10 s.
-    assert (scan.stamp, scan.stamp_beam) == (10.0, 2)
-    assert (scan.time_increment, scan.scan_time) == (-0.25, -2.0)
-    assert beam_times(scan).tolist() == [0.5, 0.25, 0.0]
-    assert read([1.0, 2.0]).ranges.tolist() == [2.0, 1.0]
-    alone = read([1.0])
-    assert (alone.time_increment, alone.stamp_beam) == (0.25, 0)
 
 
 def scan_bytes(ranges=(1.0, 2.0), **fields):

@@ -192,15 +192,6 @@ def test_from_message_without_what_may_be_missing():
         LaserScan.from_message(None)
 
 
-def test_from_message_of_a_scanner_that_turns_clockwise():
-    fields = {"angle_min": 0.5, "angle_increment": -0.25, "time_increment": 0.125}
-    beams = {"ranges": [1.0, 2.0, 3.0], "intensities": (4.0, 5.0, 6.0)}
-    scan = LaserScan.from_message(message(ROS_2, **fields, **beams))
-    assert scan.angles.tolist() == [0.0, 0.25, 0.5]
-    assert (scan.ranges.tolist(), scan.intensities.tolist()) == ([3.0, 2.0, 1.0], [6.0, 5.0, 4.0])
-    assert (scan.stamp, scan.stamp_beam, scan.time_increment) == (7.25, 2, -0.125)
-
-
 @pytest.mark.parametrize(
     ("changed", "problem"),
     [

@@ -15,8 +15,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lineament import LaserScan, LineamentError
 from lineament.output import open_writer
-from lineament.output.markers import markers_of
-from lineament.output.scene import layers_of
 
 RANGES = [1.0, 2.5, math.nan, 9.0, 0.05, 1.25]
 POSE = (1.5, -2.0, 0.5)
@@ -80,67 +78,6 @@ both = pytest.mark.parametrize(
 
 def points_of(points):
     return np.array([(p.get("x", 0.0), p.get("y", 0.0)) for p in points])
-
-
-def test_foxglove_has_scan_transform_and_scene(tmp_path):
-    scan = scan_of(intensities=np.arange(6.0))
-    messages = read_foxglove(write(tmp_path / "a.mcap", (FOUND, scan)))
-    assert [m[0] for m in messages] == ["/tf", "/scan", "/scan/features"]
-    assert {m[1] for m in messages} == {12_250_000_000}
-    stamp = {"seconds": 12, "nanos": 250_000_000}
-    tf, scanned, scene = (m[2] for m in messages)
-
-    assert tf["timestamp"] == stamp
-    assert (tf["parent_frame_id"], tf["child_frame_id"]) == ("map", "laser_link")
-    assert tf["translation"] == {"x": 1.5, "y": -2.0}
-    assert 2 * math.atan2(tf["rotation"]["z"], tf["rotation"]["w"]) == pytest.approx(0.5)
-
-    assert (scanned["timestamp"], scanned["frame_id"]) == (stamp, "laser_link")
-    assert (scanned["start_angle"], scanned["end_angle"]) == (-0.5, -0.5 + 5 * 0.125)
-    np.testing.assert_array_equal(scanned["ranges"], np.where(scan.valid, RANGES, np.nan))
-    assert scanned["intensities"] == list(range(6))
-
-    layers = layers_of(markers_of(FOUND, scan))
-    for layer, entity in zip(layers, scene["entities"], strict=True):
-        assert (entity["timestamp"], entity["frame_id"]) == (stamp, "laser_link")
-        assert entity["id"] == layer.name
-        color = dict(zip("rgba", layer.color, strict=True))
-        assert len(layer.strips) + len(layer.points) > 0
-        for line, strip in zip(entity["lines"], layer.strips, strict=True):
-            np.testing.assert_array_equal(points_of(line["points"]), strip)
-            assert (line["thickness"], line["color"]) == (layer.size, color)
-        for sphere, (x, y) in zip(entity["spheres"], layer.points, strict=True):
-            assert sphere["pose"]["position"] == {"x": x, "y": y}
-            assert (sphere["size"], sphere["color"]) == (dict.fromkeys("xyz", layer.size), color)
-
-
-def test_ros2_has_scan_transform_and_markers(tmp_path):
-    """What is in the messages, test_ros_messages.py checks."""
-    scan = scan_of(intensities=np.arange(6.0), scan_time=0.1, time_increment=0.01)
-    messages = read_ros2(write(tmp_path / "a.ros2.mcap", (FOUND, scan)))
-    assert [m[0] for m in messages] == ["/tf", "/scan", "/scan/features"]
-    assert {m[1] for m in messages} == {12_250_000_000}
-    (transform,) = messages[0][2].transforms
-    assert (transform.header.frame_id, transform.child_frame_id) == ("map", "laser_link")
-    back = LaserScan.from_message(messages[1][2], pose=POSE)
-    np.testing.assert_array_equal(back.ranges, np.float32(RANGES))  # invalid ones too
-    np.testing.assert_array_equal(back.valid, scan.valid)
-    assert (back.stamp, back.frame_id) == (scan.stamp, scan.frame_id)
-    assert [marker.ns for marker in messages[2][2].markers] == LAYERS
-
-
-@both
-def test_what_is_no_more_is_replaced_or_deleted(tmp_path, name, read):
-    written = (FOUND, scan_of(pose=None)), (EMPTY, scan_of(pose=None, stamp=13.0))
-    messages = read(write(tmp_path / name, *written))
-    assert [m[0] for m in messages] == ["/scan", "/scan/features"] * 2  # no pose, no transform
-    if read is read_ros2:
-        for marker in messages[-1][2].markers:
-            assert (marker.action, marker.id, len(marker.points)) == (2, 0, 0)
-    else:
-        entities = messages[-1][2]["entities"]
-        assert [e["id"] for e in entities] == LAYERS
-        assert not any(e["lines"] or e["spheres"] for e in entities)
 
 
 @both
