@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from in_memory import Taken
 
 import lineament as ln
 from lineament.live import FoxgloveSink, LiveConfig, ReplaySource, RosSink, run_live
@@ -20,25 +21,6 @@ from lineament.output.ros_messages import RosMessages
 
 REPORT, TIME = Report(1.0, Counts(scans=1), Counts(), (0, 0), 0, {}, 0), (1, 2)
 WALLS = [((0.0, 0.0), (4.0, 0.0)), ((4.0, 0.0), (4.0, 3.0))]
-
-
-class Publisher:
-    """A publisher that all listen to, and that keeps the messages."""
-
-    unsent = 0
-
-    def __init__(self):
-        self.sent = []
-
-    def advertise(self, topic, kind, is_latched=False):  # noqa: ARG002
-        assert topic
-        assert kind
-
-    def listeners(self, topic):
-        return bool(topic)
-
-    def publish(self, message):
-        self.sent.append(message)
 
 
 def recorded(messages, name):
@@ -68,7 +50,7 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
     """0 where it is located, 1 where it is but for a direction, 2 where it is not known."""
     messages = RosMessages("cdr")
     given = recorded(messages, "diagnostics")
-    sink = RosSink(Publisher(), messages, LiveConfig(map="a.dxf", log="a.npz"))
+    sink = RosSink(Taken(), messages, LiveConfig(map="a.dxf", log="a.npz"))
     evidence = Evidence(12.34, 0.75, 0.2, 0.05, 100)
     where = Whereabouts(verdict, (1.0, -2.0, 0.5), np.diag((4e-4, 9e-4, turn)), evidence)
     sink._plan._frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
@@ -92,8 +74,7 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
 def test_foxglove_draws_the_plan_in_grey(plan):
     messages = FoxgloveMessages()
     given = recorded(messages, "features")
-    sink = FoxgloveSink(Publisher(), messages, LiveConfig(map=plan))
-    sink.diagnose(REPORT, TIME)
+    FoxgloveSink(Taken(), messages, LiveConfig(map=plan)).diagnose(REPORT, TIME)
     ((topic, moment, (layer,), _),) = given
     assert (topic, moment) == ("/scan/plan", (*TIME, "map", ""))
     assert (layer.name, layer.color, layer.size) == ("plan", (0.5, 0.5, 0.5, 1.0), 0.02)

@@ -8,7 +8,9 @@ import struct
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from in_memory import Taken
 from lineament_lab.evaluation.arena import archived_scans
+from test_view import read
 
 import lineament as ln
 from lineament.cli import run
@@ -26,7 +28,6 @@ from lineament.simulation import drive as drive_scans
 from lineament.simulation.buildings import office
 from lineament.simulation.wheels import Wheels
 from lineament.tasks.mapping import map_log
-from lineament.view import Session
 from lineament.view.api import answer
 
 SEED, SIZE, RATE = 1, (40.0, 24.0), 4.0
@@ -237,69 +238,48 @@ def test_one_line_for_what_cannot_be_done(files, capsys, monkeypatch, arguments,
     assert not (files / "a.tum").exists()
 
 
-class Kept:
-    """A publisher that keeps what it is given."""
-
-    unsent = 0
-
-    def __init__(self):
-        self.topics, self.sent = {}, []
-
-    def advertise(self, topic, kind, is_latched=False):  # noqa: ARG002
-        self.topics[topic] = kind
-
-    def listeners(self, topic):
-        return topic in self.topics
-
-    def publish(self, message):
-        self.sent.append(message)
-
-
 @pytest.mark.parametrize("layers", ["", "walls,segments,*"])
 def test_live_publishes_pose_and_verdict(files, layers):
     config = LiveConfig(map=str(files / "plan.dxf"), layers=layers)
-    publisher, pipeline = Kept(), Pipeline(config)
+    publisher, pipeline = Taken(), Pipeline(config)
     sink = RosSink(publisher, RosMessages("cdr"), config)
-    assert publisher.topics["/scan/pose"] == "geometry_msgs/msg/PoseWithCovarianceStamped"
+    assert publisher.kinds["/scan/pose"] == "geometry_msgs/msg/PoseWithCovarianceStamped"
     sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
-    assert len(publisher.sent) == 1
+    assert len(publisher.messages) == 1
     for scan in ln.open_log(files / "log.npz"):
         frame = pipeline("a", scan)
         sink.publish(frame)
     assert frame.where.verdict == "located"
-    of_pose = [message for message in publisher.sent if message.topic == "/scan/pose"]
+    of_pose = publisher.data("/scan/pose")
     assert len(of_pose) == 12
-    assert b"map\0" in of_pose[0].data
-    publisher.sent.clear()
+    assert b"map\0" in of_pose[0]
+    publisher.messages.clear()
     sink.diagnose(Report(1.0, Counts(scans=1), Counts(), (0, 0), 0, {}, 0), (1, 2))
-    assert len(publisher.sent) == 2
-    assert b"lineament: /scan/pose\0" in publisher.sent[1].data
-    assert b"located, without where the scanner is mounted\0" in publisher.sent[1].data
-    nowhere = ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)
-    publisher.sent.clear()
-    sink.publish(pipeline("b", nowhere))
-    assert not [message for message in publisher.sent if message.topic == "/scan/pose"]
+    _, of_plan = publisher.messages
+    assert b"lineament: /scan/pose\0" in of_plan.data
+    assert b"located, without where the scanner is mounted\0" in of_plan.data
+    sink.publish(pipeline("b", ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)))
+    assert not publisher.data("/scan/pose")
 
 
 def test_foxglove_shows_the_pose_on_the_plan(files):
     config = LiveConfig(map=str(files / "plan.dxf"))
-    publisher, pipeline = Kept(), Pipeline(config)
+    publisher, pipeline = Taken(), Pipeline(config)
     sink = FoxgloveSink(publisher, FoxgloveMessages(), config)
     sink.publish(pipeline("a", next(iter(ln.open_log(files / "log.npz")))))
-    (transform,) = (message for message in publisher.sent if message.topic == "/tf")
-    x, y = struct.unpack("<dxd", re.search(rb"\x09(.{17})", transform.data, re.S)[1])
+    (transform,) = publisher.data("/tf")
+    x, y = struct.unpack("<dxd", re.search(rb"\x09(.{17})", transform, re.S)[1])
     assert (x, y) == pytest.approx((-2, 0.2), abs=0.02)
     sink.publish(pipeline("b", ln.LaserScan(np.full(9, np.inf), -1.0, 0.1, stamp=9.0)))
-    assert sum(message.topic == "/tf" for message in publisher.sent) == 1
-    publisher.sent.clear()
+    assert len(publisher.data("/tf")) == 1
+    publisher.messages.clear()
     sink.diagnose(Report(1.0, Counts(), Counts(), (0, 0), 0, {}, 0), (1, 2))
-    assert [message.topic for message in publisher.sent] == ["/scan/plan"]
+    assert [message.topic for message in publisher.messages] == ["/scan/plan"]
 
 
 def test_the_viewer_locates_logs_on_a_plan(files):
     plan = LineMap.read(files / "plan.dxf")
-    with Session(files / "log.npz", {"optimal": ln.Extractor()}, plan) as session:
-        assert session.wait(60)
+    with read(files / "log.npz", {"optimal": ln.Extractor()}, plan) as session:
         walls = json.loads(answer(session, "/api/plan"))["walls"]
         np.testing.assert_allclose(walls, plan.ends.reshape(-1, 4), atol=1e-4)
         scan = json.loads(answer(session, "/api/scan?log=0&i=3&method=optimal"))
@@ -310,12 +290,10 @@ def test_the_viewer_locates_logs_on_a_plan(files):
         poses = json.loads(answer(session, "/api/poses?log=0&first=0&count=12"))["poses"]
         np.testing.assert_allclose(poses, [(-2 + 0.1 * k, 0.2, 0.3) for k in range(12)], atol=0.02)
     elsewhere = LineMap.from_lines([[0, 0, 9, 0], [9, 0, 9, 1], [9, 1, 0, 1], [0, 1, 0, 0]])
-    with Session(files / "one.npz", {"optimal": ln.Extractor()}, elsewhere) as session:
-        assert session.wait(60)
+    with read(files / "one.npz", {"optimal": ln.Extractor()}, elsewhere) as session:
         scan = json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))
         assert (scan["pose"], scan["where"]["covariance"]) == (None, None)
-    with Session(files / "one.npz", {"optimal": ln.Extractor()}) as session:
-        assert session.wait(60)
+    with read(files / "one.npz", {"optimal": ln.Extractor()}) as session:
         assert json.loads(answer(session, "/api/plan")) == {"walls": []}
         assert json.loads(answer(session, "/api/scan?log=0&i=0&method=optimal"))["where"] is None
 
