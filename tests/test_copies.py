@@ -164,10 +164,7 @@ def step_of(kind):
             Drive(),
             lambda of, scan, features, *_: (of.add(scan, features), of.scans.copy()),
         ),
-        "pipeline": (
-            Pipeline(LiveConfig(track=True)),
-            lambda of, scan, *_: of("front", scan),
-        ),
+        "pipeline": (Pipeline(LiveConfig(track=True)), lambda of, scan, *_: of("front", scan)),
     }[kind]
     return made, lambda of, k: values(step(of, *seen[k]))
 

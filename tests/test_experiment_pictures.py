@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 from handmade import features
 from lineament_lab.evaluation.arena import Arena
-from lineament_lab.reproduce import (
-    grid,
-    layers,
-    museum,
-    noise,
-    real,
-    repetition,
-    similarity,
-)
+from lineament_lab.reproduce import grid, layers, museum, noise, real, repetition, similarity
 from lineament_lab.reproduce.findings import dot_chart, log_axis
 from lineament_lab.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
 from panels import angle_of, assert_apart, assert_legible, by_label, drawn, notes, texts_of

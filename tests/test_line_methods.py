@@ -4,17 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from worlds import (
-    BOX,
-    NOISE,
-    STEP,
-    fan,
-    full_circle,
-    room,
-    scan_of,
-    vertex,
-    wall,
-)
+from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex, wall
 
 from lineament import Extractor, LaserScan
 from lineament.methods import get_method

@@ -9,17 +9,7 @@ from lineament_lab.methods.ransac import Ransac
 from lineament_lab.methods.region_growing import RegionGrowing
 from naive_partition import tracked
 from naive_regions import assert_same_pieces, grow
-from worlds import (
-    BOX,
-    NOISE,
-    fan,
-    full_circle,
-    random_scan,
-    room,
-    scan_of,
-    vertex,
-    wall,
-)
+from worlds import BOX, NOISE, fan, full_circle, random_scan, room, scan_of, vertex, wall
 
 from lineament import Extractor, LaserScan, RangeNoise
 from lineament.kernels import layout as at

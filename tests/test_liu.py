@@ -5,16 +5,7 @@ import math
 import numpy as np
 import pytest
 from liu_2023 import Paper, corner_response, polar
-from worlds import (
-    BOX,
-    NOISE,
-    STEP,
-    fan,
-    full_circle,
-    room,
-    scan_of,
-    vertex,
-)
+from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex
 
 from lineament import Extractor, LaserScan
 from lineament.methods import stages

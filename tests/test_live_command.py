@@ -11,15 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_driving import (
-    Running,
-    eventually,
-    heard,
-    points_of,
-    scan_message,
-    scan_of,
-    scene,
-)
+from live_driving import Running, eventually, heard, points_of, scan_message, scan_of, scene
 
 import lineament as ln
 from lineament.cli import run

@@ -127,11 +127,7 @@ CASES = {
     # A corner is 29 cm from the measurements beside it, not 36 cm from them.
     "REACH": (count("corners"), (hole(3), 1), (hole(4), 0)),
     # The end of a wall is known to 8 cm, by its spacing, or it is no edge.
-    "MOST_DEVIATION": (
-        lambda found: len(found.edges),
-        (end(8), 1),
-        (end(12), 0),
-    ),
+    "MOST_DEVIATION": (lambda found: len(found.edges), (end(8), 1), (end(12), 0)),
     # A column of 1.3 m is round, one of 1.7 m not.
     "ARC_RADIUS": (count("arcs"), (column(1.3), 1), (column(1.7), 0)),
     # A round surface shows 45°, or it is none.

@@ -113,9 +113,7 @@ def test_corners_alone_by_beams():
     # Along the beam the noise; across a spacing, uniformly.
     across = (2.0 * 0.01) ** 2 / 12
     np.testing.assert_allclose(
-        np.linalg.eigvalsh(features.corners["covariance"][1]),
-        [across, across + 1e-4],
-        rtol=0.02,
+        np.linalg.eigvalsh(features.corners["covariance"][1]), [across, across + 1e-4], rtol=0.02
     )
     assert ln.Tracker()(features) is not None
 
@@ -234,11 +232,7 @@ def test_a_file_by_name(mine):
         ("my.py:lost", {}, "my.py has no function or class 'lost'"),
         ("my.py:number", {}, "my.py has no function or class 'number'"),
         ("my.py:find", {"a": 1}, "is a function, expected no parameters: a"),
-        (
-            "my.py:Cut",
-            {"bt": 1},
-            r"method 'my.py:Cut' has no parameter 'bt': .* one of: at",
-        ),
+        ("my.py:Cut", {"bt": 1}, r"method 'my.py:Cut' has no parameter 'bt': .* one of: at"),
         ("bad.py:find", {}, r"cannot be loaded: ZeroDivisionError: division by zero \(bad.py:2\)"),
         ("worse.py:find", {}, "cannot be loaded: SyntaxError"),
     ],

@@ -174,10 +174,7 @@ def test_areas_by_hand():
         (lambda: benchmark_iepf(np.ones(4), 3), r"points has shape \(4,\), expected \(n, 2\)"),
         (lambda: benchmark_iepf(np.ones((4, 3)), 3), r"points has shape \(4, 3\), expected \(n, 2"),
         (lambda: benchmark_iepf(np.ones((4, 2)), 1), "max_vertices is 1, expected a whole number"),
-        (
-            lambda: cast_map([NEAR, np.ones((2, 3))], np.zeros(1)),
-            r"polylines\[1\] has shape",
-        ),
+        (lambda: cast_map([NEAR, np.ones((2, 3))], np.zeros(1)), r"polylines\[1\] has shape"),
         (lambda: run_benchmark(wall_benchmark(), "lui"), "method 'lui' is unknown"),
         (
             lambda: run_benchmark(
