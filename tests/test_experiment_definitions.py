@@ -1,11 +1,9 @@
 """The pictures of the definitions: what is drawn is what was computed, and where it is."""
 
-import math
-
 import numpy as np
 import pytest
 from lineament_lab.reproduce import definitions, machine
-from panels import angle_of, assert_legible, beside, by_label, drawn, notes, texts_of
+from panels import assert_legible, beside, drawn, notes, texts_of
 
 
 def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
@@ -21,59 +19,6 @@ def test_figures_have_the_names_of_the_paper_and_the_place_of_the_scanner():
         axes = figure.axes[0]
         assert axes.get_title(loc="left").startswith(name)
         assert ([[0.0, 0.0]] in [points.tolist() for points in drawn(axes)]) == has_scanner
-
-
-def test_figure_1_has_the_field_of_view_and_one_beam_with_its_coordinates():
-    _, figure, _ = definitions._scan()
-    (axes,) = figure.axes
-    noisy_point, sensor, view, beam, down, across, x_axis, y_axis, turn = drawn(axes)[:9]
-    assert sensor.tolist() == view[[0]].tolist() == view[[-1]].tolist() == [[0, 0]]
-    assert x_axis.tolist() == [[0, 0], [1, 0]]
-    assert y_axis.tolist() == [[0, 0], [0, 1]]
-    for arc, begin, end in ((view[1:-1], -80, 80), (turn, 0, angle_of(beam[1]))):
-        assert np.ptp(np.hypot(*arc.T)) == pytest.approx(0)
-        assert angle_of(arc[[0, -1]]) == pytest.approx((begin, end))
-    x, y = beam[1]
-    assert beam[0].tolist() == [0, 0]
-    np.testing.assert_allclose(down, [(x, 0), (x, y)])
-    np.testing.assert_allclose(across, [(0, y), (x, y)])
-    places = {}
-    for text, place in notes(axes):
-        places.setdefault(text, []).append(place)
-    assert places["corner"] == [(3.0, -1.6)]
-    np.testing.assert_allclose(by_label(axes)["corner"], places["corner"], atol=0.01)
-    assert len(by_label(axes)["breakpoint"]) >= 3
-    assert places["breakpoint"] == [(2.3, 0.5), (1.8, 2.2), (0.7, -1.75)]
-    assert noisy_point.tolist() == [list(place) for place in places["noise point"]]
-    assert np.hypot(*noisy_point.T) == pytest.approx(3.7)
-    at = {text.get_text().strip(): np.array(text.get_position()) for text in axes.texts}
-    np.testing.assert_allclose(at[r"$\rho_i$"], beam[1] / 2)
-    np.testing.assert_allclose(at["$(x_i, y_i)$"], (x, y))
-    for name, arc, bearing in (("160°", view, 0), (r"$\theta_1 = -80°$", view, -80),
-                               (r"$\theta_i$", turn, 15)):  # fmt: skip
-        assert np.hypot(*(arc - at[name]).T).min() == 0
-        assert angle_of(at[name]) == pytest.approx(bearing, abs=0.5)
-
-
-def test_figure_4_has_the_spacing_of_neighbours_on_a_wall():
-    plan, curves = definitions._spacing()[1].axes
-    points = next(points for points in drawn(plan) if len(points) > 2)
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    along = np.array((5.4, 1.6)) - (0.4, -0.75)
-    assert beside(points - (0.4, -0.75), along) == pytest.approx(0, abs=1e-9)
-    rays = [line for line in drawn(plan) if len(line) == 2][: len(points)]
-    assert [ray.tolist() for ray in rays] == [[[0, 0], point] for point in points.tolist()]
-    assert angle_of(points)[1:] == pytest.approx(angle_of(points)[:-1] + 5)
-    (first, at_first), (last, at_last) = notes(plan)
-    assert (first, last) == (f"{steps[0]:.2f} m", f"{steps[-1]:.2f} m")
-    np.testing.assert_allclose(at_first, points[:2].mean(axis=0))
-    np.testing.assert_allclose(at_last, points[-2:].mean(axis=0))
-    spacing, least, limit = by_label(curves).values()
-    assert (np.diff(spacing[:, 0]) >= 0).all()
-    np.testing.assert_allclose(least[:, 1], least[:, 0] * math.radians(1 / 3))
-    # A wall at an angle is never nearer than that, but for the noise; neighbours are connected.
-    assert np.median(spacing[:, 1] / least[:, 1]) > 1
-    assert (limit[:, 1] > least[:, 1]).all()
 
 
 def test_figure_6_has_the_farthest_point_from_each_chord():
@@ -99,29 +44,6 @@ def test_figure_6_has_the_farthest_point_from_each_chord():
             found.append(vertex.tolist())
             ends.append(vertex.tolist())
     assert len(found) == 2
-
-
-def test_figure_7_has_the_distances_of_two_parabolas_and_their_sums():
-    plan, sums = definitions._parabolas()[1].axes
-    curve = max(drawn(sums), key=len)
-    dots = [line[0] for line in drawn(sums) if len(line) == 1]
-    parabolas = [points for points in drawn(plan) if len(points) == 2 * definitions.RADIUS + 1]
-    assert len(dots) == len(parabolas) == 2
-    for points, dot, stems in zip(parabolas, dots, plan.collections, strict=True):
-        x, y = points.T
-        bend = y[0] / x[0] ** 2
-        np.testing.assert_allclose(y, bend * x**2, atol=1e-12)
-        np.testing.assert_allclose(dot, (2 * bend, y.sum()))
-        assert np.interp(dot[0], *curve.T) == pytest.approx(dot[1])
-        for (base, tip), point in zip(stems.get_segments(), points, strict=True):
-            np.testing.assert_allclose((base, tip), [(point[0], 0), point])
-        along = [line for line in drawn(plan) if np.allclose(line[:, 1], bend * line[:, 0] ** 2)]
-        assert [len(line) for line in along] == [50, len(points)]
-        assert along[0][[0, -1], 0].tolist() == points[[0, -1], 0].tolist()
-    marks = [line[0].tolist() for line in drawn(plan) if len(line) == 1]
-    at = {text.get_text().strip(): list(text.get_position()) for text in plan.texts}
-    assert [at["A"], at["B"]] == marks
-    assert marks == [[parabolas[0][definitions.RADIUS + k, 0], 0] for k in (4, 5)]
 
 
 def test_figure_7_says_how_far_the_operator_is_off_where_it_is_worst(monkeypatch):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from liu_2023 import Paper, corner_response, polar
-from worlds import BOX, NOISE, STEP, fan, full_circle, room, scan_of, vertex
+from worlds import NOISE, STEP, fan, scan_of, vertex
 
 from lineament import Extractor, LaserScan
 from lineament.methods import stages
@@ -69,21 +69,3 @@ def test_breakpoints_name_the_side_that_occludes():
     assert (start["beam"].tolist(), start["occluder"]) == ([-1, 0], -1)
     assert (end["beam"].tolist(), end["kind"]) == ([59, -1], "scan_end")
     np.testing.assert_allclose(end["position"], scan.points[59], rtol=1e-12)
-
-
-def test_closed_room_has_a_ring_of_corners():
-    angles = full_circle(1440)
-    features = Extractor("liu:scale_free", noise=NOISE)(scan_of(room(angles, BOX), angles))
-    corners, segments = features.corners, features.segments
-    assert len(corners) == len(segments) == 4
-    assert len(features.breakpoints) == 0
-    assert not corners["convex"].any()
-    np.testing.assert_allclose(corners["opening"], math.pi / 2, atol=0.01)
-    expected = {(2.0, 1.3), (-2.4, 1.3), (-2.4, -1.7), (2.0, -1.7)}
-    for x, y in expected:
-        assert np.hypot(*(corners["position"] - (x, y)).T).min() < 0.01
-    for corner in corners:
-        before, after = segments[corner["segments"]]
-        assert before["last_beam"] == after["first_beam"] == corner["beam"]
-    assert sorted(corners["segments"][:, 1]) == [0, 1, 2, 3]
-    assert (segments["first_beam"] > segments["last_beam"]).sum() == 1  # One over the seam.

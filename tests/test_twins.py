@@ -104,14 +104,6 @@ def test_degenerate_scans(name, scan):
     assert_same(name, untied(scan) if name in SPLITTERS else scan)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [*FAST, *(n for n in FINDERS if "region" in n or "paper" in n)])
-@settings(max_examples=15)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_random_scans(name, seed):
-    assert_same(name, random_scan(seed))
-
-
 @settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
