@@ -50,6 +50,9 @@ def two_walls():
 
 CLUTTER = wall(121)[0][50:58] - [0.4, 0.6, 0.2, 0.5, 0.7, 0.3, 0.6, 0.25]
 TOO_FEW = "Noise: 2 measurements hold together here, too few for a cluster."
+IN_A_WALL = ["beams 0 to 60, 61 measurements, 2.19 m", "0.0 mm along its beam (0.0 σ)"]
+IN_A_WALL += ["no neighbour that it could be one line with", "cut in two here, χ² would fall by"]
+AT_AN_END = ["the scan ends before", "to beam 10 after, over too many missing beams"]
 
 
 @pytest.mark.parametrize(
@@ -61,34 +64,11 @@ TOO_FEW = "Noise: 2 measurements hold together here, too few for a cluster."
         (wall_with(7, -1.0), 7, "invalid", "the range is -1 m, no measurement", []),
         (wall_with(7, 0.05), 7, "invalid", "0.05 m is below range_min = 0.1 m", []),
         (wall_with(7, 30.0), 7, "invalid", "30 m is at or beyond range_max = 30 m", []),
-        (
-            wall_with([], []),
-            30,
-            "segment",
-            "Part of segment 0.",
-            [
-                "beams 0 to 60, 61 measurements, 2.19 m",
-                "0.0 mm along its beam (0.0 σ)",
-                "no neighbour that it could be one line with",
-                "cut in two here, χ² would fall by",
-            ],
-        ),
+        (wall_with([], []), 30, "segment", "Part of segment 0.", IN_A_WALL),
         (wall_with(30, 3.0), 30, "spike", "", ["off the mean of its neighbours by +999.7 mm"]),
         (two_walls(), 30, "noise", TOO_FEW, ["to beam 29 before, more than the"]),
-        (
-            wall_with(slice(1, 10), NAN),
-            0,
-            "noise",
-            "",
-            ["the scan ends before", "to beam 10 after, over too many missing beams"],
-        ),
-        (
-            wall_with(slice(50, 58), CLUTTER, 121),
-            53,
-            "unexplained",
-            "too crooked",
-            ["a line through them is off by"],
-        ),
+        (wall_with(slice(1, 10), NAN), 0, "noise", "", AT_AN_END),
+        (wall_with(slice(50, 58), CLUTTER, 121), 53, "unexplained", "too crooked", ["is off by"]),
         (
             column(),
             20,

@@ -145,39 +145,29 @@ def seal(path):
     library.seal(path).write_text(hashlib.sha256(whole).hexdigest())
 
 
+def each(harm):
+    """Harm each library in a folder."""
+    return lambda folder: [harm(path) for path in [*folder.glob(f"*{library.SUFFIX}")]]
+
+
 @pytest.mark.slow
 @compiled
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
         (lambda _: None, "LINEAMENT_JIT is set"),
-        (
-            lambda folder: [path.unlink() for path in folder.glob(f"*{library.SUFFIX}")],
-            "the package was built without compiled kernels",
-        ),
+        (each(Path.unlink), "the package was built without compiled kernels"),
         (
             lambda folder: (folder / "noise.py").write_text("changed = True"),
             "the kernels are not those that were compiled",
         ),
         (
-            lambda folder: [
-                path.write_bytes(path.read_bytes()[:5000])
-                for path in folder.glob(f"*{library.SUFFIX}")
-            ],
+            each(lambda path: path.write_bytes(path.read_bytes()[:5000])),
             "the kernels are not those that were compiled",
         ),
+        (each(lambda path: (path.write_bytes(b"none"), seal(path))), "cannot be loaded ("),
         (
-            lambda folder: [
-                (path.write_bytes(b"none"), seal(path))
-                for path in folder.glob(f"*{library.SUFFIX}")
-            ],
-            "cannot be loaded (",
-        ),
-        (
-            lambda folder: [
-                path.rename(path.with_name(f"ppc64{library.SUFFIX}"))
-                for path in folder.glob(f"*{library.SUFFIX}")
-            ],
+            each(lambda path: path.rename(path.with_name(f"ppc64{library.SUFFIX}"))),
             "no compiled kernels are for this CPU",
         ),
     ],

@@ -119,17 +119,6 @@ def test_points(make):
     assert len(columns_of(read(make, make.points("/p", MOMENT, nothing)))) == 0
 
 
-def test_transform(make):
-    (transform,) = read(make, make.transform("/tf", MOMENT, (1.5, -2.0, 0.5))).transforms
-    header = transform.header
-    assert (header.frame_id, transform.child_frame_id) == ("map", "laser_link")
-    assert (header.stamp.sec, header.stamp.nanosec) == MOMENT[:2]
-    moved, turned = transform.transform.translation, transform.transform.rotation
-    assert (moved.x, moved.y, moved.z) == (1.5, -2.0, 0.0)
-    assert (turned.x, turned.y) == (0.0, 0.0)
-    assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(0.5)
-
-
 def covariance_of(values):
     """Read the plane of a covariance of six numbers, of which nothing else may be there."""
     six = np.reshape(values, (6, 6)).copy()
@@ -164,31 +153,6 @@ def test_corner_pose(make):
     assert back.header.frame_id == "laser_link"
     assert in_plane(back.pose.pose) == pytest.approx(found.pose)
     np.testing.assert_array_equal(covariance_of(back.pose.covariance), found.covariance)
-
-
-def test_markers(make):
-    layers = layers_of(markers_of(FOUND, SCAN))
-    markers = read(make, make.features("/scan/features", MOMENT, layers)).markers
-    assert [m.ns for m in markers] == ["segments", "arcs", "corners", "edges", "ellipses"]
-    for marker, layer in zip(markers, layers, strict=True):
-        is_spheres = layer.name in {"corners", "edges"}
-        stamp = marker.header.stamp
-        assert (stamp.sec, stamp.nanosec, marker.header.frame_id) == MOMENT[:3]
-        assert marker.type == (marker.SPHERE_LIST if is_spheres else marker.LINE_LIST)
-        assert (marker.id, marker.action) == (0, marker.ADD)
-        expected = layer.points if is_spheres else layer.pairs
-        np.testing.assert_array_equal([(p.x, p.y) for p in marker.points], expected)
-        assert {p.z for p in marker.points} == {0.0}
-        assert (marker.scale.x, marker.scale.y, marker.scale.z) == (layer.size,) * 3
-        color = marker.color
-        assert np.float32(layer.color).tolist() == [color.r, color.g, color.b, color.a]
-        position, turned = marker.pose.position, marker.pose.orientation
-        assert (position.x, position.y, position.z) == (0, 0, 0)
-        assert (turned.x, turned.y, turned.z, turned.w) == (0, 0, 0, 1)
-        assert (marker.lifetime.sec, marker.frame_locked, len(marker.colors)) == (0, False, 0)
-    nothing = layers_of(markers_of(features(6), SCAN))
-    markers = read(make, make.features("/f", MOMENT, nothing)).markers
-    assert [(marker.action, len(marker.points)) for marker in markers] == [(2, 0)] * 5
 
 
 def yaws_of(make, found):

@@ -182,10 +182,13 @@ class Page:
 
     def pixels(self) -> Any:
         """Return what is drawn in the first panel: rows of red, green, blue and opacity."""
-        canvas = "const c = document.querySelector('canvas');"
-        width, height = self.run(f"{canvas} return [c.width, c.height]")
-        data = "[...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]"
-        return np.reshape(self.run(f"{canvas} return {data}"), (height, width, 4))
+        width, height, data = self.run(
+            "const c = document.querySelector('canvas');"
+            "const copy = new OffscreenCanvas(c.width, c.height).getContext('2d');"
+            "copy.drawImage(c, 0, 0);"
+            "return [c.width, c.height, [...copy.getImageData(0, 0, c.width, c.height).data]];"
+        )
+        return np.reshape(data, (height, width, 4))
 
 
 @contextmanager
@@ -517,17 +520,15 @@ def test_the_world_frame_has_the_drive_behind_the_scan(page, address):
     assert page.seen(there) == pytest.approx([1.5, -0.7])
     for name in ("clusters", "arcs", "segments", "breakpoints", "edges", "corners"):
         page.click(f"#show-{name}")
-    ink = """{ const [u, v] = app.plane.toPixels(%s, app.panels[0].size).map(Math.round);
-        const ctx = Object.assign(document.createElement("canvas"), { width: 5, height: 5 })
-            .getContext("2d");
-        ctx.drawImage(app.panels[0].canvas, 2 - u, 2 - v);
-        const data = ctx.getImageData(0, 0, 5, 5).data;
-        return data.some((red, k) => k %% 4 === 0 && data[k + 3] > 100 && red < 200); }"""
 
     def drawn(point):
-        return page.seen(ink % point.tolist())
+        """Whether there is ink within two pixels of a point of the plane."""
+        time.sleep(0.3)
+        size = "app.panels[0].size"
+        u, v = page.seen(f"app.plane.toPixels({point.tolist()}, {size}).map(Math.round)")
+        red, *_, opacity = np.moveaxis(page.pixels()[v - 2 : v + 3, u - 2 : u + 3], -1, 0)
+        return bool(((opacity > 100) & (red < 200)).any())
 
-    time.sleep(0.3)
     seen = list(drive(40))
     behind, later = seen[0].points[5], seen[39].points[80]
     c, s = np.cos(seen[39].pose[2]), np.sin(seen[39].pose[2])
@@ -536,10 +537,8 @@ def test_the_world_frame_has_the_drive_behind_the_scan(page, address):
     assert not drawn(later)  # seen only from scan 39 on
     page.change("#slider", 39, "input")
     shown(page, 39)
-    time.sleep(0.3)
     assert drawn(later)
     page.click("#show-drive")
-    time.sleep(0.3)
     assert not drawn(behind + seen[0].pose[:2])
     # Near, the view goes with the sensor.
     page.press(Keys.HOME)
