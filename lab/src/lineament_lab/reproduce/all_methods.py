@@ -7,12 +7,11 @@ import numpy as np
 
 from lineament.simulation import SCENES, SENSORS
 
-from ..evaluation.scores import Scores
 from .contenders import LIU, PARTITION_ONLY, every_method
 from .experiment import Experiment, Measured, Report
 from .findings import Figure, Numbers, Progress, Setting, Table, dot_chart
 from .prose import prose
-from .scans import frames_of, interleaved_times, scored, time_ratio
+from .scans import frames_of, interleaved_times, scored, time_ratio, totals
 from .seeds import by_seed
 
 _COLUMNS = {
@@ -52,8 +51,8 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         frames = frames_of(setting, SCENES, len(SCENES), sensor)
         times = interleaved_times(methods, [frame.scan for frame in frames[: len(SCENES)]])
         numbers[sensor] = {}
-        for method, scores in scored(methods, frames, progress, sensor).items():
-            of = Scores.total(scores).summary()
+        for method, scores in totals(scored(methods, frames, progress, sensor)).items():
+            of = scores.summary()
             kinds = ("corner", "segment") if method == PARTITION_ONLY else ("corner",)
             if method == PARTITION_ONLY or "corner_precision_0.10" not in of:
                 of = {k: v for k, v in of.items() if not k.startswith((*kinds, "arc"))}

@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
-
 from lineament.extractor import Extractor
 from lineament.features import Features
 from lineament.output import canvas, drawing
@@ -46,24 +44,21 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     for sensor in SCANNERS:
         frames = frames_of(setting, ["layers"], SCANS_A_FRAME, sensor)
         scores = scored(methods, frames, progress, f"clusters, {sensor}", partition_scores)
-        totals = {name: PartitionScores.total(of) for name, of in scores.items()}
-        numbers[sensor] = {name: score.summary() for name, score in totals.items()}
-    mixed = totals[PAPER].regions
+        found = {name: PartitionScores.total(of) for name, of in scores.items()}
+        numbers[sensor] = {name: score.summary() for name, score in found.items()}
+    mixed = found[PAPER].regions
     numbers["mixed"] = {"found": mixed.found, "true": mixed.true}
     alike = like_figure_10(setting.seed)
-    found = {TRUE: alike.truth}
-    found |= {name: e(alike.scan) for name, e in fitted_methods(setting.methods).items()}
-    numbers["example"] = {
-        name: {"clusters": _count(features), "corners": len(features.corners)}
-        for name, features in found.items()
-    }
+    example = {TRUE: alike.truth}
+    example |= {name: e(alike.scan) for name, e in fitted_methods(setting.methods).items()}
+    numbers["example"] = {name: _counts(features) for name, features in example.items()}
 
     def draw() -> Iterable[Figure]:
         """Draw the last frame with the median success of all methods, and the scene."""
         shown = frames[median_scan(scores, lambda of: of.success)]
         few = {name: methods[name](shown.scan) for name in (PAPER, FIXED)}
         yield _clusters(shown.scan, {"true clusters": shown.truth} | few)
-        yield from pictures("fig10", prose("fig10")[0], alike.scan, found)
+        yield from pictures("fig10", prose("fig10")[0], alike.scan, example)
 
     return Measured(numbers, draw)
 
@@ -87,15 +82,16 @@ def _lead(n: Any) -> str:
     return f"{100 * (n[PAPER]['success'] - n[FIXED]['success']):+.1f}".replace("-", "−")
 
 
-def _count(features: Features) -> int:
-    return len(np.unique(features.clusters[features.clusters >= 0]))
+def _counts(features: Features) -> dict[str, int]:
+    clusters = int(features.clusters.max(initial=-1)) + 1
+    return {"clusters": clusters, "corners": len(features.corners)}
 
 
 def like_figure_10(seed: int) -> Frame:
     """Return the first scene with the counts of Figure 10, or that which is nearest to them."""
 
     def off(frame: Frame) -> int:
-        counts = int(frame.truth.clusters.max(initial=-1)) + 1, len(frame.truth.corners)
+        counts = _counts(frame.truth).values()
         return sum(abs(a - b) for a, b in zip(counts, PAPER_COUNTS, strict=True))
 
     frames = simulated_frames(SENSORS["paper"], ["layers"], scene_numbers(SOUGHT, seed))
@@ -112,7 +108,9 @@ def _clusters(scan: LaserScan, found: Mapping[str, Features]) -> Figure:
     figure, panels = canvas.new_panels(len(found), len(found))
     for axes, (name, features) in zip(panels, found.items(), strict=True):
         shown = drawing.draw_beams(axes, scan, features.clusters)
-        canvas.style_plane(axes, name, canvas.count(_count(features), "cluster"), shown)
+        canvas.style_plane(
+            axes, name, canvas.count(_counts(features)["clusters"], "cluster"), shown
+        )
         drawing.draw_breakpoints(axes, features.breakpoints)
     return Figure.of("fig5", figure)
 
@@ -128,10 +126,8 @@ def _judged_layers(n: Any) -> Judged:
 
 def _judged_counts(n: Any, method: str) -> tuple[str, Margins]:
     true, found = n["example"][TRUE], n["example"][method]
-    return (
-        f"{found['clusters']:.0f} and {found['corners']:.0f}",
-        [-abs(found[name] - true[name]) for name in ("clusters", "corners")],
-    )
+    about = f"{found['clusters']:.0f} and {found['corners']:.0f}"
+    return about, [-abs(found[name] - true[name]) for name in true]
 
 
 CLAIMS = (

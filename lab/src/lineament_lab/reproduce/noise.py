@@ -16,12 +16,11 @@ from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, Sensor, World, scene, truth
 
 from ..evaluation.counts import ratio, rms
-from ..evaluation.scores import Scores
 from .contenders import FIGURE_9, LIU, PAPER
 from .experiment import Claim, Experiment, Judged, Measured, Report
 from .findings import Figure, Progress, Setting, Table, log_axis
 from .prose import prose
-from .scans import scene_numbers, scored
+from .scans import scene_numbers, scored, totals
 
 #: The paper's scanner, with a noise point in every fiftieth beam.
 SENSOR: Sensor = replace(SENSORS["paper"], outlier=0.02)
@@ -80,11 +79,10 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         for how, changes in (("not filtered", {"half_width": 0}), ("filtered", {}))
     }
     variants[f"{LIU}, lines fitted to filtered ranges"] = Extractor(LIU, measure="filtered")
-    features = {}
-    for name, of in scored(variants, frames, progress, "features").items():
-        scores = Scores.total(of)
-        found = scores.corners.counts.found
-        features[name] = {"corners_a_scan": found / scores.scans, **scores.summary()}
+    features = {
+        name: {"corners_a_scan": of.corners.counts.found / of.scans, **of.summary()}
+        for name, of in totals(scored(variants, frames, progress, "features")).items()
+    }
     return Measured(
         {"ranges": _ranges(frames), "features": features}, lambda: [_figure(setting.seed)]
     )
@@ -92,44 +90,24 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 
 def report(n: Any, setting: Setting) -> Report:
     """Make a table of ranges, by place, and one of features, by variant."""
-    names = {place: _NAMES.get(place, f"noise points, off by {place}") for place in n["ranges"]}
-    ranges = Table.of_numbers(
-        "Errors of ranges",
-        {names[place]: of for place, of in n["ranges"].items()},
-        _RANGES,
-        f"{SCANS_A_FRAME * setting.frames} scans; the noise of the ranges is 10 mm. Labelled "
-        "noise: in a cluster of fewer than three points, with the filter and the paper’s numbers.",
-        first="beams",
-    )
-    features = Table.of_numbers(
-        "What is found with the filter and without it",
-        n["features"],
-        _FEATURES,
-        "Corners within 0.1 m of true ones that show six beams or more of both sides; errors of "
-        "correct corners and lines. ÷ bound: root mean square of the offset over its Cramér–Rao "
-        "bound.",
-        first="liu",
+    of_ranges, of_features = prose("notes of noise", scans=SCANS_A_FRAME * setting.frames)
+    places = {_NAMES.get(p, f"noise points, off by {p}"): of for p, of in n["ranges"].items()}
+    title = "What is found with the filter and without it"
+    tables = (
+        Table.of_numbers("Errors of ranges", places, _RANGES, of_ranges, "beams"),
+        Table.of_numbers(title, n["features"], _FEATURES, of_features, "liu"),
     )
     labelled = {place: f"{100 * of['labelled']:.0f} %" for place, of in n["ranges"].items()}
     nearest, farthest = (_size(*SIZES[i]) for i in (0, -1))
-    raw, filtered = (
-        [
-            f"{100 * n['features'][f'{PAPER}, {how}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
+    shares = {
+        how: [
+            f"{100 * n['features'][f'{PAPER}, {about}'].get(f'corner_{of}_0.10', math.nan):.0f} %"
             for of in ("precision", "recall")
         ]
-        for how in ("not filtered", "filtered")
-    )
-    text = prose(
-        *("noise",),
-        near=labelled[nearest],
-        far=labelled[farthest],
-        planes=labelled["planes"],
-        nearest=nearest,
-        farthest=farthest,
-        raw=raw,
-        filtered=filtered,
-    )
-    return text, (ranges, features)
+        for how, about in (("raw", "not filtered"), ("filtered", "filtered"))
+    }
+    sizes = {"near": labelled[nearest], "far": labelled[farthest], "planes": labelled["planes"]}
+    return prose("noise", nearest=nearest, farthest=farthest, **sizes, **shares), tables
 
 
 def _judged(n: Any) -> Judged:

@@ -18,7 +18,7 @@ from .contenders import feature_methods
 from .experiment import Experiment, Measured, MissingError, Report
 from .findings import Columns, Numbers, Progress, Setting, Table
 from .prose import prose
-from .scans import Frame, scored
+from .scans import Frame, scored, totals
 
 #: Occupancy grids, in a folder beside that of the recordings.
 PLANS = ("stata_basement", "building_31", "depot", "warehouse", "tb3_sandbox")
@@ -52,8 +52,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     for plan in PLANS:
         progress(f"{plan}: simulating")
         frames = list(frames_on(folder / f"{plan}.yaml", SCANS_A_FRAME * setting.frames))
-        found = scored(methods, frames, progress, plan)
-        by_plan.append({name: Scores.total(of) for name, of in found.items()})
+        by_plan.append(totals(scored(methods, frames, progress, plan)))
     over_plans = {name: _over_plans([of[name] for of in by_plan]) for name in methods}
     return Measured({"methods": over_plans})
 
@@ -62,7 +61,8 @@ def report(n: Numbers, setting: Setting) -> Report:
     """Make a table of all plans together."""
     title = f"{len(PLANS)} plans, {SCANS_A_FRAME * setting.frames} scans in each"
     about = prose("plans", sensor=SENSOR, area=AREA, long=LONG, bow=1e3 * BOW)
-    return (*about, *prose("rivals")), (Table.of_numbers(title, n["methods"], _COLUMNS, _NOTE),)
+    table = Table.of_numbers(title, n["methods"], _COLUMNS, "Least and greatest: of one plan.")
+    return (*about, *prose("rivals")), (table,)
 
 
 def frames_on(path: Path, count: int) -> Iterator[Frame]:
@@ -125,9 +125,6 @@ def _over_plans(scores: list[Scores]) -> dict[str, Any]:
         if np.isfinite(of).all():
             summary |= {f"{kind}_least": min(of), f"{kind}_greatest": max(of)}
     return summary
-
-
-_NOTE = "Least and greatest: of one plan."
 
 
 EXPERIMENT = Experiment("Scenes that are not ours", measure, report, once=True)

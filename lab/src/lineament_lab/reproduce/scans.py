@@ -98,6 +98,11 @@ def scored(
     }
 
 
+def totals(scores: Mapping[str, Sequence[S]]) -> dict[str, S]:
+    """Add up the scores of all frames, by method."""
+    return {name: of[0].total(of) for name, of in scores.items()}
+
+
 def median_scan(
     scores: Mapping[str, Sequence[S]],
     figure: Callable[[S], float],

@@ -16,7 +16,7 @@ from .contenders import IEPF, LIU, PAPER, PDBS_LINES, by_letter, fitted_methods,
 from .experiment import Claim, Experiment, Margins, Measured, Report, better
 from .findings import Figure, Progress, Setting, Table
 from .prose import prose
-from .scans import INDOORS, frames_of, median_scan, recorded_scans, scored
+from .scans import INDOORS, frames_of, median_scan, recorded_scans, scored, totals
 from .similarity import COUNTS, SIMILARITY_NOTE, counts_of
 
 TRUE = "true features"
@@ -44,9 +44,9 @@ def measure(setting: Setting, progress: Progress) -> Measured:
     for kind in INDOORS:
         frames = frames_of(setting, [kind])
         scores = scored(methods, frames, progress, kind)
-        totals = {name: Scores.total(of) for name, of in scores.items()}
-        everything = {name: everything[name] + total for name, total in totals.items()}
-        numbers[kind] = {name: _numbers(total) for name, total in totals.items()}
+        of_kind = totals(scores)
+        everything = {name: everything[name] + total for name, total in of_kind.items()}
+        numbers[kind] = {name: _numbers(total) for name, total in of_kind.items()}
         corners = [len(frame.truth.corners) for frame in frames]
         full = [k for k, count in enumerate(corners) if count >= np.median(corners)]
         frame = frames[median_scan(scores, lambda of: of.segments.counts.f1, full)]
@@ -79,11 +79,9 @@ def report(n: Any, setting: Setting) -> Report:
     """Make a table for each kind of scene, and for each recording."""
     tables = []
     for kind in INDOORS:
-        true = (next(iter(n[kind].values()))[f"{of}_true"] for of in ("segments", "corners"))
-        note = (
-            "{} scans. True segments: {:.0f}, true corners: {:.0f}, both sides of 6 beams or more."
-        )
-        note = note.format(setting.frames, *true)
+        true = next(iter(n[kind].values()))
+        counts = {of: true[f"{of}_true"] for of in ("segments", "corners")}
+        (note,) = prose("notes of scenes", scans=setting.frames, **counts)
         tables.append(Table.of_numbers(f"Scans of a simulated {kind}", n[kind], _COLUMNS, note))
     recorded = (name for name in n if name not in (*INDOORS, "segment_f1"))
     tables += [
@@ -93,10 +91,10 @@ def report(n: Any, setting: Setting) -> Report:
 
 
 def _numbers(scores: Scores) -> dict[str, float]:
-    counts = {"corners": scores.corners.counts, "segments": scores.segments.counts}
-    numbers = {f"{kind}_found": of.found for kind, of in counts.items()}
-    numbers |= {f"{kind}_right": of.correct for kind, of in counts.items()}
-    return numbers | {f"{kind}_true": of.true for kind, of in counts.items()} | scores.summary()
+    numbers: dict[str, float] = {}
+    for kind, of in (("corners", scores.corners.counts), ("segments", scores.segments.counts)):
+        numbers |= {f"{kind}_found": of.found, f"{kind}_right": of.correct, f"{kind}_true": of.true}
+    return numbers | scores.summary()
 
 
 def pictures(name: str, about: str, scan: LaserScan, found: Mapping[str, Features]) -> list[Figure]:
