@@ -441,7 +441,8 @@ WORLD = World([[-3, -2, 3, -2], [3, -2, 3, 1.5], [3, 1.5, 1, 1.5], [1, 1.5, 1, 2
 @pytest.mark.slow
 def test_commands_write_a_grid_and_find_a_drive_on_it(tmp_path, capsys):
     log, target = tmp_path / "log.npz", tmp_path / "map.yaml"
-    scans = list(drive(WORLD, [(-2, 0), (1.0, 0.5)], SENSORS["utm30lx"], speed=0.5, rate=2))
+    way = [(-2, 0), (1.0, 0.5), (-2, 1), (1.0, -1)]
+    scans = list(drive(WORLD, way, SENSORS["utm30lx"], speed=0.5, rate=2))
     save_log(log, scans)
     assert run(["map", str(log), "-o", str(target), "-q"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["log.npz", "map.pgm", "map.yaml"]

@@ -12,9 +12,11 @@ from .locate import Location, locate
 from .loops import Survey
 
 #: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
-_PLACES, _AGREE = 3.0, (0.5, 0.05)
+PLACES, _AGREE = 3.0, (0.5, 0.05)
+#: Places may be off by so many deviations of the way between them.
+_OFF = 3.0
 #: So many places agree at least, and so many times as many as are located elsewhere.
-_FEWEST, _MORE = 3, 3
+FEWEST, MORE = 3, 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,17 +38,19 @@ class Placement:
 
 def is_sure(agree: int, others: int) -> bool:
     """Whether that many places that agree are enough, beside others."""
-    return agree >= max(_FEWEST, _MORE * others)
+    return agree >= max(FEWEST, MORE * others)
 
 
-def placed_on(plan: LineMap, survey: Survey, frames: Numbers) -> Placement | None:
+def placed_on(
+    plan: LineMap, survey: Survey, frames: Numbers, known: float = 0.0
+) -> Placement | None:
     """Find the motion that puts some key frames where the plan shows what they saw.
 
     Places along the way are looked for without a first guess; most of those that are located agree
-    on it. None if none is located.
+    on it, as far as they are `known` to each other (one deviation [m]). None if none is located.
     """
     places = {}
-    for q, query in survey.queries(_PLACES):
+    for q, query in survey.queries(PLACES):
         if q in frames and (where := locate(query, plan)):
             places[q] = where
     if not places:
@@ -56,7 +60,7 @@ def placed_on(plan: LineMap, survey: Survey, frames: Numbers) -> Placement | Non
     x, y = survey.poses[frames, :2].mean(axis=0).tolist()
     ends, turns = np.array([compose(m, (x, y, 0.0)) for m in moves]), np.array(moves)[:, 2]
     agree = np.abs(wrapped(turns[:, None] - turns)) < _AGREE[1]
-    agree &= np.linalg.norm(ends[:, None, :2] - ends[:, :2], axis=2) < _AGREE[0]
+    agree &= np.linalg.norm(ends[:, None, :2] - ends[:, :2], axis=2) < _AGREE[0] + _OFF * known
     best = int(agree.sum(axis=1).argmax())
     chosen = [q for q, is_one in zip(places, agree[best].tolist(), strict=True) if is_one]
     others = len(places) - len(chosen)

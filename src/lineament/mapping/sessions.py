@@ -29,7 +29,7 @@ from .local_map import beams_of, some
 from .loops import FLOOR, Survey
 from .making import APART, TWICE, VIEWS, DriveMap, single
 from .parts import beside, boxes_of
-from .placing import Placement, is_sure, placed_on
+from .placing import FEWEST, MORE, PLACES, Placement, is_sure, placed_on
 
 #: Walls that are one are looked for so often, poses and walls adjusted in between.
 _ROUNDS = 3
@@ -64,10 +64,20 @@ def placements(made: DriveMap, plan: LineMap) -> list[Placement | None]:
 
     NothingFoundError if none is found.
     """
-    found = [placed_on(plan, made.survey, made.parts.frames(k)) for k in range(made.parts.count)]
+    found = [
+        placed_on(plan, made.survey, made.parts.frames(k), known)
+        for k, known in enumerate(made.parts.deviations.tolist())
+    ]
     sure = [where if where is not None and where.is_sure else None for where in found]
     if not any(sure):
-        raise NothingFoundError("the drive is not on the plan, or the plan does not say where")
+        agree, others = max(
+            ((len(of.places), of.others) for of in found if of is not None), default=(0, 0)
+        )
+        raise NothingFoundError(
+            "the drive is not on the plan, or the plan does not say where: of places each "
+            f"{PLACES:g} m of way {agree} agree and {others} do not, expected {FEWEST} that agree, "
+            f"and {MORE} for each that does not"
+        )
     return sure
 
 
