@@ -115,6 +115,7 @@ def test_short_walls_do_not_turn_to_their_beams():
         *product(["optimal"], [9, 10, 12]),
         # With borders of lines that wrong borders gave, it was up to 2.5 and 2.2 of 8 and 10.
         *product(["iepf", "line_tracking", "hough", "ransac", "region_growing"], [8, 10, 16]),
+        *product(["split_and_merge"], [16, 32]),
     ],
 )
 def test_covariance_of_a_corner_whose_border_may_lie_elsewhere(name, n):

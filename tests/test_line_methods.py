@@ -204,24 +204,6 @@ def test_nothing_needs_tuning_when_the_noise_grows(extractor, sigma):
     assert max(missed, false) <= 4
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["iepf", "split_and_merge", "line_tracking"])
-def test_covariances_of_corners_have_the_lever_arm(name):
-    """NEES of χ² with two degrees of freedom, its 95 % interval widened for cuts a beam off.
-
-    The others fit lines to measurements of the other wall as well, where the cut is a beam off.
-    """
-    extractor, angles = Extractor(name, noise=NOISE), fan(25)
-    ideal = vertex(angles, 3.0, 90, convex=False)
-    nees = []
-    for seed in range(300):
-        (corner,) = extractor(scan_of(noisy(ideal, seed), angles)).corners
-        error = corner["position"] - (3.0, 0.0)
-        nees.append(error @ np.linalg.solve(corner["covariance"], error))
-    assert np.median(nees) == pytest.approx(2 * math.log(2), rel=0.2)
-    assert 1.7 < np.mean(nees) < 2.6
-
-
 def test_nothing_is_found_in_nothing_and_in_clutter_of_single_points(extractor):
     angles = fan(20)
     for ranges in (np.full(len(angles), np.nan), 2.0 + np.arange(len(angles)) % 2):

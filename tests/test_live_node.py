@@ -1,7 +1,6 @@
 """The loop of a node over messages in memory, and its pipeline."""
 
 import math
-import struct
 import time
 from dataclasses import replace
 from functools import partial
@@ -479,16 +478,14 @@ def test_a_scan_is_deskewed_by_the_motion_before_it_or_where_none_is_known_by_it
 
 
 def turning_scan(way, pose, twist, still=False):
-    """Return a message of a sweep of 270° in 75 ms in a room; `way` is 1 or -1, its mirror's."""
+    """Return a sweep of 270° in 75 ms in a room; `way` is 1 or -1, its mirror's."""
     n, step = 541, math.radians(0.5)
     bearings, each = way * (np.arange(n) * step - math.radians(135)), 0.075 / 540
     times = np.zeros(n) if still else each * np.arange(n)
     at = np.array([compose(pose, tuple(by)) for by in poses_along(twist, times)])
     ranges, _ = cast_rays(room(), at, bearings)
-    ends = bearings[0], bearings[-1], way * step, each, 0.1, 0.1, 30.0
-    header = b"\0\1\0\0" + struct.pack("<iII", 7, 0, 6) + b"laser\0\0\0"
-    data = header + struct.pack("<7fI", *ends, n) + ranges.astype("<f4").tobytes() + bytes(4)
-    return received_scan("one", data, "cdr", "sensor_msgs/LaserScan").read()
+    fields = {"time_increment": each, "range_min": 0.1, "range_max": 30.0, "stamp": 7.0}
+    return ln.LaserScan(ranges, float(bearings[0]), way * step, **fields)
 
 
 @pytest.mark.parametrize("way", [1, -1], ids=["counter-clockwise", "clockwise"])
