@@ -160,7 +160,7 @@ class TestEngine:
 
     def test_seeds_are_pooled_before_they_are_reported_and_the_first_is_drawn(self):
         ran, reports = [], []
-        found = self.declared(ran).run(Setting(9, 3, seeds=3), lambda *about: reports.append(about))
+        found = self.declared(ran).run(Setting(9, 3, seeds=3), reports.append, "nothing")
         assert ran == [3, 4, 5]
         assert found.title == "Nothing"
         assert found.text == ("4 (3–5) of 9 frames",)
@@ -169,22 +169,21 @@ class TestEngine:
             repr(found.numbers) == "{'n': Spread([3.0, 4.0, 5.0]), 'all': {'a': np.float64(1.0)}}"
         )
         assert found.tables[0].rows[0][1].values == (3.0, 4.0, 5.0)
-        seeds = [f", seed {seed}" for seed in (3, 4, 5)]
-        assert reports == [(s, what) for s in seeds for what in ("starting", "measuring")] + [
-            ("", "drawing")
-        ]
+        seeds = [f"nothing, seed {seed}" for seed in (3, 4, 5)]
+        whats = ("starting", "measuring")
+        assert reports == [*(f"{s}: {what}" for s in seeds for what in whats), "nothing: drawing"]
 
     def test_what_no_seed_changes_is_measured_once(self):
         ran, reports = [], []
-        self.declared(ran, once=True).run(Setting(1, 3, seeds=2), lambda *a: reports.append(a))
+        self.declared(ran, once=True).run(Setting(1, 3, seeds=2), reports.append, "nothing")
         assert ran == [3]
-        assert reports[0] == ("", "starting")
+        assert reports[0] == "nothing: starting"
 
     def test_what_is_missing_is_said(self):
         def measure(*_):
             raise MissingError("no recordings")
 
-        found = Experiment("A bag", measure, print).run(Setting(), lambda *_: None)
+        found = Experiment("A bag", measure, print).run(Setting(), print, "bag")
         assert found == Findings("A bag", ("The recordings are missing: nothing is measured.",))
 
     def test_experiments_run_by_their_names(self, monkeypatch):

@@ -88,14 +88,10 @@ def run_experiments(
         If there is no such experiment.
     """
     chosen = experiment_names(names)
-    findings = {}
-    for k, name in enumerate(chosen, 1):
-
-        def report(seed: str, about: str, where: str = f"{name} ({k}/{len(chosen)})") -> None:
-            progress(f"{where}{seed}: {about}")
-
-        findings[name] = experiment(name).run(setting, report)
-    return findings
+    return {
+        name: experiment(name).run(setting, progress, f"{name} ({k}/{len(chosen)})")
+        for k, name in enumerate(chosen, 1)
+    }
 
 
 def experiment(name: str) -> Experiment:

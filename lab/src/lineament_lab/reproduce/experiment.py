@@ -113,19 +113,19 @@ class Experiment:
     claims: tuple[Claim, ...] = ()
     once: bool = False
 
-    def run(self, setting: Setting, progress: Callable[[str, str], None]) -> Findings:
+    def run(self, setting: Setting, progress: Progress, name: str) -> Findings:
         """Measure with each seed, pool the numbers, report them, and draw those of the first.
 
         Numbers that differ between the seeds have median and range: see `Spread`. A table without
-        rows is left out. Progress is given the seed, or nothing if there is one, and a few words.
+        rows is left out. Progress is given the name, the seed if there are several, and what.
         """
         numbers: list[dict[str, Any]] = []
         draw = Measured({}).draw
         for one in setting.by_seed()[: 1 if self.once else None]:
             seed = "" if self.once or setting.seeds == 1 else f", seed {one.seed}"
 
-            def about(what: str, seed: str = seed) -> None:
-                progress(seed, what)
+            def about(what: str, where: str = name + seed) -> None:
+                progress(f"{where}: {what}")
 
             about("starting")
             try:
@@ -134,7 +134,7 @@ class Experiment:
                 return Findings(self.title, prose(str(missing)))
             draw = draw if numbers else measured.draw
             numbers.append(measured.numbers)
-        progress("", "drawing")
+        progress(f"{name}: drawing")
         pooled = merged(numbers) if len(numbers) > 1 else numbers[0]
         text, tables = self.report(pooled, setting)
         shown = tuple(table for table in tables if table.rows)

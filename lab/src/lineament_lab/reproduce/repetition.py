@@ -63,13 +63,9 @@ def measure(setting: Setting, progress: Progress) -> Measured:
             measured = repetition(p, numbers)
             choices.append({"reading": p.reading, "chosen_by": by, **p._asdict(), **measured})
     peaks = {criterion: _peaks(grid, criterion) for criterion in CRITERIA}
-    alike = {
-        c: [reading for reading, at in of.items() if at["lead"] >= 0] for c, of in peaks.items()
-    }
     points = [p._asdict() | of for p, of in grid.items()]
     return Measured(
-        {"grid": points, "choices": choices, "peaks": peaks, "alike": alike},
-        lambda: _figures(setting, progress),
+        {"grid": points, "choices": choices, "peaks": peaks}, lambda: _figures(setting, progress)
     )
 
 
@@ -114,29 +110,19 @@ def report(n: Any, _: Setting) -> Report:
     """Make a table of peaks for each criterion, and that of the choices on other scenes."""
     lost: dict[str, Any] = {"radius": RADIUS, "threshold": THRESHOLD}
     lost |= dict.fromkeys(("at_radius", "at_threshold", "here", "largest"), "lost")
-    peaks = (
-        Table.of_numbers(
-            f"Where it is largest: {about}",
-            {"paper": lost} | n["peaks"][criterion],
-            _PEAKS,
-            f"A dash: at {THRESHOLD} no corner is found again with any radius. An optimum at an "
-            "end of the grid may lie beyond it.",
-            first="reading",
-        )
-        for criterion, about in CRITERIA.items()
-    )
-    choices = Table.of_numbers(
-        "The paper’s parameters and the best of the grid, on other scenes",
-        {(of["reading"], of["chosen_by"]): of for of in n["choices"]},
-        _COLUMNS,
-        "Precision, recall and F1: corners within 0.1 m of true ones with six beams or more on "
-        "both sides. The paper’s values of AR are lost.",
-        first=("reading", "chosen by"),
-    )
+    of_peaks, of_choices = prose("notes of repetition", threshold=THRESHOLD)
+    tables = []
+    for criterion, about in CRITERIA.items():
+        title, rows = f"Where it is largest: {about}", {"paper": lost} | n["peaks"][criterion]
+        tables.append(Table.of_numbers(title, rows, _PEAKS, of_peaks, "reading"))
+    title = "The paper’s parameters and the best of the grid, on other scenes"
+    choices = {(of["reading"], of["chosen_by"]): of for of in n["choices"]}
+    names = ("reading", "chosen by")
+    tables.append(Table.of_numbers(title, choices, _COLUMNS, of_choices, names))
     two, one = (_alike(n, criterion) for criterion in CRITERIA)
     sizes = {"forms": len(FORMS), "widths": len(HALF_WIDTHS), "readings": len(_papers())}
     text = prose("repetition", flat=FLAT, two=two, one=one, **sizes)
-    return text, (*peaks, choices)
+    return text, tables
 
 
 def _judged(n: Any) -> Judged:

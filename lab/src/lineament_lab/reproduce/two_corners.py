@@ -93,21 +93,15 @@ def report(n: Any, setting: Setting) -> Report:
     rows = {name: _row(of, n["all_bound"], name.startswith("liu")) for name, of in n["all"].items()}
     rows["bound"] = {"here": f"{DISTANCE:.4f}", "over": 1.0}
     rows["bound"] |= dict.fromkeys(("standard_deviation", "error"), n["all_bound"])
-    overall = Table.of_numbers(
-        "Table 2: distance between the two corners, from all five places together",
-        rows,
-        _COLUMNS,
-        f"A and B are the found corners nearest to them, within {GATE} m. That favours methods "
-        "that find several corners at one vertex.",
-    )
-    tables = [overall]
+    of_all, of_place = prose("notes of two_corners", gate=GATE)
+    title = "Table 2: distance between the two corners, from all five places together"
+    tables = [Table.of_numbers(title, rows, _COLUMNS, of_all)]
     for title, key, factor in _BY_PLACE:
         of_places = {name: dict(enumerate(one[key] for one in of)) for name, of in places.items()}
         if key == "standard_deviation":
             of_places["bound"] = dict(enumerate(n["bound"]))
         columns = {f"place {k + 1}": (k, factor) for k in range(len(n["bound"]))}
-        note = "The paper’s values of single places are lost."
-        tables.append(Table.of_numbers(f"{title}, by place", of_places, columns, note))
+        tables.append(Table.of_numbers(f"{title}, by place", of_places, columns, of_place))
     return text, tables
 
 
