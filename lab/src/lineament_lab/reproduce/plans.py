@@ -11,6 +11,7 @@ from lineament.mapping import LineMap
 from lineament.mapping.grids import Grid
 from lineament.scan import Array, LaserScan
 from lineament.simulation import SENSORS, World, truth
+from lineament.simulation.placing import clearance
 from lineament.simulation.surfaces import View
 
 from ..evaluation.scores import Scores
@@ -72,12 +73,11 @@ def frames_on(path: Path, count: int) -> Iterator[Frame]:
     rng = np.random.default_rng([len(ends), count])
     free = grid.placed(np.argwhere(grid.free)[:, ::-1].astype(np.float64) + 0.5)
     anywhere = free[rng.integers(len(free), size=round(len(free) * grid.resolution**2 / AREA))]
-    people = [one for one in anywhere if _distances(one, ends).min() > 2.0 * RADIUS]
+    people = anywhere[clearance(World(ends), anywhere) > 2.0 * RADIUS]
     world, found = World(ends, [(*person, RADIUS) for person in people]), 0
     while found < count:
         place = free[rng.integers(len(free))]
-        near = [math.dist(person, place) for person in people]
-        if min(_distances(place, ends).min(), min(near, default=math.inf) - RADIUS) < CLEAR:
+        if clearance(world, [place])[0] < CLEAR:
             continue
         pose = (float(place[0]), float(place[1]), float(rng.uniform(-math.pi, math.pi)))
         scan = sensor.scan(world, pose, rng)
@@ -89,15 +89,6 @@ def frames_on(path: Path, count: int) -> Iterator[Frame]:
             LaserScan(bowed, scan.angle_min, scan.angle_increment, range_max=scan.range_max),
             truth(world, pose, sensor),
         )
-
-
-def _distances(place: Array, ends: Array) -> Array:
-    """Return how far walls are from a place [m]."""
-    start, along = ends[:, :2], ends[:, 2:] - ends[:, :2]
-    part = ((place - start) * along).sum(axis=1) / (along**2).sum(axis=1)
-    nearest = start + np.clip(part, 0.0, 1.0)[:, None] * along
-    distances: Array = np.hypot(*(place - nearest).T)
-    return distances
 
 
 def _bows(view: View, scan: LaserScan, rng: np.random.Generator) -> Array:
