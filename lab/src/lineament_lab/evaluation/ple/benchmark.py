@@ -104,15 +104,14 @@ def run_benchmark(
     """Map all scans with all budgets, and score the maps.
 
     The method is the name of one (see `method_map`), or a function of a scan and a number of
-    vertices that makes polylines, such as `iepf_map`; the result has its name, or the one given.
+    vertices that makes polylines; the result has its name, or the one given.
     ``track(scans, name, total)`` yields the scans, and shows the progress. Raises ValueError if
     there is no such method, or a map has more vertices than allowed.
 
     Examples
     --------
-    >>> from lineament_lab.evaluation.ple import iepf_map
     >>> scan = LaserScan([2.0, 2.0, 2.0], angle_min=-0.01, angle_increment=0.01)
-    >>> run_benchmark(Benchmark("wall", (scan,), (2,), (), {}), iepf_map).means()["vertices"]
+    >>> run_benchmark(Benchmark("wall", (scan,), (2,), (), {}), "iepf").means()["vertices"]
     [2.0]
     """
     make = method_map(method) if isinstance(method, str) else method

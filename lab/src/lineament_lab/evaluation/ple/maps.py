@@ -24,8 +24,8 @@ _MARGIN = 1e-3
 _LEAST_COSINE = 0.1
 #: Error of a return that the map does not explain, and the most that any counts [m].
 _WORST = 0.3
-#: Distances closer than this are equal but for rounding [m].
-_TIE = 1e-12
+#: Errors below this are of rounding [m].
+_LEAST = 1e-12
 
 
 def method_map(method: str) -> MapMaker:
@@ -81,7 +81,7 @@ def _penalised(polylines: Sequence[Array], scan: LaserScan, vertices: int) -> fl
     """How ill a map explains a scan, and what its vertices cost."""
     ranges, n = scan.ranges[scan.valid], max(int(scan.valid.sum()), 1)
     errors = np.nan_to_num(cast_map(polylines, scan.angles[scan.valid]) - ranges, nan=_WORST)
-    squares = max(float(np.sum(np.minimum(errors**2, _WORST**2))), n * _TIE**2)
+    squares = max(float(np.sum(np.minimum(errors**2, _WORST**2))), n * _LEAST**2)
     return n * math.log(squares / n) + vertices * (2.0 * math.log(n / vertices) + 5.0)
 
 
@@ -148,55 +148,6 @@ def _on_ray(segment: np.void, end: str, bearing: float) -> Array:
     if abs(cosine) < _LEAST_COSINE:
         return np.array(segment[end])
     return np.asarray((normal @ segment["centroid"]) / cosine * ray)
-
-
-def iepf_map(scan: LaserScan, max_vertices: int) -> list[Array]:
-    """Map a scan by `benchmark_iepf`: one polyline through all returns, whatever the gaps."""
-    return [benchmark_iepf(scan.points[scan.valid], max_vertices)]
-
-
-def benchmark_iepf(points: Array, max_vertices: int) -> Array:
-    """Split a polyline of points (n, 2) at the point farthest from its chord, as the authors did.
-
-    The iterative end-point fit begins with the first and the last point, and splits where the
-    distance to the infinite line through the ends of a part is the largest of all parts, until
-    there are min(n, `max_vertices`) vertices. Of points that tie, the first is taken.
-
-    Examples
-    --------
-    >>> points = np.array([[0.0, 0.0], [1.0, 0.1], [2.0, 1.0], [3.0, 0.0]])
-    >>> benchmark_iepf(points, 3).tolist()
-    [[0.0, 0.0], [2.0, 1.0], [3.0, 0.0]]
-    """
-    points = np.asarray(points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError(f"points has shape {points.shape}, expected (n, 2)")
-    if max_vertices < 2:
-        raise ValueError(f"max_vertices is {max_vertices}, expected a whole number ≥ 2")
-    if len(points) <= 2:
-        return points
-    vertices = [0, len(points) - 1]
-    splits = [_farthest(points, *vertices)]
-    while len(vertices) < min(max_vertices, len(points)):
-        k = max(range(len(splits)), key=lambda k: splits[k][0])
-        vertices.insert(k + 1, splits[k][1])
-        splits[k : k + 1] = (_farthest(points, *vertices[j : j + 2]) for j in (k, k + 1))
-    return points[vertices]
-
-
-def _farthest(points: Array, first: int, last: int) -> tuple[float, int]:
-    """Return the largest distance of a point between two others from their line, and which."""
-    if last - first < 2:
-        return -1.0, first
-    chord = points[last] - points[first]
-    arms = points[first + 1 : last] - points[first]
-    length = math.hypot(*chord)
-    if length > 0.0:
-        distances = np.abs(chord[0] * arms[:, 1] - chord[1] * arms[:, 0]) / length
-    else:
-        distances = np.hypot(arms[:, 0], arms[:, 1])
-    largest = float(distances.max())
-    return largest, first + 1 + int(np.argmax(distances >= largest - _TIE))
 
 
 @dataclass(frozen=True, slots=True)
