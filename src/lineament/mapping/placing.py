@@ -8,15 +8,18 @@ from ..scan import Pose
 from ..scan.poses import compose, inverse
 from ..walls import Numbers, wrapped
 from .line_map import LineMap
-from .locate import Location, locate
+from .locate import MOST_CONTRADICTED, Location, locate
 from .loops import Survey
 
 #: Key frames are looked for on a plan from places so far apart [m]; places that agree [m, rad].
 PLACES, _AGREE = 3.0, (0.5, 0.05)
 #: Places may be off by so many deviations of the way between them.
 _OFF = 3.0
+#: Errors of a drive on a plan beside that [m, rad]; no larger share of its places looks through
+#: walls of the plan.
+_NEAR, _LOOK_THROUGH = (0.2, 0.05), 0.4
 #: So many places agree at least, and so many times as many as are located elsewhere.
-FEWEST, MORE = 3, 3
+FEWEST, _MORE = 3, 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,15 +33,29 @@ class Placement:
     places: dict[int, Location]
     others: int
 
-    @property
-    def is_sure(self) -> bool:
-        """Whether enough places agree, and few enough do not."""
-        return is_sure(len(self.places), self.others)
+
+def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> Placement | None:
+    """Find some key frames on a plan as `placed_on`; None if they may be elsewhere.
+
+    Enough places agree, and few enough do not, wherever on the plan these are. Where all places are
+    looked at there, most do not look through its walls: the mirror image of a floor has places that
+    are alike, but other doors.
+    """
+    found = placed_on(plan, survey, frames, known)
+    if found is None or not is_sure(len(found.places), found.others):
+        return None
+    (way, turn), against = _NEAR, []
+    spread = np.diag((way + known, way + known, turn)) ** 2
+    for q, query in survey.queries(PLACES):
+        if q in frames:
+            where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
+            against.append(where.evidence.contradicted > MOST_CONTRADICTED)
+    return found if np.mean(against) <= _LOOK_THROUGH else None
 
 
 def is_sure(agree: int, others: int) -> bool:
     """Whether that many places that agree are enough, beside others."""
-    return agree >= max(FEWEST, MORE * others)
+    return agree >= max(FEWEST, _MORE * others)
 
 
 def placed_on(

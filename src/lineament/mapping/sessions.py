@@ -29,12 +29,14 @@ from .local_map import beams_of, some
 from .loops import FLOOR, Survey
 from .making import APART, TWICE, VIEWS, DriveMap, single
 from .parts import beside, boxes_of
-from .placing import FEWEST, MORE, PLACES, Placement, is_sure, placed_on
+from .placing import FEWEST, PLACES, Placement, is_sure, surely_on
 
 #: Walls that are one are looked for so often, poses and walls adjusted in between.
 _ROUNDS = 3
 #: Walls of a plan are looked through by pieces so long [m]; by so many beams of a key frame.
 _PIECE, _BEAMS = 0.5, 360
+#: Walls along each other (45°); others are farther than any [m].
+_ALONG, _FAR = 0.7, 1e6
 #: A piece is gone if at least so many key frames look through it, and more than see it.
 _THROUGH = 2
 
@@ -65,20 +67,15 @@ def placements(made: DriveMap, plan: LineMap) -> list[Placement | None]:
     NothingFoundError if none is found.
     """
     found = [
-        placed_on(plan, made.survey, made.parts.frames(k), known)
+        surely_on(plan, made.survey, made.parts.frames(k), known)
         for k, known in enumerate(made.parts.deviations.tolist())
     ]
-    sure = [where if where is not None and where.is_sure else None for where in found]
-    if not any(sure):
-        agree, others = max(
-            ((len(of.places), of.others) for of in found if of is not None), default=(0, 0)
-        )
+    if not any(found):
         raise NothingFoundError(
-            "the drive is not on the plan, or the plan does not say where: of places each "
-            f"{PLACES:g} m of way {agree} agree and {others} do not, expected {FEWEST} that agree, "
-            f"and {MORE} for each that does not"
+            "the drive is not on the plan, or the plan does not say where: expected "
+            f"{FEWEST} places along the way, {PLACES:g} m from each other, that agree"
         )
-    return sure
+    return found
 
 
 def onto_plan(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> DriveMap:
@@ -122,15 +119,12 @@ def merge_onto(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> 
     were not found. NothingFoundError if the places contradict each other once they are adjusted.
     """
     placed = onto_plan(made, plan, found)
-    old, loose = _seen_before(plan)
+    old, loose, is_drawn = _seen_before(plan)
     adjusted, sights = _adjusted(placed, loose, found)
     label, known = np.full(len(old), -1), lengths_of(loose) > SHORT
-    label[known] = sights["wall"][sights["frame"] == len(made.survey.frames)]
-    lines = adjusted.with_poses(sights)
-    # What the walls around are off as well, a wall is off in any case.
-    arm = ((lines["centroid"][label] - old["centroid"]) * unit(old["angle"])).sum(axis=1)
-    common = covariance_at(old["covariance"] - loose["covariance"], arm)
-    lines["covariance"][label[known]] += common[known]
+    lines, is_new = adjusted.with_poses(sights), sights["frame"] < len(made.survey.frames)
+    label[known] = sights["wall"][~is_new]
+    _add_common(lines, ~is_drawn & np.isin(label, sights["wall"][is_new]), label, old)
     survey = Survey(placed.survey.frames, adjusted.poses, sights, lines)
     walls, again, gone = _united(survey, old, label, placed.parts.is_sure)
     frames = zip(made.frame_of.tolist(), made.poses, strict=True)
@@ -139,18 +133,40 @@ def merge_onto(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> 
     return Merged(replace(placed, map=united, poses=poses), len(plan.walls), again, gone)
 
 
-def _seen_before(plan: LineMap) -> tuple[Records, Records]:
+def _seen_before(plan: LineMap) -> tuple[Records, Records, NDArray[np.bool_]]:
     """Return the walls of a plan, then those that may be seen from either side turned back.
 
-    Both as they are, and as they are beside the walls around them: known to `MAPPED`, also those of
-    drawings, which say nothing of it.
+    As they are, and as they are beside the walls around them: known to `MAPPED`, also those of
+    drawings, which say nothing of it; and which these are.
     """
     old = np.append(plan.walls, turned_back(plan.walls[plan.walls["side"] == 0]))
-    is_drawn = ~old["covariance"].any(axis=(1, 2))
+    is_drawn = np.asarray(~old["covariance"].any(axis=(1, 2)))
     old["covariance"][is_drawn] = bent(MAPPED**2, lengths_of(old))[is_drawn]
     loose = old.copy()
     loose["covariance"] /= np.maximum(old["covariance"][:, :1, :1] / MAPPED**2, 1.0)
-    return old, loose
+    return old, loose, is_drawn
+
+
+def _add_common(lines: Records, again: NDArray[np.bool_], label: Numbers, old: Records) -> None:
+    """Add to the covariances of lines what the walls of a map are off together.
+
+    What a drive sees on a map is known beside the walls around it. Those of the map hold what they
+    are all off; a line that is none of them has that of the nearest that was seen again, and lies
+    along it. Walls of drawings are each off by themselves.
+    """
+    at = np.flatnonzero(again)
+    if not len(at):
+        return
+    near = old[at]
+    away = np.linalg.norm(lines["centroid"][:, None] - near["centroid"], axis=2)
+    facing = np.cos(lines["angle"][:, None] - near["angle"])
+    best = (away + np.where(abs(facing) < _ALONG, _FAR, 0.0)).argmin(axis=1)
+    best[label[at]] = np.arange(len(at))
+    side = np.sign(facing[np.arange(len(lines)), best])
+    arm = ((lines["centroid"] - near["centroid"][best]) * unit(lines["angle"])).sum(axis=1)
+    spread = near["covariance"][best]
+    spread[:, [0, 1], [1, 0]] *= side[:, None]
+    lines["covariance"] += covariance_at(spread, arm)
 
 
 def _adjusted(
