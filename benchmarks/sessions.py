@@ -153,54 +153,78 @@ def doubled(plan: LineMap) -> float:
     return doubled_walls(plan.ends.reshape(-1, 4))
 
 
+class Tally:
+    """What became of pairs: right, wrong or refused (None), by what the map is of."""
+
+    def __init__(self) -> None:
+        self.verdicts: dict[str, list[bool | None]] = {}
+        self.errors: list = []
+        self.fates: list = []
+        self.squares: list = []
+        self.lengths: list = []
+
+    def add(self, name: str, is_right: bool | None) -> None:
+        self.verdicts.setdefault(name, []).append(is_right)
+
+    def same(self, old: Session, new: Session) -> None:
+        """Count a pair of sessions of one storey."""
+        found = merged(new, old.made.map)
+        name = f"the same storey, {'half' if overlap(old, new) >= 0.5 else 'less'} of the way"
+        if found is None:
+            self.add(name, None)
+            return
+        error = judged(old, new, found)
+        self.add(name, bool(error[0] < RIGHT[0] and error[2] < RIGHT[1]))
+        self.errors.append(error)
+        self.fates.append(fate(old, new, found))
+        self.squares.append(nees(found.made, old.truth, new.segments))
+        plans = old.made.map, new.made.map, found.made.map
+        self.lengths.append([*map(doubled, plans), length(plans[-1])])
+
+    def other(self, name: str, new: Session, plan: LineMap) -> None:
+        """Count a pair of which the drive is nowhere on the map, or in two places."""
+        self.add(name, None if merged(new, plan) is None else False)
+
+    def show(self) -> None:
+        print("| the map is of | pairs | right | wrong | refused |\n|---|--:|--:|--:|--:|")
+        for name, found in self.verdicts.items():
+            counts = [sum(of is value for of in found) for value in (True, False, None)]
+            print(f"| {name} | {len(found)} | " + " | ".join(map(str, counts)) + " |")
+        way, most, turn = np.array(self.errors).T
+        gone, left, stand, lost = np.sum(self.fates, axis=0)
+        old, new, both, total = np.sum(self.lengths, axis=0)
+        squares = np.concatenate(self.squares)
+        mean, median = squares.mean(axis=0), np.median(squares, axis=0)
+        print(
+            f"\nplaced: RMS of a drive {1000 * np.median(way):.1f} mm in the median, at most "
+            f"{1000 * way.max():.0f} mm; a pose at most {1000 * most.max():.0f} mm; turn at most "
+            f"{math.degrees(turn.max()):.2f}°\ndoubled walls: {old:.1f} m in the old maps, "
+            f"{new:.1f} m in the new, {both:.1f} m of {total:.0f} m merged\nold walls that stand no "
+            f"more: {gone:.0f} m, of these left out {left:.0f} m; that stand: {stand:.0f} m, of "
+            f"these left out {lost:.1f} m\nsquares of {len(squares)} walls over their variances: "
+            f"offsets {mean[0]:.2f} (median {median[0]:.2f}), angles {mean[1]:.2f} "
+            f"({median[1]:.2f})"
+        )
+
+
 def simulated(first: int, buildings: int) -> None:
-    """Print the table of simulated pairs: six of each storey, and eleven in which to refuse."""
-    rows: dict[str, list] = {}
-    before, errors, fates, squares, walls = [], [], [], [], []
-    for seed in range(first, first + buildings):
-        here = [session(seed, k) for k in range(3)]
-        for old, new in permutations(here, 2):
-            found = merged(new, old.made.map)
-            shared = overlap(old, new)
-            name = "the same storey, half of the way or more" if shared >= 0.5 else "less"
-            if found is None:
-                rows.setdefault(name, []).append(None)
-                continue
-            error = judged(old, new, found)
-            rows.setdefault(name, []).append(bool(error[0] < RIGHT[0] and error[2] < RIGHT[1]))
-            errors.append(error)
-            fates.append(fate(old, new, found))
-            squares.append(nees(found.made, old.truth, new.segments))
-            walls.append([*map(doubled, (old.made.map, new.made.map, found.made.map)),
-                          length(found.made.map)])  # fmt: skip
-        for new in here:
-            plan = here[0].made.map
-            for name, other in (("mirrored", mirrored(plan)), ("twice on the map", twice(plan))):
-                found = merged(new, other)
-                rows.setdefault(name, []).append(None if found is None else False)
-            for old in before[-5:]:
-                found = merged(new, old.made.map)
-                rows.setdefault("another storey", []).append(None if found is None else False)
-        before.append(here[seed % 3])
-        print(f"{sum(map(len, rows.values()))} pairs, {seed}", file=sys.stderr, flush=True)
-    print("| the map is of | pairs | right | wrong | refused |\n|---|--:|--:|--:|--:|")
-    for name, found in rows.items():
-        counts = [sum(of is value for of in found) for value in (True, False, None)]
-        print(f"| {name} | {len(found)} | " + " | ".join(map(str, counts)) + " |")
-    way, most, turn = np.array(errors).T
-    gone, left, stand, lost = np.sum(fates, axis=0)
-    of_old, of_new, of_both, total = np.sum(walls, axis=0)
-    mean, median = np.concatenate(squares).mean(axis=0), np.median(np.concatenate(squares), axis=0)
-    print(
-        f"\nplaced: error (RMS of a drive) {1000 * np.median(way):.1f} mm in the median, at most "
-        f"{1000 * way.max():.0f} mm; largest of a pose {1000 * most.max():.0f} mm; turn at most "
-        f"{math.degrees(turn.max()):.2f}°\ndoubled walls: {of_old:.1f} m in the old maps, "
-        f"{of_new:.1f} m in the new, {of_both:.1f} m of {total:.0f} m merged\nold walls that stand "
-        f"no more: {gone:.0f} m, of these left out {left:.0f} m; that stand: {stand:.0f} m, of "
-        f"these left out {lost:.1f} m\nsquares of {len(np.concatenate(squares))} walls over their "
-        f"variances: offsets {mean[0]:.2f} (median {median[0]:.2f}), angles {mean[1]:.2f} "
-        f"({median[1]:.2f})"
-    )
+    """Print the table of simulated pairs, 21 of each storey; Ctrl-C ends it early."""
+    tally, before = Tally(), []
+    try:
+        for seed in range(first, first + buildings):
+            here = [session(seed, k) for k in range(3)]
+            for old, new in permutations(here, 2):
+                tally.same(old, new)
+            for new in here:
+                tally.other("that storey mirrored", new, mirrored(here[0].made.map))
+                tally.other("that storey twice", new, twice(new.made.map))
+                for old in before[-3:]:
+                    tally.other("another storey", new, old.made.map)
+            before.append(here[seed % 3])
+            print(f"{sum(map(len, tally.verdicts.values()))} pairs", file=sys.stderr, flush=True)
+    except KeyboardInterrupt:
+        print(f"{len(before)} storeys")
+    tally.show()
 
 
 def real(pictures: Path | None) -> None:

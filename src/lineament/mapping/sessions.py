@@ -151,8 +151,8 @@ def _add_common(lines: Records, again: NDArray[np.bool_], label: Numbers, old: R
     """Add to the covariances of lines what the walls of a map are off together.
 
     What a drive sees on a map is known beside the walls around it. Those of the map hold what they
-    are all off; a line that is none of them has that of the nearest that was seen again, and lies
-    along it. Walls of drawings are each off by themselves.
+    are all off; any other line has that of the nearest along it that was seen again. Walls of
+    drawings are each off by themselves.
     """
     at = np.flatnonzero(again)
     if not len(at):
