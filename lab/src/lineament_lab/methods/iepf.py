@@ -9,17 +9,16 @@ data*, RoMoCo 2017.
 
 from typing import Any, ClassVar
 
-from lineament.kernels.line_fit import TOTAL, WEIGHTED
 from lineament.methods.base import MethodBase
 from lineament.methods.parameters import method, parameter
 from lineament.methods.workspace import Block
 
 from ..kernels.splitting import split
-from .lines import PieceMethod
+from .lines import VertexMethod
 
 
 @method
-class IEPF(PieceMethod):
+class IEPF(VertexMethod):
     """Iterative end point fit.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -51,11 +50,6 @@ class IEPF(PieceMethod):
         4.0, "part of the tolerance that grows with noise", low=0, unit="σ"
     )
     min_piece: int = parameter(4, "least points of a piece", low=2)
-    corner: str = parameter(
-        "intersection",
-        "whether a corner lies where its lines meet, or on its measurement",
-        choices=("intersection", "beam"),
-    )
 
     def __post_init__(self) -> None:
         MethodBase.__post_init__(self)
@@ -67,11 +61,4 @@ class IEPF(PieceMethod):
         self.part(block, self.min_points)
         tolerance = self.threshold, self.proportion, self.noise_factor
         split(*block.workspace, False, *tolerance, self.min_piece)
-        self.settle(block, self.unevenness)
-        if self.corner == "intersection":
-            self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
-        else:
-            self.measure(block, fit=TOTAL, sharp=False)
-
-    def leave(self, block: Block) -> None:
-        """Leave the corners where the pieces meet."""
+        self.finish(block)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 from lineament.kernels import layout as at
 from lineament.kernels.breakpoints import BORGES_ALDON, FIXED
 from lineament.kernels.budget import LINK, WORST, limit_pieces
-from lineament.kernels.line_fit import FITS, WEIGHTED
+from lineament.kernels.line_fit import FITS, TOTAL, WEIGHTED
 from lineament.methods.base import MethodBase
 from lineament.methods.parameters import MOST_VERTICES, method, parameter
 from lineament.methods.workspace import Block, budget_scratch
@@ -110,6 +110,28 @@ class PieceMethod(LineMethod):
         """Settle the borders and fit."""
         self.settle(block, self.unevenness)
         self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
+
+
+@method
+class VertexMethod(PieceMethod):
+    """A method whose pieces meet at measurements, where its corners are as published."""
+
+    corner: str = parameter(
+        "intersection",
+        "whether a corner lies where its lines meet, or on its measurement",
+        choices=("intersection", "beam"),
+    )
+
+    def finish(self, block: Block) -> None:
+        """Settle the borders and fit; corners stay on measurements if `corner` says so."""
+        if self.corner == "intersection":
+            PieceMethod.finish(self, block)
+        else:
+            self.settle(block, self.unevenness)
+            self.measure(block, fit=TOTAL, sharp=False)
+
+    def leave(self, block: Block) -> None:
+        """Leave the corners where the pieces meet."""
 
 
 @method

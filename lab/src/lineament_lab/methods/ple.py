@@ -7,16 +7,15 @@ from 2-D laser range scans*, IROS 2018 (arXiv 1910.10711).
 from typing import Any, ClassVar
 
 from lineament.kernels.breakpoints import FIXED
-from lineament.kernels.line_fit import TOTAL, WEIGHTED
 from lineament.methods.parameters import method, parameter
 from lineament.methods.workspace import Block
 
 from ..kernels.vertex_removal import remove_vertices
-from .lines import PieceMethod
+from .lines import VertexMethod
 
 
 @method
-class PLE(PieceMethod):
+class PLE(VertexMethod):
     """Probabilistic line extraction.
 
     1. *Cluster* neighbouring points (breakpoint detector of Borges and Aldon).
@@ -51,28 +50,16 @@ class PLE(PieceMethod):
     line_error: float = parameter(
         1.0, "error of a measurement that no line explains", above=0, unit="m"
     )
-    corner: str = parameter(
-        "intersection",
-        "whether a corner lies where its lines meet, or on its measurement",
-        choices=("intersection", "beam"),
-    )
 
     def part(self, block: Block, min_points: int, noise_factor: float = 3.0) -> None:
         """Part the scan into clusters, at a fixed distance also where beams return nothing."""
         if self.clusters == "fixed":
             block.part((FIXED, self.distance, 0.0), self.max_missing, min_points)
         else:
-            PieceMethod.part(self, block, min_points, noise_factor)
+            VertexMethod.part(self, block, min_points, noise_factor)
 
     def find(self, block: Block) -> None:
         """Cluster, connect, remove, merge and fit."""
         self.part(block, self.min_points)
         remove_vertices(*block.workspace, self.rise, self.line_error, self.max_vertices)
-        self.settle(block, self.unevenness)
-        if self.corner == "intersection":
-            self.measure(block, fit=WEIGHTED, trim=self.corner_trim)
-        else:
-            self.measure(block, fit=TOTAL, sharp=False)
-
-    def leave(self, block: Block) -> None:
-        """Leave the corners where the pieces meet."""
+        self.finish(block)
