@@ -77,10 +77,10 @@ def compare_scan(
 ) -> Comparison:
     """Compare methods on a scan: extractors, or any functions from a scan to features, by name.
 
-    They are timed on the scans `timed`, or on the scan itself; ``track(methods, about, total)``
+    They are timed on the scans `timed`, or on the scan itself; ``track(methods, about, whole)``
     iterates over the methods and shows the progress.
     """
-    names = track(list(extractors), "comparing", len(extractors))
+    names = track(list(extractors), "comparing", extractors)
     features = {name: extractors[name](scan) for name in names}
     seconds = interleaved_times(extractors, list(timed) or [scan], kernels=False)
     return Comparison(title, scan, features, seconds)

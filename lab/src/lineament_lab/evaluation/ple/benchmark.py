@@ -105,7 +105,7 @@ def run_benchmark(
 
     The method is the name of one (see `method_map`), or a function of a scan and a number of
     vertices that makes polylines; the result has its name, or the one given.
-    ``track(scans, name, total)`` yields the scans, and shows the progress. Raises ValueError if
+    ``track(scans, name, whole)`` yields the scans, and shows the progress. Raises ValueError if
     there is no such method, or a map has more vertices than allowed.
 
     Examples
@@ -118,7 +118,7 @@ def run_benchmark(
     if name is None:
         name = method if isinstance(method, str) else getattr(method, "__name__", repr(method))
     scores = np.zeros((len(benchmark.scans), len(benchmark.max_vertices)), _SCORE)
-    for i, scan in enumerate(track(benchmark.scans, name, len(benchmark.scans))):
+    for i, scan in enumerate(track(benchmark.scans, name, benchmark.scans)):
         outline = None if benchmark.outlines is None else benchmark.outlines[i]
         for j, budget in enumerate(benchmark.max_vertices):
             score = score_map(make(scan, budget), scan, outline)
