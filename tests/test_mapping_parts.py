@@ -14,7 +14,7 @@ from lineament.mapping import LocalMap, placing
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import single
-from lineament.mapping.placing import is_sure, placed_on
+from lineament.mapping.placing import is_enough, placed_on
 from lineament.scan.poses import compose
 from lineament.simulation import World
 from lineament.walls import walls_of
@@ -81,7 +81,7 @@ def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
 
 
 def test_three_places_that_agree_are_sure_and_thrice_those_that_do_not():
-    assert [is_sure(*of) for of in ((2, 0), (3, 0), (3, 1), (5, 2), (6, 2))] == [0, 1, 1, 0, 1]
+    assert [is_enough(*of) for of in ((2, 0), (3, 0), (3, 1), (5, 2), (6, 2))] == [0, 1, 1, 0, 1]
 
 
 def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():

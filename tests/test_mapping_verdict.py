@@ -13,7 +13,7 @@ from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import apart, beside, between, boxes_of, parts_of
-from lineament.mapping.sessions import onto_plan, placements
+from lineament.mapping.sessions import merge_onto, onto_plan, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, office
 from lineament.walls.sights import SIGHT
@@ -235,6 +235,12 @@ def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
     beyond = placed.map.ends[placed.walls_of == 1].reshape(-1, 2)[:, 0]
     assert beyond.min() > plan.ends[:, :, 0].max()
     np.testing.assert_array_equal(placed.walls_of, made.walls_of)
+    # As one map with it, the upper floor is left out, and no wall of the lower one is missing.
+    merged = merge_onto(made, plan, placements(made, plan))
+    assert merged.made.located == (0,)
+    assert merged.made.map.ends[:, :, 0].max() < plan.ends[:, :, 0].max() + 0.1
+    assert merged.again > 50
+    assert merged.gone < 1.0
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     are alike, but other doors.
     """
     found = placed_on(plan, survey, frames, known)
-    if found is None or not is_sure(len(found.places), found.others):
+    if found is None or not is_enough(len(found.places), found.others):
         return None
     (way, turn), against = _NEAR, []
     spread = np.diag((way + known, way + known, turn)) ** 2
@@ -53,7 +53,7 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     return found if np.mean(against) <= _LOOK_THROUGH else None
 
 
-def is_sure(agree: int, others: int) -> bool:
+def is_enough(agree: int, others: int) -> bool:
     """Whether that many places that agree are enough, beside others."""
     return agree >= max(FEWEST, _MORE * others)
 

@@ -29,7 +29,7 @@ from .local_map import beams_of, some
 from .loops import FLOOR, Survey
 from .making import APART, TWICE, VIEWS, DriveMap, single
 from .parts import beside, boxes_of
-from .placing import FEWEST, PLACES, Placement, is_sure, surely_on
+from .placing import FEWEST, PLACES, Placement, is_enough, surely_on
 
 #: Walls that are one are looked for so often, poses and walls adjusted in between.
 _ROUNDS = 3
@@ -57,7 +57,7 @@ class Merged:
     def __str__(self) -> str:
         return (
             f"{self.again} of the {self.before} walls of the plan seen again, "
-            f"{self.gone:.1f} m of them looked through and left out\n"
+            f"{self.gone:.1f} m of them looked through and left out"
         )
 
 
@@ -126,7 +126,8 @@ def merge_onto(made: DriveMap, plan: LineMap, found: list[Placement | None]) -> 
     label[known] = sights["wall"][~is_new]
     _add_common(lines, ~is_drawn & np.isin(label, sights["wall"][is_new]), label, old)
     survey = Survey(placed.survey.frames, adjusted.poses, sights, lines)
-    walls, again, gone = _united(survey, old, label, placed.parts.is_sure)
+    is_sure = placed.parts.is_sure & np.isin(placed.parts.numbers, placed.located)
+    walls, again, gone = _united(survey, old, label, is_sure)
     frames = zip(made.frame_of.tolist(), made.poses, strict=True)
     poses = [compose(survey.pose(k), relative(made.survey.pose(k), pose)) for k, pose in frames]
     united = LineMap(walls, plan.columns, sigma=MAPPED)
@@ -188,9 +189,10 @@ def _adjusted(
     held = np.append(parts.roots[apart], n)
     edges, count = np.append(placed.chain, ties), int(sights["wall"].max()) + 1
     adjusted = optimise(poses, edges, sights, count, held=held)
-    right = adjusted.weights[-len(ties) :] > 0.5
-    if not is_sure(int(right.sum()), int((~right).sum())):
-        raise NothingFoundError("places of the drive on the plan contradict each other")
+    right, of_ties = adjusted.weights[-len(ties) :] > 0.5, parts.numbers[ties["ends"][:, 1]]
+    for k in placed.located:
+        if not is_enough(*(int((of_ties == k)[of].sum()) for of in (right, ~right))):
+            raise NothingFoundError("places of the drive on the plan contradict each other")
     ties = ties[right]
     ties["information"], ties["loop"] = ties["information"] / TWICE, False
     edges = np.append(placed.chain, ties)

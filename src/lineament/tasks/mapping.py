@@ -58,6 +58,7 @@ class Mapping:
         lost = f", {self.lost} times lost" if self.lost else ""
         refused = f", {self.refused} refused" if self.refused else ""
         known = ", ".join(f"{deviation:.2g} m" for deviation in self.known)
+        merged = "" if self.merged is None else f"  {self.merged}\n"
         each = " in each part" if len(self.known) > 1 else ""
         return (
             f"{self.log} -> {self.output}\n"
@@ -65,7 +66,7 @@ class Mapping:
             f"  {self.loops} loops{refused}\n"
             f"  by its covariances, places are known to {known}{each} from the start\n"
             f"{self._unsure()}"
-            f"{'' if self.merged is None else f'  {self.merged}'}"
+            f"{merged}"
             f"  {self.map}\n"
             f"  {self.seconds:.1f} s, {self.scans / self.seconds:.0f} scans/s"
         )
