@@ -14,7 +14,7 @@ from lineament.mapping import LocalMap, placing
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
 from lineament.mapping.making import single
-from lineament.mapping.placing import is_enough, placed_on
+from lineament.mapping.placing import is_enough, placed_on, surely_on
 from lineament.scan.poses import compose
 from lineament.simulation import World
 from lineament.walls import walls_of
@@ -78,6 +78,27 @@ def test_most_places_of_a_drive_agree_where_it_is_on_a_plan(monkeypatch):
     assert (sorted(found.places), found.others) == ([1, 2], 3)
     assert placed_on(None, survey, np.arange(3, 6)).move in (seen[3], seen[4])
     assert placed_on(None, survey, np.arange(5, 6)) is None
+
+
+@pytest.mark.parametrize(("against", "sure"), [(2, True), (3, False)])
+def test_a_drive_that_looks_through_walls_at_most_places_is_elsewhere(monkeypatch, against, sure):
+    """Five places agree; looked at there, so many of them contradict the plan."""
+    survey = Survey([None] * 5, np.column_stack((3.0 * np.arange(5), np.zeros((5, 2)))), None, None)
+    queries = [(k, compose((1.0, 2.0, 0.5), survey.pose(k))) for k in range(5)]
+
+    def locate(pose, _, guess=None, spread=None):
+        if guess is not None:
+            np.testing.assert_allclose(guess, pose)
+            np.testing.assert_allclose(np.diag(spread), [0.09, 0.09, 0.0025])
+        k = [of for _, of in queries].index(pose)
+        evidence = SimpleNamespace(contradicted=0.06 if k < against else 0.05)
+        return SimpleNamespace(pose=pose, evidence=evidence)
+
+    monkeypatch.setattr(Survey, "queries", lambda *_: queries)
+    monkeypatch.setattr(placing, "locate", locate)
+    found = surely_on(None, survey, np.arange(5), 0.1)
+    assert (found is not None) == sure
+    assert surely_on(None, survey, np.arange(2), 0.1) is None
 
 
 def test_three_places_that_agree_are_sure_and_thrice_those_that_do_not():
