@@ -1,7 +1,7 @@
 """Settings of maps and places that were tuned on recordings, and that no single case shows.
 
-The figures of docs/results.md and docs/notebook.md are theirs: `benchmarks/mapping.py` and
-`benchmarks/locating.py` measure them again.
+The figures of docs/results.md and docs/notebook.md are theirs: `benchmarks/mapping.py`,
+`benchmarks/locating.py` and `benchmarks/sessions.py` measure them again.
 """
 
 import importlib
@@ -29,10 +29,13 @@ SETTINGS = {
                "_FEW_BEAMS": 40, "_NEAR": (0.15, 0.06), "_SAME": (0.06, 0.02), "_WIDE": 0.12,
                "_TIGHT": 0.02, "VOTED": 16, "SURE_ON_MAP": np.log(100),
                "LEAD": 12.0, "FAR": 0.5},
-    "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "_TWICE": 25.0,
+    "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "TWICE": 25.0,
                "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_SPREADS": ((0.8, 0.12), (0.3, 0.06)),
-               "_APART": 0.015, "_PLACES": 3.0, "_AGREE": (0.5, 0.05), "_VIEWS": 3},
+               "APART": 0.015, "VIEWS": 3},
+    "placing": {"PLACES": 3.0, "_AGREE": (0.5, 0.05), "_OFF": 3.0, "_NEAR": (0.2, 0.05),
+                "_LOOK_THROUGH": 0.4, "FEWEST": 3, "_MORE": 3},
     "refine": {"COARSE": (0.25, 0.07), "FINE": (0.06, 0.02), "ROUGH": 0.01, "_ROUNDS": 6},
+    "sessions": {"_ROUNDS": 3, "_PIECE": 0.5, "_BEAMS": 360, "_ALONG": 0.7, "_THROUGH": 2},
     "walls.sights": {"LEAST_SURE": 0.2, "_TURN": 0.35},
 }  # fmt: skip
 
