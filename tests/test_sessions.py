@@ -111,6 +111,21 @@ def test_what_was_not_seen_again_stays(sessions, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_map_of_sessions_is_a_map_like_any_other(sessions, tmp_path):
+    """The same drive once more, and once more: nothing is added."""
+    folder, *_ = sessions
+    plans, before = [], folder / "monday.parquet"
+    for k in range(3):
+        after = tmp_path / f"{k}.parquet"
+        map_log(folder / "tuesday.npz", after, onto=before, merge=True, odometry=False)
+        plans.append(LineMap.read(after))
+        before = after
+    lengths = [at_length(plan.ends) for plan in plans]
+    np.testing.assert_allclose(lengths, lengths[0], rtol=0.02)
+    assert max(doubled_walls(plan.ends.reshape(-1, 4)) for plan in plans) < 0.1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("merge", [True, False])
 def test_another_building_is_refused_and_nothing_is_written(sessions, tmp_path, capsys, merge):
     folder, *_ = sessions
