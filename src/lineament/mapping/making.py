@@ -14,6 +14,7 @@ from ..scan.poses import compose
 from ..walls import SHORTEST, Numbers, Records, cut, lengths_of, unit
 from ..walls.sights import errors, lines_of, merged, sights_of, walls_along
 from .adjust import Adjusted, edges_of, optimise
+from .believed import believed
 from .drive_map import UNKNOWN, KeyFrame
 from .grids import GRID_ENDINGS
 from .index import MAPPED
@@ -125,13 +126,15 @@ def make_map(frames: list[KeyFrame], scans: list[tuple[int, Pose]]) -> DriveMap:
 
     Key frames and scans are those of `Drive`. NothingFoundError if there are no walls.
     """
-    pairs = [(k, k + 1) for k in range(len(frames) - 1)]
-    spreads = [spread_of(frame) for frame in frames[1:]]
-    chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
     seen = [(frame.features.segments, frame.walls) for frame in frames]
     sights, poses = sights_of(seen, _ROUGH), np.array([frame.pose for frame in frames])
     if not len(sights):
         raise NothingFoundError(f"no walls are seen in {len(frames)} key frames, expected some")
+    lines = lines_of(sights, poses, _count(sights))
+    frames = believed(Survey(frames, poses, sights, lines))
+    pairs = [(k, k + 1) for k in range(len(frames) - 1)]
+    spreads = [spread_of(frame) for frame in frames[1:]]
+    chain = edges_of(pairs, [frame.motion.pose for frame in frames[1:]], spreads)
     found = optimise(poses, chain, sights, _count(sights))
     rough = roughness(sights, found.poses, _ROUGH)
     sights = sights_of(seen, rough)
