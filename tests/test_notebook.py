@@ -327,14 +327,8 @@ def test_features_in_a_notebook(scan):
     )
     assert matrix[0] == -matrix[3] > 0  # up is up, and as large as across
     assert matrix[1:3] == [0, 0]
-    dots = "".join(e.get("d") for e in found["path"] if e.get("stroke-linecap"))
-    assert dots.count("h0") > 300  # some share a place
-    bar = next(e.get("d") for e in found["path"] if "v4H" in e.get("d"))
-    lowest = max(float(y) for y in re.findall(r"M[-\d.]+ ([-\d.]+)", dots))
-    assert float(bar.partition(" ")[2].partition("v")[0]) > lowest  # the bar is below all
     assert "arcs" not in "".join(found["text"][0].itertext())
     rows = [[cell.text for cell in row] for row in found["tr"][1:]]
-    assert [row[0] for row in rows].count("segment") == len(features.segments) <= notebook.MOST_ROWS
     longest = features.segments[features.segments["length"].argmax()]
     assert rows[0][3].startswith(f"{longest['length']:.3f} m")
     assert rows[0][4] == f"{1000 * math.sqrt(longest['covariance'][0, 0]):.1f}"
@@ -448,16 +442,9 @@ def test_what_is_not_finite_by_half_is_left_out_of_a_picture(bad):
     assert legend.count("tspan") == 10
 
 
-def test_scan_and_log_in_a_notebook(scan, log):
-    posed = scan.with_pose((1.0, 2.0, 0.0))
-    text = "".join(ET.fromstring(posed._repr_html_()).itertext())
-    drawn_and_listed = ln.extract(posed)._repr_html_().split("<svg", 1)[1].split("<table")
-    for part in drawn_and_listed:
-        assert part.removesuffix("</div>") in posed._repr_html_()
-    for fact in ("360 beams", "357 valid", "2.500 s", "0 to 5 m", "laser", "1.000 m, 2.000 m"):
-        assert fact in text
-    assert "5, the first is drawn" in log._repr_html_()
-    assert f"{ln.extract(log[0]).counts()['segments']} segments" in log._repr_html_()
+def test_a_scan_in_a_notebook_has_the_picture_and_the_table_of_its_features(scan):
+    for part in ln.extract(scan)._repr_html_().split("<svg", 1)[1].split("<table"):
+        assert part.removesuffix("</div>") in scan._repr_html_()
 
 
 def test_control_characters_of_names_do_not_reach_a_page():
