@@ -14,11 +14,27 @@ import re
 import statistics
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from lineament_lab.evaluation.ple import load_benchmark, run_benchmark
+from lineament_lab.evaluation.pooling import bootstrap
+from lineament_lab.methods import RIVALS
+from lineament_lab.reproduce import Setting, Table, run_experiments
+from lineament_lab.reproduce import scans as recorded
+from lineament_lab.reproduce.claims import bands, verdicts
+from lineament_lab.reproduce.contenders import KEYPOINTS
+from lineament_lab.reproduce.findings import Columns, cell_text, cells
+from lineament_lab.reproduce.machine import machine
+from lineament_lab.reproduce.real import FURTHER_LOGS
+
+from lineament import Extractor
+from lineament.methods import METHODS
+from lineament.simulation import SENSORS
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = tuple(ROOT / name for name in ("docs/results.md", "README.md", "docs/comparison.md"))
@@ -71,8 +87,6 @@ def is_text(node: object) -> bool:
 
 def stamp(seconds: float, frames: int) -> str:
     """Return commit, date, machine, versions and seeds, and the hash of what was measured."""
-    from lineament_lab.reproduce.machine import machine
-
     git = ["git", "-C", str(ROOT)]
     commit = subprocess.run([*git, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
     dirty = subprocess.run([*git, "status", "--porcelain", "src"], capture_output=True, text=True)
@@ -88,12 +102,36 @@ def stamp(seconds: float, frames: int) -> str:
 # Tables ------------------------------------------------------------------------------------------
 
 
-def markdown(columns: Sequence[str], rows: Rows) -> str:
-    """Return a table in Markdown, compact; numbers with three digits."""
-    from lineament_lab.reproduce.findings import cell_text
+Write = Callable[[Any], str]
 
-    lines = [columns, ["---"] * len(columns), *([cell_text(cell) for cell in row] for row in rows)]
-    return "\n".join(f"|{'|'.join(map(str, line))}|" for line in lines)
+
+def markdown(columns: Sequence[str], rows: Rows, write: Write = cell_text) -> str:
+    """Return a table in Markdown, compact; what is no text is written by a function."""
+    cells = ([cell if isinstance(cell, str) else write(cell) for cell in row] for row in rows)
+    return "\n".join(f"|{'|'.join(line)}|" for line in (columns, ["---"] * len(columns), *cells))
+
+
+def of_numbers(
+    first: str | tuple[str, ...],
+    numbers: Mapping[Any, Mapping[Any, Any]],
+    columns: Columns,
+    write: Write = cell_text,
+) -> str:
+    """Return a table of named numbers, as `Table.of_numbers` makes it."""
+    table = Table.of_numbers("", numbers, columns, first=first)
+    return markdown(table.columns, table.rows, write)
+
+
+def over(first: str, names: Iterable[str], groups: Iterable[Any], columns: Columns) -> str:
+    """Return a table of medians over groups, with the least and the greatest."""
+
+    def ends(values: Iterable[Any]) -> str:
+        known = list(map(float, values))
+        few = (statistics.median(known), min(known), max(known))
+        return "{}<br>({}–{})".format(*map(cell_text, few))
+
+    each = {name: zip(*(cells(of[name], columns) for of in groups), strict=True) for name in names}
+    return markdown((first, *columns), ((name, *map(ends, of)) for name, of in each.items()))
 
 
 def two_digits(value: Any) -> str:
@@ -101,19 +139,9 @@ def two_digits(value: Any) -> str:
     return "–" if value is None or math.isnan(value) else f"{value:.2f}"
 
 
-def two_lines(interval: Any) -> str | None:
+def two_lines(interval: Any) -> str:
     """Write a number, and its interval below it."""
-    from lineament_lab.reproduce.findings import cell_text
-
-    return None if interval is None else cell_text(interval).replace(" (", "<br>(")
-
-
-def over(values: Sequence[float]) -> str:
-    """Write the median of numbers, and the least and the greatest of them."""
-    from lineament_lab.reproduce.findings import cell_text
-
-    ends = (statistics.median(values), min(values), max(values))
-    return "{}<br>({}–{})".format(*(cell_text(value) for value in ends))
+    return cell_text(interval).replace(" (", "<br>(")
 
 
 def without_ranges(text: str) -> str:
@@ -132,8 +160,6 @@ class Results:
     """Runs experiments once each, with all seeds, and makes the tables of their numbers."""
 
     def __init__(self, frames: int) -> None:
-        from lineament_lab.reproduce import Setting
-
         data = DATA if DATA.is_dir() else None
         self.setting = Setting(frames, SEEDS[0], data, seeds=len(SEEDS))
         self.found: dict[str, Any] = {}
@@ -141,8 +167,6 @@ class Results:
 
     def findings(self, name: str) -> Any:
         """Return what an experiment found: numbers that differ by seed have their range."""
-        from lineament_lab.reproduce import run_experiments
-
         if name not in self.found:
             print(name, file=sys.stderr, flush=True)
             self.found |= run_experiments([name], self.setting, str)
@@ -161,11 +185,8 @@ class Results:
             "segment F1": "segment_f1",
             "clusters right": "partition_success",
         }
-        rows = [
-            (method, *(two_digits(found[method].get(key)) for key in columns.values()))
-            for method in methods or (*ON_RECORDINGS, "liu", "pdbs")
-        ]
-        return markdown(("method", *columns), rows)
+        rows = {method: found[method] for method in methods or (*ON_RECORDINGS, "liu", "pdbs")}
+        return of_numbers("method", rows, columns, two_digits)
 
     def summary(self) -> str:
         """The table of README: some methods with the paper's sensor."""
@@ -176,17 +197,12 @@ class Results:
         found = self.numbers("all_methods")
         plans = self.numbers("plans").get("methods", {})
         keys = "corner_f1_0.10", "corner_least", "corner_greatest"
-        rows = [
-            (
-                method,
-                *(two_digits(of[method].get(keys[0])) for of in found.values()),
-                "{:.2f} ({:.2f}–{:.2f})".format(*(plans[method][key] for key in keys))
-                if plans
-                else None,
-            )
-            for method in SOME
-        ]
-        return markdown(("method", *found, "others’ plans"), rows)
+        rows = {m: {sensor: of[m].get(keys[0]) for sensor, of in found.items()} for m in SOME}
+        for method in SOME if plans else ():
+            ends = (plans[method][key] for key in keys)
+            rows[method]["plans"] = "{:.2f} ({:.2f}–{:.2f})".format(*ends)
+        columns = {sensor: sensor for sensor in found} | {"others’ plans": "plans"}
+        return of_numbers("method", rows, columns, two_digits)
 
     def optimal(self) -> str:
         """More numbers of the default method, by sensor."""
@@ -201,88 +217,62 @@ class Results:
             "segment NEES, median": "segment_nees_median",
             "arc F1": "arc_f1",
         }
-        rows = [
-            (label, *(two_digits(of["optimal"].get(key)) for of in found.values()))
+        rows = {
+            label: {sensor: of["optimal"].get(key) for sensor, of in found.items()}
             for label, key in shown.items()
-        ]
-        return markdown(("optimal", *found), rows)
+        }
+        return of_numbers("optimal", rows, {sensor: sensor for sensor in found}, two_digits)
 
     def real(self) -> str:
         """Methods on all recordings, by measures that need no truth, with intervals."""
-        from lineament_lab.evaluation.pooling import bootstrap
-        from lineament_lab.reproduce.findings import Interval
-        from lineament_lab.reproduce.real import FURTHER_LOGS
-
-        found = self.numbers("real")
-        rows = []
+        found, rows = self.numbers("real"), {}
+        repeats = found["repeats"]
         for method in ON_RECORDINGS:
-            pools = found["pooled"]["all"][method]
-            counts = {log: of[method]["count"] for log, of in found["repeats"].items()}
-            kept = [counts[log] for log in FURTHER_LOGS if log in counts]
-            repeated = (bootstrap(of, sum) for of in (list(counts.values()), kept))
-            rows.append(
-                (
-                    method,
-                    two_lines(pools["phantom_in_100m"]),
-                    two_lines(Interval(*(100 * value for value in pools["covered"]))),
-                    *(two_lines(pools.get(f"{kind}_nees")) for kind in ("segments", "corners")),
-                    *(two_lines(of) if of.value else None for of in repeated),
-                )
-            )
-        columns = (
-            *("method", "phantom m in 100 m", "covered [%]", "segment NEES, still"),
-            *("corner NEES, still", "corners repeated", "of logs kept from the fit"),
-        )
-        return markdown(columns, rows)
+            rows[method] = dict(found["pooled"]["all"][method])
+            for name, logs in (("again", repeats), ("kept", FURTHER_LOGS)):
+                counts = [repeats[log][method]["count"] for log in logs if log in repeats]
+                total = bootstrap(counts, sum)
+                rows[method][name] = total if total.value else None
+        columns = {
+            "phantom m in 100 m": "phantom_in_100m",
+            "covered [%]": "covered",
+            "segment NEES, still": "segments_nees",
+            "corner NEES, still": "corners_nees",
+            "corners repeated": "again",
+            "of logs kept from the fit": "kept",
+        }
+        return of_numbers("method", rows, columns, two_lines)
 
     def keypoints(self) -> str:
         """Corners found again by those of methods and by detectors of keypoints, over the logs."""
-        repeats = self.numbers("real")["repeats"]
-        shown = {
-            "corners a scan": ("corners_per_scan", 1),
-            "repeated of the fewer [%]": ("fewer_rate", 100),
-            "repeated, less chance [%]": ("rate_without_edges", 100),
+        columns = {
+            "corners a scan": "corners_per_scan",
+            "repeated of the fewer [%]": "fewer_rate",
+            "repeated, less chance [%]": "rate_without_edges",
         }
-        rows = [
-            (
-                method,
-                *(
-                    over([f * of[method][key] for of in repeats.values()])
-                    for key, f in shown.values()
-                ),
-            )
-            for method in FOUND_AGAIN
-        ]
-        return markdown(("method", *shown), rows)
+        return over("method", FOUND_AGAIN, self.numbers("real")["repeats"].values(), columns)
 
     def fits(self) -> str:
         """Errors and covariances of line fits, given the walls, over the sensors."""
-        found = self.numbers("fits")
-        shown = {
+        found = self.numbers("fits").values()
+        columns = {
             "offset ÷ bound": "segment_offset_over_bound",
             "angle ÷ bound": "segment_angle_over_bound",
             "segment NEES": "segment_nees",
             "corner NEES": "corner_nees",
         }
-        names = next(iter(found.values()))
-        rows = [
-            (
-                name,
-                *(over([float(of[name][key]) for of in found.values()]) for key in shown.values()),
-            )
-            for name in names
-        ]
-        return markdown(("fit", *shown), rows)
+        return over("fit", next(iter(found)), found, columns)
 
     def arena(self) -> str:
         """Corners of a real arena, at rest and moving."""
         arenas = self.numbers("real")["arena"]
-        shown = {"recall": ("recall", 1), "error [mm]": ("median_error", 1e3)}
-        rows = [
-            (m, *(f * of[m][key] for of in arenas.values() for key, f in shown.values()))
+        shown = {"recall": "recall", "error [mm]": "median_error"}
+        columns = {f"{a}: {label}": f"{a}, {key}" for a in arenas for label, key in shown.items()}
+        rows = {
+            m: {f"{a}, {key}": value for a, of in arenas.items() for key, value in of[m].items()}
             for m in SOME
-        ]
-        return markdown(("method", *(f"{a}: {s}" for a in arenas for s in shown)), rows)
+        }
+        return of_numbers("method", rows, columns)
 
     def relations(self) -> str:
         """Motion against relations that people verified: up to a minute apart, and beyond."""
@@ -290,14 +280,13 @@ class Results:
         for log, of in self.numbers("tracking").items():
             for source in MOTIONS if of["near"] else ():
                 near, far = of["near"][source], of["far_apart"].get(source)
-                pairs = [(near[f"way_{k}"], near[f"turn_{k}"]) for k in ("mean", "std")]
-                way, turn = zip(*pairs, strict=True)
+                way, turn = ([near[f"{of}_{k}"] for k in ("mean", "std")] for of in ("way", "turn"))
                 rows.append(
                     (
                         *(log, source, near["motions"]),
-                        f"{1e3 * way[0]:.0f} ± {1e3 * way[1]:.0f}",
+                        "{:.0f} ± {:.0f}".format(*(1e3 * part for part in way)),
                         f"{1e3 * near['way_median']:.0f}",
-                        f"{math.degrees(turn[0]):.2f} ± {math.degrees(turn[1]):.2f}",
+                        "{:.2f} ± {:.2f}".format(*map(math.degrees, turn)),
                         f"{1e3 * far['way_median']:.0f} ({far['motions']})" if far else None,
                     )
                 )
@@ -306,20 +295,23 @@ class Results:
 
     def tracking(self) -> str:
         """Motion from features and by ICP, and tracks."""
-        rows = []
+        rows = {}
         for log, of in self.numbers("tracking").items():
             for source in ("features", "ICP"):
-                motion, tracks = of["motion"][source], of["tracks"].get(source, {})
-                kept = (100 * tracks[kind]["kept"] for kind in tracks)
-                errors = (1e3 * motion[key] for key in ("way_median", "way_rmse", "turn_median"))
-                rows.append((log, source, *errors, *(kept if tracks else (None, None))))
-        columns = ("log", "motion from", "way, median [mm]", "RMSE", "turn, median [mrad]")
-        return markdown((*columns, "segments kept [%]", "corners kept [%]"), rows)
+                tracks = of["tracks"].get(source, {})
+                kept = {kind: track["kept"] for kind, track in tracks.items()}
+                rows[log, source] = of["motion"][source] | kept
+        columns = {
+            "way, median [mm]": "way_median",
+            "RMSE": ("way_rmse", 1e3),
+            "turn, median [mrad]": "turn_median",
+            "segments kept [%]": "segments",
+            "corners kept [%]": "corners",
+        }
+        return of_numbers(("log", "motion from"), rows, columns)
 
     def maps(self) -> str:
         """The public benchmark of polylines."""
-        from lineament_lab.evaluation.ple import load_benchmark, run_benchmark
-
         methods = "optimal", "iepf", "line_tracking"
         rows: dict[str, list[object]] = {name: [name] for name in methods}
         authors = {"ple+": "*PLE+*", "ple": "*PLE*"}
@@ -339,8 +331,6 @@ class Results:
 
     def claims(self) -> str:
         """The paper's figures and tables, what is found here, and the verdict."""
-        from lineament_lab.reproduce.claims import bands, verdicts
-
         names = "definitions", "noise", "layers", "repetition", "scenes", "similarity"
         names += "two_corners", "sensitivity", "success"
         found = {name: self.findings(name) for name in names}
@@ -355,23 +345,15 @@ class Results:
     def similarity(self) -> str:
         """Share of measurements that methods explain, and the error of these."""
         found = next(iter(self.numbers("similarity").values()))
-        rows = [
-            (method, f"{100 * of['similarity_explained']:.0f}", f"{1e3 * of['similarity_rms']:.0f}")
-            for method in ("the true lines", "pdbs, fitted", *SOME)
-            for of in [found[method]]
-        ]
-        return markdown(("method", "explained [%]", "RMS error of these [mm]"), rows)
+        rows = {method: found[method] for method in ("the true lines", "pdbs, fitted", *SOME)}
+        columns = {
+            "explained [%]": "similarity_explained",
+            "RMS error of these [mm]": "similarity_rms",
+        }
+        return of_numbers("method", rows, columns, "{:.0f}".format)
 
     def times(self) -> dict[str, dict[str, Any]]:
         """Time methods in turns, once: by sensor and method the rounds and scans [s]."""
-        from lineament_lab.methods import RIVALS
-        from lineament_lab.reproduce import scans as recorded
-        from lineament_lab.reproduce.contenders import KEYPOINTS
-
-        from lineament import Extractor
-        from lineament.methods import METHODS
-        from lineament.simulation import SENSORS
-
         if not self.timed:
             compiled = [name for name in (*METHODS, *RIVALS) if name not in KEYPOINTS]
             methods = {name: Extractor(name) for name in compiled}
@@ -384,14 +366,11 @@ class Results:
 
     def speed(self) -> str:
         """Times of methods in turns in one run, as ratios to that of `liu`."""
-        import numpy as np
-        from lineament_lab.reproduce.scans import time_ratio
-
         times = self.times()
         rows: dict[str, list[object]] = {name: [name] for name in times["paper"]}
         for of in times.values():
             for name, taken in of.items():
-                middle, least, most = time_ratio(taken, of["liu"])
+                middle, least, most = recorded.time_ratio(taken, of["liu"])
                 ratio = f"{middle:.1f} ({least:.1f}–{most:.1f})"
                 rows[name] += [1e6 * float(np.median(taken)), ratio]
         columns = [f"{beams} beams{what}" for beams in (481, 1081) for what in (" [µs]", " ÷ liu")]
@@ -399,8 +378,6 @@ class Results:
 
     def ours(self) -> str:
         """What the comparison with other projects says of this one."""
-        import numpy as np
-
         found, times = self.numbers("all_methods"), self.times()["paper"]
         arenas = self.numbers("real")["arena"] if self.setting.data else {}
         rest, moving = (arenas.get(name, {}) for name in ("arena, static", "arena, moving"))
@@ -420,8 +397,7 @@ class Results:
 
     def process(self) -> str:
         """What a process costs: starts and threads."""
-        sys.path.insert(0, str(Path(__file__).parent))
-        import speed
+        import speed  # beside this file
 
         gains = (f"{speed.speed_of_method(m, 'utm30lx')[3]:.2f}" for m in ("optimal", "liu"))
         rows = [
