@@ -258,43 +258,27 @@ def _tangent() -> Drawn:
     return "fig8", figure, {"sum": total, "stage": float(stage)}
 
 
-def _claim(figure: str, paper: str, about: str, margin: Callable[[Any], float]) -> Claim:
-    """Declare what a figure shows, and by how much its numbers do."""
-    place = f"Figure {figure[3:]}"
-    return Claim(place, paper, lambda n: Judged(about, [margin(n[figure])]), figure)
+def _claim(name: str, margin: Callable[[Any], float], about: str, paper: str) -> Claim:
+    """Declare what a figure shows here and in the paper, and by how much its numbers do."""
+    return Claim(
+        f"Figure {name[3:]}", paper, lambda n: Judged(about, [margin(n[name])]), figure=name
+    )
 
 
+_SUM = "By definition and by the code: the same sum"
+_TABLE_1 = Judged("Other hardware, compiled code", ())
 CLAIMS = (
-    _claim(
-        *("fig1", "Breakpoint, corner and noise point of a scan", "Each found where it is drawn"),
-        lambda n: 0.02 - n["off"],
-    ),
-    _claim(
-        *("fig4", "Points are farther apart at a distance", "So is the threshold"),
-        lambda n: min(n["ratio"] - 1, -n["beyond"]),
-    ),
-    _claim(
-        *("fig6", "Primary corners are farthest from the chord", "Corners within a beam"),
-        lambda n: 0.02 - n["off"],
-    ),
-    _claim(
-        *("fig7", "Distance to the tangent grows with the curvature", "Proportional"),
-        lambda n: 1e-9 - n["off"],
-    ),
-    _claim(
-        *("fig8", "Support, arc length, parabolas, tangent"),
-        "By definition and by the code: the same sum",
-        lambda n: 1e-9 - abs(n["sum"] - n["stage"]),
-    ),
-    Claim(
-        *("Table 1", "Hardware and software"),
-        lambda _: Judged("Other hardware, compiled code", ()),
-    ),
-)
-EXPERIMENT = Experiment(
-    "Definitions (Figures 1, 4, 6, 7, 8) and the machine (Table 1)",
-    measure,
-    report,
-    CLAIMS,
-    once=True,
-)
+    _claim("fig1", lambda n: 0.02 - n["off"], "Each found where it is drawn",
+           "Breakpoint, corner and noise point of a scan"),
+    _claim("fig4", lambda n: min(n["ratio"] - 1, -n["beyond"]), "So is the threshold",
+           "Points are farther apart at a distance"),
+    _claim("fig6", lambda n: 0.02 - n["off"], "Corners within a beam",
+           "Primary corners are farthest from the chord"),
+    _claim("fig7", lambda n: 1e-9 - n["off"], "Proportional",
+           "Distance to the tangent grows with the curvature"),
+    _claim("fig8", lambda n: 1e-9 - abs(n["sum"] - n["stage"]), _SUM,
+           "Support, arc length, parabolas, tangent"),
+    Claim("Table 1", "Hardware and software", lambda _: _TABLE_1),
+)  # fmt: skip
+TITLE = "Definitions (Figures 1, 4, 6, 7, 8) and the machine (Table 1)"
+EXPERIMENT = Experiment(TITLE, measure, report, CLAIMS, once=True)

@@ -67,10 +67,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
 
     def draw() -> Iterable[Figure]:
         """Draw the scan with the median error, its errors, and the two corners."""
-        about = (
-            f"The museum: of {len(frames)} scans from equal parts of the bag the one with the "
-            "median mean similarity error of all methods together"
-        )
+        (about,) = prose("museum-fig11", scans=len(frames))
         found = {name: extract(scan) for name, extract in methods.items()}
         yield from pictures("museum-fig11", about, scan, found)
         strips = {name: found[name] for name in (PAPER, IEPF, PDBS_LINES)}

@@ -193,9 +193,6 @@ def _figure(seed: int) -> Figure:
     return Figure.of("fig2-3", figure)
 
 
-EXPERIMENT = Experiment(
-    "Noise points, filtered and not (Figures 2 and 3)",
-    measure,
-    report,
-    (Claim("Figures 2, 3", "Filtering removes noise points and keeps edges", _judged, "fig2-3"),),
-)
+TITLE = "Noise points, filtered and not (Figures 2 and 3)"
+_PAPER = "Filtering removes noise points and keeps edges"
+EXPERIMENT = Experiment(TITLE, measure, report, (Claim("Figures 2, 3", _PAPER, _judged, "fig2-3"),))

@@ -225,12 +225,7 @@ def _scatter(standing: Scored[StandingScores], kind: str) -> Numbers:
 
 def pooled_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     """Make the table of what is pooled: a row for each method."""
-    first = next(iter(rows.values()))
-    note = (
-        f"By length, measurements and pairs of {first['buildings']} buildings "
-        f"({first['standing_buildings']} where a sensor stands); in brackets 95 % by a bootstrap "
-        "over the buildings."
-    )
+    (note,) = prose("notes of real", **next(iter(rows.values())))
     return Table.of_numbers(title, rows, _POOLED, note)
 
 

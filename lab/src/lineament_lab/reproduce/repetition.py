@@ -175,9 +175,6 @@ def _figure(grids: list[Grid], field: str, name: str, along: str, unit: str) -> 
     return Figure.of(name, figure, "fig9", along=along, fixed=fixed, seeds=len(_SEEDS))
 
 
-EXPERIMENT = Experiment(
-    "Average repetition against support radius and threshold (Figure 9)",
-    measure,
-    report,
-    (Claim("Figure 9", "Repetition is largest at radius 6 and threshold 0.66", _judged, "fig9a"),),
-)
+TITLE = "Average repetition against support radius and threshold (Figure 9)"
+_PAPER = "Repetition is largest at radius 6 and threshold 0.66"
+EXPERIMENT = Experiment(TITLE, measure, report, (Claim("Figure 9", _PAPER, _judged, "fig9a"),))

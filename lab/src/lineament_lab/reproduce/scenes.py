@@ -50,10 +50,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         corners = [len(frame.truth.corners) for frame in frames]
         full = [k for k, count in enumerate(corners) if count >= np.median(corners)]
         frame = frames[median_scan(scores, lambda of: of.segments.counts.f1, full)]
-        about = (
-            f"Simulated {kind}: of {len(full)} of {len(frames)} scans, those with most corners, "
-            "the one with the median F1 of the segments of all methods together"
-        )
+        (about,) = prose("fig11-simulated", kind=kind, full=len(full), frames=len(frames))
         found = {name: extract(frame.scan) for name, extract in methods.items()}
         drawn.append((f"fig11-{kind}", about, frame.scan, {TRUE: frame.truth} | found))
     for name, scans in recorded_scans(setting, CHOICE):
@@ -65,10 +62,7 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         scan = scans[median_scan(errors, lambda of: of.mean)]
         found = {method: extract(scan) for method, extract in methods.items()}
         numbers[name] = {m: counts_of(scan, of) for m, of in found.items()}
-        about = (
-            f"{name}: of {CHOICE} scans from equal parts of the recording the one with the median "
-            "mean similarity error of all methods together"
-        )
+        (about,) = prose("fig11-recorded", log=name, scans=CHOICE)
         first = {method: of for method, of in found.items() if method in FIRST}
         drawn.append((f"fig11-{name.lower().replace(' ', '-')}", about, scan, first))
     numbers["segment_f1"] = {name: s.segments.counts.f1 for name, s in everything.items()}
@@ -120,15 +114,6 @@ def _judged(n: Any, method: str) -> tuple[str, Margins]:
     return f"{found[method]:.2f}", [better(found[method], other) for other in others]
 
 
-EXPERIMENT = Experiment(
-    "The methods side by side (Figure 11)",
-    measure,
-    report,
-    (
-        Claim(
-            *("Figure 11", "Better lines than PDBS and IEPF"),
-            by_letter("F1 of lines", _judged, PDBS_LINES, IEPF),
-            "fig11-room",
-        ),
-    ),
-)
+_JUDGE = by_letter("F1 of lines", _judged, PDBS_LINES, IEPF)
+CLAIM = Claim("Figure 11", "Better lines than PDBS and IEPF", _JUDGE, "fig11-room")
+EXPERIMENT = Experiment("The methods side by side (Figure 11)", measure, report, (CLAIM,))

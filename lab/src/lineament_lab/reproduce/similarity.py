@@ -30,10 +30,7 @@ SIMILARITY = {
 }
 #: The same, and how many features there are.
 COUNTS: Columns = {k: k for k in ("segments", "corners", "arcs", "clusters")} | SIMILARITY
-SIMILARITY_NOTE = (
-    "Explained: share of the valid measurements that a segment or an arc has, as it says itself. "
-    "Error: their distance from it; what a method calls noise has none."
-)
+SIMILARITY_NOTE, _VARIANCE = prose("notes of similarity")
 #: The literal pipeline, by the points that its lines are fitted to.
 FILTERED = f"{PAPER}, filtered points"
 #: What the paper says of its largest errors; its other values are lost.
@@ -103,7 +100,7 @@ def report(n: Numbers, _: Setting) -> Report:
             f"Similarity error: {where}",
             {method: {"paper": OF_PAPER.get(method), **of} for method, of in found.items()},
             _COLUMNS,
-            f"{SIMILARITY_NOTE} The variance is the square of the RMS less that of the mean.",
+            f"{SIMILARITY_NOTE} {_VARIANCE}",
         )
         for where, found in n.items()
     )
@@ -146,14 +143,6 @@ def _judged(n: Any, method: str) -> tuple[str, Margins]:
     return "nothing explained" if math.isnan(most) else f"{most:.2f} m", [SMALL - most]
 
 
-EXPERIMENT = Experiment(
-    "Similarity error (Figure 12)",
-    measure,
-    report,
-    (
-        Claim(
-            *("Figure 12", "Errors within 0.01 m; PDBS and IEPF up to 0.25 m"),
-            by_letter("Largest error", _judged, IEPF, PDBS_LINES),
-        ),
-    ),
-)
+_JUDGE = by_letter("Largest error", _judged, IEPF, PDBS_LINES)
+CLAIM = Claim("Figure 12", "Errors within 0.01 m; PDBS and IEPF up to 0.25 m", _JUDGE)
+EXPERIMENT = Experiment("Similarity error (Figure 12)", measure, report, (CLAIM,))

@@ -217,20 +217,12 @@ def _judged_distance(n: Any, method: str) -> tuple[str, Margins]:
     return about, [0.01 - abs(mean - DISTANCE) for mean in means]
 
 
-EXPERIMENT = Experiment(
-    "A convex and a concave corner from five places (Figure 13, Table 2)",
-    measure,
-    report,
-    (
-        Claim(
-            *("Figure 13", "A convex and a concave corner from five places"),
-            by_letter("Both found, worst to best place", _judged_found),
-            *("fig13", "both"),
-        ),
-        Claim(
-            *("Table 2", "Their distance: 2.302 m on average, variance lost"),
-            by_letter(f"Means of the places, of {DISTANCE} m", _judged_distance),
-            open="both",
-        ),
-    ),
+_FOUND = by_letter("Both found, worst to best place", _judged_found)
+_FAR = by_letter(f"Means of the places, of {DISTANCE} m", _judged_distance)
+_PAPER = "Their distance: 2.302 m on average, variance lost"
+TITLE = "A convex and a concave corner from five places"
+CLAIMS = (
+    Claim("Figure 13", TITLE, _FOUND, "fig13", "both"),
+    Claim("Table 2", _PAPER, _FAR, open="both"),
 )
+EXPERIMENT = Experiment(f"{TITLE} (Figure 13, Table 2)", measure, report, CLAIMS)
