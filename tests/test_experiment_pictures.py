@@ -196,11 +196,11 @@ def test_errors_of_methods_are_strips_with_one_axis_below(monkeypatch):
     assert_legible(figure)
 
 
-def test_rows_of_a_chart_are_legible(shown):
+def test_rows_of_a_chart_are_legible():
     rows = {f"method {k}, shared steps": {"f1": k / 40, "t": 2.0**k} for k in range(40)}
-    dot_chart({"one": rows, "other": rows}, {"F1": "f1", "time": "t"}, ["time"])
-    assert_legible(shown[0])
-    assert_apart(shown[0].axes[0].get_yticklabels())
+    figure = dot_chart({"one": rows, "other": rows}, {"F1": "f1", "time": "t"}, ["time"])
+    assert_legible(figure)
+    assert_apart(figure.axes[0].get_yticklabels())
 
 
 @pytest.mark.parametrize(("high", "numbers"), [(150, [2, 5, 10, 20, 50, 100]),

@@ -121,12 +121,9 @@ def test_recordings_that_are_missing_are_left_out(tmp_path):
     assert Setting(data=tmp_path).recordings(files) == {"A": tmp_path / "a.log"}
 
 
-def test_chart_draws_what_is_finite(monkeypatch):
-    shown = []
-    monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
+def test_chart_draws_what_is_finite():
     numbers = {"one": {"a": {"f1": 1.0}, "b": {"f1": np.nan, "t": 3}}, "other": {"b": {"f1": 2}}}
-    dot_chart(numbers, {"F1 [%]": "f1", "time": "t"}, ["time"])
-    f1, time = shown[0].axes
+    f1, time = dot_chart(numbers, {"F1 [%]": "f1", "time": "t"}, ["time"]).axes
     assert [tick.get_text() for tick in f1.get_yticklabels()] == ["b", "a"]
     drawn = [np.asarray(line.get_xdata(), float) for line in f1.lines]
     np.testing.assert_array_equal(drawn, [[np.nan, 100.0], [200.0, np.nan]])
@@ -135,11 +132,9 @@ def test_chart_draws_what_is_finite(monkeypatch):
 
 @pytest.mark.parametrize(("label", "lines"), [("errors of all corners.", 1),
                                               ("errors of some corners.", 2)])  # fmt: skip
-def test_labels_of_a_chart_have_lines_of_22_letters(label, lines, monkeypatch):
-    shown = []
-    monkeypatch.setattr("lineament_lab.reproduce.findings.canvas.figure_bytes", shown.append)
-    dot_chart({"one": {"a": {"f1": 1.0}}}, {label: "f1"}, [])
-    assert len(shown[0].axes[0].get_xlabel().split("\n")) == lines
+def test_labels_of_a_chart_have_lines_of_22_letters(label, lines):
+    figure = dot_chart({"one": {"a": {"f1": 1.0}}}, {label: "f1"}, [])
+    assert len(figure.axes[0].get_xlabel().split("\n")) == lines
 
 
 class TestEngine:

@@ -159,9 +159,9 @@ def fit_walls(scan: LaserScan, truth: Features, fit: Fit) -> Features:
         beams = np.flatnonzero(masks[k])
         beams = np.roll(beams, -int(np.searchsorted(beams, wall["first_beam"])))
         on = scan.points[beams[1:-1]]
-        normal = np.array([-np.sin(wall["angle"]), np.cos(wall["angle"])])
         spread = np.sqrt(noise.range_variance(np.hypot(*on.T)))
-        on = on[np.abs((on - wall["centroid"]) @ normal) <= SIGMAS * spread]
+        off = (on - wall["centroid"]) @ _normal(wall["angle"])
+        on = on[np.abs(off) <= SIGMAS * spread]
         if len(on) >= MIN_BEAMS:
             lines[k] = line = fit(on, noise)
             segments[k]["centroid"], segments[k]["angle"] = line.point, line.angle
@@ -188,7 +188,7 @@ def meeting(before: LineFit, after: LineFit) -> tuple[Array, Array]:
     >>> meeting(*lines)[0].round(2).tolist()
     [1.97, 1.0]
     """
-    normals: Any = np.array([[-np.sin(line.angle), np.cos(line.angle)] for line in (before, after)])
+    normals: Any = np.array([_normal(line.angle) for line in (before, after)])
     offsets = [normal @ line.point for normal, line in zip(normals, (before, after), strict=True)]
     place = np.linalg.solve(normals, offsets)
     variances = []

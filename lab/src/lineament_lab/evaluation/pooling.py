@@ -122,16 +122,11 @@ def distinct(
     return {name: path for name, path in logs.items() if name not in doubles}, doubles
 
 
-def building(log: str) -> str:
-    """Return where a recording was made; an unknown one is a building itself."""
-    return BUILDINGS.get(log, log)
-
-
 def by_building(scored: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Add up the scores of the recordings of each building, by method."""
+    """Add up the scores of each building, or of a recording of an unknown one, by method."""
     places: dict[str, list[Mapping[str, Any]]] = {}
     for log, of in scored.items():
-        places.setdefault(building(log), []).append(of)
+        places.setdefault(BUILDINGS.get(log, log), []).append(of)
     return {
         place: {m: type(logs[0][m]).total(of[m] for of in logs) for m in logs[0]}
         for place, logs in places.items()

@@ -67,9 +67,8 @@ def _chart(numbers: Numbers) -> Figure:
         sensor: {method: of for method, of in found.items() if method != PARTITION_ONLY}
         for sensor, found in numbers.items()
     }
-    about = "All methods that find corners and segments (rows), with all sensors (colours)."
     logarithmic = [label for label in _PANELS if "÷" in label or "time" in label]
-    return Figure("methods", about, dot_chart(shown, _PANELS, logarithmic))
+    return Figure.of("methods", dot_chart(shown, _PANELS, logarithmic))
 
 
 def report(n: Numbers, setting: Setting) -> Report:

@@ -219,8 +219,8 @@ def cell_text(cell: object) -> str:
     return f"{value:.3g}" if value == 0 or abs(value) >= 1e-4 else f"{value:.2e}"
 
 
-def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -> bytes:
-    """Draw numbers as dots, as PNG: rows are methods, colours are sensors or logs.
+def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -> Any:
+    """Draw numbers as dots: rows are methods, colours are sensors or logs.
 
     Only finite ones are drawn; `log_axes` are the labels of the logarithmic axes.
     """
@@ -238,7 +238,7 @@ def dot_chart(numbers: Numbers, panels: Columns, log_axes: Iterable[str] = ()) -
             log_axis(axes.xaxis)
         axes.set_yticks(range(len(rows)), rows)
     canvas.add_legend(figure)
-    return canvas.figure_bytes(figure)
+    return figure
 
 
 def log_axis(axis: Any) -> None:

@@ -98,13 +98,10 @@ def measure(setting: Setting, progress: Progress) -> Measured:
         progress(f"{log}: reading")
         scans = load_recording(path, SCANS_A_FRAME * setting.frames, LOGS[log][1])
         found[log] = measure_log(log, scans, setting.seed, progress, verified.get(log))
-    return Measured(found, lambda: [_chart(found)])
-
-
-def _chart(found: Numbers) -> Figure:
-    about = "Motion against the corrected poses, from scan to scan, by log (colours)."
     motions = {log: of["motion"] for log, of in found.items()}
-    return Figure("tracking", about, dot_chart(motions, _PANELS, _PANELS))
+    return Measured(
+        found, lambda: [Figure.of("tracking", dot_chart(motions, _PANELS, _PANELS), "motions")]
+    )
 
 
 def report(n: Numbers, _: Setting) -> Report:
