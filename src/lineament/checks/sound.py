@@ -96,7 +96,6 @@ def positive(covariances: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def directions(segments: NDArray[np.void]) -> Iterator[str]:
     """Yield which segments do not lead from their start to their end, as long as they say."""
-    """Yield which segments do not lead from their start to their end, as long as they say."""
     way = segments["end"] - segments["start"]
     lengths = np.hypot(*way.T)
     wrong = np.abs(lengths - segments["length"]) > 1e-9 * lengths
