@@ -1,5 +1,7 @@
 """What a map says of itself: parts that do not hang together, and poses that are not sure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -10,13 +12,15 @@ from lineament.cli import cli
 from lineament.logs import save_log
 from lineament.mapping import LineMap
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
+from lineament.mapping.believed import believed
 from lineament.mapping.drive_map import Drive
+from lineament.mapping.loops import Survey
 from lineament.mapping.making import make_map
 from lineament.mapping.parts import apart, beside, between, boxes_of, parts_of
 from lineament.mapping.sessions import merge_onto, onto_plan, placements
-from lineament.scan.poses import compose, relative
+from lineament.scan.poses import compose, inverse, relative
 from lineament.simulation import SENSORS, Wheels, office
-from lineament.walls.sights import SIGHT
+from lineament.walls.sights import SIGHT, lines_of, sights_of
 
 
 def adjusted(poses, edges):
@@ -241,6 +245,41 @@ def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
     assert merged.made.map.ends[:, :, 0].max() < plan.ends[:, :, 0].max() + 0.1
     assert merged.again > 50
     assert merged.gone < 1.0
+
+
+@pytest.mark.slow
+def test_two_floors_are_two_parts_with_odometry_that_stands_still_in_the_lift():
+    (_, below, truth), (_, above, of_above) = driven(3, 80), driven(5, 80)
+    lift = compose(below[-1].pose, inverse(above[0].pose))
+    odometry = [scan.pose for scan in below] + [compose(lift, scan.pose) for scan in above]
+    made = mapped([*below, *above], odometry)
+    assert made.parts.numbers[made.frame_of].tolist() == 80 * [0] + 80 * [1]
+    assert max(errors_by_part(made, [*truth, *of_above])) < 0.02
+
+
+@pytest.mark.slow
+def test_odometry_over_a_lost_key_frame_is_believed_unless_walls_deny_it():
+    """What is seen after it goes on, lies where nothing was seen, or contradicts what was."""
+    _, scans, _ = driven(3, 60)
+    drive, extract = Drive(), Extractor()
+    for scan in scans:
+        drive.add(scan, extract(scan), scan.pose)
+    frames, poses = list(drive.frames), np.array([frame.pose for frame in drive.frames])
+    frames[30] = replace(frames[30], is_lost=True)
+    sights = sights_of([(frame.features.segments, frame.walls) for frame in frames], 0.01)
+    lines = lines_of(sights, poses, int(sights["wall"].max()) + 1)
+    for move, is_believed in (
+        ((0.0, 0.0, 0.0), True),
+        ((99.0, 0.0, 0.0), True),
+        ((0, 0, 2), False),
+    ):
+        moved, at = poses.copy(), tuple(poses[30])
+        by = compose(compose(at, move), inverse(at))
+        moved[30:] = [compose(by, tuple(pose)) for pose in poses[30:]]
+        found = believed(Survey(frames, moved, sights, lines_of(sights, moved, len(lines))))
+        assert [frame.is_torn for frame in found] == [
+            k == 30 and not is_believed for k in range(len(frames))
+        ]
 
 
 @pytest.mark.slow
