@@ -55,7 +55,8 @@ class Mapping:
     merged: Merged | None = None
 
     def __str__(self) -> str:
-        lost = f", {self.lost} times lost" if self.lost else ""
+        times = "once" if self.lost == 1 else f"{self.lost} times"
+        lost = f", {times} lost" if self.lost else ""
         refused = f", {self.refused} refused" if self.refused else ""
         known = ", ".join(f"{deviation:.2g} m" for deviation in self.known)
         merged = "" if self.merged is None else f"  {self.merged}\n"
@@ -63,7 +64,7 @@ class Mapping:
         return (
             f"{self.log} -> {self.output}\n"
             f"  {self.scans} scans, {self.frames} key frames, {sum(self.ways):.0f} m{lost}\n"
-            f"  {self.loops} loops{refused}\n"
+            f"  {self.loops} loop{'s' * (self.loops != 1)}{refused}\n"
             f"  by its covariances, places are known to {known}{each} from the start\n"
             f"{self._unsure()}"
             f"{merged}"
