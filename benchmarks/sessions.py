@@ -169,7 +169,8 @@ class Tally:
     def same(self, old: Session, new: Session) -> None:
         """Count a pair of sessions of one storey."""
         found = merged(new, old.made.map)
-        name = f"the same storey, {'half' if overlap(old, new) >= 0.5 else 'less'} of the way"
+        shared = "half of the way or more" if overlap(old, new) >= 0.5 else "less of the way"
+        name = f"the same storey, {shared}"
         if found is None:
             self.add(name, None)
             return
