@@ -24,20 +24,21 @@ from moving_picture import moved as placed
 from lineament import Extractor
 from lineament.mapping.making import DriveMap
 from lineament.mapping.mapper import Mapper
-from lineament.scan.poses import relative
+from lineament.scan import Pose
+from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, office
 
 #: Pictures of a film, and how long each is shown [ms].
 _PICTURES, _SHOWN = 90, 130
 
 
-def film(path: Path, taken: list, made: DriveMap, way: np.ndarray) -> None:
+def film(path: Path, taken: list, made: DriveMap, way: np.ndarray, start: Pose) -> None:
     """Write a film of the drafts, scans, poses and places that were not sure, one after the other.
 
-    Loops are those of the last map, shown once both of their ends are on the draft.
+    Loops are those of the last map, shown once both of their ends are on the draft. All is drawn in
+    the frame of the building, in which the robot begins at `start`.
     """
-    walls = made.map.walls
-    shown = Film(np.concatenate((walls["start"], walls["end"])))
+    shown, way = Film(placed(made.map.ends.reshape(-1, 2), start)), placed(way, start)
     for k, draft, scan, where, unsure in taken:
         known = draft.frames if draft else 0
         loops = made.loops["ends"][(made.loops["ends"] < known).all(axis=1)]
@@ -45,17 +46,18 @@ def film(path: Path, taken: list, made: DriveMap, way: np.ndarray) -> None:
             f"$ lineament live --mapping plan.svg   {k:5d} scans {len(loops):3d} loops"
         )
         if draft:
-            walls = draft.map.walls
-            shown.lines(walls["start"], walls["end"], WALL, 0.7)
-        points = placed(scan.points[scan.valid], where.pose)
-        shown.lines(np.tile(where.pose[:2], (len(points[::12]), 1)), points[::12], BEAM, 0.4)
+            walls = placed(draft.map.ends.reshape(-1, 2), start)
+            shown.lines(walls[::2], walls[1::2], WALL, 0.7)
+        here = compose(start, where.pose)
+        points = placed(scan.points[scan.valid][::12], here)
+        shown.lines(np.tile(here[:2], (len(points), 1)), points, BEAM, 0.4)
         axes.plot(*way[: k + 1].T, color=LOST, linewidth=0.6)
         axes.plot(*way[unsure].T, ".", color=SEEN, markersize=3)
-        ends = made.survey.poses[loops, :2]
-        shown.lines(ends[:, 0], ends[:, 1], ROBOT, 2.0)
-        axes.plot(*ends.reshape(-1, 2).T, ".", color=ROBOT, markersize=3)
+        ends = placed(made.survey.poses[loops.ravel(), :2], start)
+        shown.lines(ends[::2], ends[1::2], ROBOT, 2.0)
+        axes.plot(*ends.T, ".", color=ROBOT, markersize=3)
         large = np.array([(3.0, 0.0), (-2.0, 1.6), (-2.0, -1.6)])
-        axes.fill(*placed(large, where.pose).T, color=ROBOT if where else SEEN, zorder=5)
+        axes.fill(*placed(large, here).T, color=ROBOT if where else SEEN, zorder=5)
         shown.take()
     shown.take(12)
     shown.save(path, _SHOWN)
@@ -124,7 +126,7 @@ def main() -> None:
         f"memory {memory[0]}, the process beside it {memory[1]}"
     )
     if chosen.picture:
-        film(chosen.picture, pictures, made, way)
+        film(chosen.picture, pictures, made, way, truth[0])
         print(f"{chosen.picture}: {chosen.picture.stat().st_size / 1000:.0f} kB")
 
 
