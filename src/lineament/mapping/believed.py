@@ -71,7 +71,7 @@ def _odds(survey: Survey, k: int) -> float:
 def _judged(query: Query, own: Records, others: Records, poses: Array, before: Array) -> Array:
     """Add what beams say of poses on the walls of others; the first pose is that on their own.
 
-    Beams that pass through their own walls are left out: behind glass nothing can be told.
+    Beams that pass through their own walls are left out: those may be glass.
     """
     index = LineMap(own, sigma=MAPPED).index
     passes = [evidence_of(poses[:1], beam[None], index, _TIGHT)[0, 3] for beam in query.beams]
