@@ -68,7 +68,7 @@ def row(size: tuple[float, float], count: int, seed: int) -> str:
         false += bool(where) and not is_right
     middle, most = np.quantile(spent, (0.5, 0.95))
     return (
-        f"| {size[0]:g} × {size[1]:g} m | {len(plans[0].walls):,} | {np.median(making):.0f} ms "
+        f"| {size[0]:g} m × {size[1]:g} m | {len(plans[0].walls):,} | {np.median(making):.0f} ms "
         f"| {middle:.0f} ms | {most:.0f} ms | {right} of {len(spent)} | {false} |"
     )
 
@@ -78,7 +78,7 @@ def main() -> None:
     parser.add_argument("--queries", type=int, default=60, help="on each plan")
     parser.add_argument("--seed", type=int, default=3)
     chosen = parser.parse_args()
-    print("| storey | lines | plan made in | a query | of 95 % | located, right | false |")
+    print("| storey | lines | plan made in | a query | of 95 % at most | located, right | false |")
     print("|---|--:|--:|--:|--:|--:|--:|")
     for size in SIZES:
         print(row(size, chosen.queries, chosen.seed), flush=True)
