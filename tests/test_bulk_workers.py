@@ -14,7 +14,7 @@ from bulk_logs import Deadly, corner_log, flaser_log, halves, outcomes, rows_of,
 
 import lineament as ln
 from lineament.cli import run
-from lineament.tasks.bulk import Processes, Row, dask_executor, extract_logs, workers
+from lineament.tasks.bulk import Processes, Row, dask_executor, extract_logs, parts, workers
 from lineament.tasks.bulk.parts import Task, extract_part
 
 IEPF = ln.Extractor("iepf")
@@ -188,7 +188,9 @@ def test_an_interrupted_run_cancels_what_has_not_begun(logs, tmp_path):
     assert set(outcomes(tmp_path / "out").values()) == {"pending"}
 
 
-def test_what_a_report_raises_ends_the_work_and_leaves_nothing(logs, tmp_path):
+def test_what_a_report_raises_ends_the_work_and_leaves_nothing(logs, tmp_path, monkeypatch):
+    monkeypatch.setattr(parts, "_PERIOD", 0.0)
+
     def stop(scans, total):
         assert (scans, total) == (0, 3)
         assert len(halves(tmp_path)) == 1

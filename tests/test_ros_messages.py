@@ -246,7 +246,7 @@ def test_frames_of_all_lengths_leave_numbers_aligned(make, length):
 
 def test_messages_of_ros1_in_a_file(tmp_path):
     path = tmp_path / "a.mcap"
-    with McapWriter(path, (), RosMessages("ros1")) as writer:
+    with McapWriter(path, RosMessages("ros1")) as writer:
         writer.write(FOUND, LaserScan(np.full(6, 2.0), 0.0, 0.1, stamp=7.5, pose=(1, 2, 0.5)))
     (scan,) = ln.open_log(path)
     assert (scan.stamp, scan.frame_id, scan.ranges.tolist()) == (7.5, "laser", [2.0] * 6)

@@ -67,14 +67,14 @@ class LineLog(Log):
         return self._known.get(words[0], "") if words else ""
 
     def _lines(self, kinds: Collection[str] = ()) -> Iterator[tuple[int, bytes]]:
-        """Yield numbered lines: of some kinds, and a few others, or all."""
+        """Yield numbered lines: those that begin as some kinds do, and a few others; or all."""
         begins = (*map(str.encode, kinds), *_BLANKS) if kinds else ()
         return numbered_lines(self.source, self.limits, begins)
 
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         parse = self._parser()
         needed = {*self._wanted, *self.other_kinds}
-        for number, line in self._until_broken(self._lines(needed)):
+        for number, line in self._until_broken(self._lines(needed & {*self.kinds})):
             kind = self._kind(line)
             if kind not in needed:
                 continue
