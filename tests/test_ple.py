@@ -47,8 +47,8 @@ def test_the_authors_iepf_comes_out_to_the_last_digit(real, simulated):
     pytest.importorskip("shapely")
     shown = []
 
-    def track(scans, about, total):
-        shown.append((len(scans), about, total))
+    def track(scans, about, whole):
+        shown.append((len(scans), about, len(whole)))
         return scans
 
     result = run_benchmark(real, iepf_map, track=track)
