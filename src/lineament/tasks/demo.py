@@ -71,7 +71,9 @@ def run_demo(
         raise LineamentError(f"{log}: has no scans")
     for path in drawn:  # of another log
         path.unlink(missing_ok=True)
-    pictures = list(track(_draw(target, log, extractor, summary.scans, limits), "drawing", drawn))
+    pictures = list(
+        track(_draw(target, log, extractor, summary.scans, limits), "drawing", _PICTURES[:-1])
+    )
     counts = [(name, str(count)) for name, count in summary.features.items()]
     facts = [
         ("log", str(log)),
