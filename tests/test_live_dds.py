@@ -5,6 +5,7 @@ import random
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import closing
 
@@ -125,6 +126,27 @@ def test_odometry_comes_before_the_scan(participant, peer):
     peer.write("/robot/odom", odometry_message(math.nan))
     with pytest.raises(ValueError, match="expected finite numbers"):
         received(source)[0].read()
+
+
+def test_a_scan_that_comes_meanwhile_waits_for_its_odometry(participant, peer, monkeypatch):
+    source = source_of(participant, deskew="odom", topic="/scan")
+    connected(peer, source, "/scan", "LaserScan")
+    peer.publish("/odom", "Odometry")
+    eventually(lambda: peer.listeners("/odom"))
+    take, sent = raw_dds.RawReader.take_raw, []
+
+    def interrupted(reader):
+        """Take messages; both are sent after the first topic was looked at."""
+        found = take(reader)
+        if not sent:
+            sent.append(peer.write("/odom", odometry_message(0.5)))
+            peer.write("/scan", scan_message())
+            time.sleep(0.1)
+        return found
+
+    monkeypatch.setattr(raw_dds.RawReader, "take_raw", interrupted)
+    came = source.receive(0.0) + received(source)
+    assert [one.what for one in came] == ["an odometry", "a scan"]
 
 
 def test_garbage_comes_and_is_refused_in_one_line(participant, peer):

@@ -70,7 +70,9 @@ class DdsSource:
         A signal does not end the wait: it is handled when the wait is over.
         """
         self._arrivals.wait(round(max(timeout, 0.0) * NANO))
-        return [message for subscription in self._topics for message in subscription.take()]
+        # Scans are taken first, and returned last: what was sent before them has come by then.
+        taken = [subscription.take() for subscription in self._topics[::-1]]
+        return [message for messages in taken[::-1] for message in messages]
 
     def problems(self) -> list[str]:
         """Return what was found since the last call that keeps messages away, a line each."""
