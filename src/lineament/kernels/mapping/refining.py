@@ -79,7 +79,7 @@ def refine(
     first_way, first_turn, rough, gate, rounds = settings
     for h in range(len(poses)):
         way, turn = first_way, first_turn
-        for _ in range(int(rounds)):
+        for lap in range(int(rounds)):
             x, y, theta = poses[h, 0], poses[h, 1], poses[h, 2]
             c, s = math.cos(theta), math.sin(theta)
             hxx = hxy = hyy = hxt = hyt = htt = gx = gy = gt = 0.0
@@ -108,6 +108,9 @@ def refine(
                 off = vx * ry - vy * rx
                 twist = math.atan2(same * (vx * uy - vy * ux), same * (vx * ux + vy * uy))
                 v00, v01, v11 = _joint(wall, walls[best], a, same, rough)
+                if lap == 0:  # Of pairs that may be wrong, far ones turn a pose the most.
+                    v00 += spread[0]
+                    v11 += spread[1]
                 det = v00 * v11 - v01 * v01
                 w00, w01, w11 = v11 / det, -v01 / det, v00 / det
                 # Derivatives of the offset by x, y and θ; the angle turns with θ.
