@@ -328,7 +328,11 @@ def _likely_turns(around: Features, features: Features, expected: float, spread:
 
 
 def passed(walls: NDArray[np.void], beams: Array) -> NDArray[np.bool_]:
-    """Whether beams pass through each wall, away from its ends, and end far behind."""
+    """Whether beams pass through each wall, away from its ends, and end far behind.
+
+    A wall that faces away behind the sensor counts as well: the line of a beam goes through it,
+    backwards. It has been left, and what is seen on the way back is for a loop to join.
+    """
     ends, passes = np.concatenate((walls["start"], walls["end"]), axis=1), np.empty(len(walls), int)
     count_passes(beams, ends, (0.1, 0.2, 0.3), passes)
     return passes >= 3
