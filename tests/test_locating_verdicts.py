@@ -9,15 +9,28 @@ from small_room import RING, plan_of, query_at
 
 from lineament import LaserScan
 from lineament.mapping import LineMap, Query, locate
+from lineament.mapping.evidence import Evidence
 from lineament.mapping.following import follow
 from lineament.mapping.hypotheses import BOX, TURN
 from lineament.mapping.index import MAPPED
-from lineament.mapping.locate import LEAD, VERDICTS, _judged, _near, distinct, squares_off
+from lineament.mapping.locate import (
+    LEAD,
+    UNKNOWN,
+    VERDICTS,
+    Location,
+    _anywhere,
+    _judged,
+    _near,
+    _spread,
+    distinct,
+    squares_off,
+)
 from lineament.mapping.refine import adjusted
 
 POSE, PLAN = (0.3, -0.2, 0.7), plan_of(RING)
 SURE, ROOM = math.log(1000), 500.0
 LOCATED, AMBIGUOUS, UNOBSERVED, LOST = VERDICTS
+ALL = Evidence(50.0, 1.0, 0.0, 0.0, 100)
 #: The package has the function under this name.
 MODULE = sys.modules["lineament.mapping.locate"]
 
@@ -121,7 +134,52 @@ def test_on_a_map_of_scans_more_beams_may_pass_through_walls(monkeypatch):
     for control, verdict in ((-LEAD - 0.1, LOCATED), (-LEAD + 0.1, AMBIGUOUS)):
         rows = iter([np.array([(60.0, *shares)]), np.array([(60.0 + control, 0.9, 0.1, 0.0)])])
         monkeypatch.setattr(MODULE, "_searched", lambda *_, of=rows: (poses[:1], next(of)))
-        assert locate(query, mapped).verdict == verdict
+        assert _anywhere(query, mapped).verdict == verdict
+
+
+def test_a_map_may_be_as_exact_as_a_drawing(monkeypatch):
+    """What is not found as on a map of scans is looked for as on a drawing."""
+    mapped, looked_at = LineMap(PLAN.walls, sigma=MAPPED), []
+    places = {
+        True: Location(LOST, POSE, UNKNOWN, ALL),
+        False: Location(LOCATED, POSE, UNKNOWN, ALL),
+    }
+
+    def anywhere(_, plan):
+        looked_at.append((plan.is_mapped, plan.sigma))
+        return places[plan.is_mapped]
+
+    monkeypatch.setattr(MODULE, "_anywhere", anywhere)
+    query = query_at(POSE, PLAN)
+    assert locate(query, mapped) is places[False]
+    assert looked_at == [(True, MAPPED), (False, 0.0)]
+    places[False] = Location(AMBIGUOUS, POSE, UNKNOWN, ALL)
+    assert locate(query, mapped) is places[True]
+    places[True] = Location(LOCATED, POSE, UNKNOWN, ALL)
+    looked_at.clear()
+    assert locate(query, mapped) is places[True]
+    assert len(looked_at) == 1
+    assert locate(query, PLAN) is places[False]
+
+
+@pytest.mark.parametrize(
+    ("off", "behind", "variance", "left"),
+    [
+        ((0.08, 0.0, 0.0), 0.0, 0.0032, 0),  # as likely: half of the square
+        ((0.08, 0.0, 0.0), math.log(3), 0.0016, 0),
+        ((0.4, 0.0, 0.0), 0.0, 0.0, 1),  # too far to be one place
+        ((0.4, 0.0, 0.0), math.log(19), 0.008, 0),
+        ((5.0, 0.0, 0.0), 0.0, 0.0, 1),
+        ((0.08, 0.0, 0.2), 0.0, 0.0, 1),  # turned
+    ],
+)
+def test_poses_beside_the_best_are_one_place_that_is_known_less_well(off, behind, variance, left):
+    best, known = np.array(POSE), np.diag((1e-6, 1e-6, 1e-8))
+    others = [(tuple((best + off).tolist()), ALL)]
+    covariance, rest = _spread(best, known, others, np.exp([-behind]))
+    assert covariance[0, 0] == pytest.approx(1e-6 + variance)
+    assert covariance[1, 1] == 1e-6
+    assert len(rest) == left
 
 
 def test_poses_around_a_guess():

@@ -43,6 +43,8 @@ class LineMap(ReadOnly):
     ----------
     left_out : int
         Walls and columns of the file, or given, whose numbers are not finite.
+    is_mapped : bool
+        Whether scans made it: walls have covariances, or are off by as much.
 
     Raises
     ------
@@ -72,8 +74,7 @@ class LineMap(ReadOnly):
         self.left_out = int((~finite).sum() + (~whole).sum())
         self.columns, rest = columns[whole], walls[finite]
         places = np.concatenate((ends[finite].ravel(), self.columns["center"].ravel()))
-        farthest = abs(places).max(initial=0.0)
-        if farthest > FARTHEST:
+        if (farthest := abs(places).max(initial=0.0)) > FARTHEST:
             raise LineamentError(
                 f"the plan is {farthest:.4g} m from its origin, expected a building: "
                 "is it drawn in metres?"
@@ -82,13 +83,13 @@ class LineMap(ReadOnly):
         if not len(self.walls):
             raise LineamentError(f"the plan has no walls: {len(walls)} lines, none has a length")
         self.walls, self.columns = locked(self.walls), locked(self.columns)
-        extent = max(self.size)
-        if extent > LONGEST:
+        if (extent := max(self.size)) > LONGEST:
             raise LineamentError(
                 f"the plan is {extent:.5g} m wide, expected a building: "
                 "is it drawn in other units? (units=, --units)"
             )
         self.sigma = sigma
+        self.is_mapped = sigma >= MAPPED or bool(self.walls["covariance"].any())
 
     def __repr__(self) -> str:
         wide, deep = self.size
@@ -133,10 +134,12 @@ class LineMap(ReadOnly):
         """The directions of the walls, see `hypotheses.spectrum`."""
         return spectrum(self.walls)
 
-    @property
-    def is_mapped(self) -> bool:
-        """Whether scans made it: walls have covariances, or are off by as much."""
-        return self.sigma >= MAPPED or bool(self.walls["covariance"].any())
+    @cached_property
+    def as_drawn(self) -> "LineMap":
+        """The same walls as on a drawing: where they are said to be, and none is missing."""
+        plan = LineMap(self.walls, self.columns)
+        plan.is_mapped = False
+        return plan
 
     @cached_property
     def index(self) -> Index:
@@ -225,11 +228,7 @@ class LineMap(ReadOnly):
         >>> LineMap.from_grid(Grid(cells, 0.05)).walls["start"].round(3).tolist()
         [[1.0, 0.225], [0.425, 0.225], [0.425, 0.775]]
         """
-        walls = walls_of_grid(grid, limits or Limits())
-        if not len(walls):
-            n = int(grid.occupied.sum())
-            raise LineamentError(f"has no walls: {n} of {grid.cells.size} cells are occupied")
-        return cls(walls, sigma=sigma)
+        return cls(walls_of_grid(grid, limits or Limits()), sigma=sigma)
 
     @classmethod
     def read(

@@ -41,6 +41,8 @@ NOT_MIRRORED = 3.0
 #: On maps that scans made: over the best pose on another's map, and over other poses of this one
 #: and of its mirror image; nearer to the best than `FAR` [m], over these as on a drawing.
 SURE_ON_MAP, LEAD, FAR = math.log(100), 12.0, 0.5
+#: Poses nearer than that, and turned by less [rad], are beside the best.
+BESIDE = 0.1
 #: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
 MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
 #: A direction in which the pose is known no better is unobserved [m].
@@ -141,16 +143,26 @@ def locate(
         query = query.query()
     elif isinstance(query, Features):
         query = query_of_scan(query, scan)
-    if guess is None:
-        tried = _tried(query.anchors, query, plan)
-    else:
+    if guess is not None:
         tried = _near(guess, covariance, query, plan)
-    poses, found = _searched(tried, query, plan)
+        poses, found = _searched(tried, query, plan)
+        if not len(poses):
+            return Location(LOST, guess, UNKNOWN, _NOTHING)
+        return _judged(poses, found, query, plan, len(tried))
+    where = _anywhere(query, plan)
+    if where or not plan.is_mapped:
+        return where
+    # What counts as made by scans, a grid say, may be as exact and as whole as a drawing.
+    return _anywhere(query, plan.as_drawn) or where
+
+
+def _anywhere(query: Query, plan: LineMap) -> Location:
+    """Look for what was seen without a guess."""
+    poses, found = _searched(_tried(query.anchors, query, plan), query, plan)
     if not len(poses):
-        return Location(LOST, guess or (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
-    room = len(tried) if guess else poses_on(plan)
-    odds, where = found[0, 0], _judged(poses, found, query, plan, room)
-    if where.verdict != LOCATED or guess is not None:
+        return Location(LOST, (0.0, 0.0, 0.0), UNKNOWN, _NOTHING)
+    odds, where = found[0, 0], _judged(poses, found, query, plan, poses_on(plan))
+    if where.verdict != LOCATED:
         return where
     if not plan.is_mapped and where.evidence.contradicted > LESS_CONTRADICTED:
         return replace(where, verdict=LOST)
@@ -255,18 +267,39 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
         return Location(LOST, _pose(refit), np.linalg.inv(information + WEAK), first)
     best, information = adjusted(poses[0], pairs, query, plan.index)
     covariance = np.asarray(np.linalg.inv(information + WEAK), np.float64)
-    others = [
-        (_pose(pose), other)
-        for pose, other, behind in zip(poses[1:], rest, found[0, 0] - found[1:, 0], strict=True)
-        if behind < (LEAD if plan.is_mapped and math.dist(pose[:2], poses[0, :2]) > FAR else SURE)
-    ]
+    behind = found[0, 0] - found[1:, 0]
+    is_far = np.hypot(*(poses[1:, :2] - poses[0, :2]).T) > FAR
+    is_other = behind < np.where(is_far & plan.is_mapped, LEAD, SURE)
+    others = [(_pose(poses[1 + k]), rest[k]) for k in np.flatnonzero(is_other)]
+    by_odds = np.exp(-behind[is_other])
     if len(distinct(np.stack((best, poses[0])), np.zeros(2), _SAME, 2)) == 2:
-        others.insert(0, (_pose(poses[0]), first))  # walls that depend on each other disagree
+        # Walls that depend on each other disagree.
+        others.insert(0, (_pose(poses[0]), first))
+        by_odds = np.append(1.0, by_odds)
+    covariance, others = _spread(best, covariance, others, by_odds)
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     x, y = vectors[:, 1].tolist()
     if values[1] > UNSURE**2:
         return Location(UNOBSERVED, _pose(best), covariance, first, (x, y), others)
     return Location(AMBIGUOUS if others else LOCATED, _pose(best), covariance, first, None, others)
+
+
+def _spread(
+    best: Array, covariance: Array, others: list[tuple[Pose, Evidence]], by_odds: Array
+) -> tuple[Array, list[tuple[Pose, Evidence]]]:
+    """Take poses beside the best into its covariance; return that, and the other ones.
+
+    They are what walls that stand in front of each other allow: one place, not as well known. It is
+    a mixture of the poses by their likelihoods, `by_odds` times that of the best.
+    """
+    off = np.array([pose for pose, _ in others]).reshape(-1, 3) - best
+    off[:, 2] = wrapped(off[:, 2])
+    is_beside = (np.hypot(off[:, 0], off[:, 1]) < FAR) & (abs(off[:, 2]) < BESIDE)
+    weights = np.where(is_beside, by_odds, 0.0)
+    mixed = covariance + (off.T * weights) @ off / (1.0 + weights.sum())
+    if np.linalg.eigvalsh(mixed[:2, :2])[1] > UNSURE**2:
+        return covariance, others
+    return mixed, [other for other, beside in zip(others, is_beside, strict=True) if not beside]
 
 
 def poses_on(plan: LineMap) -> float:

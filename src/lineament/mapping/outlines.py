@@ -42,7 +42,8 @@ class Outline(NamedTuple):
 def walls_of_grid(grid: Grid, limits: Limits) -> Records:
     """Return the faces of what is occupied that are seen from free space, on their left.
 
-    Where no cell is free, what is unknown counts as free. A LineamentError beyond the limit.
+    Where no cell is free, what is unknown counts as free. A LineamentError without a wall, or with
+    more borders of cells than the limit of ``entities``.
     """
     occupied, free = grid.occupied, grid.free
     borders = outlines(occupied, free if free.any() else ~occupied)
@@ -53,6 +54,9 @@ def walls_of_grid(grid: Grid, limits: Limits) -> Records:
     rows = np.concatenate([np.zeros(0), *(rows for _, rows in found)])
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     long = lengths >= max(_SHORT, _SHORTEST / grid.resolution)
+    if not long.any():
+        n = int(occupied.sum())
+        raise LineamentError(f"has no walls: {n} of {occupied.size} cells are occupied")
     walls = walls_of(grid.placed(ends[long]), side=1)
     # Cells of one row are off alike, those of another in their own way.
     variance = (_UNIFORM + _NOISE) / rows[long] + _MAPPED
