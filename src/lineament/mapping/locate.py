@@ -41,12 +41,11 @@ NOT_MIRRORED = 3.0
 #: On maps that scans made: over the best pose on another's map, and over other poses of this one
 #: and of its mirror image; nearer to the best than `FAR` [m], over these as on a drawing.
 SURE_ON_MAP, LEAD, FAR = math.log(100), 12.0, 0.5
-#: Poses nearer than that, and turned by less [rad], are beside the best.
-BESIDE = 0.1
 #: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
 MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
-#: A direction in which the pose is known no better is unobserved [m].
-UNSURE = 0.15
+#: A direction in which the pose is known no better is unobserved [m]; poses nearer to the best, and
+#: turned by less [rad], are one place with it.
+UNSURE, BESIDE = 0.15, 0.1
 #: Errors of beams and walls beside their covariances [m]: where poses are tried, and judged.
 _WIDE, _TIGHT = 0.12, 0.02
 
@@ -294,11 +293,9 @@ def _spread(
     """
     off = np.array([pose for pose, _ in others]).reshape(-1, 3) - best
     off[:, 2] = wrapped(off[:, 2])
-    is_beside = (np.hypot(off[:, 0], off[:, 1]) < FAR) & (abs(off[:, 2]) < BESIDE)
+    is_beside = (np.hypot(off[:, 0], off[:, 1]) < UNSURE) & (abs(off[:, 2]) < BESIDE)
     weights = np.where(is_beside, by_odds, 0.0)
     mixed = covariance + (off.T * weights) @ off / (1.0 + weights.sum())
-    if np.linalg.eigvalsh(mixed[:2, :2])[1] > UNSURE**2:
-        return covariance, others
     return mixed, [other for other, beside in zip(others, is_beside, strict=True) if not beside]
 
 
