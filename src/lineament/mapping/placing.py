@@ -37,8 +37,8 @@ class Placement:
 def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> Placement | None:
     """Find some key frames on a plan as `placed_on`; None if they may be elsewhere.
 
-    Enough places agree, and few enough do not, wherever on the plan these are. Where all places are
-    looked at there, most do not look through its walls: the mirror image of a floor has places that
+    Enough places agree, and few enough do not, wherever on the plan these are. Where the others are
+    looked at there, few of them look through its walls: the mirror image of a floor has places that
     are alike, but other doors.
     """
     found = placed_on(plan, survey, frames, known)
@@ -49,7 +49,8 @@ def surely_on(plan: LineMap, survey: Survey, frames: Numbers, known: float) -> P
     for q, query in survey.queries(PLACES):
         if q in frames:
             where = locate(query, plan, compose(found.move, survey.pose(q)), spread)
-            against.append(where.evidence.contradicted > MOST_CONTRADICTED)
+            is_through = where.evidence.contradicted > MOST_CONTRADICTED
+            against.append(is_through and q not in found.places)
     return found if np.mean(against) <= _LOOK_THROUGH else None
 
 
