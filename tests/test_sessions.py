@@ -1,7 +1,5 @@
 """Two sessions as one map: `lineament map --onto --merge`, and what it refuses."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -10,11 +8,8 @@ from lineament_lab.evaluation.maps import doubled_walls
 from lineament.cli import cli, run
 from lineament.errors import NothingFoundError
 from lineament.logs import save_log
-from lineament.mapping import LineMap, placing
-from lineament.mapping.evidence import Evidence
+from lineament.mapping import LineMap
 from lineament.mapping.index import MAPPED
-from lineament.mapping.locate import UNKNOWN, Location
-from lineament.mapping.placing import Placement
 from lineament.mapping.sessions import (
     _add_common,
     _again,
@@ -238,18 +233,3 @@ def test_without_a_place_there_is_no_placement(monkeypatch):
     monkeypatch.setattr("lineament.mapping.sessions.surely_on", lambda *_: None)
     with pytest.raises(NothingFoundError, match="expected 3 places along the way"):
         placements(Made, None)
-
-
-@pytest.mark.parametrize(("located", "is_sure"), [(5, False), (6, True)])
-def test_places_that_were_located_are_not_against_it(monkeypatch, located, is_sure):
-    """All of ten places look through walls: of those that were not located, four may."""
-    through = Location(
-        "not on this map", (0.0, 0.0, 0.0), UNKNOWN, Evidence(9.0, 0.8, 0.1, 0.1, 99)
-    )
-    found = Placement((0.0, 0.0, 0.0), dict.fromkeys(range(located), through), 0)
-    monkeypatch.setattr(placing, "placed_on", lambda *_: found)
-    monkeypatch.setattr(placing, "locate", lambda *_: through)
-    survey = SimpleNamespace(
-        queries=lambda _: [(q, None) for q in range(10)], pose=lambda _: (0.0, 0.0, 0.0)
-    )
-    assert (placing.surely_on(None, survey, np.arange(10), 0.1) is found) == is_sure
