@@ -20,8 +20,8 @@ from lineament.mapping.locate import (
     Location,
     _anywhere,
     _judged,
+    _mixture,
     _near,
-    _spread,
     distinct,
     squares_off,
 )
@@ -176,7 +176,7 @@ def test_a_map_may_be_as_exact_as_a_drawing(monkeypatch):
 def test_poses_beside_the_best_are_one_place_that_is_known_less_well(off, behind, variance, left):
     best, known = np.array(POSE), np.diag((1e-6, 1e-6, 1e-8))
     others = [(tuple((best + off).tolist()), ALL)]
-    covariance, rest = _spread(best, known, others, np.exp([-behind]))
+    covariance, rest = _mixture(best, known, others, np.exp([-behind]))
     assert covariance[0, 0] == pytest.approx(1e-6 + variance)
     assert covariance[1, 1] == 1e-6
     assert len(rest) == left

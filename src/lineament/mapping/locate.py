@@ -61,7 +61,8 @@ class Location:
     pose : (x, y, theta)
         The best pose of the sensor in the frame of the plan [m, m, rad].
     covariance : ndarray, shape (3, 3)
-        Of the pose [m, m, rad]; large in the direction that is unobserved.
+        Of the pose [m, m, rad]; large in the direction that is unobserved. It contains poses beside
+        the best that are nearly as likely.
     evidence : Evidence
         What the beams say of the pose.
     unobserved : (x, y) or None
@@ -102,7 +103,8 @@ def locate(
     """Find where features, or a local map, lie on a plan, with or without a first guess.
 
     Corners of both that are alike vote for poses; those are refined by weighted least squares of
-    walls on walls, and judged by the beams: explained, short, or passing through a wall.
+    walls on walls, and judged by the beams: explained, short, or passing through a wall. What is
+    not located on a map that scans made is looked for as on a drawing, too.
 
     Parameters
     ----------
@@ -275,7 +277,7 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
         # Walls that depend on each other disagree.
         others.insert(0, (_pose(poses[0]), first))
         by_odds = np.append(1.0, by_odds)
-    covariance, others = _spread(best, covariance, others, by_odds)
+    covariance, others = _mixture(best, covariance, others, by_odds)
     values, vectors = np.linalg.eigh(covariance[:2, :2])
     x, y = vectors[:, 1].tolist()
     if values[1] > UNSURE**2:
@@ -283,7 +285,7 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     return Location(AMBIGUOUS if others else LOCATED, _pose(best), covariance, first, None, others)
 
 
-def _spread(
+def _mixture(
     best: Array, covariance: Array, others: list[tuple[Pose, Evidence]], by_odds: Array
 ) -> tuple[Array, list[tuple[Pose, Evidence]]]:
     """Take poses beside the best into its covariance; return that, and the other ones.
