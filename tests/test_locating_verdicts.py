@@ -131,10 +131,32 @@ def test_on_a_map_of_scans_more_beams_may_pass_through_walls(monkeypatch):
     # The best pose on the map of another building is like that.
     found = np.array([(99.0, 0.35, 0.35, 0.3), (0.0, 0.1, 0.4, 0.5)])
     assert _judged(poses, found, query, mapped, 1e6).verdict == LOST
-    for control, verdict in ((-LEAD - 0.1, LOCATED), (-LEAD + 0.1, AMBIGUOUS)):
-        rows = iter([np.array([(60.0, *shares)]), np.array([(60.0 + control, 0.9, 0.1, 0.0)])])
-        monkeypatch.setattr(MODULE, "_searched", lambda *_, of=rows: (poses[:1], next(of)))
-        assert _anywhere(query, mapped).verdict == verdict
+    # What is more than 18 nats likelier than that has to lead the mirror image by 12.
+    for ahead, verdict in ((LEAD + 0.1, LOCATED), (LEAD - 0.1, AMBIGUOUS)):
+        assert beside_the_mirror_image(monkeypatch, mapped, 0.99, ahead) == verdict
+
+
+def beside_the_mirror_image(monkeypatch, plan, explained, ahead, odds=60.0):
+    """Verdict on a pose that explains so much, and is so far ahead of the mirror image."""
+    of_best = np.array([(odds, explained, 1 - explained, 0.0)])
+    rows = iter([of_best, np.array([(odds - ahead, 0.9, 0.1, 0.0)])])
+    monkeypatch.setattr(MODULE, "_searched", lambda *_: (np.array([POSE]), next(rows)))
+    return _anywhere(query_at(POSE, PLAN), plan).verdict
+
+
+@pytest.mark.parametrize(("is_mapped", "both"), [(False, 18.0), (True, 30.0)])
+def test_what_hardly_passes_one_limit_has_to_pass_the_other_by_more(monkeypatch, is_mapped, both):
+    """The odds over chance and the lead over the mirror image together exceed a limit."""
+    plan = LineMap(PLAN.walls, sigma=MAPPED) if is_mapped else PLAN
+    n = len(query_at(POSE, PLAN).beams) / 3
+    chance = math.log(7.0 * 5.0 / BOX**2 * 2 * math.pi / TURN)
+    for share in (0.68, 0.72):
+        over = share * math.log(0.73 / 0.33) + (1 - share) * math.log(0.15 / 0.34)
+        odds = chance + 8.0
+        ahead = both - (over * n if is_mapped else 8.0)
+        assert ahead > (LEAD if is_mapped else 3.0)
+        assert beside_the_mirror_image(monkeypatch, plan, share, ahead + 0.1, odds) == LOCATED
+        assert beside_the_mirror_image(monkeypatch, plan, share, ahead - 0.1, odds) == AMBIGUOUS
 
 
 def test_a_map_may_be_as_exact_as_a_drawing(monkeypatch):

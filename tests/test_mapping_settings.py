@@ -28,7 +28,7 @@ SETTINGS = {
     "locate": {"TRIED": 800, "SIFTED": 60, "REFINED": 24, "JUDGED": 12, "_FEWEST_BEAMS": 12,
                "_FEW_BEAMS": 40, "_NEAR": (0.15, 0.06), "_SAME": (0.06, 0.02), "_WIDE": 0.12,
                "_TIGHT": 0.02, "VOTED": 16, "SURE_ON_MAP": np.log(100),
-               "LEAD": 12.0, "FAR": 0.5},
+               "LEAD": 12.0, "FAR": 0.5, "BOTH": 18.0, "BOTH_ON_MAP": 30.0},
     "making": {"_ROUGH": 0.01, "_OFTEN": 8, "_SMOOTHEST": 1e-5, "_ROUGHEST": 0.05, "TWICE": 25.0,
                "_LEAST": np.diag((0.02, 0.02, 0.01)) ** 2, "_SPREADS": ((0.8, 0.12), (0.3, 0.06)),
                "APART": 0.015, "VIEWS": 3},

@@ -109,6 +109,30 @@ def test_nothing_is_sure_and_wrong_in_rooms_of_all_kinds():
     assert known > 95
 
 
+@pytest.mark.parametrize("jolt", [0.052, -0.08, 0.3])
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_wheel_that_spins_turns_a_corridor_in_odometry_alone(jolt, is_closed):
+    """All walls are then far from where odometry has them, and they know better."""
+    walls = [(-3, -1, 12, -1), (12, 1, -3, 1)] + [(12, -1, 12, 1)] * is_closed
+    corridor, rng, extract = World(walls), np.random.default_rng(0), ln.Extractor()
+    tracker = Tracker(roughness=0.0)
+    for k in range(8):
+        scan = SENSORS["utm30lx"].scan(corridor, (0.2 * k, 0.1, 0.0), rng, k / 5)
+        turned = jolt * (k > 5)
+        odometry = compose((1.0, 0.02, turned), (0.2 * (k - 5), 0.0, 0.0))
+        tracks = tracker(extract(scan), odometry)
+        if k == 5:
+            before = tracks.segments.tolist()
+        if k == 6:
+            motion = tracks.motion
+    assert len(before) == len(walls)
+    if is_closed:
+        assert tracks.segments.tolist() == before
+        assert motion.observable and abs(motion.theta) < 0.005
+    else:
+        assert not motion.observable
+
+
 def test_odometry_of_a_node_holds_over_a_pause():
     """A robot stands for 10 s, in each room; where it is not sure, its covariance is wide."""
     for seed, room in enumerate(ROOMS.values()):

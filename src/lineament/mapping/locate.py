@@ -36,11 +36,12 @@ _NEAR, _SAME = (0.15, 0.06), (0.06, 0.02)
 #: The best pose is more likely than the next by so much (nats), and than chance: that of a wrong
 #: pose, times the number of poses that a plan has room for.
 SURE = math.log(1000)
-#: The same over the best pose of the mirror image.
-NOT_MIRRORED = 3.0
+#: The same over the best pose of the mirror image; and this and what it is over chance together,
+#: as one that only just passes both limits is rarely right.
+NOT_MIRRORED, BOTH = 3.0, 18.0
 #: On maps that scans made: over the best pose on another's map, and over other poses of this one
-#: and of its mirror image; nearer to the best than `FAR` [m], over these as on a drawing.
-SURE_ON_MAP, LEAD, FAR = math.log(100), 12.0, 0.5
+#: and of its mirror image, and both; nearer to the best than `FAR` [m], as on a drawing.
+SURE_ON_MAP, LEAD, BOTH_ON_MAP, FAR = math.log(100), 12.0, 30.0, 0.5
 #: If more of the beams are contradicted, it is not this map: where there is a guess, and where not.
 MOST_CONTRADICTED, LESS_CONTRADICTED = 0.05, 0.03
 #: A direction in which the pose is known no better is unobserved [m]; poses nearer to the best, and
@@ -170,10 +171,12 @@ def _anywhere(query: Query, plan: LineMap) -> Location:
     # Chance, and a plan that is mirrored, do as well by the mirror image of what was seen.
     image = query.mirrored()
     _, feigned = _searched(_tried(image_of(query.anchors), image, plan), image, plan, 0.0)
-    control, ahead = feigned[:, 0].max(initial=-math.inf), LEAD if plan.is_mapped else NOT_MIRRORED
-    if control > odds + SURE:
+    ahead = odds - feigned[:, 0].max(initial=-math.inf)
+    if ahead < -SURE:
         return replace(where, verdict=LOST)
-    return replace(where, verdict=AMBIGUOUS) if control > odds - ahead else where
+    least, both = (LEAD, BOTH_ON_MAP) if plan.is_mapped else (NOT_MIRRORED, BOTH)
+    is_doubtful = ahead < max(least, both - where.evidence.log_odds)
+    return replace(where, verdict=AMBIGUOUS) if is_doubtful else where
 
 
 #: Covariance of a pose of which nothing is known, and of a guess for which none is given.

@@ -202,8 +202,9 @@ class Tracker(InTurn):
         if (deviations[[0, 2]] <= _UNIQUE).all():
             spread = np.diag(deviations) ** 2
             motion, pairs = self._follow(frame, prior, spread, prior, spread)
-            is_sure = motion.observable or odometry is None
-            if not (is_sure and is_contradicted(motion.pose, fresh, frame.segments)):
+            # Where walls show a part of the motion, odometry is believed in the rest.
+            is_partial = odometry is not None and len(motion.unobserved) in (1, 2)
+            if is_partial or not is_contradicted(motion.pose, fresh, frame.segments):
                 return motion, pairs
             deviations = _ANYWHERE
             expected.insert(0, (prior, deviations))
