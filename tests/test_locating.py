@@ -14,19 +14,22 @@ from test_view import read
 
 import lineament as ln
 from lineament.cli import run
+from lineament.errors import LineamentError
 from lineament.live import LiveConfig
 from lineament.live.counters import Counts, Report
 from lineament.live.pipeline import Pipeline
 from lineament.live.sinks import FoxgloveSink, RosSink
 from lineament.logs import save_npz
 from lineament.mapping import LineMap
-from lineament.mapping.following import Follower, combined, follow
+from lineament.mapping.evidence import Evidence
+from lineament.mapping.following import Follower, Whereabouts, combined, follow
 from lineament.output.foxglove import FoxgloveMessages
 from lineament.output.ros_messages import RosMessages
 from lineament.simulation import SENSORS, World, room
 from lineament.simulation import drive as drive_scans
 from lineament.simulation.buildings import office
 from lineament.simulation.wheels import Wheels
+from lineament.tasks import locate as locate_task
 from lineament.tasks.mapping import map_log
 from lineament.view.api import answer
 
@@ -206,6 +209,69 @@ def test_the_command(files, capsys, log, ending):
     np.testing.assert_allclose(x, -2 + 0.1 * np.arange(scans), atol=0.02)
 
 
+@pytest.mark.parametrize(("poses", "ending"), [("tum", "png"), ("csv", "svg"), ("parquet", "pdf")])
+def test_the_command_draws_the_way(files, poses, ending, monkeypatch):
+    given = ["locate", str(files / "log.npz"), "--map", str(files / "plan.dxf"), "-q"]
+    out, picture = files / f"poses.{poses}", files / f"where.{ending}"
+    given += ["-o", str(out), "--picture", str(picture)]
+    assert run(given) == 0
+    assert picture.read_bytes()[:5] in (b"\x89PNG\r", b"<?xml", b"%PDF-")
+    assert out.stat().st_size > 0
+    for path in (out, picture):
+        path.unlink()
+    monkeypatch.setattr("lineament.output.canvas.save", fail)
+    assert run(given) == 1
+    assert not {out, picture} & set(files.iterdir())  # both files, or none
+
+
+def fail(*_given):
+    raise LineamentError("the disk is full")
+
+
+def test_the_picture_shows_where_the_way_is_not_known(monkeypatch):
+    """A step has the lesser verdict of its ends; nothing is drawn where no pose is known."""
+    verdicts = {
+        0: "ambiguous", 1: "located", 2: "located", 3: "not on this map", 4: "ambiguous",
+        5: "located", 6: "direction unobserved", 7: "located", 8: "not on this map",
+    }  # fmt: skip
+    evidence = Evidence(0.0, 1.0, 0.0, 0.0, 100)
+    places = [
+        Whereabouts(verdict, (float(k), 0.0, 0.0), 1e-4 * np.eye(3), evidence)
+        for k, verdict in verdicts.items()
+    ]
+    saved = []
+    monkeypatch.setattr("lineament.output.canvas.save", lambda figure, _: saved.append(figure))
+    locate_task.draw(places, plan_of(room()), "a.png", "title", "about")
+    (axes,) = saved[0].axes
+    drawn = {
+        of.get_label(): [tuple(path.vertices[:, 0].tolist()) for path in of.get_paths()]
+        for of in axes.collections
+    }
+    assert {name: drawn[name] for name in drawn if not name.startswith("_")} == {
+        "located": [(1.0, 2.0)],
+        "not located": [(2.0, 5.0)],
+        "direction unobserved": [(5.0, 6.0), (6.0, 7.0)],
+    }
+    spots = {line.get_label(): line.get_xdata() for line in axes.lines}
+    assert spots == {"located first": [1.0], "located last": [7.0]}
+    locate_task.draw(places[:1], plan_of(room()), "a.png", "title", "about")
+    (axes,) = saved[1].axes
+    assert not axes.lines  # Never located: the plan alone.
+
+
+def test_a_picture_does_not_replace_the_image_of_the_grid(files, capsys):
+    plan_of(room()).write(files / "map.yaml")
+    about = (files / "map.yaml").read_text().replace("map.pgm", "map.png")
+    (files / "map.yaml").write_text(about)
+    (files / "map.pgm").rename(files / "map.png")
+    before = (files / "map.png").read_bytes()
+    given = ["locate", str(files / "log.npz"), "--map", str(files / "map.yaml")]
+    given += ["-o", str(files / "a.csv"), "--picture", str(files / "map.png")]
+    assert run(given) == 1
+    assert "map.png: would replace" in capsys.readouterr().err
+    assert (files / "map.png").read_bytes() == before
+
+
 def test_units_and_a_plan_of_no_size(files, capsys):
     given = ["locate", str(files / "log.npz"), "--map", str(files / "plan.dxf")]
     given += ["-o", str(files / "poses.csv"), "--units"]
@@ -227,6 +293,7 @@ def test_units_and_a_plan_of_no_size(files, capsys):
         (["locate", "-o", "a.tum", "--layers", "doors"], "no layer is doors"),
         (["locate", "-o", "a.tum", "--map", "none.dxf"], "none.dxf: No such file"),
         (["locate", "-o", "a.txt"], "expected an ending of .tum, .csv, .parquet"),
+        (["locate", "-o", "a.tum", "--picture", "a.gif"], "a.gif: expected an ending of .png,"),
     ],
 )
 def test_one_line_for_what_cannot_be_done(files, capsys, monkeypatch, arguments, told):

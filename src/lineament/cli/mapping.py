@@ -38,6 +38,8 @@ UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
 _NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
 #: Formats that a map is written in.
 _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
+#: Those of a picture of walls and a way; in `plan -o` an .svg is a plan.
+_PICTURES = (".png", ".svg", ".pdf")
 
 
 @click.command("map")
@@ -46,7 +48,7 @@ _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
     "-o", "--output", required=True, type=PATH, help="The map: .dxf, .svg, .parquet or .yaml."
 )
 @click.option("--poses", type=PATH, help="Pose of each scan, as TUM writes them: .tum.")
-@click.option("--picture", type=PATH, help="Walls and way, red where it is not sure: .png or .pdf.")
+@click.option("--picture", type=PATH, help="Walls and way, red if not sure: .png, .svg or .pdf.")
 @click.option("--onto", type=PATH, help="A plan in whose frame the map is, as for locate.")
 @click.option("--merge", is_flag=True, help="With the walls of the plan of --onto, as one map.")
 @_NO_ODOMETRY
@@ -78,7 +80,7 @@ def map_command(
     if poses is not None:
         check_ending(poses, (".tum", ".txt"))
     if picture is not None:
-        check_ending(picture, (".png", ".pdf"))
+        check_ending(picture, _PICTURES)
     if merge and onto is None:
         raise click.UsageError("--merge is for the plan of --onto, which is not given")
     done = map_log(
@@ -103,6 +105,7 @@ def map_command(
 @LOG
 @MAP
 @click.option("-o", "--output", required=True, type=PATH, help="Poses: .tum, .csv or .parquet.")
+@click.option("--picture", type=PATH, help="The way on the plan: .png, .svg or .pdf.")
 @LAYERS
 @click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
 @_NO_ODOMETRY
@@ -114,6 +117,7 @@ def locate(
     log: Path | str,
     plan: Path,
     output: Path,
+    picture: Path | None,
     extractor: Extractor,
     no_odometry: bool,
     no_deskew: bool,
@@ -130,11 +134,14 @@ def locate(
     from .progress import tracker
 
     check_ending(output, ENDINGS)
+    if picture is not None:
+        check_ending(picture, _PICTURES)
     found = locate_log(
         log,
         plan,
         output,
         extractor,
+        picture=picture,
         odometry=not no_odometry,
         deskewed=not no_deskew,
         track=tracker(quiet),

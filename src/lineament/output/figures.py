@@ -26,6 +26,14 @@ if TYPE_CHECKING:
 PANEL, _STRIP = 5.6, 1.9  # width of a panel, height of a strip of errors [inch]
 _ALONE = 8.0  # width of a panel that has no neighbour [inch]
 _NOTE = "Beside a corner: its quality, the share of such corners found again from another place."
+#: Colour, width and dashes of the parts of a way.
+_WAYS: dict[str, tuple[str, float, str]] = {
+    "way": ("way", 1.0, "-"),
+    "not sure": ("corner", 3.0, "-"),
+    "located": ("way", 1.6, "-"),
+    "direction unobserved": ("arc", 3.0, "-"),
+    "not located": ("corner", 1.8, ":"),
+}
 #: A stamp is a date if it is later than 1990 [s].
 _DATES = 631_152_000
 
@@ -59,11 +67,14 @@ def plot_walls(
     *,
     title: str = "",
     dark: bool = False,
-    ways: tuple[Array, Array] | None = None,
+    about: str = "",
+    ways: Mapping[str, Array] | None = None,
+    spots: Mapping[str, Array] | None = None,
 ) -> None:
     """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture.
 
-    `ways` are parts of the way (n, 2, 2) on which the poses are sure, and on which they are not.
+    `about` is a line above it; `ways` are steps of a way (n, 2, 2) by the names in `_WAYS`, and
+    `spots` two places (2,) by names of their own.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
@@ -73,19 +84,19 @@ def plot_walls(
     wide = canvas.PAGE_WIDTH
     figure = canvas.new_figure(wide, canvas.plane_height(points, wide), dark=dark)
     axes = figure.subplots()
-    about = f"{count(len(lines), 'wall')}, {count(len(radii), 'column')}"
-    canvas.style_plane(axes, title, about, points)
+    counts = f"{count(len(lines), 'wall')}, {count(len(radii), 'column')}"
+    canvas.style_plane(axes, title, about or counts, points)
     theme = canvas.theme_of(axes)
     axes.add_collection(LineCollection(list(lines), colors=theme.ink, linewidths=0.8))
-    if ways is not None:
-        for way, color, wide, name in zip(
-            ways, (theme.way, theme.corner), (1.0, 3.0), ("way", "not sure"), strict=True
-        ):
-            if len(way):
-                axes.add_collection(
-                    LineCollection(list(way), colors=color, linewidths=wide, label=name)
-                )
-        axes.legend(loc="best", fontsize="small", frameon=False, labelcolor=theme.text)
+    for name, steps in (ways or {}).items():
+        if len(steps):
+            color, width, dashes = _WAYS[name]
+            drawn = {"colors": getattr(theme, color), "linewidths": width, "linestyles": dashes}
+            axes.add_collection(LineCollection(list(steps), label=name, zorder=3, **drawn))
+    for mark, (name, spot) in zip("os", (spots or {}).items(), strict=False):
+        axes.plot(*spot, mark, color=theme.way, ms=7, mec=theme.paper, label=name, zorder=4)
+    if axes.get_legend_handles_labels()[0]:
+        canvas.add_legend(figure)
     for center, radius in zip(centers.tolist(), radii.tolist(), strict=True):
         axes.add_patch(Circle(center, radius, fill=False, color=theme.arc))
     canvas.save(figure, path)

@@ -4,7 +4,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice, pairwise
@@ -20,7 +20,10 @@ from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
 from ..mapping import VERDICTS, LineMap
 from ..mapping.following import Whereabouts, follow
+from ..mapping.grids import all_files
+from ..mapping.locate import LOCATED, UNOBSERVED
 from ..mapping.plans import is_a_building
+from ..output.figures import plot_walls
 from ..progress import Track, untracked
 from ..scan import LaserScan
 from .mapping import tum_written
@@ -58,11 +61,10 @@ class Located:
             raise NothingFoundError(f"{self.log}: never located: {self.warning or usual}")
 
     def __str__(self) -> str:
-        shares = (f"{100 * n / self.scans:.1f} % {name}" for name, n in self.verdicts.items())
         first = f"located first after {self.first:.1f} s, lost {self.lost} times since"
         return (
             f"{self.log} on {self.plan} -> {self.output}\n"
-            f"  {self.scans} scans: {', '.join(shares)}\n"
+            f"  {_shares(self.verdicts)}\n"
             f"  {'never located' if math.isnan(self.first) else first}\n"
             f"  {self.seconds:.2f} s, {self.scans / max(self.seconds, 1e-9):.0f} scans/s"
         )
@@ -78,6 +80,7 @@ def locate_log(
     units: str | None = None,
     odometry: bool = True,
     deskewed: bool = True,
+    picture: str | os.PathLike[str] | None = None,
     track: Track = untracked,
     **reading: Any,
 ) -> Located:
@@ -100,6 +103,8 @@ def locate_log(
         Whether the poses of the log are taken as odometry, where it has them.
     deskewed : bool
         Whether scans are deskewed that say how long their sweep takes.
+    picture : path-like, optional
+        Where to draw the plan and the way on it, ``.png``, ``.svg`` or ``.pdf``.
     track : callable
         ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
@@ -125,7 +130,8 @@ def locate_log(
     (11, 0.0)
     """
     ending = ending_of(output, ENDINGS)
-    check_outputs([output], [path, plan])
+    outputs = [output] if picture is None else [output, picture]
+    check_outputs(outputs, [path, *all_files(plan, is_read=True)])
     extractor = Extractor() if extractor is None else extractor
     drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
     started = time.perf_counter()
@@ -149,12 +155,16 @@ def locate_log(
     found = [(scan.stamp, where) for scan, where in followed(drawn)]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
+    verdicts = {name: sum(w.verdict == name for _, w in found) for name in VERDICTS}
     if ending == ".tum":
         placed = [(stamp, where.pose) for stamp, where in found if where]
-        with tum_written(output, [stamp for stamp, _ in placed], [pose for _, pose in placed]):
-            pass
+        written = tum_written(output, [stamp for stamp, _ in placed], [pose for _, pose in placed])
     else:
-        _write_table(output, found, is_csv=ending == ".csv")
+        written = _table_written(output, found, is_csv=ending == ".csv")
+    with written:  # Both files, or none.
+        if picture is not None:
+            title = f"{Path(log.name).name} on {Path(plan).name}"
+            draw([w for _, w in found], drawn, picture, title, _shares(verdicts))
     stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
     seconds, warning = time.perf_counter() - started, ""
     if sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf":
@@ -171,7 +181,7 @@ def locate_log(
         plan=str(plan),
         output=str(output),
         scans=len(found),
-        verdicts={name: sum(w.verdict == name for _, w in found) for name in VERDICTS},
+        verdicts=verdicts,
         first=stamps[known.index(True)] - stamps[0] if any(known) else math.nan,
         lost=sum(was and not now for was, now in pairwise(known)),
         warning=warning,
@@ -199,9 +209,42 @@ def _units_that_fit(
     return best
 
 
-def _write_table(
-    path: str | os.PathLike[str], found: list[tuple[float, Whereabouts]], *, is_csv: bool
+def _shares(verdicts: dict[str, int]) -> str:
+    """Write how many scans there are, and the share of those with each verdict."""
+    scans = sum(verdicts.values())
+    shares = (f"{100 * n / scans:.1f} % {name}" for name, n in verdicts.items())
+    return f"{scans} scans: {', '.join(shares)}"
+
+
+def draw(
+    places: list[Whereabouts],
+    plan: LineMap,
+    picture: str | os.PathLike[str],
+    title: str,
+    about: str,
 ) -> None:
+    """Draw the way on a plan; where it is not known, a dotted line leads to where it is again."""
+    known = [(k, where) for k, where in enumerate(places) if where.is_known]
+    ways: dict[str, list[tuple[Any, Any]]] = {"located": [], UNOBSERVED: [], "not located": []}
+    for (i, before), (k, where) in pairwise(known):
+        both = LOCATED if before and where else UNOBSERVED
+        ways[both if k == i + 1 else "not located"].append((before.pose[:2], where.pose[:2]))
+    located = [np.array(where.pose[:2]) for where in places if where]
+    plot_walls(
+        plan.ends,
+        *(plan.columns["center"], plan.columns["radius"], picture),
+        title=title,
+        about=about,
+        ways={name: np.reshape(steps, (-1, 2, 2)) for name, steps in ways.items()},
+        spots={"located first": located[0], "located last": located[-1]} if located else {},
+    )
+
+
+@contextmanager
+def _table_written(
+    path: str | os.PathLike[str], found: list[tuple[float, Whereabouts]], *, is_csv: bool
+) -> Iterator[None]:
+    """Write all scans as a table, as `tum_written` does."""
     import pyarrow as pa
     import pyarrow.csv
     import pyarrow.parquet as pq
@@ -224,8 +267,10 @@ def _write_table(
     for name in ("explained", "short", "contradicted", "log_odds"):
         columns[name] = array_of([getattr(where.evidence, name) for where in places])
     table = pa.table(columns)
-    with naming_errors(path), written_beside(path) as temporary:
-        if is_csv:
-            pyarrow.csv.write_csv(table, temporary)
-        else:
-            pq.write_table(table, temporary)
+    with written_beside(path) as temporary:
+        with naming_errors(path):
+            if is_csv:
+                pyarrow.csv.write_csv(table, temporary)
+            else:
+                pq.write_table(table, temporary)
+        yield

@@ -130,7 +130,7 @@ def map_log(
     merge : bool
         Whether the map has the walls of that plan too, those that are one as one wall.
     picture : path-like, optional
-        Where to draw the walls and the way, ``.png`` or ``.pdf``: what is not sure of it is red.
+        Where to draw the walls and the way, ``.png``, ``.svg`` or ``.pdf``: red if not sure.
     odometry : bool
         Whether the poses of the log are taken as odometry, where it has them.
     track : callable
@@ -190,7 +190,8 @@ def map_log(
         made.write(output)
         if picture is not None:
             rings = made.map.columns["center"], made.map.columns["radius"]
-            plot_walls(made.map.ends, *rings, picture, title=Path(log.name).name, ways=made.way)
+            ways = dict(zip(("way", "not sure"), made.way, strict=True))
+            plot_walls(made.map.ends, *rings, picture, title=Path(log.name).name, ways=ways)
     return Mapping(
         log=str(path),
         output=str(output),
