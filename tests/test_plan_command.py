@@ -133,6 +133,7 @@ def test_info_describes_a_plan_or_a_grid(plan, capsys):
         (["plan", "broken.svg", "-o", "a.dxf"], 1, "broken.svg: is no SVG: "),
         (["plan", "a.yaml", "-o", "a.yaml"], 1, "a.yaml: would replace a.yaml, which is read"),
         (["info", "other.svg"], 1, "other.svg: is no plan that lineament wrote"),
+        (["info", "a.pgm"], 1, "a.pgm: is an image, expected the .yaml of the grid"),
     ],
 )
 def test_what_cannot_be_converted_is_one_line(plan, refused, arguments, status, line):

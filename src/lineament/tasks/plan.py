@@ -20,8 +20,8 @@ from ..walls import lengths_of
 #: Formats that a plan is written in: pictures, and those that are read again or go on elsewhere.
 PICTURES = (".png", ".pdf")
 ENDINGS = (".dxf", ".yaml", ".svg", ".parquet", ".csv", ".jsonl", ".geojson", *PICTURES)
-#: What is described as a plan, and not as a log.
-PLANS = (".dxf", ".svg", ".parquet", *GRID_ENDINGS)
+#: What is described as a plan, and not as a log; images are refused with a hint at their grid.
+PLANS = (".dxf", ".svg", ".parquet", *GRID_ENDINGS, ".pgm", ".png")
 
 
 def convert_plan(
