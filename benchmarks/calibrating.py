@@ -3,6 +3,10 @@
 A robot drives along rooms of simulated storeys with furniture and people, a scanner mounted
 anywhere on it; its wheels have other radii and another track than is believed, slip, and jolt now
 and then. Odometry is counted 100 times a second.
+
+``--real intel_wheels.npz`` measures a recording with wheels in place of it: `ranges`, `angle_min`,
+`angle_increment`, the poses by the wheels (`odometry`), and corrected poses of the laser
+(`known_poses`) of some scans (`known`). Each half of it is calibrated by itself, too.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import math
 import os
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -24,7 +29,7 @@ import ros_bags
 
 from lineament.logs import save_npz
 from lineament.scan import LaserScan
-from lineament.scan.poses import compose
+from lineament.scan.poses import compose, poses_along, twist_between
 from lineament.simulation import SENSORS
 from lineament.simulation.buildings import office
 from lineament.simulation.drive import drive_poses
@@ -100,12 +105,67 @@ def wheels(seed: int, metres: float) -> tuple[str, np.ndarray, np.ndarray]:
     return f"{len(scans)} scans, {done.steps} steps", error, found.covariance
 
 
+def real(path: Path) -> None:
+    """Calibrate the whole of a recording, each half, and correct the second by the first."""
+    data = dict(np.load(path))
+    bearings = float(data["angle_min"]), float(data["angle_increment"])
+    places: list[tuple[float, float, float]] = [(x, y, a) for x, y, a in data["odometry"].tolist()]
+    scans = [
+        LaserScan(ranges, *bearings, stamp=float(i), pose=pose)
+        for i, (ranges, pose) in enumerate(zip(data["ranges"], places, strict=True))
+    ]
+    half = len(scans) // 2
+    parts = {"whole": scans, "first half": scans[:half], "second half": scans[half:]}
+    done = {name: calibrated(part, 0.0) for name, part in parts.items()}
+    for name, about in done.items():
+        print(f"{name}: {str(about).partition(': ')[2]}")
+    first, second = done["first half"], done["second half"]
+    for name, value in first.found.values.items():
+        spread = math.hypot(first.found.deviations[name], second.found.deviations[name])
+        off = (second.found.values[name] - value) / spread
+        print(f"| {name} | the second half differs by {off:.1f} deviations |")
+    is_second = data["known"] >= half
+    known, truth = data["known"][is_second] - half, data["known_poses"][is_second, :2]
+    for name, way in (
+        ("as recorded", places[half:]),
+        ("corrected by the first half", corrected(places[half:], first.found.values)),
+    ):
+        apart = misplaced(np.array(way)[known, :2], truth)
+        print(f"the second half {name}: ATE {apart:.1f} m over {len(known)} poses")
+
+
+def corrected(
+    places: list[tuple[float, float, float]], values: dict[str, float]
+) -> list[tuple[float, float, float]]:
+    """Return the poses of the scanner by odometry as a calibration corrects it."""
+    mounting, pose, found = (values["x"], values["y"], values["theta"]), (0.0, 0.0, 0.0), []
+    for before, after in pairwise((places[0], *places)):
+        forward, left, turn = twist_between(before, after, 1.0)
+        forward, left = values["way"] * forward, values["way"] * left
+        twist = forward, left, values["turn"] * (turn - values["drift"] * forward)
+        x, y, theta = poses_along(twist, [1.0])[0].tolist()
+        pose = compose(pose, (x, y, theta))
+        found.append(compose(pose, mounting))
+    return found
+
+
+def misplaced(places: np.ndarray, truth: np.ndarray) -> float:
+    """Return how far places (n, 2) are from others, once they are laid on them: rms [m]."""
+    one, other = ((of - of.mean(axis=0)) @ (1, 1j) for of in (places, truth))
+    turn = np.vdot(one, other)
+    return float(np.sqrt(np.mean(np.abs(one * turn / abs(turn) - other) ** 2)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--drives", type=int, default=32)
     parser.add_argument("--seed", type=int, default=700)
     parser.add_argument("--against", action="store_true")
+    parser.add_argument("--real", type=Path, metavar="FILE")
     given = parser.parse_args()
+    if given.real:
+        real(given.real)
+        return
     measure, metres = (against, 40.0) if given.against else (wheels, 150.0)
     errors, squares = [], []
     for seed in range(given.seed, given.seed + given.drives):

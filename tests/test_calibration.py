@@ -84,6 +84,24 @@ def test_errors_are_as_large_as_the_deviations_say():
     assert 0.75 < np.mean(squares) < 1.3
 
 
+def test_a_robot_that_slides_to_one_side_for_a_while_is_not_surer_for_it():
+    """Pieces of the drive disagree about theta, not about ways and turns, which stay as sure."""
+    squares, widened = [], []
+    for seed in range(30):
+        odometry, motions = drive_of(SHAPES * 10, noise=(4e-3, 1e-3, 0.02), seed=seed)
+        even = calibrate(odometry, motions).deviations
+        slides = np.random.default_rng([seed, 1]).normal(0.0, 0.03, 36)
+        for k, way in enumerate(odometry):
+            way[1][1] += slides[k // 10] * way[1][0]
+        found = calibrate(odometry, motions)
+        squares.append(((found.values["theta"] - MOUNTING[2]) / found.deviations["theta"]) ** 2)
+        widened.append([found.deviations[name] / even[name] for name in found.names])
+    assert 0.5 < np.mean(squares) < 1.8
+    by_name = np.median(widened, axis=0)
+    assert by_name[2] > 5
+    assert (by_name[3:] < 1.1).all()
+
+
 @pytest.mark.parametrize(
     ("shapes", "unknown"),
     [

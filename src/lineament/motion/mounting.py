@@ -29,6 +29,9 @@ _STEP = 0.2
 _ROUNDS, _DEGREES, _SMALL = 60, 3.0, 0.01
 #: A step beyond this quantile of χ² is a slip, or its scans were matched wrongly; at most so many.
 _SLIP, _MOST_SLIPS = 0.999, 0.5
+#: The drive is cut into so many pieces, of so many steps at least; they disagree where their
+#: scatter is beyond what χ² has by chance, at so many deviations of a normal variable.
+_PIECES, _FEWEST_STEPS, _DISAGREES = 12, 10, 3.0
 #: Why odometry and scans may not go together.
 HINT = "is it another robot's, of other times, or in other units?"
 
@@ -211,5 +214,25 @@ def fitted(model: Model, count: int) -> Fit:
                 break
     deviates = np.sqrt(np.einsum("nii->ni", covariances))
     covariance: Array = np.diag(BEFORE[:count] ** 2)
-    covariance[np.ix_(free, free)] = np.linalg.inv(information)
+    pulls = np.linalg.solve(information, np.einsum("nib,nb->in", weighted, residuals))
+    covariance[np.ix_(free, free)] = _widened(np.linalg.inv(information), pulls)
     return Fit(covariance, residuals, deviates, is_slip, noise)
+
+
+def _widened(covariance: Array, pulls: Array) -> Array:
+    """Widen a covariance where pieces of the drive disagree by more than it says.
+
+    `pulls` (k, n) are those of each step on each value. Of steps that are independent, the sums
+    over pieces scatter by the covariance; an error that lasts longer than a step, as where a robot
+    slides to one side for a while, makes them scatter more.
+    """
+    pieces = min(_PIECES, pulls.shape[1] // _FEWEST_STEPS)
+    if pieces < 2:
+        return covariance
+    starts, degrees = np.arange(pieces) * pulls.shape[1] // pieces, pieces - 1
+    excess = (np.add.reduceat(pulls, starts, axis=1) ** 2).sum(axis=1) / np.diag(covariance)
+    excess *= pieces / degrees
+    spread = 2 / (9 * degrees)  # Wilson and Hilferty: the cube root of χ² is about normal.
+    limit = (1 - spread + _DISAGREES * math.sqrt(spread)) ** 3
+    factors = np.sqrt(np.where(excess > limit, excess, 1.0))
+    return np.asarray(covariance * np.outer(factors, factors))
