@@ -5,7 +5,7 @@
 # on a few metres of way show where on the plan the robot is, without a first
 # guess, and how sure that is. The building is simulated, so we know the truth;
 # people walk in it, and the wheels slip. Any other [log](../logs.md) does as
-# well.
+# well: two [recordings](#recorded-logs) follow, if they are at hand.
 
 # %%
 import lineament as ln
@@ -139,6 +139,39 @@ other = LineMap.from_lines(office(5, (30, 20)).plan.segments)
 print(locate(local, other).verdict)
 
 # %% [markdown]
+# ## Recorded logs
+#
+# A Jackal with a Velodyne drove through an arena of walls; its bag becomes an
+# occupancy grid, as nav2 has it. Weeks before, it had turned at a lattice of
+# places there, with a scan each quarter turn, seconds apart. They are located
+# on the grid, without odometry. If the recordings are not at hand, Monday’s and
+# Tuesday’s bags take their places. From the shell:
+#
+# ```sh
+# lineament map DRIVE -o arena.yaml
+# lineament locate VISIT --map arena.yaml --no-odometry -o visit.csv --picture visit.png
+# ```
+
+# %%
+import os
+from pathlib import Path
+
+data = Path(os.environ.get("LINEAMENT_DATA", "."))
+drive = data / "rosbag1/jackal_mocap.bag"
+visit = data / "truth/jackal_static_data.npz"
+if not (drive.exists() and visit.exists()):
+    drive, visit = monday, tuesday
+map_log(drive, "arena.yaml")
+given = {"odometry": False, "deskewed": False, "picture": "visit.png"}
+done = locate_log(visit, "arena.yaml", "visit.csv", **given)
+print(done.verdicts, f"lost {done.lost} times")
+
+# %% alt="Walls of the grid, and where the robot was on it"
+from IPython.display import Image
+
+Image("visit.png")
+
+# %% [markdown]
 # [Where on a plan](../locate.md) says how the pose is found and how often it is
 # right, [Maps](../maps.md) how the plan is made.
 
@@ -158,7 +191,6 @@ print(locate(local, other).verdict)
 # [Live on a robot](live.md). The bag is played five times as fast.
 
 # %%
-import os
 import sys
 from subprocess import PIPE, STDOUT, Popen
 
