@@ -89,7 +89,7 @@ def walls(storeys: int, seed: int) -> None:
             world = turned(building.plan, angle)
             c, s = math.cos(angle), math.sin(angle)
             at = viewpoints(building) @ np.array([[c, s], [-s, c]])
-            plan = LineMap.from_grid(grid_of(world, at))
+            plan = LineMap.from_grid(grid_of(world, at), sigma=0.0)
             off, of = offsets(world.segments.reshape(-1, 2, 2), plan.ends)
             all_off.append(off)
             lengths.append(of)

@@ -307,6 +307,31 @@ def test_looks_that_contradict_the_plan(monkeypatch, looks, known):
     assert [bool(where) for where in wheres] == known
 
 
+def test_a_guess_that_somebody_says_is_as_likely_as_without_it(monkeypatch):
+    """Chance has few poses to choose from near it: what it is better than by that does not count.
+
+    Two deviations of 0.5 m and 10° are 9 poses along x and y, and 9 of the turn; of the plan, of
+    7 m by 5 m, 97 places and 30 turns.
+    """
+    saved = math.log(35 / 0.36 * 30 / (9 * 9 * 9))
+    scan, guessed = next(scans_on([0.0])), 3
+    for odds, is_known in ((saved + SURELY + 0.1, True), (saved + SURELY - 0.1, False)):
+        looks = []
+
+        def answer(*given, of=odds, looks=looks):
+            looks.append(len(given) > 2)
+            return location(odds=of) if looks[-1] else location(LOST, -5.0)
+
+        monkeypatch.setattr("lineament.mapping.following.locate", answer)
+        found, extract = Follower(plan_of(RING)), Extractor()
+        found.suppose((0.1, 0.0, 0.0))
+        for k in range(5):
+            where = found(extract(scan.stamped("first", int(1.1e9 * k))))
+            assert bool(where) == is_known
+        expected = 5 if is_known else guessed
+        assert sum(looks) == expected
+
+
 @pytest.mark.parametrize(
     ("step", "turn", "pace", "every"),
     [(0.11, 0.0, 0.01, 5), (0.0, 0.055, 0.01, 5), (0.0, 0.0, 0.3, 4), (0.0, 0.0, 0.1, 11)],

@@ -11,6 +11,7 @@ from handmade import arc, features, segment
 import lineament as ln
 from lineament.cli import run
 from lineament.mapping import Grid, LineMap
+from lineament.mapping.index import MAPPED
 from lineament.output import open_writer
 
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
@@ -88,6 +89,44 @@ def test_geojson_of_a_grid_has_what_is_free(tmp_path):
     assert {tuple(place) for place in outer} == corners
     assert len(hole) == 5
     assert sum(one["properties"]["kind"] == "wall" for one in found) == 4
+
+
+@pytest.mark.parametrize("ending", ["dxf", "svg"])
+def test_a_drawing_keeps_whether_scans_saw_its_walls(plan, ending, capsys):
+    """Walls that scans saw are off by some centimetres, those of a drawing are exact."""
+    mapped = LineMap(plan.walls, sigma=MAPPED)
+    grid = plan.to_grid()
+    said = {
+        False: "lines that are drawn, taken to be exact",
+        True: "scans: walls may be off by 4.5",
+    }
+    for made, is_mapped in ((plan, False), (mapped, True), (LineMap.from_grid(grid), True)):
+        made.write(f"a.{ending}")
+        again = LineMap.read(f"a.{ending}")
+        assert (again.is_mapped, again.sigma) == (is_mapped, MAPPED * is_mapped)
+        assert LineMap.read(f"a.{ending}", sigma=0.01).sigma == 0.01
+        # Nothing is lost by another format.
+        assert run(["plan", f"a.{ending}", "-o", "b.svg", "-q"]) == 0
+        assert LineMap.read("b.svg").is_mapped == is_mapped
+        capsys.readouterr()
+        assert run(["info", f"a.{ending}"]) == 0
+        assert said[is_mapped] in capsys.readouterr().out
+
+
+def test_what_one_scan_shows_is_seen_by_a_scan(tmp_path):
+    scan = ln.simulation.SENSORS["utm30lx"].scan(
+        ln.simulation.room(), (0, 0, 0), np.random.default_rng(0)
+    )
+    for ending in ("dxf", "svg"):
+        with open_writer(tmp_path / f"a.{ending}") as writer:
+            writer.write(ln.extract(scan), scan)
+        assert LineMap.read(tmp_path / f"a.{ending}").is_mapped
+
+
+def test_a_grid_is_as_far_off_in_memory_as_in_a_file(plan):
+    grid = plan.to_grid()
+    grid.write("a.yaml")
+    assert LineMap.from_grid(grid).sigma == LineMap.read("a.yaml").sigma == MAPPED
 
 
 @pytest.mark.usefixtures("plan")

@@ -35,8 +35,8 @@ _WHOLE = ("LWPOLYLINE", "POLYLINE", "MLINE")
 _BEGINS = re.compile(rb"^[ \t]*0[ \t]*\r?$", re.MULTILINE), re.compile(rb"\0[A-Z]")
 _BINARY = b"AutoCAD Binary DXF"
 
-#: Under this name lineament writes of a wall in how many views it was seen.
-_APPLICATION = "LINEAMENT"
+#: Property of drawings that lineament made of scans.
+_SCANNED = "lineament walls", "scanned"
 _QUIET = logging.NullHandler()
 
 Numbers = NDArray[np.int64]
@@ -46,13 +46,13 @@ _Error = Callable[[str], LineamentError]
 class Drawn(NamedTuple):
     """Lines (n, 2, 2) and circles ``x y r`` (m, 3) of a drawing [m]; how many are left out.
 
-    `is_ours` is whether lineament made it of scans.
+    `is_scanned` is whether lineament made it of scans.
     """
 
     lines: Array
     circles: Array
     left_out: int
-    is_ours: bool
+    is_scanned: bool
 
 
 @dataclass(slots=True)
@@ -169,13 +169,8 @@ def _drawn(
     ends = ends[~(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) <= 1e-6)]
     if not len(ends):
         raise error(f"has no walls: {len(parts)} entities on {len(there)} layers, no line")
-    is_ours = any(map(_is_seen, drawing.modelspace().query("LINE")))
-    return Drawn(ends, np.concatenate(circles), left_out, is_ours)
-
-
-def _is_seen(line: Any) -> bool:
-    """Whether scans saw a wall: lineament writes in how many views."""
-    return bool(line.has_xdata(_APPLICATION) and line.get_xdata(_APPLICATION)[-1].value > 1)
+    is_scanned = drawing.header.custom_vars.get(_SCANNED[0]) == _SCANNED[1]
+    return Drawn(ends, np.concatenate(circles), left_out, is_scanned)
 
 
 def _measure(

@@ -201,7 +201,7 @@ class Localiser:
         self._followers = {frame: Follower(plan) for frame in self._followers}
         for frame, where in self._known.items():
             if where.is_known and frame in self._followers:
-                self._followers[frame].suppose(where.pose, where.covariance)
+                self._followers[frame].suppose(where.pose)
 
     def _follower(self, frame: str) -> Following:
         assert self._plan is not None

@@ -214,7 +214,7 @@ class LineMap(ReadOnly):
         return cls(*(records[records["views"] >= min_views] for records in shown), sigma=sigma)
 
     @classmethod
-    def from_grid(cls, grid: Grid, *, sigma: float = 0.0, limits: Limits | None = None) -> Self:
+    def from_grid(cls, grid: Grid, *, sigma: float = MAPPED, limits: Limits | None = None) -> Self:
         """Take the walls of an occupancy grid: the faces of what is occupied, seen from free cells.
 
         A wall lies in the middle of its cells, where a robot has hits. Its covariance is that of a
@@ -272,8 +272,8 @@ class LineMap(ReadOnly):
             if ending in (".dxf", ".svg"):
                 is_dxf = ending == ".dxf"
                 drawn = read_drawing(path, layers, units, most) if is_dxf else read_svg(path, most)
-                lines, circles, left_out, is_ours = drawn
-                plan = cls.from_lines(lines, circles, sigma=seen if is_ours else sigma or 0.0)
+                lines, circles, left_out, is_scanned = drawn
+                plan = cls.from_lines(lines, circles, sigma=seen if is_scanned else sigma or 0.0)
             elif ending == ".parquet":
                 features, left_out = read_table(path, most)
                 plan = cls.from_features([features], sigma=seen)
@@ -325,8 +325,8 @@ class LineMap(ReadOnly):
         """Write the map, in the format of the ending of the path.
 
         Those are the formats of ``lineament extract``, and ``.yaml``: an occupancy grid without
-        free cells, see `to_grid`, with its image beside it. In a table a wall is seen from its
-        left: one that may be seen from either side has two rows.
+        free cells, see `to_grid`, with its image beside it. A ``.dxf`` or ``.svg`` keeps whether
+        scans saw the walls. A wall of a table is seen from its left, or has two rows.
         """
         ending, plan = Path(path).suffix.lower(), self
         if ending in GRID_ENDINGS:
@@ -336,4 +336,5 @@ class LineMap(ReadOnly):
         if len(both) and ending not in (".dxf", ".svg", ".geojson"):
             plan = LineMap(np.append(self.walls, turned_back(both)), self.columns)
         with open_writer(path) as writer:
+            writer.is_scanned = self.is_mapped
             writer.write(plan.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))
