@@ -2,7 +2,8 @@
 
 Run: python benchmarks/contact_sheet.py [-m METHOD] [--new SEED] -o FOLDER, with LINEAMENT_DATA.
 By `--new` two scans by chance of each of fifteen recordings, six a sheet, in place of those that
-are always drawn.
+are always drawn. By `--plans FOLDER` one sheet of the walls of all grids (.yaml) in a folder, such
+as nav2_bringup/maps.
 """
 
 import argparse
@@ -10,10 +11,15 @@ import os
 from pathlib import Path
 from random import Random
 
+from matplotlib.collections import LineCollection
+
 from lineament import Extractor, open_log
-from lineament.output.canvas import figure_bytes
+from lineament.errors import LineamentError
+from lineament.mapping import LineMap
+from lineament.output.canvas import INK, figure_bytes, new_panels, style_plane
 from lineament.output.figures import scan_title, scans_figure
 from lineament.output.stages import trace_figure
+from lineament.walls import lengths_of
 
 DATA = Path(os.environ.get("LINEAMENT_DATA", "../shared/data"))
 #: Scans that are drawn, by the number that `lineament plot --scan` takes: first those at which
@@ -59,13 +65,34 @@ def new_scans(seed: int) -> list[tuple[str, int]]:
     ]
 
 
+def draw_plans(folder: Path, output: Path) -> None:
+    """Draw the walls of each grid in a folder that is one."""
+    plans = {}
+    for path in sorted(folder.glob("*.yaml")):
+        try:
+            plans[path.name] = LineMap.read(path)
+        except LineamentError as error:
+            print(error)
+    figure, panels = new_panels(len(plans), 2)
+    for axes, (name, plan) in zip(panels, plans.items(), strict=True):
+        about = f"{len(plan.walls)} walls, {lengths_of(plan.walls).sum():.0f} m"
+        style_plane(axes, name, about, plan.ends.reshape(-1, 2))
+        axes.add_collection(LineCollection(list(plan.ends), colors=INK, linewidths=0.6))
+    (output / "plans.png").write_bytes(figure_bytes(figure, dpi=110))
+    print(f"{len(plans)} plans, drawn in {output}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("-m", "--method", default="optimal")
     parser.add_argument("--new", type=int, metavar="SEED")
+    parser.add_argument("--plans", type=Path, metavar="FOLDER")
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
+    if given.plans:
+        draw_plans(given.plans, given.output)
+        return
     extract, scans = Extractor(given.method), []
     for file, number in SHEET if given.new is None else new_scans(given.new):
         if not (DATA / file).exists():
