@@ -74,7 +74,7 @@ def plot_walls(
     """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture.
 
     `about` is a line above it; `ways` are steps of a way (n, 2, 2) by the names in `_WAYS`, and
-    `spots` two places (2,) by names of their own.
+    `spots` its ends (2,), by what they are called.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
