@@ -9,6 +9,7 @@ import lineament as ln
 from lineament.mapping import LineMap
 from lineament.mapping.evidence import Evidence
 from lineament.mapping.following import Whereabouts
+from lineament.mapping.index import MAPPED
 from lineament.mapping.judging import DENIED, LASTING, LEAST, Judge
 from lineament.mapping.locate import LOCATED, LOST, UNKNOWN
 from lineament.simulation import SENSORS, World
@@ -53,10 +54,11 @@ def carried(stamp: float) -> ln.Features:
     return seen(furnished(99), (5.0 + 0.5 * stamp, 3.1, 2.0), stamp)
 
 
+@pytest.mark.parametrize("sigma", [0.0, MAPPED])
 @pytest.mark.parametrize("seed", [0, 3, 5, 8])
-def test_a_pose_is_not_wrong_among_things_that_have_moved(seed):
-    """The plan denies each scan, but each shows what those before showed."""
-    plan, world = LineMap.from_lines(furnished(seed).segments), furnished(seed + 50)
+def test_a_pose_is_not_wrong_among_things_that_have_moved(seed, sigma):
+    """The plan denies each scan, but each shows what those before showed. So on a robot's map."""
+    plan, world = LineMap.from_lines(furnished(seed).segments, sigma=sigma), furnished(seed + 50)
     judge, denied = begun(plan, world), 0
     for stamp in np.arange(0.2, 2.0, 0.2).tolist():
         judgement = judge(seen(world, at(stamp), stamp), at(stamp), NOWHERE)

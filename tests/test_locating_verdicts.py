@@ -173,7 +173,12 @@ def test_a_map_may_be_as_exact_as_a_drawing(monkeypatch):
 
     monkeypatch.setattr(MODULE, "_anywhere", anywhere)
     query = query_at(POSE, PLAN)
-    assert locate(query, mapped) is places[False]
+    found = locate(query, mapped)
+    assert (found.verdict, found.pose) == (LOCATED, POSE)
+    # Its walls are as far off as before: those of four sides, and of each side two.
+    added = found.covariance - UNKNOWN
+    assert 0.3 * MAPPED < math.sqrt(added[0, 0]) < MAPPED
+    assert 0.3 * MAPPED < math.sqrt(added[1, 1]) < MAPPED
     assert looked_at == [(True, MAPPED), (False, 0.0)]
     places[False] = Location(AMBIGUOUS, POSE, UNKNOWN, ALL)
     assert locate(query, mapped) is places[True]

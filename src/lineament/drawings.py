@@ -35,8 +35,6 @@ _WHOLE = ("LWPOLYLINE", "POLYLINE", "MLINE")
 _BEGINS = re.compile(rb"^[ \t]*0[ \t]*\r?$", re.MULTILINE), re.compile(rb"\0[A-Z]")
 _BINARY = b"AutoCAD Binary DXF"
 
-#: Property of drawings that lineament made of scans.
-_SCANNED = "lineament walls", "scanned"
 _QUIET = logging.NullHandler()
 
 Numbers = NDArray[np.int64]
@@ -44,15 +42,11 @@ _Error = Callable[[str], LineamentError]
 
 
 class Drawn(NamedTuple):
-    """Lines (n, 2, 2) and circles ``x y r`` (m, 3) of a drawing [m]; how many are left out.
-
-    `is_scanned` is whether lineament made it of scans.
-    """
+    """Lines (n, 2, 2) and circles ``x y r`` (m, 3) of a drawing [m]; how many are left out."""
 
     lines: Array
     circles: Array
     left_out: int
-    is_scanned: bool
 
 
 @dataclass(slots=True)
@@ -169,8 +163,7 @@ def _drawn(
     ends = ends[~(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) <= 1e-6)]
     if not len(ends):
         raise error(f"has no walls: {len(parts)} entities on {len(there)} layers, no line")
-    is_scanned = drawing.header.custom_vars.get(_SCANNED[0]) == _SCANNED[1]
-    return Drawn(ends, np.concatenate(circles), left_out, is_scanned)
+    return Drawn(ends, np.concatenate(circles), left_out)
 
 
 def _measure(

@@ -130,7 +130,7 @@ class Follower(InTurn):
 
     def __init__(self, plan: LineMap, way: float = 5.0) -> None:
         self.plan, self.way = plan, way
-        self._most, self._least = (DENIED_ON_MAP, SURE_ON_MAP) if plan.is_mapped else (DENIED, SURE)
+        self._most = DENIED_ON_MAP if plan.is_mapped else DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
         self._restart()
@@ -250,9 +250,9 @@ class Follower(InTurn):
         if not self.is_known and self._guessed:
             self._guessed -= 1
             near = locate(self._local, self.plan, self._pose, self._covariance)
-            # Who says where it is may be wrong: it is to be as likely as if nobody had.
+            # Who says where it is may be wrong: it is to be as sure as if nobody had.
             odds = near.evidence.log_odds - favour(self._covariance, self.plan)
-            return self._found(near, blurred) if odds > self._least else near
+            return self._found(near, blurred) if odds > SURE else near
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
@@ -262,7 +262,8 @@ class Follower(InTurn):
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
         # It takes more to leave a place than to believe it at first.
         odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
-        is_missed = found.verdict == LOST and (odds < self._least or contradicted > self._most)
+        least = SURE_ON_MAP if self.plan.is_mapped else SURE
+        is_missed = found.verdict == LOST and (odds < least or contradicted > self._most)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         return self._found(found, blurred)
 

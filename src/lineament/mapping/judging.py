@@ -91,7 +91,8 @@ class Judge(InTurn):
     """
 
     def __init__(self, plan: LineMap) -> None:
-        self.plan = plan
+        # A pose is denied where chance does as well, not where the best pose of a map would.
+        self.plan = plan.as_drawn if plan.is_mapped else plan
         self._denied, self._since = 0, math.nan
         self._seen: tuple[Features, Pose] | None = None
 
@@ -127,7 +128,7 @@ class Judge(InTurn):
         is_elsewhere = off is not None and not is_near
         if (is_denied and is_elsewhere) or (self._denied >= ENOUGH and is_lasting):
             verdict = WRONG
-        elif is_near and found.evidence.log_odds > 0:
+        elif is_near and max(found.evidence.log_odds, where.evidence.log_odds) > 0:
             verdict = RIGHT
             self._seen = features, where.pose
         return Judgement(verdict, pose, off, found.evidence)

@@ -37,14 +37,16 @@ class LineMap(ReadOnly):
     columns : structured array of `COLUMN`, optional
         Those with numbers that are not finite are left out.
     sigma : float
-        How far the drawn walls are from where they stand [m], beside their covariances.
+        How far walls are from where they stand [m], beside their covariances. 4.5 cm is that of
+        buildings beside their drawings, and of maps beside buildings; 0 that of simulated ones.
 
     Attributes
     ----------
     left_out : int
         Walls and columns of the file, or given, whose numbers are not finite.
     is_mapped : bool
-        Whether scans made it: walls have covariances, or are off by as much.
+        Whether it is some centimetres off: walls have covariances, or `sigma` is 4.5 cm or more.
+        Beams may then pass through some of its walls, and poses have to be more plainly there.
 
     Raises
     ------
@@ -237,7 +239,7 @@ class LineMap(ReadOnly):
         layers: Sequence[str] | None = None,
         *,
         units: str | None = None,
-        sigma: float | None = None,
+        sigma: float = MAPPED,
         limits: Mapping[str, int] | None = None,
     ) -> Self:
         """Read a plan: DXF, an occupancy grid, or a table of features in the world's frame.
@@ -254,9 +256,9 @@ class LineMap(ReadOnly):
             "wall" in their name, or all if there are none.
         units : str, optional
             Those of a DXF: m, dm, cm, mm, ft or in; by default those that it names, or metres.
-        sigma : float, optional
-            How far the walls are from where they stand [m]: by default `MAPPED` for those of scans,
-            in a grid, a table, or a drawing that lineament made of them, and 0 for others.
+        sigma : float
+            How far the walls are from where they stand [m]. Buildings are some centimetres off
+            their drawings, and maps off the buildings.
         limits : mapping, optional
             Limits that differ from those of ``lineament.limits.Limits``: of the plan's bytes
             (``drawing``), ``entities``, ``depth`` of blocks, ``chords``, ``walls``, ``cells``.
@@ -267,18 +269,17 @@ class LineMap(ReadOnly):
             If the file cannot be read, is beyond a limit, or has no walls.
         """
         ending, most = Path(path).suffix.lower(), Limits.of(limits)
-        seen = MAPPED if sigma is None else sigma
         try:
             if ending in (".dxf", ".svg"):
                 is_dxf = ending == ".dxf"
                 drawn = read_drawing(path, layers, units, most) if is_dxf else read_svg(path, most)
-                lines, circles, left_out, is_scanned = drawn
-                plan = cls.from_lines(lines, circles, sigma=seen if is_scanned else sigma or 0.0)
+                lines, circles, left_out = drawn
+                plan = cls.from_lines(lines, circles, sigma=sigma)
             elif ending == ".parquet":
                 features, left_out = read_table(path, most)
-                plan = cls.from_features([features], sigma=seen)
+                plan = cls.from_features([features], sigma=sigma)
             elif ending in GRID_ENDINGS:
-                plan, left_out = cls.from_grid(Grid.read(path, most), sigma=seen, limits=most), 0
+                plan, left_out = cls.from_grid(Grid.read(path, most), sigma=sigma, limits=most), 0
             else:
                 raise unknown_plan(ending)
             plan.left_out += left_out
@@ -325,8 +326,8 @@ class LineMap(ReadOnly):
         """Write the map, in the format of the ending of the path.
 
         Those are the formats of ``lineament extract``, and ``.yaml``: an occupancy grid without
-        free cells, see `to_grid`, with its image beside it. A ``.dxf`` or ``.svg`` keeps whether
-        scans saw the walls. A wall of a table is seen from its left, or has two rows.
+        free cells, see `to_grid`, with its image beside it. In a table a wall is seen from its
+        left: one that may be seen from either side has two rows.
         """
         ending, plan = Path(path).suffix.lower(), self
         if ending in GRID_ENDINGS:
@@ -336,5 +337,4 @@ class LineMap(ReadOnly):
         if len(both) and ending not in (".dxf", ".svg", ".geojson"):
             plan = LineMap(np.append(self.walls, turned_back(both)), self.columns)
         with open_writer(path) as writer:
-            writer.is_scanned = self.is_mapped
             writer.write(plan.to_features(), LaserScan([], 0.0, 1.0, pose=(0.0, 0.0, 0.0)))

@@ -105,7 +105,7 @@ def locate(
 
     Corners of both that are alike vote for poses; those are refined by weighted least squares of
     walls on walls, and judged by the beams: explained, short, or passing through a wall. What is
-    not located on a map that scans made is looked for as on a drawing, too.
+    not located on walls that are some centimetres off is looked for as if they were exact, too.
 
     Parameters
     ----------
@@ -154,8 +154,14 @@ def locate(
     where = _anywhere(query, plan)
     if where or not plan.is_mapped:
         return where
-    # What counts as made by scans, a grid say, may be as exact and as whole as a drawing.
-    return _anywhere(query, plan.as_drawn) or where
+    # It may be as exact and as whole as it is drawn; its walls are no better known by that.
+    drawn = _anywhere(query, plan.as_drawn)
+    if not drawn:
+        return where
+    best = np.array([drawn.pose])
+    _, (pairs, *_), _ = refined(best, query, plan.index, FINE)
+    _, information = adjusted(best[0], pairs, query, plan.index)
+    return replace(drawn, covariance=drawn.covariance + np.linalg.inv(information + WEAK))
 
 
 def _anywhere(query: Query, plan: LineMap) -> Location:

@@ -30,7 +30,7 @@ def read_svg(path: str | os.PathLike[str], limits: Limits) -> Drawn:
         raise error(problem.strerror or "cannot be read") from None
     except (ElementTree.ParseError, ValueError) as problem:
         raise error(f"is no SVG: {problem}") from None
-    layers = {group.get("id"): group for group in root.iter(f"{_NAME}g")}
+    layers = {group.get("id"): list(group) for group in root.iter(f"{_NAME}g")}
     if root.tag != f"{_NAME}svg" or not {"walls", "arcs", "corners"} <= set(layers):
         raise error("is no plan that lineament wrote: in an SVG it looks for its own layers")
     limits.check("walls", len(layers["walls"]) + len(layers["arcs"]), error)
@@ -41,8 +41,7 @@ def read_svg(path: str | os.PathLike[str], limits: Limits) -> Drawn:
         circles = [_circle(row) for row in layers["arcs"]]
     except (KeyError, ValueError, TypeError) as problem:
         raise error(f"is no plan that lineament wrote: {problem!r}") from None
-    is_scanned = layers["walls"].get("data-walls") == "scanned"
-    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0, is_scanned)
+    return Drawn(np.reshape(lines, (-1, 2, 2)), np.reshape(circles, (-1, 3)), 0)
 
 
 def _circle(row: ElementTree.Element) -> list[float]:

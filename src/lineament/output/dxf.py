@@ -11,8 +11,6 @@ from .plans import Plan, PlanWriter
 
 #: Layers and their colours, as numbers of AutoCAD: black or white, red, light red, magenta, grey.
 LAYERS = {"WALLS": 7, "CORNERS": 1, "EDGES": 11, "ARCS": 6, "ELLIPSES": 8}
-#: A custom property, and what it says of walls that scans saw.
-SCANNED = "lineament walls", "scanned"
 #: Name under which each wall has the number of views in which it was seen.
 APPLICATION = "LINEAMENT"
 #: Points are drawn as crosses of this size [m].
@@ -26,8 +24,6 @@ class DxfWriter(PlanWriter):
         drawing = new("R2010", units=units.M)
         drawing.header["$PDMODE"], drawing.header["$PDSIZE"] = CROSS, CROSS_SIZE
         drawing.header.custom_vars.append("lineament", plan.caption)
-        if plan.is_scanned:
-            drawing.header.custom_vars.append(*SCANNED)
         drawing.appids.add(APPLICATION)
         for name, color in LAYERS.items():
             drawing.layers.add(name, color=color)

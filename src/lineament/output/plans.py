@@ -20,12 +20,11 @@ MIN_VIEWS, FEW = 3, 10
 
 
 class Plan(NamedTuple):
-    """What is drawn, how often each segment was seen, a caption, and whether scans saw it."""
+    """What is drawn, how often each of its segments was seen, and a caption."""
 
     markers: Markers
     views: NDArray[np.int64]
     caption: str
-    is_scanned: bool = True
 
 
 class PlanWriter(Writer):
@@ -80,7 +79,7 @@ class PlanWriter(Writer):
         is_map = self._written == 1 and not len(self._first.features.clusters)
         scans = "" if is_map else f" of {count(self._written, 'scan')}"
         caption = f"{' and '.join(found.rsplit(', ', 1))}{scans}{often}"
-        self._draw(self._temporary, Plan(markers, views, caption, self.is_scanned))
+        self._draw(self._temporary, Plan(markers, views, caption))
 
     @abstractmethod
     def _draw(self, temporary: Path, plan: Plan) -> None:

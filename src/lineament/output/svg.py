@@ -16,8 +16,6 @@ from .plans import Plan, PlanWriter
 WIDTH, HEIGHT, FOOT, MARGIN = 400.0, 260.0, 17.0, 10.0
 #: Widths of lines and radius of a corner on paper [mm].
 WALL_LINE, THIN_LINE, CORNER_DOT = 0.45, 0.2, 0.4
-#: What a layer of walls says that scans saw.
-SCANNED = 'data-walls="scanned"'
 #: Scales, and lengths of the bar.
 ROUND = [step * 10.0**power for power in range(-4, 11) for step in (1, 2, 5)]
 
@@ -62,8 +60,6 @@ def _document(plan: Plan) -> Iterator[str]:
         "edges": f'fill="{EDGE_COLOR}"',
         "corners": f'fill="{CORNER_COLOR}"',
     }
-    if plan.is_scanned:
-        inks["walls"] += f" {SCANNED}"
     for name, elements in layers(plan.markers, lambda _, x, y: _circle(x, y, dot), plan.views):
         yield f'<g id="{name}" inkscape:groupmode="layer" inkscape:label="{name}" {inks[name]}>'
         yield from elements

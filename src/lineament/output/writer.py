@@ -44,8 +44,6 @@ class Writer(InTurn, ABC):
     chunk: ClassVar[int] = 1
     #: Whether the format draws the scans, and not only what is found in them.
     needs_scan: ClassVar[bool] = False
-    #: Whether scans saw what is written: a plan says so, as walls that are drawn are known exactly.
-    is_scanned: bool = True
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path

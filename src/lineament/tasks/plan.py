@@ -115,7 +115,5 @@ def describe_plan(path: str | os.PathLike[str], limits: dict[str, int] | None = 
         ("size", f"{wide_walls:.2f} m x {deep_walls:.2f} m"),
         ("corners", f"{len(plan.corners)}"),
         ("columns", f"{len(plan.columns)}"),
-        ("made of", f"scans: walls may be off by {100 * plan.sigma:g} cm" if plan.is_mapped
-                    else "lines that are drawn, taken to be exact"),
     ]  # fmt: skip
     return "\n".join([f"{path}: a plan", *(f"  {name:<8} {value}" for name, value in rows)])
