@@ -1,6 +1,6 @@
 """How often `Judge` is wrong of a localiser that is right, and how soon it notices a kidnapping.
 
-A robot drives through simulated storeys among people, with furniture that the plan does not have,
+A robot drives through simulated storeys among people, with furniture that the map does not have,
 or has elsewhere; another localiser believes in poses as AMCL does, 5 cm and 1° off, each 0.25 m or
 11°, and moves on with the wheels between. Once in two minutes the robot is carried to another
 place, unnoticed by its wheels; 20 s later it is where it is believed to be again. Counted are the
@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from grids import grid_of, viewpoints
 
 import lineament as ln
 from lineament.mapping import LineMap
@@ -66,10 +67,12 @@ def believed(truth: list[Pose], wheels: list[Pose], rng: np.random.Generator) ->
 
 
 def judged(seed: int, sensor: str, rate: float) -> list[Found]:
-    """Drive through one storey, on two plans of it."""
+    """Drive through one storey, on two plans of it: grids of 5 cm, as AMCL has them."""
     storey = office(seed, (40.0, 24.0))
-    walls = LineMap.from_lines(storey.plan.segments, side=1)
-    furnished = LineMap.from_lines(storey.world.segments)
+    at = viewpoints(storey)
+    walls, furnished = (
+        LineMap.from_grid(grid_of(world, at)) for world in (storey.plan, storey.world)
+    )
     return [
         _driven(storey, "walls alone", walls, seed, sensor, rate),
         _driven(_moved(storey, seed), "furniture, a third moved", furnished, seed, sensor, rate),

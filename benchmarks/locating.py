@@ -28,6 +28,7 @@ import lineament as ln
 from lineament.mapping import VERDICTS, LineMap, LocalMap, Query, locate
 from lineament.mapping.evidence import evidence_of
 from lineament.mapping.following import follow
+from lineament.mapping.index import MAPPED
 from lineament.mapping.refine import COARSE, refined
 from lineament.simulation import SENSORS
 from lineament.simulation.buildings import Building, office
@@ -264,6 +265,42 @@ def followed(
     return np.array(rows)
 
 
+def built(seed: int) -> None:
+    """Print how often places are found on drawings from which the building is some centimetres off.
+
+    All walls of one line are off together.
+    """
+    rows: dict[tuple[float, float], list[tuple[bool, bool, float]]] = {}
+    for k in range(seed, seed + 8):
+        lines, rng = storey(k).plan.segments.reshape(-1, 2, 2), np.random.default_rng(k)
+        along = lines[:, 1] - lines[:, 0]
+        normal = abs(along[:, ::-1]) / np.linalg.norm(along, axis=1)[:, None]
+        line = np.column_stack((normal, abs((lines[:, 0] * normal).sum(axis=1)))).round(2)
+        _, line = np.unique(line, axis=0, return_inverse=True)
+        off = rng.standard_normal(line.max() + 1)[line.ravel()]
+        found = places(k, 30)
+        for error in (0.0, 0.01, 0.02, 0.03):
+            drawn = lines + (error * off[:, None] * normal)[:, None]
+            for sigma in (0.0, MAPPED):
+                plan = LineMap.from_lines(drawn, side=1, sigma=sigma)
+                for place in found:
+                    where = locate(place.query, plan)
+                    x, y, turn = np.subtract(where.pose, place.truth)
+                    out = np.array((x, y, math.remainder(turn, 2 * math.pi)))
+                    right = math.hypot(x, y) < RIGHT[0] and abs(out[2]) < RIGHT[1]
+                    nees = out @ np.linalg.solve(where.covariance, out) / 3
+                    rows.setdefault((error, sigma), []).append((bool(where), right, nees))
+    print("| walls off | sigma | places | located, right | false | χ²/3, median |")
+    print("|--:|--:|--:|--:|--:|--:|")
+    for (error, sigma), of in rows.items():
+        located, right, nees = map(np.array, zip(*of, strict=True))
+        print(
+            f"| {100 * error:g} cm | {100 * sigma:g} cm | {len(of)} | "
+            f"{100 * (located & right).mean():.1f} % | {(located & ~right).sum()} | "
+            f"{np.median(nees[located & right]):.2f} |"
+        )
+
+
 def follow_all() -> None:
     """Print how logs are followed: six storeys on four plans, and the arena."""
     found: dict[str, list[np.ndarray]] = {}
@@ -284,7 +321,12 @@ def follow_all() -> None:
         for name, world in zip(
             ("own", "moved", "mirrored", "other"), (*worlds, other), strict=True
         ):
-            found.setdefault(name, []).append(followed(scans, truth, plan_of(world), True))
+            plan = plan_of(world)
+            found.setdefault(name, []).append(followed(scans, truth, plan, True))
+            plan = LineMap(plan.walls, sigma=MAPPED)
+            found.setdefault(f"{name}, sigma={MAPPED:g}", []).append(
+                followed(scans, truth, plan, True)
+            )
         sparse = followed(scans[::3], truth[::3], plan_of(worlds[2]), True)
         found.setdefault("mirrored, a scan each 0.75 m", []).append(sparse)
     print("| plan | scans | located | right | median error | χ²/3 |\n|---|--:|--:|--:|--:|--:|")
@@ -317,7 +359,11 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder where the local maps are kept")
     parser.add_argument("--most", type=int, help="local maps of a storey")
     parser.add_argument("--follow", action="store_true", help="follow logs instead")
+    parser.add_argument("--built", action="store_true", help="places in buildings off their plans")
     options = parser.parse_args()
+    if options.built:
+        built(options.seed)
+        return
     if options.follow:
         follow_all()
         return
