@@ -75,11 +75,11 @@ def judged(seed: int, sensor: str, rate: float) -> list[Found]:
     )
     return [
         _driven(storey, "walls alone", walls, seed, sensor, rate),
-        _driven(_moved(storey, seed), "furniture, a third moved", furnished, seed, sensor, rate),
+        _driven(moved(storey, seed), "furniture, a third moved", furnished, seed, sensor, rate),
     ]
 
 
-def _moved(storey: Building, seed: int, share: float = 1 / 3) -> Building:
+def moved(storey: Building, seed: int, share: float = 1 / 3) -> Building:
     """Return a storey a share of whose furniture stands elsewhere."""
     rng, n = np.random.default_rng([seed, 78]), len(storey.plan.segments)
     new = storey.refurnished(seed + 5000, share).world

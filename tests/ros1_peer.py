@@ -62,6 +62,8 @@ def _fill(message: object, fields: dict) -> None:
     for name, value in fields.items():
         if name == "stamp":
             message.stamp = rospy.Time(value["sec"], value["nanosec"])
+        elif name == "transforms":
+            message.transforms = [_filled("geometry_msgs/TransformStamped", one) for one in value]
         elif isinstance(value, dict):
             _fill(getattr(message, name), value)
         elif name in ("ranges", "intensities") and value and isinstance(value[0], dict):
@@ -70,6 +72,12 @@ def _fill(message: object, fields: dict) -> None:
             setattr(message, name, [LaserEcho(echo["echoes"]) for echo in value])
         else:
             setattr(message, name, value)
+
+
+def _filled(kind: str, fields: dict) -> object:
+    message = get_message_class(kind)()
+    _fill(message, fields)
+    return message
 
 
 def _plain(value: object) -> object:

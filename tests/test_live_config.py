@@ -55,10 +55,8 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"odom_frame": "/map"}, "two of map_frame, odom_frame and base_frame are one, expected"),
         ({"map_frame": "a b"}, f"map_frame is 'a b', {_NAME}"),
         ({"judge": "amcl_pose"}, "judge is 'amcl_pose', expected a map as well"),
-        (
-            {"judge": "a", "map": "b", "log": "c"},
-            "judge is 'a', expected a topic of scans in place",
-        ),
+        ({"judge": "a", "map": "b", "log": "c", "poses": "/d"}, "poses are not used with judge"),
+        ({"judge": "a", "map": "b", "log": "c", "deskew": "poses"}, "poses are not used with jud"),
         ({"deskew": "odom", "log": "a.bag"}, "deskew is 'odom', but a log is played; expected"),
         ({"noise": 10**400}, "0, expected 0 to 1000"),
         ({"noise": float("inf")}, "noise is inf, expected 0 to 1000"),

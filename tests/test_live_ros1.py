@@ -10,8 +10,10 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
-from contextlib import closing
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from importlib.machinery import PathFinder
 from pathlib import Path
 
@@ -28,16 +30,27 @@ from live_driving import (
     received,
     scan_message,
 )
+from robot_driving import (
+    MOUNTING,
+    Moment,
+    driven,
+    link_message,
+    message_of,
+    off,
+    pose_of,
+    written,
+)
 
 import lineament as ln
 from lineament import LineamentError
-from lineament.live import LiveConfig, Pipeline, RosSink
+from lineament.live import LiveConfig, Node, Pipeline, RosSink
 from lineament.live.received import GUESS, MAP, ODOMETRY, RELOCATE
 from lineament.live.received import SCAN as SCANS
 from lineament.live.ros1 import Ros1Node, Ros1Publisher, Ros1Source
 from lineament.output.feature_points import feature_points
 from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Message
+from lineament.scan.poses import compose
 from lineament.tasks.warmup import warm_up
 
 # rospy leaves sockets open, and calls what is deprecated.
@@ -246,6 +259,63 @@ def test_a_map_a_guess_and_a_call_as_map_server_rviz_and_amcl_have_them(node, sc
         assert (came.what, came.read()) == (RELOCATE, None)
     assert not node.ended
     eventually(lambda: not scanner.listeners(guess))
+
+
+def test_a_robot_on_a_plan_is_placed_for_a_genuine_listener(node, peer, topic, tmp_path):
+    """As nav2's predecessor, move_base, has it: by `amcl_pose`, and `map` → `odom` on `/tf`."""
+    links, placed = "tf2_msgs/TFMessage", "geometry_msgs/PoseWithCovarianceStamped"
+    plan = written(tmp_path / "own.dxf", 1)
+    config = LiveConfig(topic=topic, map=plan, namespace=topic)
+    peer.publish("/tf_static", links, False, True)
+    peer.write("/tf_static", link_message(0.0, "base_link", "laser", MOUNTING))
+    peer.publish("/tf", links)
+    peer.publish(topic, SCAN)
+    peer.listen("/tf", links)
+    peer.listen(f"{topic}/amcl_pose", placed)
+    publisher = Ros1Publisher(node)
+    sink = RosSink(publisher, RosMessages("ros1"), config)
+    moments, stopped = iter(driven(1, 150)), threading.Event()
+    with (
+        closing(Ros1Source(node, config)) as source,
+        ThreadPoolExecutor(1) as pool,
+        ExitStack() as stack,
+    ):
+        stack.callback(stopped.set)
+        running = pool.submit(Node(source, Pipeline(config), [sink]).run, stopped.is_set)
+        eventually(lambda: peer.listeners("/tf") > 1 and peer.listeners(topic))
+        links_of_plan: list[dict] = []
+
+        def link() -> bool:
+            moment = next(moments)
+            stamp = moment.scan.stamp
+            peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
+            peer.write(topic, message_of(moment.scan, stamp))
+            came = (one for message in peer.take("/tf") for one in message["transforms"])
+            links_of_plan.extend(one for one in came if one["header"]["frame_id"] == "map")
+            return bool(links_of_plan)
+
+        eventually(link, pause=0.1)
+        pose = heard(peer, f"{topic}/amcl_pose")
+        stopped.set()
+        assert running.result(DEADLINE).total.malformed == 0
+    peer.close()  # Other tests are not to have it as a listener.
+    eventually(lambda: not publisher.listeners("/tf"))
+    (found, *_), placed = links_of_plan, pose["pose"]["pose"]
+    assert (found["header"]["frame_id"], found["child_frame_id"]) == ("map", "odom")
+    moment = at(found, later=1.0)
+    assert off(compose(pose_of(found["transform"]), moment.believed), moment.base)[0] < 0.05
+    assert pose["header"]["frame_id"] == "map"
+    base = pose_of({"translation": placed["position"], "rotation": placed["orientation"]})
+    assert off(base, at(pose).base)[0] < 0.05
+    assert pose["pose"]["covariance"][0] > 0
+
+
+def at(message: dict, later: float = 0.0) -> Moment:
+    """Return the moment that a message is of, or a time before it."""
+    stamp = message["header"]["stamp"]
+    time = stamp["sec"] + stamp["nanosec"] / 1e9 - later
+    (moment,) = (moment for moment in driven(1, 150) if abs(moment.scan.stamp - time) < 1e-6)
+    return moment
 
 
 def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):

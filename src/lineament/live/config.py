@@ -108,7 +108,8 @@ class LiveConfig:
         Whether that transform is published on ``/tf``.
     judge : str, optional
         With a plan, a topic of ``geometry_msgs/PoseWithCovarianceStamped``: the poses of another
-        localiser, which get a verdict each. Then nothing of ours takes their place.
+        localiser, which get a verdict each. Then nothing of ours takes their place. Of a bag that
+        is played, ``/tf`` and the topic of `odometry` are heard as well, as from the robot.
     log : str, optional
         A log that is played in place of a topic.
     log_topic : str, optional
@@ -220,7 +221,7 @@ class LiveConfig:
             raise ValueError(f"dock_shape is {self.dock_shape!r}, expected a dock as well")
         if self.log is None and self.deskew == "poses":
             raise ValueError("deskew is 'poses', which only a log has; expected a topic, or scans")
-        if self.log is not None and self.odometry_topic is not None:
+        if self.log is not None and self.odometry_topic is not None and not self.is_localiser:
             name = "deskew" if self.odometry is None else "odometry"
             raise ValueError(
                 f"{name} is {getattr(self, name)!r}, but a log is played; expected poses or scans"
@@ -229,9 +230,10 @@ class LiveConfig:
             raise ValueError(
                 f"deskew is {self.deskew!r}, and odometry {self.odometry!r}, expected one topic"
             )
-        if self.judge is not None and not self.is_localiser:
-            missing = "map" if self.map is None else "topic of scans in place of a log"
-            raise ValueError(f"judge is {self.judge!r}, expected a {missing} as well")
+        if self.judge is not None and self.map is None and self.mapping is None:
+            raise ValueError(f"judge is {self.judge!r}, expected a map as well")
+        if self.judge is not None and (self.poses is not None or self.deskew == "poses"):
+            raise ValueError("poses are not used with judge; expected odometry, or none for /tf")
         if len({getattr(self, name).strip("/") for name in FRAMES}) < len(FRAMES):
             raise ValueError("two of map_frame, odom_frame and base_frame are one, expected three")
         if self.log is None and self.ros == 0:
@@ -317,9 +319,9 @@ class LiveConfig:
     def is_localiser(self) -> bool:
         """Whether a robot is followed on a plan: its frames, and what it is asked, are listened to.
 
-        A log that is played has poses in their place.
+        A log that is played has poses in their place, but where its localiser is judged.
         """
-        return self.has_map and self.log is None
+        return self.has_map and (self.log is None or self.judge is not None)
 
     @property
     def can_relocate(self) -> bool:

@@ -108,7 +108,7 @@ class PlanTopics:
         """Publish verdicts on ``/diagnostics``."""
         if self._frame is None:
             return
-        for status in _statuses(self._frame, self._config):
+        for status in statuses(self._frame, self._config):
             if is_stale:
                 status = status._replace(level=3, summary="no scans")
             self._publisher.publish(status.message(self._make, self._config, DIAGNOSTICS, time))
@@ -122,7 +122,7 @@ class PlanTopics:
         config, placed, judgement = self._config, frame.placed, frame.judgement
         if judgement is None:
             return
-        *_, status = _statuses(frame, config)
+        *_, status = statuses(frame, config)
         stamp = on_plan.seconds, on_plan.nanoseconds
         if self._is_heard(topic := f"{config.judge_topic}/verdict"):
             self._publisher.publish(status.message(self._make, config, topic, stamp))
@@ -137,10 +137,10 @@ class PlanTopics:
 
 
 def _summaries(frame: Frame, config: LiveConfig) -> list[tuple[int, str]]:
-    return [(status.level, status.summary) for status in _statuses(frame, config)]
+    return [(status.level, status.summary) for status in statuses(frame, config)]
 
 
-def _statuses(frame: Frame, config: LiveConfig) -> list[Status]:
+def statuses(frame: Frame, config: LiveConfig) -> list[Status]:
     """Statuses of our pose, and then of one that is judged."""
     where, placed = frame.where, frame.placed
     if where is None:

@@ -7,9 +7,14 @@ from collections.abc import Callable, Iterator, Sequence
 from heapq import merge as merged
 from typing import Any
 
+from ..errors import LogError
 from ..logs import open_log
+from ..logs.ros import RosLog
+from ..logs.ros_bag import Connection
+from ..rosmsg.poses import TRANSFORMS
+from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
-from .received import MOUNTINGS, Received
+from .received import JUDGED, MOUNTINGS, Received, Wanted
 
 #: Stamps that stand still, go back or leap by more than this are played one `_STEP` apart [s].
 _LEAP, _STEP = 10.0, 0.1
@@ -38,6 +43,8 @@ class ReplaySource:
         Which scans are played.
     merge : sequence of str
         In place of it, the topics of several scanners, with the mountings that the log has.
+    heard : sequence of Wanted
+        What is heard of a bag beside its scans, in its order; mountings before all of them.
     clock : callable
         Returns the time [s].
     **reading
@@ -73,6 +80,7 @@ class ReplaySource:
         loop: bool = False,
         topic: str | None = None,
         merge: Sequence[str] = (),
+        heard: Sequence[Wanted] = (),
         clock: Callable[[], float] = time.monotonic,
         **reading: Any,
     ) -> None:
@@ -81,7 +89,10 @@ class ReplaySource:
         self._logs = [open_log(path, name, **reading) for name in names]
         self._rate, self._loop, self._clock = rate, loop, clock
         # Of several scanners it is to be known where they are, before their scans.
-        self._before = [self._mountings()] if merge else []
+        self._before = [self._mountings()] if merge or heard else []
+        self._heard = {one.topic: one for one in heard if one.what != MOUNTINGS}
+        if heard:
+            self._overhear()
         self._items = self._measured()
         self._next: tuple[str, LaserScan] | None = next(self._items, None)
         # The first scan is due when it is first asked for.
@@ -96,12 +107,12 @@ class ReplaySource:
 
     def receive(self, timeout: float) -> list[Received]:
         """Wait until the next scan is due, up to `timeout` [s]; return those that are."""
-        came, self._before = self._before, []
+        came: list[Received] = []
         if self._read_ahead():
             time.sleep(max(min(self._due - self._clock(), timeout), 0.0))
         now = self._clock()
         while len(came) < _MOST and self._read_ahead() and self._due <= now:
-            came.append(self._take())
+            came, self._before = [*came, *self._before, self._take()], []
             # When there is time, this scan is processed before the next one is read.
             if self._clock() - came[-1].arrived < _PUNCTUAL:
                 break
@@ -122,6 +133,23 @@ class ReplaySource:
     def _mountings(self) -> Received:
         links = self._logs[0].mountings()
         return Received(self._logs[0].name, lambda: links, self._clock(), MOUNTINGS)
+
+    def _overhear(self) -> None:
+        """Let what stands in the bag before a scan come before it."""
+        log, found = self._logs[0], {(topic.name, topic.type) for topic in self._logs[0].contents()}
+        for one in self._heard.values():
+            if one.what == JUDGED and (one.topic, one.kind) not in found:
+                raise LogError(log.name, f"has no {one.kind} on {one.topic!r}, to be judged")
+        assert isinstance(log, RosLog)  # Others have no messages of such types.
+        kinds = {
+            topic: TRANSFORMS if one.kind in TRANSFORMS else (one.kind,)
+            for topic, one in self._heard.items()
+        }
+        log.overhear(kinds, self._hear)
+
+    def _hear(self, connection: Connection, data: Buffer) -> None:
+        one = self._heard[connection.topic]
+        self._before.append(one.received(connection.topic, data, connection.encoding))
 
     def _take(self) -> Received:
         assert self._next is not None

@@ -17,9 +17,10 @@ from .counters import Report
 from .merging import MergingPipeline
 from .node import Node
 from .pipeline import Pipeline
-from .received import Source
+from .received import GUESS, JUDGED, LINKS, MOUNTINGS, ODOMETRY, Source, Wanted, wanted
 from .replay import ReplaySource
 from .sinks import FoxgloveSink, RosSink, Sink
+from .terminal import Terminal
 
 
 def run_live(
@@ -68,7 +69,12 @@ def run_live(
         is_stopped()  # From here on a signal ends a node that runs, and not a start.
         topics = ", ".join(config.rig.topics) if config.merge else config.scan_topic
         write(f"{config.name} finds features on {topics} by {config.method}")
+        terminal = Terminal(write, config)
+        if config.has_map:
+            sinks.append(terminal)
         report = Node(source, pipeline, sinks, write=write, show=show).run(is_stopped)
+        if terminal.summary:
+            write(terminal.summary)
         if config.mapping is not None:
             write("stopped: the map is made of all scans")
             write(pipeline.save())
@@ -108,6 +114,7 @@ def _ends(
             loop=config.loop,
             topic=config.log_topic,
             merge=config.rig.topics if config.merge else (),
+            heard=_heard(config),
             pose_topic=config.poses,
             echo=config.echo,
             ring=config.ring,
@@ -139,6 +146,12 @@ def _ends(
         sinks.append(FoxgloveSink(server, foxglove.FoxgloveMessages(), config))
     assert source is not None  # `LiveConfig` requires a log where there is no ROS.
     return source, sinks
+
+
+def _heard(config: LiveConfig) -> list[Wanted]:
+    """Return what is heard of a bag whose localiser is judged: all that places the robot."""
+    kept = (MOUNTINGS, LINKS, ODOMETRY, GUESS, JUDGED) if config.is_localiser else ()
+    return [one for one in wanted(config) if one.what in kept]
 
 
 def _is_for_foxglove_alone(config: LiveConfig, write: Callable[[str], None]) -> bool:

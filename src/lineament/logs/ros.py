@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import LogError
@@ -44,6 +44,7 @@ class RosLog(Log):
         if not any(name in self.topics for name in self._wanted):
             raise self._no_scans()
         self._pose_finder()
+        self._overheard: Mapping[str, Container[str]] = {}
 
     @abstractmethod
     def _open_bags(self) -> list[Bag]:
@@ -83,6 +84,12 @@ class RosLog(Log):
                     self._fault(LogError(bag.path, f"{STATIC}: {error}"))
         return found
 
+    def overhear(
+        self, topics: Mapping[str, Container[str]], hear: Callable[[Connection, Buffer], None]
+    ) -> None:
+        """While scans are read, call `hear` with messages of such topics and types among them."""
+        self._overheard, self._hear = topics, hear
+
     def _items(self) -> Iterator[tuple[str, LaserScan]]:
         finder = self._pose_finder()
         waiting = finder.finish if finder else tuple
@@ -94,7 +101,7 @@ class RosLog(Log):
         yield from waiting()
 
     def _ready(self, finder: PoseFinder | None) -> Iterator[tuple[str, LaserScan]]:
-        topics = {*self._wanted, *(finder.topics if finder else ())}
+        topics = {*self._wanted, *self._overheard, *(finder.topics if finder else ())}
         numbers: Counter[str] = Counter()
         for bag in self._bags:
             for connection, data in bag.messages(topics, self._fault):
@@ -115,6 +122,8 @@ class RosLog(Log):
         topic, kind = connection.topic, connection.type
         if finder and finder.takes(topic, kind):
             return finder.learn(connection, data)
+        if kind in self._overheard.get(topic, ()):
+            self._hear(connection, data)
         if topic not in self._wanted or kind not in self._decoders:
             return ()
         scan = self._decoders[kind](data, connection.encoding)

@@ -19,6 +19,8 @@ GAP = 0.5
 LATE = 0.2
 #: A clock that is set back by more begins anew [s].
 _SET_BACK = 1.0
+#: Stamps farther apart are of different clocks [s].
+_ANOTHER_CLOCK = 3600.0
 
 
 class Place(NamedTuple):
@@ -102,13 +104,19 @@ class _Link:
         (begin, pose), (end, following) = self._poses[last - 1], self._poses[last]
         is_covered = after > 0 and stamp - end <= LATE and 0 < end - begin <= GAP
         if not is_covered:
-            raise LookupError(
-                f"{name} in {self.parent} is known from {self._poses[0][0]:.3f} to "
-                f"{self._poses[-1][0]:.3f} s, not at {stamp:.3f} s"
-            )
+            raise LookupError(f"{name} in {self.parent} is known only {self._known(stamp)}")
         along = poses_along(twist_between(pose, following, end - begin), [stamp - begin])
         x, y, turn = along[0].tolist()
         return compose(pose, (x, y, math.remainder(turn, 2 * math.pi)))
+
+    def _known(self, stamp: float) -> str:
+        """Say where poses are known instead; without the time, so that a gap is one line."""
+        early, late = self._poses[0][0] - stamp, stamp - self._poses[-1][0]
+        if max(early, late) > _ANOTHER_CLOCK:
+            return "at stamps hours away, by another clock"
+        if early > 0:
+            return "at later stamps"
+        return "at earlier stamps" if late > 0 else f"around a gap of more than {GAP} s"
 
 
 def frame_of(name: str) -> str:

@@ -1,0 +1,177 @@
+"""How soon the localiser of `lineament live --map` notices that it was carried away.
+
+A robot drives through simulated storeys among people, with furniture that the plan does not have,
+or has elsewhere. Each 30 s it is carried to another place of its way, at least 2 m off, unnoticed
+by its wheels, and drives on there. `Localiser` hears its odometry and its scans as in the node.
+Counted are, of each time that it was located rightly before: the seconds until the status is not
+"located" any more, or is so at the new place, and until it is that; and transforms that are
+published after it and are wrong, by 0.3 m or 3°. The robot may have been put down just behind a
+scan: the first scan of the new place counts as one period after it.
+"""
+
+import argparse
+import math
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from judging import PEOPLE, SOON, SPEED, moved
+
+import lineament as ln
+from lineament.live import Frame, LiveConfig
+from lineament.live.localiser import Localiser
+from lineament.live.plan_topics import statuses
+from lineament.live.received import LINKS, MOUNTINGS
+from lineament.mapping import LineMap
+from lineament.rosmsg.poses import StampedPose
+from lineament.scan import LaserScan, Pose
+from lineament.scan.poses import compose, relative
+from lineament.simulation import SENSORS, Building, Wheels, office
+
+#: The robot is carried away each so many seconds, so far at least [m].
+EACH, FAR = 30.0, 2.0
+#: A transform that places the robot so far off is wrong [m, rad].
+WRONG = 0.3, math.radians(3)
+HERE = (0.0, 0.0, 0.0)
+
+
+class Found(NamedTuple):
+    """What is counted of one kidnapping; times are infinite where it did not happen [s]."""
+
+    plan: str
+    noticed: float
+    wrong: int
+    last_wrong: float
+    again: float
+
+
+class Driven(NamedTuple):
+    """A scan, what its wheels say, and where it was taken."""
+
+    scan: LaserScan
+    wheels: Pose
+    truth: Pose
+
+
+def kidnapped(seed: int, sensor: str, rate: float, times: int) -> list[Found]:
+    """Carry a robot away in one storey, on two plans of it."""
+    storey = office(seed, (40.0, 24.0))
+    walls = LineMap.from_lines(storey.plan.segments, side=1)
+    furnished = LineMap.from_lines(storey.world.segments)
+    return [
+        found
+        for name, building, plan in (
+            ("walls alone", storey, walls),
+            ("furniture, a third moved", moved(storey, seed), furnished),
+        )
+        for found in _kidnapped(building, name, plan, seed, sensor, rate, times)
+    ]
+
+
+def _kidnapped(
+    building: Building, name: str, plan: LineMap, seed: int, sensor: str, rate: float, times: int
+) -> Iterator[Found]:
+    options = {"seed": seed, "speed": SPEED, "rate": rate, "wheels": Wheels(), "people": PEOPLE}
+    scans, truth = building.drive(SENSORS[sensor], moving=True, **options)
+    way = [Driven(scan, scan.pose, true) for scan, true in zip(scans, truth, strict=True)]
+    rng, n = np.random.default_rng([seed, 79]), round(EACH * rate)
+    robot, at, was_right = Robot(plan), -1, False
+    for _ in range(times + 1):
+        before, at = way[at].truth, int(rng.integers(len(way) - n))
+        while math.dist(before[:2], way[at].truth[:2]) < FAR:
+            at = int(rng.integers(len(way) - n))
+        noticed = again = math.inf
+        wrong, last_wrong, counts = 0, 0.0, was_right
+        robot.lift(way[at].wheels)
+        for k in range(n):
+            driven = way[at]
+            is_located, sent = robot.see(driven, rate)
+            is_right = sent is not None and not _is_wrong(sent, driven.truth)
+            after = (k + 1) / rate
+            if sent is not None and not is_right:
+                wrong, last_wrong = wrong + 1, after
+            if is_right or not is_located:
+                noticed = min(noticed, after)
+            if is_right and is_located:
+                again = min(again, after)
+            was_right, at = is_located and is_right, at + 1
+        at -= 1
+        if counts:
+            yield Found(name, noticed, wrong, last_wrong, again)
+
+
+def _is_wrong(pose: Pose, truth: Pose) -> bool:
+    x, y, turn = relative(truth, pose)
+    return math.hypot(x, y) > WRONG[0] or abs(turn) > WRONG[1]
+
+
+class Robot:
+    """A localiser, and what it hears of a robot whose wheels do not notice that it is lifted."""
+
+    def __init__(self, plan: LineMap) -> None:
+        extract = ln.Extractor()
+        self._config, self._extract = LiveConfig(map="plan.dxf"), extract
+        self._localiser = Localiser(self._config, plan, extract)
+        self._localiser.hear([StampedPose(0.0, "base_link", "laser", HERE)], MOUNTINGS)
+        self._believed, self._wheels, self._scans = HERE, HERE, 0
+
+    def lift(self, wheels: Pose) -> None:
+        """Put it down where its wheels, had it driven there, would say this."""
+        self._wheels = wheels
+
+    def see(self, driven: Driven, rate: float) -> tuple[bool, Pose | None]:
+        """Drive to the next scan; return the status, and where the transform places the robot."""
+        self._believed = compose(self._believed, relative(self._wheels, driven.wheels))
+        self._wheels, self._scans = driven.wheels, self._scans + 1
+        stamp = 1_000_000_000_000 + round(1e9 * self._scans / rate)
+        scan = driven.scan.with_pose(None).stamped("first", stamp)
+        link = StampedPose(stamp / 1e9, "odom", "base_link", self._believed)
+        self._localiser.hear([link], LINKS)
+        features = self._extract(scan)
+        where, placed, _ = self._localiser(features, scan, scan)
+        status, *_ = statuses(Frame(scan, scan, features, None, where=where), self._config)
+        is_sent = placed is not None and placed.odom is not None
+        sent = compose(placed.odom, self._believed) if is_sent else None
+        return where.verdict == "located" and status.level < 2, sent
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--storeys", type=int, default=20)
+    parser.add_argument("--times", type=int, default=10, help="kidnappings in each, on each plan")
+    parser.add_argument("--seed", type=int, default=7000)
+    parser.add_argument("--sensor", default="lms181")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--rate", type=float, default=5.0, help="scans a second")
+    options = parser.parse_args()
+    drive = partial(kidnapped, sensor=options.sensor, rate=options.rate, times=options.times)
+    seeds = range(options.seed, options.seed + options.storeys)
+    with ProcessPoolExecutor(options.workers) as pool:
+        report([one for found in pool.map(drive, seeds) for one in found])
+
+
+def report(found: list[Found]) -> None:
+    """Print a row for each plan, and one for both."""
+    print(
+        "| plan | kidnapped | noticed within 0.5 s | the last after | no wrong transform "
+        "| one | more | the last after | again: median | 90 % | never |\n"
+        "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"
+    )
+    for name in (*dict.fromkeys(one.plan for one in found), "both"):
+        some = [one for one in found if name in (one.plan, "both")]
+        noticed = np.array([one.noticed for one in some])
+        wrong = np.array([one.wrong for one in some])
+        again = np.array([one.again for one in some])
+        print(
+            f"| {name} | {len(some)} | {(noticed < SOON).sum()} | {noticed.max():.1f} s | "
+            f"{(wrong == 0).sum()} | {(wrong == 1).sum()} | {(wrong > 1).sum()} | "
+            f"{max(one.last_wrong for one in some):.1f} s | {np.median(again):.1f} s | "
+            f"{np.quantile(again, 0.9, method='higher'):.1f} s | {np.isinf(again).sum()} |"
+        )
+
+
+if __name__ == "__main__":
+    main()
