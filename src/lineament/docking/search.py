@@ -12,8 +12,9 @@ from ..scan.poses import compose
 from .fitting import SIGMAS, Beams, Fit, beams_of, fit
 from .shape import Shape, ShapePose
 
-#: Steps in which a shape is looked for around a guess [m, rad]; starts that are fitted.
-_STEP, _TURN, _STARTS = 0.15, math.radians(15), 16
+#: Steps in which a shape is looked for around a guess [m, rad], no wider than a foot of a pallet;
+#: starts that are fitted.
+_STEP, _TURN, _STARTS = 0.1, math.radians(15), 16
 #: Points of a shape that are compared with so many of the scan, none worse than so far off [m].
 _SAMPLES, _POINTS, _WORST = 32, 120, 0.3
 #: Noise where a scan has none that is known.
