@@ -1,12 +1,15 @@
 """Shapes that a robot docks to: where they are, how sure that is, and that nothing else is one."""
 
+import importlib.util
 import math
+from pathlib import Path
 
 import ezdxf
 import numpy as np
 import pytest
 
 import lineament as ln
+from lineament.bounds import line_bound
 from lineament.docking import Shape, ShapeDock, find_shape
 from lineament.docking.fitting import _bracket, beams_of, fit
 from lineament.errors import LineamentError
@@ -122,6 +125,14 @@ def test_the_best_pose_is_not_one_beside_it():
     assert off @ np.linalg.solve(found.covariance, off) / 3 < 2.0
 
 
+@pytest.mark.parametrize("guess", [(2.075, 0.175, 0.1), (2.0, 0.175, 0.1), (2.05, 0.03, 0.1)])
+def test_narrow_feet_are_found_from_between_two_starts(guess):
+    shape, pose = Shape(FRONTS), (2.0, 0.1, 0.1)
+    for seed in range(4):
+        features = seen(shape, pose, np.random.default_rng(seed), sensor="lms361")
+        assert find_shape(features, shape, guess).pose == pytest.approx(pose, abs=0.02)
+
+
 def test_what_is_not_there_is_not_found():
     shape, rng = Shape(RECESS), np.random.default_rng(0)
     assert find_shape(seen(Shape(V), (2.0, 0.0, 0.0), rng), shape, (2.0, 0.0, 0.0)) is None
@@ -202,3 +213,20 @@ def test_a_shape_is_looked_for_anew_where_it_was_said_to_be():
     assert results[0] is None or results[0].pose == pytest.approx(second, abs=0.02)
     assert results[-1].pose == pytest.approx(second, abs=0.02)
     assert compose(here, inverse(here)) == (0.0, 0.0, 0.0)
+
+
+def test_the_bounds_of_the_benchmark_are_those_of_a_wall_and_its_ends():
+    path = Path(__file__).parents[1] / "benchmarks" / "docking.py"
+    spec = importlib.util.spec_from_file_location("benchmark_docking", path)
+    benchmark = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmark)
+    sensor = SENSORS["utm30lx"]
+    by_range, with_ends = benchmark.bounds(Shape([[(0, -0.4), (0, 0.4)]]), (2.0, 0.0, 0.0), sensor)
+    beams = sensor.angles[np.abs(np.tan(sensor.angles)) < 0.2]
+    offset, turn = np.diag(line_bound(beams, (2.0, 0.0), math.pi / 2, sensor.noise).covariance)
+    assert by_range == pytest.approx((offset, 1e9, turn), rel=1e-4)
+    # The bearing of (2, ±0.4) changes by ∓0.4/ρ² with x, 2/ρ² with y and 0.4²/ρ² with the turn.
+    square, weight = 2**2 + 0.4**2, 12 / sensor.angle_increment**2
+    x = 1 / (1 / offset + 2 * weight * (0.4 / square) ** 2)
+    y = 1 / (2 * weight * (2 / square) ** 2) + (0.4**2 / 2) ** 2 * turn
+    assert with_ends == pytest.approx((x, y, turn), rel=1e-4)
