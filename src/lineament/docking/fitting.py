@@ -2,7 +2,9 @@
 
 A beam measures the range to a piece of the shape, with the noise of ranges. Where the shape ends
 alone, and the next beam passes behind, the bearing of that end is known to the spacing of beams:
-this is what shows where a straight piece, or a row of feet, begins.
+this is what shows where a straight piece, or a row of feet, begins. A beam has a width, too. Where
+the end splits it, its range may lie between both depths: then the end is at that beam's bearing, to
+half its width, for which half a spacing is taken.
 """
 
 import math
@@ -16,7 +18,7 @@ from .shape import Shape
 
 #: Ranges are taken within so much of the shape, from a first guess on [m]; then within so many σ.
 _GATES = 0.3, 0.15, 0.08, 0.04
-_SIGMAS, _FINE = 3.5, 6
+SIGMAS, _FINE = 3.5, 6
 #: A beam that meets a piece at a smaller sine says little of it.
 _GRAZING = 0.12
 #: Of a piece that ends alone so much is left out [m].
@@ -25,6 +27,8 @@ _END = 0.01
 _LONGEST = 0.2
 #: A beam past an end is so much behind it [m]; an end is looked for so near to where it should be.
 _BEHIND, _AROUND = 0.06, 0.08
+#: A beam that is less far behind it than this share of what the next one is, is split by an end.
+_SPLIT = 0.9
 
 
 class Beams(NamedTuple):
@@ -37,7 +41,7 @@ class Beams(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """A pose, the information on it (3, 3), χ² a degree of freedom, and counts of beams.
+    """A pose, the information on it (3, 3), χ², its degrees of freedom, and counts of beams.
 
     Beams that reach the shape; that pass through it, as it stands; and that end before it.
     """
@@ -45,6 +49,7 @@ class Fit(NamedTuple):
     pose: Pose
     information: Array
     chi2: float
+    freedom: int
     reached: int
     through: int
     short: int
@@ -76,7 +81,7 @@ def _step(beams: Beams, shape: Shape, pose: Pose, gate: float) -> Fit | None:
     expected, which = _cast(beams, pieces, shape.free)
     meets = which >= 0
     off = np.where(meets, beams.ranges - np.where(meets, expected, 0.0), np.inf)
-    limit = np.maximum(_SIGMAS * np.sqrt(beams.variances), gate)
+    limit = np.maximum(SIGMAS * np.sqrt(beams.variances), gate)
     reached = meets & (np.abs(off) <= limit)
     if reached.sum() < 5:
         return None
@@ -98,9 +103,22 @@ def _step(beams: Beams, shape: Shape, pose: Pose, gate: float) -> Fit | None:
     damped = information + np.eye(3) / _LONGEST**2
     x, y, turn = np.linalg.solve(damped, (jacobian.T * weights) @ residuals).tolist()
     moved = pose[0] + x, pose[1] + y, math.remainder(pose[2] + turn, 2 * math.pi)
-    chi2 = float((weights * residuals**2).sum() / max(len(residuals) - 3, 1))
-    through, short = meets & (off > limit), meets & (off < -limit)
-    return Fit(moved, information, chi2, int(reached.sum()), int(through.sum()), int(short.sum()))
+    chi2, freedom = float((weights * residuals**2).sum()), max(len(residuals) - 3, 1)
+    through, short = meets & (off > limit) & ~_split(beams, expected), meets & (off < -limit)
+    counts = (int(which.sum()) for which in (reached, through, short))
+    return Fit(moved, information, chi2, freedom, *counts)
+
+
+def _split(beams: Beams, expected: Array) -> NDArray[np.bool_]:
+    """Which beams end between the shape and what the next one meets, past its outline."""
+    is_split = np.zeros(len(expected), np.bool_)
+    for edge, beyond in ((slice(1, None), slice(-1)), (slice(-1), slice(1, None))):
+        behind = np.where(np.isinf(expected[beyond]), beams.ranges[beyond], 0.0)
+        nearest = expected[edge]
+        with np.errstate(invalid="ignore"):
+            is_less = beams.ranges[edge] - nearest < _SPLIT * (behind - nearest)
+        is_split[edge] |= is_less & np.isfinite(behind)
+    return is_split
 
 
 def _normals(pieces: Array) -> Array:
@@ -159,12 +177,15 @@ def _bracket(beams: Beams, place: Array, other: Array, normal: Array) -> tuple[f
     near = near[np.argsort(away[near], kind="stable")]
     line = (normal @ place) / (beams.along[near] @ normal)
     off = beams.ranges[near] - line
-    limit = np.maximum(_SIGMAS * np.sqrt(beams.variances[near]), 0.01)
+    limit = np.maximum(SIGMAS * np.sqrt(beams.variances[near]), 0.01)
     on = np.abs(off) <= limit
     if not on.any() or on[-1]:
         return None
     last = int(np.flatnonzero(on)[-1])
     if on[: last + 1].mean() < 0.5 or off[last + 1] < _BEHIND:
         return None  # what is before it hides the end, or nobody knows where it is
-    inside, outside = side * away[near[[last, last + 1]]]
-    return bearing + float(inside), bearing + float(outside)
+    inside, outside = away[near[[last, last + 1]]]
+    beyond = off[last + 2] if last + 2 < len(near) else np.inf
+    if np.isfinite(beyond) and off[last + 1] < _SPLIT * beyond:
+        inside, outside = (inside + outside) / 2, (3 * outside - inside) / 2
+    return bearing + float(side * inside), bearing + float(side * outside)

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from ..features import Features
 from ..scan import Array, LaserScan, Pose, RangeNoise
-from .fitting import Beams, Fit, beams_of, fit
+from ..scan.poses import compose
+from .fitting import SIGMAS, Beams, Fit, beams_of, fit
 from .shape import Shape, ShapePose
 
-#: Steps in which a shape is looked for around a guess [m, rad]; starts that are fitted.
-_STEP, _TURN, _STARTS = 0.15, math.radians(15), 16
+#: Steps in which a shape is looked for around a guess [m, rad], no wider than a foot of a pallet;
+#: starts that are fitted.
+_STEP, _TURN, _STARTS = 0.1, math.radians(15), 16
 #: Points of a shape that are compared with so many of the scan, none worse than so far off [m].
 _SAMPLES, _POINTS, _WORST = 32, 120, 0.3
 #: Noise where a scan has none that is known.
@@ -21,6 +23,10 @@ _USUAL = RangeNoise(sigma=0.01)
 LEAST_SEEN, MOST_THROUGH = 0.5, 0.1
 #: Its pose is no worse known [m, rad]; χ² a degree of freedom is no larger.
 WORST, WORST_TURN, WORST_CHI2 = 0.05, math.radians(5), 4.0
+#: χ² is beyond chance by so many of its deviations.
+_CHANCE = 2.0
+#: A fit of few beams may stop beside the best: it is tried again from so far off [m, m, rad].
+_ASIDE = [(0.0, y, turn) for y in (-0.02, 0.02) for turn in (-0.03, 0.03)]
 #: Another pose so far off [m, rad] that meets so many of the beams makes it ambiguous.
 _APART, _AS_MANY = (0.08, math.radians(10)), 0.8
 
@@ -73,10 +79,15 @@ def find_shape(
     if not good:
         return None
     best, *rest = good
+    again = (fit(beams, shape, compose(best.pose, aside)) for aside in _ASIDE)
+    best = max((one for one in (best, *again) if one is not None and _is_seen(one)), key=_score)
     if any(_is_other(best, one) and _score(one) > _AS_MANY * _score(best) for one in rest):
         return None
+    # By chance χ² exceeds 1 in half of the scans: to grow by that makes it too large on average.
+    mean = best.chi2 / best.freedom
+    growth = mean if mean > 1 + _CHANCE * math.sqrt(2 / best.freedom) else 1.0
     # A direction that nothing shows is as good as unknown.
-    covariance = np.linalg.inv(best.information + 1e-3 * np.eye(3)) * max(best.chi2, 1.0)
+    covariance = np.linalg.inv(best.information + 1e-3 * np.eye(3)) * growth
     place, turn = np.linalg.eigvalsh(covariance[:2, :2])[1], covariance[2, 2]
     if place > WORST**2 or turn > WORST_TURN**2:
         return None
@@ -138,12 +149,13 @@ def _distance(points: Array, samples: Array, pose: Array) -> float:
 
 
 def _score(one: Fit) -> float:
-    return one.reached - 2.0 * one.through
+    """Beams that reach it, each less by its share of the largest χ² at which it would."""
+    return one.reached - one.chi2 / SIGMAS**2 - 2.0 * one.through
 
 
 def _is_seen(one: Fit) -> bool:
     total = one.reached + one.short + one.through
-    is_solid = one.through <= MOST_THROUGH * total and one.chi2 <= WORST_CHI2
+    is_solid = one.through <= MOST_THROUGH * total and one.chi2 <= WORST_CHI2 * one.freedom
     return is_solid and one.reached >= LEAST_SEEN * total
 
 
