@@ -18,6 +18,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from grids import grid_of, viewpoints
 from judging import PEOPLE, SOON, SPEED, moved
 
 import lineament as ln
@@ -57,10 +58,12 @@ class Driven(NamedTuple):
 
 
 def kidnapped(seed: int, sensor: str, rate: float, times: int) -> list[Found]:
-    """Carry a robot away in one storey, on two plans of it."""
+    """Carry a robot away in one storey, on two plans of it: grids of 5 cm, as of robots."""
     storey = office(seed, (40.0, 24.0))
-    walls = LineMap.from_lines(storey.plan.segments, side=1)
-    furnished = LineMap.from_lines(storey.world.segments)
+    at = viewpoints(storey)
+    walls, furnished = (
+        LineMap.from_grid(grid_of(world, at)) for world in (storey.plan, storey.world)
+    )
     return [
         found
         for name, building, plan in (

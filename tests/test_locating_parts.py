@@ -307,15 +307,10 @@ def test_looks_that_contradict_the_plan(monkeypatch, looks, known):
     assert [bool(where) for where in wheres] == known
 
 
-def test_a_guess_that_somebody_says_is_as_likely_as_without_it(monkeypatch):
-    """Chance has few poses to choose from near it: what it is better than by that does not count.
-
-    Two deviations of 0.5 m and 10° are 9 poses along x and y, and 9 of the turn; of the plan, of
-    7 m by 5 m, 97 places and 30 turns.
-    """
-    saved = math.log(35 / 0.36 * 30 / (9 * 9 * 9))
+def test_a_guess_that_somebody_says_is_as_sure_as_on_a_drawing(monkeypatch):
+    """Also on a map, where what is looked for everywhere is only a hundred times likelier."""
     scan, guessed = next(scans_on([0.0])), 3
-    for odds, is_known in ((saved + SURELY + 0.1, True), (saved + SURELY - 0.1, False)):
+    for odds, is_known in ((SURELY + 0.1, True), (SURELY - 0.1, False)):
         looks = []
 
         def answer(*given, of=odds, looks=looks):
@@ -323,13 +318,28 @@ def test_a_guess_that_somebody_says_is_as_likely_as_without_it(monkeypatch):
             return location(odds=of) if looks[-1] else location(LOST, -5.0)
 
         monkeypatch.setattr("lineament.mapping.following.locate", answer)
-        found, extract = Follower(plan_of(RING)), Extractor()
+        found, extract = Follower(LineMap(plan_of(RING).walls, sigma=0.045)), Extractor()
         found.suppose((0.1, 0.0, 0.0))
         for k in range(5):
             where = found(extract(scan.stamped("first", int(1.1e9 * k))))
             assert bool(where) == is_known
         expected = 5 if is_known else guessed
         assert sum(looks) == expected
+
+
+@pytest.mark.parametrize(("sigma", "least"), [(0.0, 0.0), (0.045, -2.0)])
+def test_a_scan_that_chance_explains_as_well_is_not_of_the_place(monkeypatch, sigma, least):
+    found, extract = Follower(LineMap(plan_of(RING).walls, sigma=sigma)), Extractor()
+    scan = next(scans_on([0.0]))
+    monkeypatch.setattr("lineament.mapping.following.locate", lambda *_: location())
+    for odds, shares, is_known in (
+        (least + 0.1, (0.5, 0.5, 0.0), True),
+        (least - 0.1, (0.5, 0.5, 0.0), False),
+        (50.0, (0.5, 0.5, 0.0), True),
+    ):
+        rows = np.array([(odds, *shares)])
+        monkeypatch.setattr("lineament.mapping.following.evidence_of", lambda *_, of=rows: of)
+        assert bool(found(extract(scan))) == is_known
 
 
 @pytest.mark.parametrize(

@@ -16,21 +16,10 @@ from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
-from .evidence import Evidence, evidence_of, over_chance
+from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
-from .locate import (
-    GUESS,
-    LOCATED,
-    LOST,
-    SURE,
-    SURE_ON_MAP,
-    UNKNOWN,
-    UNOBSERVED,
-    Location,
-    favour,
-    locate,
-)
+from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
 STEP, TURN, PERIOD = 0.5, 0.26, 1.0
@@ -43,9 +32,10 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: So many looks at the plan that say that the sensor is not there are too many; each that says
 #: otherwise takes back a part of one.
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
-#: A scan that is contradicted by a larger share of its beams is not where the pose says: on a
-#: drawing; on a map, through whose walls more beams pass where the pose is right.
-DENIED, DENIED_ON_MAP = 0.12, 0.3
+#: A scan that is contradicted by a larger share of its beams is not where the pose says, nor is one
+#: that is less likely than by chance [nats]: on a drawing; on a map, through whose walls more beams
+#: pass where the pose is right.
+DENIED, DENIED_ON_MAP = (0.12, 0.0), (0.3, -2.0)
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -130,7 +120,7 @@ class Follower(InTurn):
 
     def __init__(self, plan: LineMap, way: float = 5.0) -> None:
         self.plan, self.way = plan, way
-        self._most = DENIED_ON_MAP if plan.is_mapped else DENIED
+        self._most, self._least = DENIED_ON_MAP if plan.is_mapped else DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
         self._restart()
@@ -201,12 +191,11 @@ class Follower(InTurn):
         location = None
         is_due = self._since > STEP or self._turned > TURN
         is_due |= features.stamp - self._looked > PERIOD
-        if is_due or (self.is_known and evidence.contradicted > self._most):
+        if is_due or self._is_denied(evidence):
             location = self._look(blurred)
             self._since, self._turned, self._looked = 0.0, 0.0, features.stamp
             evidence = self._judge(features)
-        is_wrong = self.is_known and evidence.contradicted > self._most
-        verdict = LOST if is_wrong else self._verdict
+        verdict = LOST if self._is_denied(evidence) else self._verdict
         return Whereabouts(verdict, self._pose, self._covariance + blurred, evidence, location)
 
     def _is_torn(self, stamp: float, odometry: Pose | None) -> bool:
@@ -240,19 +229,20 @@ class Follower(InTurn):
         beams = thinned(beams_of(features))
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
-        odds, explained, short, contradicted = found[0].tolist()
-        if self.plan.is_mapped:
-            odds = over_chance((explained, short, contradicted), len(beams))
-        return Evidence(odds, explained, short, contradicted, len(beams))
+        return Evidence(*found[0].tolist(), len(beams))
+
+    def _is_denied(self, evidence: Evidence) -> bool:
+        """Whether a scan is not of where the sensor is believed to be."""
+        is_doubtful = evidence.log_odds < self._least or evidence.contradicted > self._most
+        return self.is_known and is_doubtful
 
     def _look(self, blurred: Array) -> Location:
         """Look for what was seen on the plan: near the pose if it is known, or everywhere."""
         if not self.is_known and self._guessed:
             self._guessed -= 1
             near = locate(self._local, self.plan, self._pose, self._covariance)
-            # Who says where it is may be wrong: it is to be as sure as if nobody had.
-            odds = near.evidence.log_odds - favour(self._covariance, self.plan)
-            return self._found(near, blurred) if odds > SURE else near
+            # Who says where it is may be wrong: on a map, it is to be as sure as on a drawing.
+            return self._found(near, blurred) if near.evidence.log_odds > SURE else near
         if not self.is_known:
             found = locate(self._local, self.plan)
             self._verdict, self._pose = found.verdict, found.pose
@@ -262,7 +252,7 @@ class Follower(InTurn):
         found = locate(self._local.query(SEEN), self.plan, self._pose, self._covariance)
         # It takes more to leave a place than to believe it at first.
         odds, contradicted = found.evidence.log_odds, found.evidence.contradicted
-        least = SURE_ON_MAP if self.plan.is_mapped else SURE
+        least = 0.0 if self.plan.is_mapped else SURE
         is_missed = found.verdict == LOST and (odds < least or contradicted > self._most)
         self._missed += 1.0 if is_missed else -min(TAKEN_BACK, self._missed)
         return self._found(found, blurred)

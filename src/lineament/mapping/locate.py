@@ -200,23 +200,13 @@ def _tried(anchors: Array, query: Query, plan: LineMap) -> Array:
 def _near(guess: Pose, covariance: ArrayLike | None, query: Query, plan: LineMap) -> Array:
     """Poses within 2 σ of a guess; where those are too many, those within 4 σ that have votes."""
     spread = GUESS if covariance is None else covariance_of_pose(covariance)
-    reach, counts = _reach(spread)
-    if np.prod(counts) <= TRIED:
-        steps = [np.linspace(-d, d, int(n)) for d, n in zip(reach, counts, strict=True)]
+    reach = 2 * np.sqrt(np.diag(spread))
+    counts = 2 * np.ceil(reach / (*[BOX / 2] * 2, TURN / 2)).astype(np.int64) + 1
+    if np.prod(counts.astype(float)) <= TRIED:
+        steps = [np.linspace(-d, d, n) for d, n in zip(reach, counts, strict=True)]
         return np.asarray(guess + np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 3))
     tried = _tried(query.anchors, query, plan)
     return np.vstack((guess, tried[squares_off(tried, guess, spread) < 16.0]))
-
-
-def _reach(covariance: Array) -> tuple[Array, Array]:
-    """Return 2 σ of a guess [m, m, rad], and how many poses are tried along each."""
-    reach = 2 * np.sqrt(np.diag(covariance))
-    return reach, 2 * np.ceil(reach / (BOX / 2, BOX / 2, TURN / 2)) + 1
-
-
-def favour(covariance: Array, plan: LineMap) -> float:
-    """Return the log-odds that a guess is given beside any other pose on a plan [nats]."""
-    return max(math.log(poses_on(plan) / float(np.prod(_reach(covariance)[1]))), 0.0)
 
 
 def squares_off(poses: Array, guess: Pose, covariance: Array) -> Array:
@@ -277,10 +267,8 @@ def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float
     every = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     is_lost = every[0].log_odds < SURE or every[0].contradicted > MOST_CONTRADICTED
     if plan.is_mapped:
-        # Near a guess, chance has fewer poses to choose the best from than on the whole map.
-        fewer = max(math.log(max(poses_on(plan), 1.0)) - chance, 0.0)
         shares = found[:, 1:].tolist()
-        every = [Evidence(over_chance((a, b, c), n) + fewer, a, b, c, n) for a, b, c in shares]
+        every = [Evidence(over_chance((a, b, c), n), a, b, c, n) for a, b, c in shares]
         is_lost = every[0].log_odds < SURE_ON_MAP
     first, *rest = every
     if is_lost:
