@@ -229,7 +229,8 @@ class Follower(InTurn):
         beams = thinned(beams_of(features))
         spread = min(math.hypot(_TIGHT, self._unsure), UNSURE)
         found = evidence_of(np.array([self._pose]), beams, self.plan.index, spread)
-        return Evidence(*found[0].tolist(), len(beams))
+        odds, explained, short, contradicted = found[0].tolist()
+        return Evidence(odds, explained, short, contradicted, len(beams))
 
     def _is_denied(self, evidence: Evidence) -> bool:
         """Whether a scan is not of where the sensor is believed to be."""
