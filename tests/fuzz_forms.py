@@ -29,7 +29,7 @@ from lineament.mapping import VERDICTS, LineMap
 from lineament.mapping.evidence import Evidence
 from lineament.mapping.following import Whereabouts
 from lineament.scan.poses import compose
-from lineament.tasks.locate import _write_table
+from lineament.tasks.locate import _table_written
 from lineament.tasks.mapping import tum_written
 
 THREADS = 4
@@ -302,7 +302,8 @@ class Results(Target):
         found = list(zip(stamps, places, strict=True))
         if not found:  # which is an error before
             return f"{ending}: nothing"
-        _write_table(path, found, is_csv=ending == ".csv")
+        with _table_written(path, found, is_csv=ending == ".csv"):
+            pass
         reading = pyarrow.csv.read_csv if ending == ".csv" else pyarrow.parquet.read_table
         rows = reading(path).to_pylist()
         for row, stamp, place in zip(rows, stamps, places, strict=True):
