@@ -23,6 +23,7 @@ from lineament.mapping.locate import (
     _mixture,
     _near,
     distinct,
+    located_near,
     squares_off,
 )
 from lineament.mapping.refine import adjusted
@@ -157,6 +158,20 @@ def test_what_hardly_passes_one_limit_has_to_pass_the_other_by_more(monkeypatch,
         assert ahead > (LEAD if is_mapped else 3.0)
         assert beside_the_mirror_image(monkeypatch, plan, share, ahead + 0.1, odds) == LOCATED
         assert beside_the_mirror_image(monkeypatch, plan, share, ahead - 0.1, odds) == AMBIGUOUS
+
+
+def test_a_prior_favours_the_poses_near_it_on_a_map():
+    """Of a graph, not of a claim: by the poses that chance does not have. On a drawing always."""
+    mapped, query = LineMap(PLAN.walls, sigma=MAPPED), query_at(POSE, PLAN)
+    covariance = np.diag((0.3, 0.3, 0.1)) ** 2
+    tried = len(_near(POSE, covariance, query, PLAN))
+    room = 7.0 * 5.0 / BOX**2 * 2 * math.pi / TURN
+    for plan, favour in ((mapped, math.log(room / tried)), (PLAN, 0.0)):
+        claim = locate(query, plan, POSE, covariance)
+        prior = located_near(query, plan, POSE, covariance, is_prior=True)
+        off = prior.evidence.log_odds - claim.evidence.log_odds
+        assert off == pytest.approx(favour)
+        assert prior.pose == claim.pose
 
 
 def test_a_map_may_be_as_exact_as_a_drawing(monkeypatch):

@@ -146,11 +146,7 @@ def locate(
     elif isinstance(query, Features):
         query = query_of_scan(query, scan)
     if guess is not None:
-        tried = _near(guess, covariance, query, plan)
-        poses, found = _searched(tried, query, plan)
-        if not len(poses):
-            return Location(LOST, guess, UNKNOWN, _NOTHING)
-        return _judged(poses, found, query, plan, len(tried))
+        return located_near(query, plan, guess, covariance)
     where = _anywhere(query, plan)
     if where or not plan.is_mapped:
         return where
@@ -162,6 +158,28 @@ def locate(
     _, (pairs, *_), _ = refined(best, query, plan.index, FINE)
     _, information = adjusted(best[0], pairs, query, plan.index)
     return replace(drawn, covariance=drawn.covariance + np.linalg.inv(information + WEAK))
+
+
+def located_near(
+    query: Query,
+    plan: LineMap,
+    guess: Pose,
+    covariance: ArrayLike | None = None,
+    *,
+    is_prior: bool = False,
+) -> Location:
+    """Look for what was seen near a guess, as `locate` does.
+
+    If the guess is a prior, as of a graph that knows how far its poses are off, chance has only the
+    poses near it to choose from, also on a map. It has all where somebody only says where it is, or
+    the sensor may have been carried away.
+    """
+    tried = _near(guess, covariance, query, plan)
+    poses, found = _searched(tried, query, plan)
+    if not len(poses):
+        return Location(LOST, guess, UNKNOWN, _NOTHING)
+    favour = max(math.log(max(poses_on(plan), 1.0) / len(tried)), 0.0) if is_prior else 0.0
+    return _judged(poses, found, query, plan, len(tried), favour)
 
 
 def _anywhere(query: Query, plan: LineMap) -> Location:
@@ -260,15 +278,17 @@ def distinct(
     return chosen[: choose(np.ascontiguousarray(poses), order, *apart, chosen)]
 
 
-def _judged(poses: Array, found: Array, query: Query, plan: LineMap, room: float) -> Location:
-    """Give the verdict on the best of some poses."""
+def _judged(
+    poses: Array, found: Array, query: Query, plan: LineMap, room: float, favour: float = 0.0
+) -> Location:
+    """Give the verdict on the best of some poses, which a guess favours by so much [nats]."""
     (refit, *_), (pairs, *_), (information, *_) = refined(poses[:1], query, plan.index, FINE)
     chance, n = math.log(max(room, 1.0)), len(query.beams)
     every = [Evidence(odds - chance, a, b, c, n) for odds, a, b, c in found.tolist()]
     is_lost = every[0].log_odds < SURE or every[0].contradicted > MOST_CONTRADICTED
     if plan.is_mapped:
         shares = found[:, 1:].tolist()
-        every = [Evidence(over_chance((a, b, c), n), a, b, c, n) for a, b, c in shares]
+        every = [Evidence(over_chance((a, b, c), n) + favour, a, b, c, n) for a, b, c in shares]
         is_lost = every[0].log_odds < SURE_ON_MAP
     first, *rest = every
     if is_lost:

@@ -14,7 +14,7 @@ from .adjust import edges_of
 from .drive_map import KeyFrame
 from .line_map import LineMap
 from .local_map import Query, beams_of, moved_beams, thinned
-from .locate import locate
+from .locate import located_near
 
 #: What is looked for is of this way before a key frame; where, of this way around another [m].
 _QUERY, _PLAN = 5.0, 5.0
@@ -89,7 +89,7 @@ class Survey:
                     plans[j] = LineMap(walls) if len(walls) > 3 else None
                 if (plan := plans[j]) is not None:
                     guess = relative(self.pose(j), self.pose(q))
-                    where = locate(query, plan, guess, covariance)
+                    where = located_near(query, plan, guess, covariance, is_prior=True)
                     if where:
                         ends.append((j, q))
                         motions.append(where.pose)
