@@ -7,8 +7,9 @@ place, unnoticed by its wheels; 20 s later it is where it is believed to be agai
 seconds until the verdict is not "right", and until it is "wrong"; and each time that a pose that is
 right is called wrong, apart from the 5 s after the robot comes back.
 
-With ``--into FILE`` each storey is a line of a file: a run that is ended goes on where it was, runs
-with other seeds can be put into one file, and ``--hours 0`` shows what is in it.
+``--real`` judges poses of real logs instead. With ``--into FILE`` each storey is a line of a file: a
+run that is ended goes on where it was, runs with other seeds can be put into one file, and
+``--hours 0`` shows what is in it.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import json
 import math
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -25,9 +27,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from evidence import DATA, LOGS, mapped
 from grids import grid_of, viewpoints
 
 import lineament as ln
+from lineament.logs import open_log
 from lineament.mapping import LineMap
 from lineament.mapping.following import Follower
 from lineament.mapping.judging import RIGHT, WRONG, Judge
@@ -133,6 +137,34 @@ def _driven(
     return Found(name, seconds, right, alarms, alarmed, not_right, wrong)
 
 
+def real() -> None:
+    """Judge poses of real scans on the map of every other one: right ones, and of a robot carried.
+
+    Of each 125 scans the last 25 are believed to be where the 400th later one was taken, and to go
+    on from there as the robot does.
+    """
+    for name in ("ACES", "Intel lab"):
+        scans = sorted(open_log(DATA / LOGS[name]), key=lambda scan: scan.stamp)
+        plan, at = mapped(scans[::2])
+        follower, judge, extract = Follower(plan), Judge(plan), ln.Extractor()
+        rng, there, counts = np.random.default_rng(0), len(at), {False: Counter(), True: Counter()}
+        for k, scan in enumerate(scans[: 2 * there - 1]):
+            true = compose(at[k // 2], relative(scans[k - k % 2].pose, scan.pose))
+            if k % 125 < 100:
+                belief = compose(true, tuple(rng.normal(0, ERROR)))
+            elif k % 125 == 100:
+                belief = at[(k + 400) % (2 * there) // 2]
+            else:
+                belief = compose(belief, relative(scans[k - 1].pose, scan.pose))
+            features = extract(scan)
+            verdict = judge(features, belief, follower(features, scan.pose)).verdict
+            is_carried = k % 125 >= 100
+            is_off = math.hypot(*relative(belief, true)[:2]) > 1.0
+            if is_off == is_carried and k % 125 > 5:
+                counts[is_carried][verdict] += 1
+        print(f"{name}: right {dict(counts[False])}, carried {dict(counts[True])}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0, help="of driving, at least")
@@ -141,7 +173,11 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--rate", type=float, default=5.0, help="scans a second")
     parser.add_argument("--into", type=Path, help="file of what was found, which goes on")
+    parser.add_argument("--real", action="store_true", help="judge poses of real logs instead")
     options = parser.parse_args()
+    if options.real:
+        real()
+        return
     kept = options.into.read_text().splitlines() if options.into and options.into.exists() else []
     done = {tuple(key): [Found(*one) for one in found] for key, found in map(json.loads, kept)}
     about = options.sensor, options.rate
