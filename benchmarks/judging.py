@@ -7,8 +7,8 @@ place, unnoticed by its wheels; 20 s later it is where it is believed to be agai
 seconds until the verdict is not "right", and until it is "wrong"; and each time that a pose that is
 right is called wrong, apart from the 5 s after the robot comes back.
 
-``--real`` judges poses of real logs instead. With ``--into FILE`` each storey is a line of a file: a
-run that is ended goes on where it was, runs with other seeds can be put into one file, and
+``--real`` judges poses of real logs instead. With ``--into FILE`` each storey is a line of a file:
+a run that is ended goes on where it was, runs with other seeds can be put into one file, and
 ``--hours 0`` shows what is in it.
 """
 
