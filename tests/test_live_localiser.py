@@ -348,6 +348,21 @@ def test_frames_move_at_constant_velocity_between_poses_and_a_little_after():
         frames.find("odom", "base", 3.3)
 
 
+def test_odometry_that_begins_anew_is_not_a_way():
+    """Between its last pose and the first one after it, and behind that alone, nothing is known."""
+    frames = Frames()
+    for stamp, x in ((1.0, 0.0), (1.1, 0.9), (1.2, 9.0), (1.3, 9.1)):
+        frames.add(StampedPose(stamp, "odom", "base", (x, 0.0, 0.0)))
+        if x == 9.0:
+            with pytest.raises(LookupError, match="base in odom jumps"):
+                frames.find("odom", "base", 1.25)
+    assert frames.find("odom", "base", 1.05).pose[0] == pytest.approx(0.45)
+    with pytest.raises(LookupError, match="base in odom jumps"):
+        frames.find("odom", "base", 1.15)
+    assert frames.find("odom", "base", 1.2).pose[0] == 9.0
+    assert frames.find("odom", "base", 1.25).pose[0] == pytest.approx(9.05)
+
+
 def test_a_tree_that_is_a_ring_or_leads_elsewhere_is_refused():
     frames = Frames()
     for parent, child in (("a", "b"), ("b", "a"), ("c", "d")):

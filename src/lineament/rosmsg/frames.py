@@ -17,6 +17,8 @@ _MOST_POSES = 1000
 GAP = 0.5
 #: So long after the last pose, the frame goes on as between the last two [s].
 LATE = 0.2
+#: No robot goes faster: its odometry has begun anew [m/s].
+FASTEST = 10.0
 #: A clock that is set back by more begins anew [s].
 _SET_BACK = 1.0
 #: Stamps farther apart are of different clocks [s].
@@ -105,6 +107,8 @@ class _Link:
         is_covered = after > 0 and stamp - end <= LATE and 0 < end - begin <= GAP
         if not is_covered:
             raise LookupError(f"{name} in {self.parent} is known only {self._known(stamp)}")
+        if math.dist(pose[:2], following[:2]) > FASTEST * (end - begin):
+            raise LookupError(f"{name} in {self.parent} jumps")
         along = poses_along(twist_between(pose, following, end - begin), [stamp - begin])
         x, y, turn = along[0].tolist()
         return compose(pose, (x, y, math.remainder(turn, 2 * math.pi)))
