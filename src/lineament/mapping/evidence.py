@@ -43,8 +43,8 @@ class Evidence:
     log_odds : float
         Logarithm of the likelihood of the beams at this pose over that at a wrong one, less that of
         the number of poses that the plan has room for; on a map that scans made, over that at the
-        best pose on a map of another place, unless it was located as on a drawing. Below 0 chance
-        does as well.
+        best pose on a map of another place, unless it was located as on a drawing. Of a scan of a
+        `Follower` it is over that at a wrong pose alone. Below 0 chance does as well.
     explained, short, contradicted : float
         Shares of the beams that end on a wall of the plan; before one, on something that the plan
         does not have; and that have passed through a wall of the plan.
