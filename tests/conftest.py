@@ -83,6 +83,14 @@ def plain() -> Iterator[ModuleType]:
     sys.modules.update(compiled)
 
 
+@pytest.fixture(scope="session")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """A small log of each format."""
+    from mutations import own_samples
+
+    return own_samples(tmp_path_factory.mktemp("samples"))
+
+
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Folder of temporary files, which must be empty when all logs are gone, after the test."""

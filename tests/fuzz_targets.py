@@ -8,6 +8,7 @@ import dataclasses
 import json
 import math
 import time
+from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
 from random import Random
@@ -27,7 +28,7 @@ from worlds import degenerate_scans, random_scan
 
 from lineament import Extractor, LaserScan, RangeNoise, open_log
 from lineament.features import TABLES
-from lineament.live import LiveConfig, Node, Pipeline, RosSink
+from lineament.live import FoxgloveSink, LiveConfig, Node, Pipeline, RosSink
 from lineament.live.received import ODOMETRY, Received, received_scan
 from lineament.logs import save_log
 from lineament.methods import get_method, method_names
@@ -273,6 +274,11 @@ class Messages(Target):
     """Messages of scans and of odometry, damaged, to a node that publishes what it finds."""
 
     TYPES = ("LaserScan", "MultiEchoLaserScan", "Odometry")
+    #: What a message may hold that no scanner means.
+    ODD = (0.0, -0.0, 1e-45, 1e-38, 1e-7, 0.1, 1.0, -1.0, 5.0, 6.2831855, 1e6, 1e15, -1e20, 1e36)
+    ODD += (math.inf, -math.inf, math.nan)
+    FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
+    FIELDS += ("time_increment", "scan_time")
     OPTIONS = (
         {},
         {"track": True, "deskew": "scans"},
@@ -288,18 +294,28 @@ class Messages(Target):
         kind = chance.choice((*self.TYPES, "LaserScan", "LaserScan"))
         messages = ros_bags.Messages(ros)
         rng = np.random.default_rng(chance.getrandbits(32))
-        ranges = random_scan(chance.getrandbits(16), chance.choice((3, 61, 181))).ranges
-        stamp = chance.choice((0.0, 1.0, 5.0 + rng.random(), 1.7e9, 2**31 - 1.0))
+        ranges = random_scan(chance.getrandbits(16), chance.choice((3, 61, 181))).ranges.copy()
+        n = len(ranges)
+        spoilt = chance.sample(range(n), chance.choice((0, 0, 1, n // 2, n)))
+        ranges[spoilt] = chance.choices(self.ODD, k=len(spoilt))
+        stamps = (0.0, 1.0, 5.0 + rng.random(), 1.7e9, 2**31 - 1.0)
+        stamp = chance.choice(stamps if ros == 1 else (*stamps, -1.0, -(2.0**31)))
         if kind == "LaserScan":
-            message = messages.scan(stamp, ranges, rng.random(len(ranges)))
+            names = chance.sample(self.FIELDS, chance.choice((0, 0, 1, 2)))
+            fields = {name: chance.choice(self.ODD) for name in names}
+            message = messages.scan(stamp, ranges, rng.random(n), **fields)
         elif kind == "Odometry":
             message = messages.odometry(stamp, *rng.normal(size=3))
+            speeds = (1.5, 0.0, -0.5, 30.0, 1e3, 1e300, math.nan)
+            message.twist.twist.linear.x, message.twist.twist.angular.z = chance.choices(
+                speeds, k=2
+            )
         else:
             message = messages.echoes(stamp, [[r, r + 1] for r in ranges[:9]])
         store = ros_bags.store(ros)
         serialize = store.serialize_ros1 if ros == 1 else store.serialize_cdr
         data = bytes(serialize(message, message.__msgtype__))
-        if chance.random() < 0.9:
+        if chance.random() < 0.7:
             data = damaged(data, chance, data)
         return chance.randrange(len(self.OPTIONS)), kind, "ros1" if ros == 1 else "cdr", data
 
@@ -310,8 +326,13 @@ class Messages(Target):
         else:
             received = received_scan("a", data, encoding, f"sensor_msgs/{kind}")
         lines: list[str] = []
-        sink = RosSink(Taken(), RosMessages("cdr"), LiveConfig(log="played.npz"))
-        node = Node(Given([received]), self._pipelines[option], [sink], write=lines.append)
+        config = LiveConfig(log="played.npz")
+        sinks = [RosSink(Taken(), RosMessages("cdr"), config)]
+        with suppress(ImportError):
+            from lineament.output.foxglove import FoxgloveMessages
+
+            sinks.append(FoxgloveSink(Taken(), FoxgloveMessages(), config))
+        node = Node(Given([received]), self._pipelines[option], sinks, write=lines.append)
         total = node.run().total
         assert all(line.isprintable() for line in lines), lines
         assert total.malformed == sum("makes no sense" in line for line in lines)

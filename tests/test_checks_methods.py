@@ -116,13 +116,6 @@ class Shares:
         return jumps(self.scan) if len(self.scan) == len(scan) else []
 
 
-class Changes:
-    def __call__(self, scan):
-        scan.angles.setflags(write=True)
-        scan.angles[:] += 1e-3
-        return jumps(scan)
-
-
 class CopiesBadly(Remembers):
     def __call__(self, scan):
         return jumps(scan, 0.3 + self.before)

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import click
 import pytest
-from mutations import own_samples
 from test_cli import benchmark, npz  # noqa: F401 (fixtures)
 from test_output import SCAN, files_up_to, random_features, write
 from text_logs import FLASER
@@ -342,11 +341,6 @@ def test_only_stamps_of_messages_are_taken_from_the_clock_of_the_day():
 
 
 # Logs that change
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory):
-    return own_samples(tmp_path_factory.mktemp("samples"))
 
 
 def read_while(sample, folder, change, first):

@@ -17,7 +17,7 @@ from fuzz_readers import OPTIONS, check, chosen, scratch
 from fuzz_targets import Messages, Methods, Viewer, Writers
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutations import Sample, mutated, own_samples, recorded_samples, sizes
+from mutations import Sample, mutated, recorded_samples, sizes
 
 pytestmark = pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
 
@@ -34,11 +34,6 @@ def folders(tmp_path, monkeypatch):
     gc.disable()  # Temporary files must not wait for it.
     yield scratch(tmp_path)
     gc.enable()
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory):
-    return own_samples(tmp_path_factory.mktemp("samples"))
 
 
 @pytest.mark.slow
@@ -95,7 +90,7 @@ def test_where_lengths_and_offsets_stand(samples):
 @pytest.mark.parametrize(
     ("target", "inputs"),
     [
-        *((Methods, 300), (Messages, 300), (Viewer, 200), (Writers, 60)),
+        *((Methods, 300), (Messages, 1000), (Viewer, 200), (Writers, 60)),
         *((Forms, 300), (Results, 60), (Plans, 100), (Locating, 6)),
     ],
     ids=lambda value: getattr(value, "__name__", value),

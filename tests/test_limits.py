@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from crafted import CRAFTED
 from crafted_plans import PLANS
-from mutations import own_samples
 
 from lineament import LogError
 from lineament.limits import LIMITS, Limits
@@ -68,11 +67,6 @@ def test_a_crafted_file_ends_in_one_line(name, tmp_path):
     # What is skipped is reported likewise; a bag that is copied breaks off where it was too much.
     assert kept[0] < 100
     assert kept[2] == strict[2] or name == "bag.gz"
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory):
-    return own_samples(tmp_path_factory.mktemp("samples"))
 
 
 def opened(sample, folder, **options):

@@ -5,17 +5,14 @@ import time
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from random import Random
 
 import numpy as np
 import pytest
-from fuzz_targets import Messages
 from in_memory import Given, Kept, Taken
 from live_driving import garbage
 
 import lineament as ln
 from lineament.live import (
-    FoxgloveSink,
     LiveConfig,
     Node,
     Odometry,
@@ -219,59 +216,6 @@ def test_a_stop_ends_it():
     asked = iter([False, False, True])
     source = Given(*[[wall("a", float(i))] for i in range(10)])
     assert Node(source, Pipeline(LiveConfig()), []).run(lambda: next(asked)).total.scans == 2
-
-
-#: What a message may hold that no scanner means.
-NUMBERS = (0, -0.0, 1e-45, 1e-38, 1e-7, 0.1, 1, -1, 5, 6.2831855, 1e6, 1e15, -1e20, 1e30, 3.4e38)
-NUMBERS += (math.inf, -math.inf, math.nan)
-STAMPS = ((-1, 0), (2**31 - 1, 2**32 - 1), (-(2**31), 10**9), (5, 999_999_999), (5, 0))
-FIELDS = {"angle_min": -0.5, "angle_increment": 0.01, "range_min": 0.0, "range_max": 30.0}
-FIELDS |= {"time_increment": 1e-4, "scan_time": 0.1}
-
-
-def spoilt(chance: Random) -> Received:
-    """A scan with ranges and fields that no scanner means."""
-    ranges, fields, among = WALL.copy(), dict(FIELDS), NUMBERS
-    if chance.random() < 0.2:
-        among = (chance.choice(NUMBERS),)
-    for i in chance.sample(range(len(ranges)), chance.choice((0, 1, 5, 50, len(ranges)))):
-        ranges[i] = chance.choice(among)
-    for name in chance.sample(list(FIELDS), chance.choice((0, 0, 1, 2))):
-        fields[name] = chance.choice(NUMBERS)
-    seconds, nanoseconds = chance.choice(STAMPS)
-    stamp = seconds * 10**9 + nanoseconds if seconds != 5 else 5 * 10**9
-    return Received(
-        chance.choice("ab"), lambda: ln.LaserScan(ranges, **fields).stamped("first", stamp), 0.0
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("options", Messages.OPTIONS, ids=["optimal", "scans", "odom", "liu"])
-@pytest.mark.filterwarnings("ignore::lineament.LineamentWarning")
-def test_no_message_ends_a_node(options):
-    chance, n = Random(3), 800
-
-    def batch() -> list[Received]:
-        speeds = chance.choices((0.0, 1.0, -0.5, 30.0, 1e3, 1e300, math.nan), k=3)
-        return [heard(moving(*speeds, stamp=5.0)), spoilt(chance)]
-
-    taken, lines = Taken(), []
-    config = LiveConfig(log="played.npz")
-    sinks = [RosSink(taken, RosMessages("cdr"), config)]
-    try:
-        from lineament.output.foxglove import FoxgloveMessages
-    except ImportError:
-        pass
-    else:
-        sinks.append(FoxgloveSink(taken, FoxgloveMessages(), config))
-    pipeline = Pipeline(LiveConfig(**options))
-    total = Node(Given(*[batch] * n), pipeline, sinks, write=lines.append).run().total
-    assert n // 4 < total.scans <= n
-    assert total.malformed > n // 10
-    assert len(taken.messages) >= 3 * total.scans
-    faults = [line.partition(" makes no sense: ")[0] for line in lines if "sense" in line]
-    assert sorted(faults) == ["a scan of a", "a scan of b", "an odometry of o"]
-    assert not any("\n" in line for line in lines)
 
 
 @pytest.mark.parametrize("log", ["a.npz", None])

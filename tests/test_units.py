@@ -1,7 +1,6 @@
 """What is given in another unit, masked, clockwise or misspelt: taken as meant, or refused."""
 
 import math
-import warnings
 
 import numpy as np
 import pytest
@@ -173,13 +172,6 @@ def test_a_log_in_millimetres_with_its_limits_is_scaled(tmp_path):
     np.testing.assert_allclose(scan.ranges, WALL)
     with pytest.raises(ValueError, match="scale is 0"):
         open_log(path, scale=0)
-
-
-def test_what_is_heard_is_not_shown():
-    with heard() as found:
-        for _ in range(3):
-            ln.extract(MILLIMETRES, **BEARINGS)
-    assert len(found) == 1
 
 
 def test_commands_warn_in_one_line_once(tmp_path, capsys, refused):
@@ -358,15 +350,6 @@ def test_other_fields_of_a_scan_are_taken():
     for fields in ({"stamp": 1.0}, {"scale": 0.001}, {"range_max": 3.0}, BEARINGS):
         with pytest.raises(TypeError, match=r"a LaserScan has its own .* pass it alone"):
             ln.extract(found.scan, **fields)
-
-
-def test_warnings_are_shown_by_place():
-    """The text of a warning does not change from scan to scan: Python shows it once."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("default")
-        for k in range(3):
-            ln.extract(MILLIMETRES + k, **BEARINGS)
-    assert len(caught) == 1
 
 
 def test_scaled_scans_keep_irregular_bearings():
