@@ -48,6 +48,19 @@ def written(path, seed: int) -> str:
     return str(path)
 
 
+def carried(before: Moment, first: int, count: int = 10) -> list[Moment]:
+    """Return moments of a robot that was carried to another part of the drive after one.
+
+    Its wheels do not notice, and its stamps go on.
+    """
+    elsewhere = driven(1, 150)[first : first + count]
+    stamps = (before.scan.stamp_ns + (k + 1) * 200_000_000 for k in range(count))
+    return [
+        moment._replace(scan=moment.scan.stamped("first", stamp), believed=before.believed)
+        for moment, stamp in zip(elsewhere, stamps, strict=True)
+    ]
+
+
 def off(pose: Pose, true: Pose) -> tuple[float, float]:
     x, y, turn = relative(true, pose)
     return math.hypot(x, y), abs(turn)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import ros_bags
-from robot_driving import MOUNTING, Moment, driven, written
+from robot_driving import MOUNTING, Moment, carried, driven, written
 
 from lineament import LogError
 from lineament.live import Frame, LiveConfig, Pipeline, run_live
@@ -26,17 +26,9 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def moments() -> list[Moment]:
-    """A drive whose robot is carried away in its course; its wheels do not notice."""
-    kept, elsewhere = driven()[:RIGHT], driven(1, 150)[100 : 100 + CARRIED]
-    last = kept[-1]
-    stamps = (last.scan.stamp_ns + (k + 1) * 200_000_000 for k in range(CARRIED))
-    return [
-        *kept,
-        *(
-            moment._replace(scan=moment.scan.stamped("first", stamp), believed=last.believed)
-            for moment, stamp in zip(elsewhere, stamps, strict=True)
-        ),
-    ]
+    """A drive whose robot is carried away in its course."""
+    kept = driven()[:RIGHT]
+    return [*kept, *carried(kept[-1], 100, CARRIED)]
 
 
 def claims() -> list[StampedPose]:

@@ -16,7 +16,17 @@ import numpy as np
 import pytest
 from in_memory import Given, Taken
 from live_driving import Running, eventually, heard
-from robot_driving import MOUNTING, Moment, driven, link_message, message_of, off, pose_of, written
+from robot_driving import (
+    MOUNTING,
+    Moment,
+    carried,
+    driven,
+    link_message,
+    message_of,
+    off,
+    pose_of,
+    written,
+)
 
 import lineament as ln
 from lineament.live import Frame, LiveConfig, Node, Pipeline, Received, RosSink
@@ -119,14 +129,8 @@ def located(plan: str, count: int = 30, **options) -> tuple[Robot, list[Frame]]:
 
 def test_a_robot_that_is_carried_away_is_nowhere_within_half_a_second(plan):
     robot, _ = located(plan)
-    before, elsewhere = driven()[29], driven(1, 150)[140:150]
-    assert off(before.base, elsewhere[0].base)[0] > 2.5
-    # Its wheels do not notice.
-    lifted = [m._replace(believed=before.believed) for m in elsewhere]
-    lifted = [
-        m._replace(scan=m.scan.stamped("first", before.scan.stamp_ns + (k + 1) * 200_000_000))
-        for k, m in enumerate(lifted)
-    ]
+    lifted = carried(driven()[29], 140)
+    assert off(driven()[29].base, lifted[0].base)[0] > 2.5
     frames = robot.drive(lifted)
     for frame, moment in list(zip(frames, lifted, strict=True))[2:]:
         if frame.placed:
@@ -278,12 +282,7 @@ def test_a_pose_that_is_right_and_one_after_the_robot_was_carried(plan):
     last = frames[-1].judgement
     assert off(last.pose, compose(moments[39].base, MOUNTING))[0] < 0.25
     assert math.hypot(*last.off[:2]) < 0.25
-    lifted = [
-        m._replace(scan=m.scan.stamped("first", moments[39].scan.stamp_ns + (k + 1) * 200_000_000))
-        for k, m in enumerate(driven(1, 150)[100:110])
-    ]
-    lifted = [m._replace(believed=moments[39].believed) for m in lifted]
-    first, second, *_ = robot.drive(lifted)
+    first, second, *_ = robot.drive(carried(moments[39], 100))
     assert not first.judgement
     assert second.judgement.verdict == "wrong"
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from in_memory import Taken
 from live_driving import eventually
 
 import lineament as ln
@@ -23,7 +24,6 @@ from lineament.errors import LineamentError
 from lineament.live import LiveConfig, Pipeline
 from lineament.live.pipeline import time_of
 from lineament.live.plan_topics import PlanTopics
-from lineament.live.publisher import Publisher
 from lineament.live.received import LINKS, MOUNTINGS, SCAN, wanted
 from lineament.logs import save_log
 from lineament.mapping import LineMap
@@ -130,28 +130,11 @@ def test_a_scanner_that_sees_nothing_is_lost():
         assert not where.is_known
 
 
-class Kept(Publisher):
-    """Keeps what is published; somebody listens to everything."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.messages = []
-
-    def _open(self, topic, kind):
-        return topic, kind
-
-    def _send(self, _, message):
-        self.messages.append(message)
-
-    def _count(self, _):
-        return 1
-
-
 @pytest.mark.slow
 def test_a_node_publishes_poses_and_walls_and_saves_the_map(tmp_path):
     """With the scanner mounted ahead and turned, and odometry on ``/tf``."""
     scans, truth = driven()
-    mounting, path, kept = (0.25, -0.1, 0.4), tmp_path / "map.yaml", Kept()
+    mounting, path, kept = (0.25, -0.1, 0.4), tmp_path / "map.yaml", Taken()
     config = LiveConfig(mapping=str(path))
     topics = PlanTopics(kept, RosMessages("cdr"), config)
     with closing(Pipeline(config)) as pipeline:

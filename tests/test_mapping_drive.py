@@ -22,7 +22,7 @@ from lineament.mapping.sessions import onto_plan, placements
 from lineament.scan.poses import compose, relative
 from lineament.simulation import SENSORS, Wheels, World, drive, office, room
 from lineament.walls import walls_of, wrapped
-from lineament.walls.sights import SIGHT, lines_of, merged, misfits, walls_along
+from lineament.walls.sights import SIGHT, merged, misfits
 
 
 def edges(poses, pairs, sigma=0.05, loop=False):
@@ -201,19 +201,6 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
         sights["ends"] = -2.5, 2.5
         labels = merged(sights, result.poses, result.lines, 0.03)["wall"]
         assert labels.tolist() == 12 * [0, 0, 1, 1, 2, 2, 3, 3]
-
-
-def test_a_wall_ends_where_hardly_any_sight_goes_on():
-    """Twenty sights to either side of a doorway, and one along all of it."""
-    sights = np.zeros(42, SIGHT)
-    sights["covariance"] = 1e-6 * np.eye(2)
-    sights["ends"][:20], sights["ends"][20:40], sights["ends"][40:] = (0, 2), (3, 5), (0, 5)
-    pose = np.zeros((1, 3))
-    lines = lines_of(sights, pose, 1)
-    for views, ends in ((1, [(0, 5)]), (3, [(0, 2), (3, 5)]), (43, [])):
-        walls = walls_along(sights, pose, lines, views=views)
-        found = np.column_stack((walls["start"][:, 0], walls["end"][:, 0]))
-        np.testing.assert_allclose(found, np.reshape(ends, (-1, 2)), atol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from handmade import features, segment
 from small_room import scans_on
 
 from lineament import Extractor, Tracker
-from lineament.features import SEGMENT
 from lineament.mapping import LocalMap, placing
 from lineament.mapping.drive_map import Drive, _likely_turns
 from lineament.mapping.loops import Survey
@@ -32,21 +31,25 @@ def test_a_wall_is_hidden_by_how_far_it_is_in_the_middle_of_what_they_share(turn
         assert len(single(walls)) == (1 if hidden else 2)
 
 
-def test_a_short_part_of_a_bowed_wall_may_be_askew():
+def merged_walls(*rows, **fields):
+    """Numbers of the walls that the segments of one key frame become."""
+    segments = features(segments=rows).segments.copy()
+    for name, values in fields.items():
+        segments[name] = values
+    sights = sights_of([(segments, np.arange(len(rows)))])
+    lines = lines_of(sights, np.zeros((1, 3)), len(rows))
+    return merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"].tolist()
+
+
+@pytest.mark.parametrize(("turn", "walls"), [(0.1, 1), (0.14, 2)])
+def test_a_short_part_of_a_bowed_wall_may_be_askew(turn, walls):
     """Half a metre, off by 10 mm: its direction is known to 2 · 10 mm / 0.5 m = 40 mrad."""
-    for turn, parts in ((0.1, 1), (0.14, 2)):
-        segments = np.zeros(2, SEGMENT)
-        for k, (x, half, angle) in enumerate([(0.0, 5.0, 0.0), (0.0, 0.25, turn)]):
-            u = np.array((math.cos(angle), math.sin(angle)))
-            segments["start"][k], segments["end"][k] = (x, 0) - half * u, (x, 0) + half * u
-            segments["centroid"][k], segments["angle"][k] = (x, 0), angle
-        segments["length"], segments["rms"] = (10, 0.5), (0, 0.01)
-        segments["misfit"], segments["n_points"] = (0, 0.01), 1000
-        segments["covariance"] = np.eye(2) * 1e-8
-        sights = sights_of([(segments, np.arange(2))])
-        lines = lines_of(sights, np.zeros((1, 3)), 2)
-        walls = merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"]
-        assert len({*walls.tolist()}) == parts
+    half = 0.25 * np.array((math.cos(turn), math.sin(turn)))
+    whole, part = (
+        segment(-end, end, 0, 999, sigma=(1e-4, 1e-4)) for end in (np.array((5, 0)), half)
+    )
+    found = merged_walls(whole, part, rms=(0, 0.01), misfit=(0, 0.01))
+    assert len({*found}) == walls
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.4, -0.9])
@@ -107,34 +110,22 @@ def test_three_places_that_agree_are_sure_and_thrice_those_that_do_not():
     assert [is_enough(*of) for of in ((2, 0), (3, 0), (3, 1), (5, 2), (6, 2))] == [0, 1, 1, 0, 1]
 
 
-def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others():
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 0, 1]])
+def test_of_parts_that_were_seen_as_often_the_longest_gathers_the_others(order):
     """A wall of 4 m between two of 1 m, which do not touch each other."""
-    ends = np.array([(-3.1, 0, -2.1, 0), (-2, 0, 2, 0), (2.1, 0, 3.1, 0)]).reshape(-1, 2, 2)
-    for order in ([0, 1, 2], [1, 0, 2], [2, 0, 1]):
-        segments = np.zeros(3, SEGMENT)
-        segments["start"], segments["end"] = ends[order, 0], ends[order, 1]
-        segments["centroid"] = ends[order].mean(axis=1)
-        segments["length"] = np.linalg.norm(segments["end"] - segments["start"], axis=1)
-        segments["covariance"] = np.eye(2) * 1e-6
-        sights = sights_of([(segments, np.arange(3))])
-        lines = lines_of(sights, np.zeros((1, 3)), 3)
-        found = merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"]
-        assert found.tolist() == [0, 0, 0]
+    ends = [((-3.1, 0), (-2.1, 0)), ((-2, 0), (2, 0)), ((2.1, 0), (3.1, 0))]
+    found = merged_walls(*(segment(*ends[k], 0, 9, sigma=(1e-3, 1e-3)) for k in order))
+    assert found == [0, 0, 0]
 
 
 @pytest.mark.parametrize("middle", [0.0, math.pi, math.pi / 2])
 def test_parts_of_a_wall_are_one_whatever_its_direction(middle):
     """Two parts of 2 m in one line, 10 cm from each other, whose directions differ by 20 mrad."""
-    segments = np.zeros(2, SEGMENT)
-    for k, (along, turn) in enumerate([(-1.05, -0.01), (1.05, 0.01)]):
+    parts = []
+    for along, turn in ((-1.05, -0.01), (1.05, 0.01)):
         u, own = (np.array((math.cos(a), math.sin(a))) for a in (middle, middle + turn))
-        segments["centroid"][k] = along * u
-        segments["start"][k], segments["end"][k] = along * u - own, along * u + own
-        segments["angle"][k] = math.remainder(middle + turn, 2 * math.pi)
-    segments["length"], segments["covariance"] = 2.0, np.diag((0.01, 0.02)) ** 2
-    sights = sights_of([(segments, np.arange(2))])
-    lines = lines_of(sights, np.zeros((1, 3)), 2)
-    assert merged(sights, np.zeros((1, 3)), lines, 0.0)["wall"].tolist() == [0, 0]
+        parts.append(segment(along * u - own, along * u + own, 0, 9, sigma=(0.01, 0.02)))
+    assert merged_walls(*parts) == [0, 0]
 
 
 def test_a_wall_along_another_is_hidden_by_it_up_to_10_degrees():

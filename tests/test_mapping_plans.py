@@ -7,11 +7,11 @@ import ezdxf
 import numpy as np
 import pytest
 from ezdxf.units import METER_FACTOR
+from handmade import arc, features, segment
 
 import lineament as ln
 from lineament.cli import run
 from lineament.drawings import UNITS
-from lineament.features import TABLES, Features, make_records
 from lineament.logs import save_log
 from lineament.mapping import LineMap, locate
 from lineament.simulation import SENSORS, drive, office, room
@@ -19,47 +19,35 @@ from lineament.simulation import SENSORS, drive, office, room
 ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 
 
-def segment(start, end, sigma=0.01, sigma_angle=0.005, misfit=0.0):
-    start, end = np.array(start, float), np.array(end, float)
-    along = end - start
-    return {
-        "start": start,
-        "end": end,
-        "centroid": (start + end) / 2,
-        "angle": math.atan2(along[1], along[0]),
-        "covariance": np.diag((sigma, sigma_angle)) ** 2,
-        "length": np.hypot(*along),
-        "misfit": misfit,
-    }
+def line(start, end, sigma=0.01, sigma_angle=0.005, misfit=0.0):
+    row = segment(start, end, 0, 9, sigma=(sigma, sigma_angle))
+    row["misfit"] = misfit
+    return row
 
 
 def cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def features(*segments, arcs=()):
-    rows = dict.fromkeys(TABLES, ()) | {"segments": segments, "arcs": arcs}
-    tables = {name: make_records(name, rows[name]) for name in TABLES}
-    return Features(**tables, clusters=np.empty(0, np.int32))
-
-
 @pytest.mark.parametrize(
     ("other", "walls"),
     [
-        (segment((1.0, 0.0), (3.0, 0.0)), 1),  # the same again
-        (segment((2.1, 0.0), (4.0, 0.0)), 1),  # 10 cm further on
-        (segment((2.3, 0.0), (4.0, 0.0)), 2),  # a gap of a door
-        (segment((0.0, 0.02), (2.0, 0.02)), 1),  # 1.4 deviations beside it
-        (segment((0.0, 0.06), (2.0, 0.06)), 2),  # 4.2 deviations
-        (segment((0.0, 0.06), (2.0, 0.06), misfit=0.02), 1),  # of a wall that bows
-        (segment((0.0, 0.06), (2.0, 0.06), sigma=0.03), 1),  # less well known
-        (segment((0.0, 0.0), (2.0, 0.06)), 2),  # turned by 4.2 deviations
-        (segment((0.0, 0.0), (2.0, 0.06), sigma_angle=0.03), 1),
-        (segment((2.0, 0.0), (0.0, 0.0)), 2),  # its other side
+        (line((1.0, 0.0), (3.0, 0.0)), 1),  # the same again
+        (line((2.1, 0.0), (4.0, 0.0)), 1),  # 10 cm further on
+        (line((2.3, 0.0), (4.0, 0.0)), 2),  # a gap of a door
+        (line((0.0, 0.02), (2.0, 0.02)), 1),  # 1.4 deviations beside it
+        (line((0.0, 0.06), (2.0, 0.06)), 2),  # 4.2 deviations
+        (line((0.0, 0.06), (2.0, 0.06), misfit=0.02), 1),  # of a wall that bows
+        (line((0.0, 0.06), (2.0, 0.06), sigma=0.03), 1),  # less well known
+        (line((0.0, 0.0), (2.0, 0.06)), 2),  # turned by 4.2 deviations
+        (line((0.0, 0.0), (2.0, 0.06), sigma_angle=0.03), 1),
+        (line((2.0, 0.0), (0.0, 0.0)), 2),  # its other side
     ],
 )
 def test_segments_are_one_wall_by_chi_square(other, walls):
-    plan = LineMap.from_features([features(segment((0, 0), (2, 0))), features(other)])
+    plan = LineMap.from_features(
+        [features(segments=[one]) for one in (line((0, 0), (2, 0)), other)]
+    )
     assert len(plan.walls) == walls
     assert plan.walls["side"].tolist() == [1] * walls
     assert plan.walls["views"].sum() == 2
@@ -67,10 +55,10 @@ def test_segments_are_one_wall_by_chi_square(other, walls):
 
 def test_joint_line_is_the_least_squares_one():
     first, second = (
-        segment((0, 0), (2, 0), 0.01, 0.01),
-        segment((2.1, 0.01), (5, 0.03), 0.02, 0.004),
+        line((0, 0), (2, 0), 0.01, 0.01),
+        line((2.1, 0.01), (5, 0.03), 0.02, 0.004),
     )
-    wall = LineMap.from_features([features(first), features(second)]).walls[0]
+    wall = LineMap.from_features([features(segments=[one]) for one in (first, second)]).walls[0]
     # By definition: offset at x = 0 and slope of least χ².
     rows, values, weights = [], [], []
     for s in (first, second):
@@ -89,10 +77,8 @@ def test_joint_line_is_the_least_squares_one():
 
 
 def test_arcs_are_one_column_by_chi_square():
-    def arc(x, radius=0.2):
-        return {"center": (x, 1.0), "radius": radius, "covariance": np.eye(3) * 1e-4}
-
-    scans = [features(segment((0, 0), (2, 0)), arcs=[arc(x)]) for x in (1.0, 1.02, 1.2)]
+    wall = line((0, 0), (2, 0))
+    scans = [features(segments=[wall], arcs=[arc(x, 1.0, 0.2, 0, 9)]) for x in (1.0, 1.02, 1.2)]
     columns = LineMap.from_features(scans).columns
     often = LineMap.from_features(scans, min_views=2)
     assert (len(often.walls), len(often.columns)) == (1, 1)

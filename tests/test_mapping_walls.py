@@ -283,14 +283,24 @@ def test_a_wall_that_three_beams_pass_is_gone(ys, ranges, gone):
     assert not passed(other_side, beams).any()
 
 
-@pytest.mark.parametrize(("across", "parts"), [(4, 2), (6, 1)])
-def test_a_wall_goes_on_where_more_than_a_fifth_of_its_sights_do(across, parts):
+@pytest.mark.parametrize(
+    ("across", "views", "ends"),
+    [
+        (2, 1, [(0, 5)]),
+        (2, 3, [(0, 2), (3, 5)]),
+        (2, 43, []),
+        (4, 2, [(0, 2), (3, 5)]),
+        (6, 2, [(0, 5)]),
+    ],
+)
+def test_a_wall_goes_on_where_more_than_a_fifth_of_its_sights_do(across, views, ends):
     """Twenty sights to either side of a doorway, and some along all of it."""
-    sights = np.zeros(40 + across, SIGHT)
+    sights, pose = np.zeros(40 + across, SIGHT), np.zeros((1, 3))
     sights["covariance"] = 1e-6 * np.eye(2)
     sights["ends"][:20], sights["ends"][20:40], sights["ends"][40:] = (0, 2), (3, 5), (0, 5)
-    lines = lines_of(sights, np.zeros((1, 3)), 1)
-    assert len(walls_along(sights, np.zeros((1, 3)), lines, views=2)) == parts
+    walls = walls_along(sights, pose, lines_of(sights, pose, 1), views=views)
+    found = np.column_stack((walls["start"][:, 0], walls["end"][:, 0]))
+    np.testing.assert_allclose(found, np.reshape(ends, (-1, 2)), atol=1e-12)
 
 
 @pytest.mark.parametrize(("square", "columns"), [(10.5, 1), (12.3, 2)])
