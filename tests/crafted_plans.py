@@ -110,6 +110,13 @@ def _gridded(size: int, pixels: bytes) -> Callable[[Path], None]:
     return write
 
 
+def _spline(to: Any, weight: float, knot: float) -> None:
+    spline = to.add_spline()
+    points = [(0, 1, 0), (1, 2, 0), (2, 1, 0), (3, 2, 0)]
+    spline.set_open_rational(points, [1, 1, 1, weight])
+    spline.knots = [*list(spline.knots)[:-1], knot]
+
+
 #: What each is beyond (or ""), how it is written, limits, and what is said of it or of the plan.
 PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
     "laughs.dxf": ("entities", lambda path: drawn(path, _laughs), {}, ""),
@@ -162,6 +169,12 @@ PLANS: dict[str, tuple[str, Callable[[Path], Any], dict[str, int], str]] = {
         "read, 4 walls, 1 left out"),
     "splinenan.dxf": ("", _each(lambda to: to.add_open_spline([(0, 0), (NAN, 1), (2, 0), (3, 1)])),
                       {}, "read, 4 walls, 1 left out"),
+    "weights.dxf": ("", _each(lambda to: _spline(to, NAN, 1.0)), {}, "read, 4 walls, 1 left out"),
+    "knots.dxf": ("", _each(lambda to: _spline(to, 1.0, NAN)), {}, "read, 4 walls, 1 left out"),
+    "rational.dxf": ("", _each(lambda to: _spline(to, 1.0, 1.0)), {}, "walls, 0 left out"),
+    "nowhere.dxf": ("", lambda path: drawn(path, lambda space, blocks: (
+        blocks.new("a").add_line((0, 0), (1, 1)), space.add_blockref("a", (NAN, 1)))), {},
+        "read, 4 walls, 1 left out"),
     "text.parquet": ("", lambda path: table(path, change=put("x", ["a"] * 8)), {},
                      "column x holds string, expected numbers"),
     "column.parquet": ("", lambda path: table(path, change=lambda of: of.drop_columns(["x"])), {},

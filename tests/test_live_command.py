@@ -145,41 +145,35 @@ def test_a_log_is_played_until_its_end(peer, domain, log):
     assert_same(clouds[-1], ln.extract(last))
 
 
-def test_the_motion_of_a_log_is_published(peer, domain, log):
-    peer.listen("/scan/odometry", "Odometry", 1000)
-    scans = {round(1e9 * scan.stamp): scan for scan in ln.open_log(log)}
-    with Running(domain=domain, log=log, rate=0.0, track=True) as node:
+def test_the_motion_of_a_log_and_the_pose_of_a_corner_are_published(peer, domain, log):
+    """Of a drive of 4 m straight on, at whose begin the corner is 5 m ahead and 2 m to the left."""
+    kinds = {"/scan/odometry": "Odometry", "/scan/dock": "PoseWithCovarianceStamped"}
+    for topic, kind in kinds.items():
+        peer.listen(topic, kind, 1000)
+    scans = [round(1e9 * scan.stamp) for scan in ln.open_log(log)]
+    with Running(domain=domain, log=log, rate=0.0, track=True, dock=(5.3, 1.8)) as node:
         node.end()
-        eventually(lambda: peer._readers["/scan/odometry"].read(1))
-    last = peer.take("/scan/odometry")[-1]
-    header, twist, inside = last["header"], last["twist"]["twist"], np.ix_((0, 1, 5), (0, 1, 5))
-    assert (header["frame_id"], last["child_frame_id"]) == ("odom", "laser")
-    assert header["stamp"]["sec"] * 10**9 + header["stamp"]["nanosec"] == max(scans)
-    assert twist["linear"]["x"] == pytest.approx(1.0, abs=0.1)
-    place = last["pose"]["pose"]["position"]
+        eventually(lambda: all(peer._readers[topic].read(1) for topic in kinds))
+    motion, dock = (peer.take(topic)[-1] for topic in kinds)
+    for one, frame in ((motion, "odom"), (dock, "laser")):
+        stamp = one["header"]["stamp"]
+        assert stamp["sec"] * 10**9 + stamp["nanosec"] == max(scans)
+        assert one["header"]["frame_id"] == frame
+    assert motion["child_frame_id"] == "laser"
+    assert motion["twist"]["twist"]["linear"]["x"] == pytest.approx(1.0, abs=0.1)
+    place = motion["pose"]["pose"]["position"]
     assert (place["x"], place["y"]) == pytest.approx((4.0, 0.0), abs=0.05)
-    for part in ("pose", "twist"):
-        covariance = np.reshape(last[part]["covariance"], (6, 6))[inside]
+    of_pose, of_twist, of_dock = (
+        np.reshape(one["covariance"], (6, 6))[np.ix_((0, 1, 5), (0, 1, 5))]
+        for one in (motion["pose"], motion["twist"], dock["pose"])
+    )
+    for covariance in (of_pose, of_twist):
         assert (np.linalg.eigvalsh(covariance) > 0).all()
         assert (np.diag(covariance) < 0.5**2).all()
-
-
-def test_the_pose_of_a_corner_is_published(peer, domain, log):
-    """A corner of the room, 5 m ahead and 2 m to the left when the drive begins."""
-    peer.listen("/scan/dock", "PoseWithCovarianceStamped", 1000)
-    scans = list(ln.open_log(log))
-    with Running(domain=domain, log=log, rate=0.0, dock=(5.3, 1.8)) as node:
-        node.end()
-        eventually(lambda: peer._readers["/scan/dock"].read(1))
-    last = peer.take("/scan/dock")[-1]
-    assert last["header"]["frame_id"] == "laser"
-    assert last["header"]["stamp"]["sec"] == int(scans[-1].stamp)
-    place, turned = last["pose"]["pose"]["position"], last["pose"]["pose"]["orientation"]
-    covariance = np.reshape(last["pose"]["covariance"], (6, 6))[np.ix_((0, 1, 5), (0, 1, 5))]
+    place, turned = dock["pose"]["pose"]["position"], dock["pose"]["pose"]["orientation"]
     yaw = 2 * math.atan2(turned["z"], turned["w"])
-    # The drive has gone 4 m straight on.
     off = np.subtract((place["x"], place["y"], yaw), (1.0, 2.0, -0.75 * math.pi))
-    assert off @ np.linalg.solve(covariance, off) < 30
+    assert off @ np.linalg.solve(of_dock, off) < 30
     assert np.abs(off).max() < 0.03
 
 

@@ -1,7 +1,6 @@
 """Plans: walls from features, from DXF, from tables; what is no plan; written and read again."""
 
 import math
-from contextlib import nullcontext
 
 import ezdxf
 import numpy as np
@@ -147,36 +146,6 @@ def test_an_arc_however_small_has_two_chords_for_a_quarter(tmp_path):
         drawing.modelspace().add_arc((0, 0), radius, 0, 90)
         drawing.saveas(tmp_path / "plan.dxf")
         assert len(LineMap.read(tmp_path / "plan.dxf").walls) == 1 + chords
-
-
-def test_a_block_that_is_put_at_no_place_is_left_out(tmp_path):
-    """Of two walls one is in a block whose place has one number that is none."""
-    drawing = ezdxf.new("R2010", units=6)
-    drawing.modelspace().add_line((0, 0), (4, 0))
-    drawing.blocks.new("wall").add_line((0, 0), (0, 3))
-    drawing.modelspace().add_blockref("wall", (math.nan, 1.0))
-    drawing.saveas(tmp_path / "plan.dxf")
-    with pytest.warns(ln.LineamentWarning, match=r"plan\.dxf: 1 walls or columns have impossible"):
-        plan = LineMap.read(tmp_path / "plan.dxf")
-    assert plan.ends.tolist() == [[[0, 0], [4, 0]]]
-    assert plan.left_out == 1
-
-
-@pytest.mark.parametrize("what", ["knots", "weights"])
-def test_a_spline_of_numbers_that_are_none_is_left_out(tmp_path, what):
-    said = pytest.warns(ln.LineamentWarning, match="1 walls or columns have impossible numbers")
-    for value, warned in ((1.0, nullcontext()), (math.nan, said)):
-        drawing = ezdxf.new("R2010", units=6)
-        drawing.modelspace().add_line((0, 0), (4, 0))
-        spline = drawing.modelspace().add_spline()
-        points = [(0, 1, 0), (1, 2, 0), (2, 1, 0), (3, 2, 0)]
-        spline.set_open_rational(points, [1, 1, 1, value if what == "weights" else 1])
-        if what == "knots":
-            spline.knots = [*list(spline.knots)[:-1], value]
-        drawing.saveas(tmp_path / "plan.dxf")
-        with warned:
-            plan = LineMap.read(tmp_path / "plan.dxf")
-        assert (len(plan.walls) > 1) == math.isfinite(value)
 
 
 def test_walls_whose_covariance_has_one_number_that_is_none_are_left_out():

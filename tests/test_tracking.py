@@ -325,25 +325,6 @@ def test_a_corner_where_it_was_is_double_without_a_motion():
     assert tracker._doubles(corners, corners, np.zeros((1, 1), bool), None).tolist() == [False]
 
 
-def farthest_that_is_the_same(kind, make):
-    """Distance up to which a feature is taken for the one of before, by bisection [m]."""
-    low, high = 0.0, 1.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        pairs = associate(features(**{kind: [make(3.0)]}), features(**{kind: [make(3.0 + middle)]}))
-        low, high = (middle, high) if len(getattr(pairs, kind)) else (low, middle)
-    return low
-
-
-def test_gates_have_the_degrees_of_freedom_of_what_they_judge():
-    """Two of a corner, three of an arc, which has a radius besides."""
-    gate = Tracker().gate
-    of_corner = farthest_that_is_the_same("corners", lambda x: corner(x, 1.0))
-    of_arc = farthest_that_is_the_same("arcs", lambda x: arc(x, 1.0, 0.2, 10, 20))
-    expected = math.sqrt(chi_square(gate, 3) / chi_square(gate, 2))
-    assert of_arc / of_corner == pytest.approx(expected, rel=1e-3)
-
-
 def test_what_the_documents_say_of_a_tracker_nobody_set():
     """Five frames, 99 % of the right pairs, walls that are straight to a centimetre."""
     tracker = Tracker()
