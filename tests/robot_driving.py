@@ -43,6 +43,16 @@ def driven(seed: int = 1, count: int = 60) -> tuple[Moment, ...]:
     )
 
 
+@cache
+def storey_driven(
+    seed: int = 3, count: int = 150, sensor: str = "utm30lx", rate: float = 2.0
+) -> tuple[Any, list[ln.LaserScan], list[Pose]]:
+    """Return a small storey, scans of a drive with wheels that slip, and where they were taken."""
+    storey = office(seed, (24.0, 16.0), visits=0.1)
+    scans, truth = storey.drive(SENSORS[sensor], seed=1, rate=rate, people=2, wheels=Wheels())
+    return storey, list(islice(scans, count)), truth[:count]
+
+
 def written(path, seed: int) -> str:
     LineMap.from_lines(office(seed, (30, 20)).plan.segments, side=1).write(path)
     return str(path)

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
 from itertools import chain, islice, repeat
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import pytest
 from click.testing import CliRunner
 from in_memory import Taken
 from live_driving import eventually
+from robot_driving import storey_driven
 
 import lineament as ln
 from lineament.cli import cli
@@ -34,15 +34,12 @@ from lineament.output.ros_messages import RosMessages
 from lineament.output.scene import Moment
 from lineament.rosmsg.poses import StampedPose
 from lineament.scan.poses import compose, inverse, relative
-from lineament.simulation import SENSORS, Wheels, office
+from lineament.simulation import SENSORS, office
 
 
-@cache
 def driven(count: int = 90, sensor: str = "lms181"):
     """Scans of a drive with wheels that slip, and where they were taken."""
-    storey = office(3, (24, 16), visits=0.1)
-    scans, truth = storey.drive(SENSORS[sensor], seed=1, rate=4, people=2, wheels=Wheels())
-    return list(islice(scans, count)), truth[:count]
+    return storey_driven(3, count, sensor, 4.0)[1:]
 
 
 def off(pose, truth, k):

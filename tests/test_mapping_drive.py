@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from lineament_lab.evaluation.maps import absolute_errors
+from robot_driving import storey_driven
 
 from lineament import Extractor, LaserScan
 from lineament.cli import cli, run
@@ -20,7 +21,7 @@ from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map, roughness, single, widened
 from lineament.mapping.sessions import onto_plan, placements
 from lineament.scan.poses import compose, relative
-from lineament.simulation import SENSORS, Wheels, World, drive, office, room
+from lineament.simulation import SENSORS, World, drive, room
 from lineament.walls import walls_of, wrapped
 from lineament.walls.sights import SIGHT, merged, misfits
 
@@ -204,24 +205,18 @@ def test_roughness_is_found_and_parts_of_one_wall_are_merged():
 
 
 @pytest.fixture(scope="module")
-def storey():
-    return office(3, (24, 16), visits=0.1)
-
-
-@pytest.fixture(scope="module")
-def driven(storey):
-    """A drive without odometry, every scan of which is extracted once."""
-    scans, truth = storey.drive(SENSORS["utm30lx"], seed=1, rate=2, people=2, wheels=Wheels())
+def driven():
+    """A storey, a drive through it, and its map to be: without odometry, each scan once."""
+    storey, scans, truth = storey_driven()
     extract, placed = Extractor(), Drive()
-    kept = [scan for scan, _ in zip(scans, range(150), strict=False)]
-    for scan in kept:
+    for scan in scans:
         placed.add(scan, extract(scan), scan.pose)
-    return kept, truth[:150], placed
+    return storey, scans, truth, placed
 
 
 @pytest.mark.slow
-def test_a_drive_becomes_a_map(driven, storey):
-    scans, truth, placed = driven
+def test_a_drive_becomes_a_map(driven):
+    storey, scans, truth, placed = driven
     assert not any(frame.is_lost for frame in placed.frames)
     assert len(placed.scans) == len(scans)
     made = make_map(placed.frames, placed.scans)
@@ -237,7 +232,7 @@ def test_a_drive_becomes_a_map(driven, storey):
 @pytest.mark.slow
 @pytest.mark.parametrize(("carried", "first"), [(100, 20), (150, 40)])
 def test_a_robot_that_is_carried_is_found_where_it_was_before(driven, carried, first):
-    scans, truth, _ = driven
+    _, scans, truth, _ = driven
     order, extract, placed = [*range(carried), *range(first, first + 40)], Extractor(), Drive()
     for k in order:
         placed.add(scans[k], extract(scans[k]))

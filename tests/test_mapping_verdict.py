@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from lineament_lab.evaluation.maps import absolute_errors
+from robot_driving import storey_driven
 
 from lineament import Extractor, LaserScan, open_log
 from lineament.cli import cli
@@ -19,7 +20,6 @@ from lineament.mapping.making import make_map
 from lineament.mapping.parts import apart, beside, between, boxes_of, parts_of
 from lineament.mapping.sessions import merge_onto, onto_plan, placements
 from lineament.scan.poses import compose, inverse, relative
-from lineament.simulation import SENSORS, Wheels, office
 from lineament.walls.sights import SIGHT, lines_of, sights_of
 
 
@@ -148,14 +148,6 @@ def test_boxes_lie_in_a_row_beside_those_that_stay():
     assert moves.tolist() == [[0, 0], [0, 0], [9 + 6 + 3, 3]]
 
 
-def driven(seed, count=150, size=(24.0, 16.0)):
-    """A drive through a small storey, with wheels, and the true poses."""
-    building = office(seed, size, visits=0.1)
-    scans, truth = building.drive(SENSORS["utm30lx"], seed=1, rate=2, people=2, wheels=Wheels())
-    kept = [scan for scan, _ in zip(scans, range(count), strict=False)]
-    return building, kept, truth[: len(kept)]
-
-
 def mapped(scans, odometry):
     placed, extract = Drive(), Extractor()
     for scan, pose in zip(scans, odometry, strict=True):
@@ -191,7 +183,7 @@ def unlike(scan, ranges=None, stamp=None):
 @pytest.mark.parametrize("seen", [np.inf, 0.25])
 def test_a_scanner_that_is_blocked_is_named(seen, odometry):
     """For thirty scans nothing comes back, or a cover just before it does."""
-    _, scans, truth = driven(3, 170)
+    _, scans, truth = storey_driven(3, 170)
     cover = seen + 0.02 * np.random.default_rng(0).normal(size=len(scans[0]))
     scans = [unlike(scan, cover) if 80 <= k < 110 else scan for k, scan in enumerate(scans)]
     made = mapped(scans, [scan.pose if odometry else None for scan in scans])
@@ -201,7 +193,7 @@ def test_a_scanner_that_is_blocked_is_named(seen, odometry):
 
 @pytest.mark.slow
 def test_odometry_that_jumps_ends_a_part_or_is_bridged_by_walls():
-    _, scans, truth = driven(3, 170)
+    _, scans, truth = storey_driven(3, 170)
     far = (50.0, 10.0, 1.0)
     jumps = [scan.pose if k < 100 else compose(far, scan.pose) for k, scan in enumerate(scans)]
     made = mapped(scans, jumps)
@@ -214,7 +206,7 @@ def test_odometry_that_jumps_ends_a_part_or_is_bridged_by_walls():
 
 @pytest.mark.slow
 def test_odometry_of_another_robot_is_not_believed():
-    (_, scans, truth), (_, others, _) = driven(3, 150), driven(5, 150)
+    (_, scans, truth), (_, others, _) = storey_driven(3, 150), storey_driven(5, 150)
     made = mapped(scans, [scan.pose for scan in others])
     assert max(errors_by_part(made, truth)) < 0.5
     assert sum(way for *_, way in made.unsure) > 10
@@ -222,7 +214,7 @@ def test_odometry_of_another_robot_is_not_believed():
 
 @pytest.mark.slow
 def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
-    (ground, below, truth), (_, above, of_above) = driven(3), driven(7)
+    (ground, below, truth), (_, above, of_above) = storey_driven(3), storey_driven(7)
     made = mapped([*below, *above], [None] * 300)
     assert made.parts.count == 2
     assert made.parts.numbers[made.frame_of].tolist() == 150 * [0] + 150 * [1]
@@ -249,7 +241,7 @@ def test_two_floors_are_two_parts_and_each_is_found_on_its_own_plan():
 
 @pytest.mark.slow
 def test_two_floors_are_two_parts_with_odometry_that_stands_still_in_the_lift():
-    (_, below, truth), (_, above, of_above) = driven(3, 80), driven(5, 80)
+    (_, below, truth), (_, above, of_above) = storey_driven(3, 80), storey_driven(5, 80)
     lift = compose(below[-1].pose, inverse(above[0].pose))
     odometry = [scan.pose for scan in below] + [compose(lift, scan.pose) for scan in above]
     made = mapped([*below, *above], odometry)
@@ -260,7 +252,7 @@ def test_two_floors_are_two_parts_with_odometry_that_stands_still_in_the_lift():
 @pytest.mark.slow
 def test_odometry_over_a_lost_key_frame_is_believed_unless_walls_deny_it():
     """What is seen after it goes on, lies where nothing was seen, or contradicts what was."""
-    _, scans, _ = driven(3, 60)
+    _, scans, _ = storey_driven(3, 60)
     drive, extract = Drive(), Extractor()
     for scan in scans:
         drive.add(scan, extract(scan), scan.pose)
@@ -284,7 +276,7 @@ def test_odometry_over_a_lost_key_frame_is_believed_unless_walls_deny_it():
 
 @pytest.mark.slow
 def test_a_log_without_stamps_is_mapped_in_its_order(tmp_path):
-    _, scans, truth = driven(3, 60)
+    _, scans, truth = storey_driven(3, 60)
     save_log(tmp_path / "log.npz", [unlike(scan, stamp=0.0) for scan in scans])
     given = ["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.svg"), "--no-odometry"]
     result = CliRunner().invoke(cli, [*given, "--poses", str(tmp_path / "a.tum")])
@@ -296,8 +288,8 @@ def test_a_log_without_stamps_is_mapped_in_its_order(tmp_path):
 
 @pytest.mark.slow
 def test_the_command_says_what_does_not_hang_together(tmp_path):
-    whole = driven(3, 60)[1]
-    later = [unlike(scan, stamp=scan.stamp + 100) for scan in driven(7, 60)[1]]
+    whole = storey_driven(3, 60)[1]
+    later = [unlike(scan, stamp=scan.stamp + 100) for scan in storey_driven(7, 60)[1]]
     for scans, is_torn in ((whole, False), ([*whole, *later], True)):
         save_log(tmp_path / "log.npz", scans)
         given = ["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.yaml")]
