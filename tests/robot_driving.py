@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from functools import cache
 from itertools import islice
 from typing import Any, NamedTuple
@@ -74,6 +75,29 @@ def carried(before: Moment, first: int, count: int = 10) -> list[Moment]:
 def off(pose: Pose, true: Pose) -> tuple[float, float]:
     x, y, turn = relative(true, pose)
     return math.hypot(x, y), abs(turn)
+
+
+def placing(peer: Any, scans: str, moments: Iterable[Moment]) -> Callable[[], list[dict]]:
+    """Return what lets a robot send the next moment, and gives what has come of `map` → `odom`."""
+    following = iter(moments)
+
+    def step() -> list[dict]:
+        moment = next(following)
+        stamp = moment.scan.stamp
+        peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
+        peer.write(scans, message_of(moment.scan, stamp))
+        came = (one for message in peer.take("/tf") for one in message["transforms"])
+        return [one for one in came if one["header"]["frame_id"] == "map"]
+
+    return step
+
+
+def moment_of(message: dict, later: float = 0.0) -> Moment:
+    """Return the moment that a message is of, or a time before it."""
+    stamp = message["header"]["stamp"]
+    time = stamp["sec"] + stamp["nanosec"] / 1e9 - later
+    (moment,) = (one for one in driven(1, 150) if abs(one.scan.stamp - time) < 1e-6)
+    return moment
 
 
 def link_message(stamp: float, parent: str, child: str, pose: Pose) -> dict:

@@ -22,8 +22,9 @@ from robot_driving import (
     carried,
     driven,
     link_message,
-    message_of,
+    moment_of,
     off,
+    placing,
     pose_of,
     written,
 )
@@ -421,32 +422,13 @@ def test_over_dds_as_nav2_has_it(peer, domain, plan):
     peer.publish("/scan/relocate", "Empty")
     peer.listen("/tf", "TFMessage", 100)
     peer.write("/tf_static", link_message(0.0, "base_link", "laser", MOUNTING))
-    moments = driven()
-    steps = iter(range(len(moments)))
     with Running(domain=domain, map=plan, base_frame="base_link") as node:
         told = ("/scan", "/tf", "/tf_static", "/initialpose", "/scan/relocate")
         eventually(lambda: all(map(peer.listeners, told)))
-
-        def step() -> None:
-            moment = moments[k := next(steps)]
-            stamp = moment.scan.stamp
-            peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
-            peer.write("/scan", message_of(moment.scan, stamp))
-            assert k < 55
-
-        def link() -> dict | None:
-            step()
-            for message in peer.take("/tf"):
-                for one in message["transforms"]:
-                    if one["header"]["frame_id"] == "map":
-                        return one
-            return None
-
-        found = eventually(link, pause=0.05)
+        found, *_ = eventually(placing(peer, "/scan", driven()), pause=0.05)
         peer.listen("/amcl_pose", "PoseWithCovarianceStamped", 1, True)
         pose = heard(peer, "/amcl_pose")  # nothing is sent meanwhile
-    stamp = found["header"]["stamp"]["sec"] + found["header"]["stamp"]["nanosec"] / 1e9 - 1.0
-    (moment,) = (m for m in moments if abs(m.scan.stamp - stamp) < 1e-6)
+    moment = moment_of(found, later=1.0)
     base = compose(pose_of(found["transform"]), moment.believed)
     assert off(base, moment.base)[0] < 0.05
     assert found["child_frame_id"] == "odom"

@@ -76,11 +76,12 @@ def test_what_is_due_comes_together(played, clock):
     assert source.receive(1.0)[0].arrived == pytest.approx(170.4)
 
 
-def test_a_scan_in_time_is_returned_alone(played, clock):
-    source = played([0.0, 0.1, 0.2, 0.3], rate=100.0)
+@pytest.mark.parametrize(("late", "counts"), [(0.005, [1, 1]), (0.0099, [1, 1]), (0.0101, [2, 0])])
+def test_a_scan_in_time_for_a_hundredth_of_a_second_is_returned_alone(played, clock, late, counts):
+    source = played([0.0, 0.001, 0.002])
     assert len(source.receive(0.0)) == 1
-    clock.now += 0.0035  # all are due, none is late
-    assert [len(source.receive(0.0)) for _ in range(3)] == [1, 1, 1]
+    clock.now += 0.001 + late  # both are due
+    assert [len(source.receive(0.0)) for _ in range(2)] == counts
 
 
 def test_a_loop_starts_again(played, clock):

@@ -32,11 +32,11 @@ from live_driving import (
 )
 from robot_driving import (
     MOUNTING,
-    Moment,
     driven,
     link_message,
-    message_of,
+    moment_of,
     off,
+    placing,
     pose_of,
     written,
 )
@@ -274,7 +274,7 @@ def test_a_robot_on_a_plan_is_placed_for_a_genuine_listener(node, peer, topic, t
     peer.listen(f"{topic}/amcl_pose", placed)
     publisher = Ros1Publisher(node)
     sink = RosSink(publisher, RosMessages("ros1"), config)
-    moments, stopped = iter(driven(1, 150)), threading.Event()
+    stopped = threading.Event()
     with (
         closing(Ros1Source(node, config)) as source,
         ThreadPoolExecutor(1) as pool,
@@ -283,39 +283,20 @@ def test_a_robot_on_a_plan_is_placed_for_a_genuine_listener(node, peer, topic, t
         stack.callback(stopped.set)
         running = pool.submit(Node(source, Pipeline(config), [sink]).run, stopped.is_set)
         eventually(lambda: peer.listeners("/tf") > 1 and peer.listeners(topic))
-        links_of_plan: list[dict] = []
-
-        def link() -> bool:
-            moment = next(moments)
-            stamp = moment.scan.stamp
-            peer.write("/tf", link_message(stamp, "odom", "base_link", moment.believed))
-            peer.write(topic, message_of(moment.scan, stamp))
-            came = (one for message in peer.take("/tf") for one in message["transforms"])
-            links_of_plan.extend(one for one in came if one["header"]["frame_id"] == "map")
-            return bool(links_of_plan)
-
-        eventually(link, pause=0.1)
+        found, *_ = eventually(placing(peer, topic, driven(1, 150)), pause=0.1)
         pose = heard(peer, f"{topic}/amcl_pose")
         stopped.set()
         assert running.result(DEADLINE).total.malformed == 0
     peer.close()  # Other tests are not to have it as a listener.
     eventually(lambda: not publisher.listeners("/tf"))
-    (found, *_), placed = links_of_plan, pose["pose"]["pose"]
+    placed = pose["pose"]["pose"]
     assert (found["header"]["frame_id"], found["child_frame_id"]) == ("map", "odom")
-    moment = at(found, later=1.0)
+    moment = moment_of(found, later=1.0)
     assert off(compose(pose_of(found["transform"]), moment.believed), moment.base)[0] < 0.05
     assert pose["header"]["frame_id"] == "map"
     base = pose_of({"translation": placed["position"], "rotation": placed["orientation"]})
-    assert off(base, at(pose).base)[0] < 0.05
+    assert off(base, moment_of(pose).base)[0] < 0.05
     assert pose["pose"]["covariance"][0] > 0
-
-
-def at(message: dict, later: float = 0.0) -> Moment:
-    """Return the moment that a message is of, or a time before it."""
-    stamp = message["header"]["stamp"]
-    time = stamp["sec"] + stamp["nanosec"] / 1e9 - later
-    (moment,) = (moment for moment in driven(1, 150) if abs(moment.scan.stamp - time) < 1e-6)
-    return moment
 
 
 def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):

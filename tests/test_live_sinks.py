@@ -1,14 +1,13 @@
 """What sinks say of the pose on a plan, and how they draw it; signals and scans that are late."""
 
 import signal
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from in_memory import Taken
 
 import lineament as ln
-from lineament.live import FoxgloveSink, LiveConfig, ReplaySource, RosSink, run_live
+from lineament.live import FoxgloveSink, LiveConfig, RosSink, run_live
 from lineament.live.counters import Counts, Report
 from lineament.live.pipeline import Frame
 from lineament.live.stopping import stopping
@@ -99,14 +98,3 @@ def test_a_signal_behind_the_start_ends_a_node_that_runs(tmp_path):
     with stopping() as is_stopped:
         reports.append(run_live(config, is_stopped, write=write))
     assert [type(report) for report in reports] == [Report]
-
-
-@pytest.mark.parametrize(("late", "alone"), [(0.0099, True), (0.0101, False)])
-def test_a_scan_is_in_time_for_a_hundredth_of_a_second(tmp_path, monkeypatch, late, alone):
-    clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr("time.sleep", lambda _: None)
-    path = log_of(tmp_path, [0.0, 0.001, 0.002])
-    source = ReplaySource(path, clock=lambda: clock.now)
-    assert len(source.receive(0.0)) == 1
-    clock.now += 0.001 + late
-    assert len(source.receive(0.0)) == (1 if alone else 2)
