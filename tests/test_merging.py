@@ -1,13 +1,15 @@
 """Several scanners on one robot: what they see becomes one set of features."""
 
 import math
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
+from handmade import arc, corner, edge, features, segment
 
 import lineament as ln
-from lineament.features import TABLES, Features, make_records
+from lineament.features import TABLES
 from lineament.mapping import merge_features
 from lineament.scan import LaserScan
 from lineament.scan.poses import compose
@@ -27,19 +29,17 @@ def seen(world, base, mountings, seed, sensor=PLAIN):
     return [extractor(sensor.scan(world, compose(base, pose), rng)) for pose in mountings]
 
 
-def made(**tables):
-    """Make the features of a scan of three beams by the fields of their records."""
-    records = {name: make_records(name, tables.get(name, [])) for name in TABLES}
-    scan = LaserScan([5.0, 5.0, 5.0], -0.1, 0.1)
-    return Features(**records, clusters=np.zeros(3, np.int32), scan=scan)
+def made(**rows):
+    """Make the features of a scan of three beams."""
+    return replace(features(3, **rows), scan=LaserScan([5.0, 5.0, 5.0], -0.1, 0.1))
 
 
 def wall(x, first, last, sigma, **fields):
     """Make a wall at x, from its first to its last y; its offset is known to sigma."""
-    ends = {"start": (x, first), "end": (x, last), "centroid": (x, (first + last) / 2)}
-    covariance = np.diag([sigma**2, 1e-4])
-    fields = {"length": last - first, "n_points": 3, "last_beam": 2, **fields}
-    return {**ends, "angle": math.pi / 2, "covariance": covariance, **fields}
+    row = segment((x, first), (x, last), 0, 2, sigma=(sigma, 0.01))
+    for name, value in fields.items():
+        row[name] = value
+    return row
 
 
 def test_walls_are_weighted_by_their_information():
@@ -80,7 +80,7 @@ def test_walls_with_a_doorway_between_them_are_two(first, count):
 
 
 def test_the_other_side_of_a_wall_is_another_wall():
-    behind = wall(2.0, 1.0, -1.0, 0.01, angle=-math.pi / 2, length=2.0)
+    behind = wall(2.0, 1.0, -1.0, 0.01)
     walls = [made(segments=[wall(2.0, -1.0, 1.0, 0.01)]), made(segments=[behind])]
     assert len(merge_features(walls, AT_ROBOT).segments) == 2
 
@@ -92,27 +92,13 @@ def test_nothing_of_one_scanner_becomes_one():
     assert len(merge_features([halves, whole], AT_ROBOT).segments) == 2
 
 
-def corner(x, y, spread, **fields):
-    return {"position": (x, y), "covariance": spread, "kind": "corner", "beam": 1,
-            "segments": (-1, -1), **fields}  # fmt: skip
-
-
 def test_corners_and_arcs_are_weighted_by_their_information():
-    spread, other = np.diag([1e-4, 4e-4]), np.diag([4e-4, 1e-4])
-    arc = {"radius": 0.2, "n_points": 3, "last_beam": 2}
-    found = merge_features(
-        [
-            made(
-                corners=[corner(2.0, 1.0, spread)],
-                arcs=[{**arc, "center": (3, 0), "covariance": np.eye(3) * 1e-4}],
-            ),
-            made(
-                corners=[corner(2.01, 1.01, other)],
-                arcs=[{**arc, "center": (3, 0.02), "covariance": np.eye(3) * 1e-4}],
-            ),
-        ],
-        AT_ROBOT,
-    )
+    corners = corner(2.0, 1.0), corner(2.01, 1.01)
+    for row, variances in zip(corners, ([1e-4, 4e-4], [4e-4, 1e-4]), strict=True):
+        row["covariance"] = np.diag(variances)
+    arcs = arc(3, 0, 0.2, 0, 2), arc(3, 0.02, 0.2, 0, 2)
+    parts = [made(corners=[of], arcs=[at]) for of, at in zip(corners, arcs, strict=True)]
+    found = merge_features(parts, AT_ROBOT)
     assert found.corners["position"] == pytest.approx(np.array([[2.002, 1.008]]))
     assert found.corners["covariance"][0] == pytest.approx(np.eye(2) * 8e-5)
     assert found.arcs["center"] == pytest.approx(np.array([[3.0, 0.01]]))
@@ -121,22 +107,21 @@ def test_corners_and_arcs_are_weighted_by_their_information():
 
 
 def test_corners_of_another_convexity_are_two():
-    spread = np.eye(2) * 1e-4
-    parts = [made(corners=[corner(2, 1, spread, convex=is_convex)]) for is_convex in (True, False)]
+    parts = [made(corners=[corner(2, 1)]) for _ in range(2)]
+    parts[0].corners["convex"] = True
     assert len(merge_features(parts, AT_ROBOT).corners) == 2
-
-
-def edge(y, side, **fields):
-    return {"position": (2.0, y), "covariance": np.eye(2) * 1e-4, "side": side, "beam": 1, **fields}
+    parts[1].corners["convex"] = True
+    assert len(merge_features(parts, AT_ROBOT).corners) == 1
 
 
 def test_edges_stay_where_walls_end():
     hidden = made(
-        segments=[wall(2.0, -1.0, 0.5, 0.01)], edges=[edge(-1.0, "start"), edge(0.5, "end")]
+        segments=[wall(2.0, -1.0, 0.5, 0.01)],
+        edges=[edge(2.0, -1.0, side="start"), edge(2.0, 0.5)],
     )
     longer = made(
         segments=[wall(5.0, 0, 1, 0.01), wall(2.0, -0.99, 1.5, 0.01)],
-        edges=[edge(-0.99, "start", segment=1), edge(1.5, "end", segment=1)],
+        edges=[edge(2.0, -0.99, side="start", segment=1), edge(2.0, 1.5, segment=1)],
     )
     found = merge_features([hidden, longer], AT_ROBOT)
     which = found.edges["segment"]
