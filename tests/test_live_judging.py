@@ -80,13 +80,8 @@ def as_live(plan: str) -> list[str]:
     for moment in moments():
         stamp = moment.scan.stamp
         pipeline.hear([StampedPose(stamp, "odom", "base_link", moment.believed)], LINKS)
-        fields = {"range_min": 0.1, "range_max": 30.0, "frame_id": "laser", "stamp": stamp}
-        scan = type(moment.scan)(
-            moment.scan.ranges.astype("f4").astype(float),
-            moment.scan.angle_min,
-            moment.scan.angle_increment,
-            **fields,
-        )
+        ranges = moment.scan.ranges.astype("f4").astype(float)  # as the bag has them
+        scan = moment.scan._changed(ranges=ranges, range_min=0.1, range_max=30.0)
         judgement = pipeline("a", scan).judgement
         verdicts.append("" if judgement is None else judgement.verdict)
         if said and said[0].stamp == stamp:

@@ -29,7 +29,6 @@ from robot_driving import (
     written,
 )
 
-import lineament as ln
 from lineament.live import Frame, LiveConfig, Node, Pipeline, Received, RosSink
 from lineament.live.received import GUESS, JUDGED, LINKS, MAP, MOUNTINGS, ODOMETRY, RELOCATE, wanted
 from lineament.mapping import LineMap
@@ -47,11 +46,6 @@ POSE = "geometry_msgs/PoseWithCovarianceStamped"
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> str:
     return written(tmp_path_factory.mktemp("plan") / "own.dxf", 1)
-
-
-def named(scan: ln.LaserScan, frame: str) -> ln.LaserScan:
-    fields = {name: getattr(scan, name) for name in ("range_min", "range_max", "stamp")}
-    return ln.LaserScan(scan.ranges, scan.angle_min, scan.angle_increment, frame_id=frame, **fields)
 
 
 class Robot:
@@ -74,7 +68,7 @@ class Robot:
         self.say(LINKS, StampedPose(stamp, "odom", "base_footprint", moment.believed))
 
     def see(self, moment: Moment) -> Frame:
-        return self.pipeline("scanner", named(moment.scan, "laser"))
+        return self.pipeline("scanner", moment.scan)
 
     def drive(self, moments) -> list[Frame]:
         frames = []
@@ -117,7 +111,7 @@ def test_a_scanner_upside_down_and_odometry_by_a_topic(plan):
         )
         robot.pipeline.hear(odometry, ODOMETRY)
         robot.say(LINKS, StampedPose(moment.scan.stamp, "odom", "base_footprint", (9.0, 9.0, 1.0)))
-        frame = robot.pipeline("scanner", named(moment.scan.turned_over(), "laser"))
+        frame = robot.pipeline("scanner", moment.scan.turned_over())
     assert_right(frame, moment)
 
 
@@ -229,9 +223,8 @@ def lines_of(robot: Robot, moments, monkeypatch, *, moved: bool = False) -> list
     batches, lines = [], []
     for moment in moments:
         link = StampedPose(moment.scan.stamp, "odom", "base_footprint", moment.believed)
-        scan = named(moment.scan, "laser")
         batches.append([Received("tf", partial(list, [link]), 0.0, LINKS)] if moved else [])
-        batches[-1].append(Received("a", partial(copy, scan), 0.0))
+        batches[-1].append(Received("a", partial(copy, moment.scan), 0.0))
     Node(Given(*batches, []), robot.pipeline, [], write=lines.append).run()
     return lines
 
@@ -248,7 +241,7 @@ def test_a_gap_that_lasts_is_one_line(plan, monkeypatch):
 def test_a_driver_that_is_started_again_goes_on(plan):
     robot, _ = located(plan)
     robot.move(driven()[30])
-    frame = robot.pipeline("another publisher", named(driven()[30].scan, "laser"))
+    frame = robot.pipeline("another publisher", driven()[30].scan)
     assert_right(frame, driven()[30])
 
 

@@ -140,8 +140,7 @@ def test_a_node_publishes_poses_and_walls_and_saves_the_map(tmp_path):
         def seen(scan):
             base = compose(scan.pose, inverse(mounting))
             pipeline.hear([StampedPose(scan.stamp, "odom", "base_link", base)], LINKS)
-            fields = {"stamp": scan.stamp, "range_max": scan.range_max, "frame_id": "laser"}
-            bare = ln.LaserScan(scan.ranges, scan.angle_min, scan.angle_increment, **fields)
+            bare = scan.with_pose(None)
             frame = pipeline("scanner", bare)
             topics.publish(frame, Moment(*time_of(bare), "laser", "odom"))
             return frame

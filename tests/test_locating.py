@@ -61,8 +61,7 @@ def plan_of(world: World) -> LineMap:
 
 def bare(scan, stamp):
     """The same scan at another time, without odometry."""
-    bearings = scan.angle_min, scan.angle_increment
-    return ln.LaserScan(scan.ranges, *bearings, range_max=scan.range_max, stamp=stamp)
+    return scan.with_pose(None).stamped("first", round(1e9 * stamp))
 
 
 def followed(scans, plan, odometry=True):

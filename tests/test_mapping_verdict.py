@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from lineament_lab.evaluation.maps import absolute_errors
 from robot_driving import storey_driven
 
-from lineament import Extractor, LaserScan, open_log
+from lineament import Extractor, open_log
 from lineament.cli import cli
 from lineament.logs import save_log
 from lineament.mapping import LineMap
@@ -166,18 +166,6 @@ def errors_by_part(made, truth):
     return found
 
 
-def unlike(scan, ranges=None, stamp=None):
-    """Return a scan with other ranges, or another stamp."""
-    return LaserScan(
-        scan.ranges if ranges is None else ranges,
-        scan.angle_min,
-        scan.angle_increment,
-        stamp=scan.stamp if stamp is None else stamp,
-        range_max=scan.range_max,
-        pose=scan.pose,
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("odometry", [True, False])
 @pytest.mark.parametrize("seen", [np.inf, 0.25])
@@ -185,7 +173,7 @@ def test_a_scanner_that_is_blocked_is_named(seen, odometry):
     """For thirty scans nothing comes back, or a cover just before it does."""
     _, scans, truth = storey_driven(3, 170)
     cover = seen + 0.02 * np.random.default_rng(0).normal(size=len(scans[0]))
-    scans = [unlike(scan, cover) if 80 <= k < 110 else scan for k, scan in enumerate(scans)]
+    scans = [scan._changed(ranges=cover) if 80 <= k < 110 else scan for k, scan in enumerate(scans)]
     made = mapped(scans, [scan.pose if odometry else None for scan in scans])
     assert max(errors_by_part(made, truth)) < 0.02
     assert any(first <= 80 and last >= 109 for first, last, _ in made.unsure)
@@ -277,7 +265,7 @@ def test_odometry_over_a_lost_key_frame_is_believed_unless_walls_deny_it():
 @pytest.mark.slow
 def test_a_log_without_stamps_is_mapped_in_its_order(tmp_path):
     _, scans, truth = storey_driven(3, 60)
-    save_log(tmp_path / "log.npz", [unlike(scan, stamp=0.0) for scan in scans])
+    save_log(tmp_path / "log.npz", [scan.stamped("first", 0) for scan in scans])
     given = ["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.svg"), "--no-odometry"]
     result = CliRunner().invoke(cli, [*given, "--poses", str(tmp_path / "a.tum")])
     assert result.exit_code == 0, result.output
@@ -289,7 +277,7 @@ def test_a_log_without_stamps_is_mapped_in_its_order(tmp_path):
 @pytest.mark.slow
 def test_the_command_says_what_does_not_hang_together(tmp_path):
     whole = storey_driven(3, 60)[1]
-    later = [unlike(scan, stamp=scan.stamp + 100) for scan in storey_driven(7, 60)[1]]
+    later = [scan.stamped("first", scan.stamp_ns + 10**11) for scan in storey_driven(7, 60)[1]]
     for scans, is_torn in ((whole, False), ([*whole, *later], True)):
         save_log(tmp_path / "log.npz", scans)
         given = ["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.yaml")]
