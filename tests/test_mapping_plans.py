@@ -5,6 +5,7 @@ import math
 import ezdxf
 import numpy as np
 import pytest
+from crafted_plans import ROOM
 from ezdxf.units import METER_FACTOR
 from handmade import arc, features, segment
 
@@ -14,8 +15,6 @@ from lineament.drawings import UNITS
 from lineament.logs import save_log
 from lineament.mapping import LineMap, locate
 from lineament.simulation import SENSORS, drive, office, room
-
-ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 
 
 def line(start, end, sigma=0.01, sigma_angle=0.005, misfit=0.0):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from crafted_plans import ROOM
 from handmade import arc, features, segment
 
 import lineament as ln
@@ -13,8 +14,6 @@ from lineament.cli import run
 from lineament.mapping import Grid, LineMap
 from lineament.mapping.index import MAPPED
 from lineament.output import open_writer
-
-ROOM = np.array([[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]], float)
 
 
 @pytest.fixture

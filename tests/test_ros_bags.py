@@ -73,7 +73,7 @@ def test_a_picture_names_the_topic_where_a_log_has_several(tmp_path, capsys):
         assert f" · {topic}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("kind", ["mcap", "mcap-bare", "sqlite3"])
+@pytest.mark.parametrize("kind", ["mcap", "mcap-bare", "sqlite3", "rosbag1"])
 def test_a_bag_of_nothing(tmp_path, kind):
     _, problem = ros_bags.read(write(tmp_path, kind, []))
     assert problem.endswith("topics there are: none")

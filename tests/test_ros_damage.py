@@ -165,15 +165,6 @@ def test_a_ros_1_bag_that_was_not_closed(altered):
     assert "ends without an index: it is cut off, or still recorded" in problem
 
 
-def test_an_empty_ros_1_bag(tmp_path):
-    """Whether it was closed makes a difference."""
-    path = ros_bags.write(tmp_path, "rosbag1", [])
-    assert re.search("has no LaserScan or .*; topics there are: none", read(path)[1])
-    data = bytearray(path.read_bytes())
-    path.write_bytes(changed(data, data.index(b"index_pos=") + len(b"index_pos="), "<Q", 0))
-    assert "ends without an index: it is cut off, or still recorded" in read(path)[1]
-
-
 def test_the_index_records_of_early_recorders(altered):
     """They have the length that those of the version before would have, or lack their count."""
 
