@@ -486,6 +486,7 @@ def test_maps_as_they_are_sent():
     grid = read(grid_message(turned=(0.0, 0.0, math.sin(0.25), math.cos(0.25))))
     assert grid.cells.tolist() == [[-1, 0], [1, 2], [3, 4]]
     assert (grid.frame, grid.origin) == ("map", pytest.approx((1.0, 2.0, 0.5)))
+    assert read(grid_message(turned=(0.0, 0.0, 1.0, 1.0))).origin[2] == pytest.approx(math.pi / 2)
     for message, problem in (
         (grid_message(0.0), "has cells of 0 m"),
         (grid_message(math.nan), "has cells of nan m"),
@@ -493,6 +494,7 @@ def test_maps_as_they_are_sent():
         (grid_message(size=(0, 0), n=0), "has 0 cells"),
         (grid_message()[:-3], "ends early"),
         (grid_message(turned=(1.0, 0.0, 0.0, 0.0)), "its origin is not level"),
+        (grid_message(turned=(math.nan, 0.0, 0.0, 1.0)), "has cells of 0.05 m"),
     ):
         with pytest.raises(ValueError, match=problem):
             read(message)

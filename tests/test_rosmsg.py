@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lineament import LaserScan
 from lineament.rosmsg import definitions
-from lineament.rosmsg.poses import Odometry, odometry
+from lineament.rosmsg.poses import Odometry, odometry, turn_of
 from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
 from lineament.rosmsg.wire import WireReader, WireWriter
 
@@ -324,3 +324,15 @@ def test_odometry(ros, encoding):
     for x in (math.nan, -math.inf):
         with pytest.raises(ValueError, match=r"has pose .* and twist .*, expected finite numbers"):
             odometry(written(x), encoding)
+
+
+@pytest.mark.parametrize("length", [1.0, 1e-3, 2.0, 1e6])
+def test_a_quaternion_of_any_length_is_a_turn(length):
+    """One that is typed by hand, z: 1, w: 1 for a quarter turn, is longer than 1."""
+    for turn in (-3.0, -math.pi / 2, 0.0, 0.4, 2.5):
+        level = 0.0, 0.0, length * math.sin(turn / 2), length * math.cos(turn / 2)
+        assert turn_of(*level) == (pytest.approx(turn), False)
+        # Turned about x by half a circle before.
+        over = level[3], level[2], 0.0, 0.0
+        assert turn_of(*over) == (pytest.approx(turn), True)
+    assert turn_of(0.0, 0.0, 0.0, 0.0) == (0.0, False)

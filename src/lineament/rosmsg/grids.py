@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..limits import LIMITS, Limits
 from ..scan import Pose
+from .poses import turn_of
 from .wire import Buffer, WireReader
 
 
@@ -30,17 +31,16 @@ def occupancy_grid(data: Buffer, encoding: str, limits: Limits = LIMITS) -> Occu
     _, frame = reader.header()
     reader.numbers("2I")  # when it was loaded
     (resolution,), (width, height) = reader.numbers("f"), reader.numbers("2I")
-    x, y, _, qx, qy, qz, qw = reader.numbers("7d")
+    x, y, _, *turned = reader.numbers("7d")
     n = reader.count()
-    if not (0 < resolution < math.inf and all(map(math.isfinite, (x, y, qz, qw)))):
+    if not (0 < resolution < math.inf and all(map(math.isfinite, (x, y, *turned)))):
         raise ValueError(f"has cells of {resolution:g} m at {x:g} m, {y:g} m, expected more than 0")
     if n != width * height or not n:
         raise ValueError(f"has {n} cells, expected {width} x {height}, and one at least")
     if n > limits.cells:
         limits.check("cells", n)
-    if qx * qx + qy * qy > 1e-6:
+    if math.hypot(*turned[:2]) > 1e-3 * math.hypot(*turned):
         raise ValueError("its origin is not level, expected a turn about z alone")
     cells = np.frombuffer(reader.raw(n), np.int8).reshape(height, width)
     reader.end()
-    origin = x, y, math.atan2(2 * qw * qz, 1 - 2 * qz * qz)
-    return OccupancyGrid(frame, cells, float(resolution), origin)
+    return OccupancyGrid(frame, cells, float(resolution), (x, y, turn_of(*turned)[0]))

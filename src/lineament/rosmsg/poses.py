@@ -97,8 +97,15 @@ def _covariance(values: tuple[float, ...]) -> Array | None:
 def _stamped_pose(reader: WireReader, has_child: bool) -> StampedPose:
     stamp, frame = reader.header()
     child_frame = reader.text() if has_child else ""
-    x, y, _, qx, qy, qz, qw = reader.numbers("7d")
-    theta = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-    return StampedPose(
-        stamp / NANO, frame, child_frame, (x, y, theta), None, qx * qx + qy * qy > 0.5
-    )
+    x, y, _, *turned = reader.numbers("7d")
+    theta, is_upside_down = turn_of(*turned)
+    return StampedPose(stamp / NANO, frame, child_frame, (x, y, theta), None, is_upside_down)
+
+
+def turn_of(qx: float, qy: float, qz: float, qw: float) -> tuple[float, bool]:
+    """Turn about z [rad] of a quaternion of any length, as of tf2, and whether z points down.
+
+    One that is typed by hand seldom has length 1; one that is all 0 does not turn.
+    """
+    theta = math.atan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
+    return theta, qx * qx + qy * qy > qz * qz + qw * qw
