@@ -182,6 +182,15 @@ def test_what_is_no_plan_is_one_clear_line(tmp_path, name, make, line):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("ending", [".yaml", ".svg", ".parquet"])
+def test_layers_and_units_are_of_a_dxf(tmp_path, ending):
+    path = tmp_path / f"plan{ending}"
+    LineMap.from_lines([[0.0, 0.0, 9.0, 0.0], [9.0, 0.0, 9.0, 9.0]]).write(path)
+    for asked in ({"layers": ["walls"]}, {"units": "mm"}):
+        with pytest.raises(ln.LineamentError, match=rf"plan\{ending}: \w+ are of a DXF, expected"):
+            LineMap.read(path, **asked)
+
+
 def test_layer_that_is_not_there_names_those_that_are(tmp_path):
     path = draw(tmp_path / "a.dxf")
     with pytest.raises(ln.LineamentError, match=r"no layer is B-\*; there are: A-WALL, DOORS"):

@@ -23,7 +23,7 @@ from .grids import GRID_ENDINGS, Grid
 from .hypotheses import Listed, anchors, listed, meetings, spectrum
 from .index import FARTHEST, LONGEST, MAPPED, Index, make_index, rings
 from .outlines import walls_of_grid
-from .plans import doubts, read_table, unknown_plan
+from .plans import doubts, is_drawn_by_cad, read_table, unknown_plan
 from .svg_plans import read_svg
 
 
@@ -270,8 +270,8 @@ class LineMap(ReadOnly):
         """
         ending, most = Path(path).suffix.lower(), Limits.of(limits)
         try:
+            is_dxf = is_drawn_by_cad(ending, layers=layers, units=units)
             if ending in (".dxf", ".svg"):
-                is_dxf = ending == ".dxf"
                 drawn = read_drawing(path, layers, units, most) if is_dxf else read_svg(path, most)
                 lines, circles, left_out = drawn
                 plan = cls.from_lines(lines, circles, sigma=sigma)

@@ -40,6 +40,15 @@ def unknown_plan(ending: str) -> LineamentError:
     )
 
 
+def is_drawn_by_cad(ending: str, **asked: object) -> bool:
+    """Whether a plan is a DXF; LineamentError if another one is asked for what only that has."""
+    is_dxf = ending == ".dxf"
+    for name, value in asked.items():
+        if value is not None and not is_dxf:
+            raise LineamentError(f"{name} are of a DXF, expected none")
+    return is_dxf
+
+
 def is_a_building(size: float) -> bool:
     """Whether a plan so long [m] can be that of a building."""
     return _BUILDINGS[0] <= size <= _BUILDINGS[1]

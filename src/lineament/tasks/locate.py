@@ -56,7 +56,9 @@ class Located:
 
     def check_found(self) -> None:
         """Raise a NothingFoundError if no scan is located."""
-        usual = f"{self.plan}: is it another building, or in other units (--units of a DXF)?"
+        is_dxf = Path(self.plan).suffix.lower() == ".dxf"
+        other = ", or in other units (--units)" if is_dxf else ""
+        usual = f"{self.plan}: is it another building{other}?"
         if math.isnan(self.first):
             raise NothingFoundError(f"{self.log}: never located: {self.warning or usual}")
 
