@@ -289,6 +289,13 @@ def test_topics_that_have_no_poses(tmp_path, pose_topic, problem):
     check_refused(problem, path, pose_topic=pose_topic)
 
 
+def test_a_log_without_topics_has_its_own_poses(tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text("FLASER 2 1.5 1.6 7 8 0 0 0 0 7.5 robot 7.5")
+    with pytest.warns(LineamentWarning, match=r"its own are taken, not '/odom'"):
+        assert open_log(path, pose_topic="/odom").scan(0).pose == (7.0, 8.0, 0.0)
+
+
 def test_poses_of_motion_capture(data_dir):
     """The truth of this run was refined from them: they agree to centimetres."""
     topic = "/vrpn_client_node/jackal/pose"

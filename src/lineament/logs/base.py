@@ -127,6 +127,8 @@ class Log(Pictured, ABC):
     endings: ClassVar[tuple[str, ...]]
     #: Whether the reader seeks in the file, which must then not be compressed as a whole.
     needs_seek: ClassVar[bool] = False
+    #: Whether poses may be chosen by a topic; other logs have their own, or none.
+    has_pose_topics: ClassVar[bool] = False
     #: Whether all of it is in memory, whatever becomes of the file.
     is_held: ClassVar[bool] = False
     #: The one topic of a format whose scans are all of a kind.

@@ -7,7 +7,7 @@ from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from ..errors import LogError
+from ..errors import LogError, one_line, warn
 from ..limits import Limits
 from ..scan.changes import Mask
 from . import sources
@@ -138,6 +138,8 @@ def open_log(
         raise LogError(source, f"is no log that lineament knows: expected {known}")
     if head.is_gzip and reader.needs_seek:
         source = sources.unzip(source, options.limits, keep_going=keep_going)
+    if pose_topic is not None and not reader.has_pose_topics:
+        warn(one_line(f"{path}: has no topics of poses: its own are taken, not {pose_topic!r}"))
     return reader(source, topic, keep_going=keep_going, options=options)
 
 

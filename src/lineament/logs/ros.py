@@ -32,7 +32,7 @@ class RosLog(Log):
     topic; a bag that is broken or cut off raises a LogError after all that is whole.
     """
 
-    needs_seek = True
+    needs_seek = has_pose_topics = True
 
     def _open(self) -> None:
         self._decoders = decoders(self.options.echo, self.options.ring, self.limits)
