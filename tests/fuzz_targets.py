@@ -21,6 +21,7 @@ import pyarrow.parquet
 import ros_bags
 from equality import assert_sound
 from in_memory import Given, Taken
+from live_driving import received_scan
 from mutations import damaged
 from test_optimal_properties import assert_sound as assert_optimal_sound
 from test_optimal_properties import hostile_scans
@@ -29,7 +30,7 @@ from worlds import degenerate_scans, random_scan
 from lineament import Extractor, LaserScan, RangeNoise, open_log
 from lineament.features import TABLES
 from lineament.live import FoxgloveSink, LiveConfig, Node, Pipeline, RosSink
-from lineament.live.received import ODOMETRY, Received, received_scan
+from lineament.live.received import ODOMETRY, Received
 from lineament.logs import save_log
 from lineament.methods import get_method, method_names
 from lineament.output import ENDINGS, open_writer
@@ -324,7 +325,7 @@ class Messages(Target):
         if kind == "Odometry":
             received = Received("o", partial(odometry, data, encoding), time.monotonic(), ODOMETRY)
         else:
-            received = received_scan("a", data, encoding, f"sensor_msgs/{kind}")
+            received = received_scan("a", data, encoding, kind)
         lines: list[str] = []
         config = LiveConfig(log="played.npz")
         sinks = [RosSink(Taken(), RosMessages("cdr"), config)]

@@ -19,6 +19,7 @@ import numpy as np
 
 import lineament as ln
 from lineament.live import LiveConfig, Pipeline, Received, Report, Source, run_live
+from lineament.live.received import wanted
 
 #: How long anything may take on a slow machine [s]; nothing waits so long if it goes well.
 DEADLINE = 120.0
@@ -239,6 +240,14 @@ def connected(peer: Any, source: Source, topic: str, *kind: Any) -> None:
     before = source.publishers
     peer.publish(topic, *kind)
     eventually(lambda: peer.listeners(topic) and source.publishers > before)
+
+
+def received_scan(
+    publisher: str, data: bytes, encoding: str = "cdr", kind: str = "LaserScan"
+) -> Received:
+    """What a source gives of a serialised scan that has just arrived."""
+    (scans,) = wanted(LiveConfig(type=kind))
+    return scans.received(publisher, data, encoding)
 
 
 def waited_for(receive: Callable[[float], list[Received]], send: Callable[[], object]) -> Any:

@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from in_memory import Given, Kept, Taken
-from live_driving import garbage
+from live_driving import garbage, received_scan
 
 import lineament as ln
 from lineament.live import (
@@ -21,9 +21,8 @@ from lineament.live import (
     ReplaySource,
     RosSink,
 )
-from lineament.live.pipeline import time_of
-from lineament.live.received import ODOMETRY, received_scan
-from lineament.live.twists import twist_of_laser
+from lineament.live.pipeline import time_of, twist_of_laser
+from lineament.live.received import ODOMETRY
 from lineament.output.ros_messages import RosMessages
 from lineament.scan.poses import compose, poses_along, twist_between
 from lineament.simulation import SENSORS, building, drive, room
@@ -93,7 +92,7 @@ def test_frames_have_the_stamp_of_the_message_exactly():
 
 @pytest.mark.parametrize("name", garbage())
 def test_a_malformed_message_is_counted_written_once_and_survived(name):
-    bad = received_scan("bad", garbage()[name], "cdr", "sensor_msgs/LaserScan")
+    bad = received_scan("bad", garbage()[name])
     total, frames, lines = run([bad], [bad], [wall("good", 1.0)], [wall("bad", 2.0)])
     assert (total.scans, total.malformed) == (2, 2)
     assert [frame.scan.stamp for frame in frames] == [1.0, 2.0]
@@ -136,7 +135,7 @@ def test_a_sweep_that_makes_no_sense_is_refused_and_survived():
 
 def test_publishers_whose_names_are_made_up_do_not_fill_the_screen(monkeypatch):
     monkeypatch.setattr("lineament.live.node._MOST_FAULTY", 2)
-    bad = [received_scan(name, b"", "cdr", "sensor_msgs/LaserScan") for name in "abca"]
+    bad = [received_scan(name, b"") for name in "abca"]
     total, _, lines = run(bad[:2], bad[2:])
     assert total.malformed == 4
     faults = [line.partition(" makes no sense")[0] for line in lines]
@@ -200,7 +199,7 @@ def test_latency_counts_from_when_a_scan_came(clock):
 
 def test_a_publisher_that_comes_again_may_be_reported_again(clock):
     source, lines = Given(), []
-    bad = received_scan("bad", b"", "cdr", "sensor_msgs/LaserScan")
+    bad = received_scan("bad", b"")
 
     def batch(publishers: int) -> list[Received]:
         clock.now += 3.0

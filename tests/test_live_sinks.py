@@ -10,6 +10,7 @@ import lineament as ln
 from lineament.live import FoxgloveSink, LiveConfig, RosSink, run_live
 from lineament.live.counters import Counts, Report
 from lineament.live.pipeline import Frame
+from lineament.live.plan_topics import statuses
 from lineament.live.stopping import stopping
 from lineament.logs import save_npz
 from lineament.mapping import VERDICTS, LineMap
@@ -49,10 +50,12 @@ def test_diagnosis_of_a_pose(verdict, turn, level):
     """0 where it is located, 1 where it is but for a direction, 2 where it is not known."""
     messages = RosMessages("cdr")
     given = recorded(messages, "diagnostics")
-    sink = RosSink(Taken(), messages, LiveConfig(map="a.dxf", log="a.npz"))
+    config = LiveConfig(map="a.dxf", log="a.npz")
+    sink = RosSink(Taken(), messages, config)
     evidence = Evidence(12.34, 0.75, 0.2, 0.05, 100)
     where = Whereabouts(verdict, (1.0, -2.0, 0.5), np.diag((4e-4, 9e-4, turn)), evidence)
-    sink._plan._frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
+    sink._plan._frame = frame = Frame(ln.LaserScan([2.0], 0.0, 0.1), *[None] * 5, where)
+    sink._plan._statuses = statuses(frame, config)
     sink.diagnose(REPORT, TIME)
     (*_, of_node), (topic, moment, told) = given
     assert of_node["level"] == REPORT.level

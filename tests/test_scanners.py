@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 import ros_bags
 from in_memory import Given, Taken
+from live_driving import received_scan
 from mcap.reader import make_reader
 from pyarrow import csv, parquet
 
 import lineament as ln
 from lineament.live import LiveConfig, Node, Odometry, Pipeline, Received, RosSink
-from lineament.live.received import ODOMETRY, received_scan
+from lineament.live.received import ODOMETRY
 from lineament.logs import open_log, save_npz
 from lineament.motion import Tracker
 from lineament.output.ros_messages import RosMessages
@@ -203,7 +204,7 @@ def test_what_a_node_publishes_is_where_the_walls_are_at_the_stamp(scanner, desk
     for k in range(6):
         moving = Odometry((EPOCH + k * NANO / RATE) / NANO, TWIST, (0, 0, 0), "odom", "base")
         came.append([Received("o", lambda moving=moving: moving, 0.0, ODOMETRY)])
-        came.append([received_scan("s", scanner.data(k, 0.002), "cdr", "sensor_msgs/LaserScan")])
+        came.append([received_scan("s", scanner.data(k, 0.002))])
     publisher = Taken()
     sink = RosSink(publisher, RosMessages("cdr"), config)
     total = Node(Given(*came), Pipeline(config), [sink]).run().total

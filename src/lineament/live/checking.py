@@ -1,6 +1,7 @@
 """What the parameters of a live node may be: their types, choices and bounds."""
 
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -39,6 +40,8 @@ _KINDS: dict[str, tuple[type | tuple[type, ...], str]] = {
     "Names": ((tuple, list), "names"),
     "Mapping[str, Any]": (Mapping, "a table"),
 }
+#: How many numbers those of fixed length have.
+_COUNTS = {"Pose": 3, "Point": 2}
 #: x, y [m]; and names of topics.
 Point = tuple[float, float]
 Names = Sequence[str]
@@ -53,6 +56,8 @@ def check(name: str, annotation: str, value: Any) -> None:
     is_known = isinstance(value, types)
     if not is_known or (isinstance(value, bool) and kind != "bool"):
         raise ValueError(f"{name} is {value!r}, expected {wanted}")
+    if (n := _COUNTS.get(kind, 0)) and (len(value) != n or not all(map(_is_finite, value))):
+        raise ValueError(f"{name} is {value}, expected {wanted.replace(' ', ' finite ')}")
     if name in _CHOICES and value not in _CHOICES[name]:
         wanted = ", ".join(map(str, _CHOICES[name]))
         raise ValueError(f"{name} is {value!r}, expected one of {wanted}")
@@ -63,6 +68,10 @@ def check(name: str, annotation: str, value: Any) -> None:
         texts = [value.strip("/") or "none"]
     if name in _NAMES and not all(_is_name(text) for text in texts):
         raise ValueError(f"{name} is {value!r}, expected a name of letters, digits, _ and /")
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
 def _is_name(text: Any) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -197,16 +196,6 @@ class LiveConfig:
         Limits.of(self.limits)
         if "/" in self.name:
             raise ValueError(f"name is {self.name!r}, expected no /: use namespace for that")
-        for name, values, n, many in (
-            ("laser_pose", self.laser_pose, 3, "three"),
-            ("dock", (0, 0) if self.dock is None else self.dock, 2, "two"),
-            ("unsure", self.unsure, 2, "two"),
-        ):
-            if len(values) != n or not all(
-                isinstance(value, int | float) and abs(value) <= sys.float_info.max
-                for value in values
-            ):
-                raise ValueError(f"{name} is {values}, expected {many} finite numbers")
         checked_mounting(self.laser_pose)
         object.__setattr__(self, "mask", checked_mask(self.mask))
         self._check_together()

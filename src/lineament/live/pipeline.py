@@ -20,7 +20,6 @@ from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 from .configured import dock_of, extractor_of, plan_of
 from .received import ODOMETRY, Heard
-from .twists import turned_over, twist_of_laser
 
 if TYPE_CHECKING:
     from ..docking import ShapePose
@@ -51,6 +50,18 @@ def time_of(scan: LaserScan) -> tuple[int, int]:
 def stamp_of(nanoseconds: int) -> tuple[int, int]:
     """Seconds and nanoseconds of a time, clipped to what a message can hold."""
     return divmod(min(max(nanoseconds, 0), _LATEST), NANO)
+
+
+def twist_of_laser(twist: Twist, laser_pose: Pose) -> Twist:
+    """Twist of a scanner in its own frame [m/s, m/s, rad/s], by that of the body that carries it.
+
+    A point at p of a rigid body moves with v + ω × p. `laser_pose` is in the frame of the body.
+    """
+    forward, left, turn_rate = twist
+    x, y, theta = laser_pose
+    vx, vy = forward - turn_rate * y, left + turn_rate * x
+    c, s = math.cos(theta), math.sin(theta)
+    return c * vx + s * vy, c * vy - s * vx, turn_rate
 
 
 class Frame(NamedTuple):
@@ -277,7 +288,8 @@ class Pipeline(InTurn):
         if odometry is None or abs(scan.stamp - odometry.stamp) > _OLDEST:
             return None
         twist = twist_of_laser(odometry.twist, self._config.laser_pose)
-        return turned_over(twist) if self._config.upside_down else twist
+        forward, left, turn_rate = twist
+        return (forward, -left, -turn_rate) if self._config.upside_down else twist
 
     def _extract(self, scan: LaserScan) -> Features:
         return self._publisher("").extractor(scan)

@@ -70,6 +70,7 @@ class PlanTopics:
         self._publisher, self._make, self._config = publisher, messages, config
         self._pose = f"{config.scan_topic}/pose"
         self._frame: Frame | None = None
+        self._statuses: list[Status] = []
         self._topics = {self._pose: _PLACED}
         if (judged := config.judge_topic) is not None:
             self._topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
@@ -88,8 +89,8 @@ class PlanTopics:
     def publish(self, frame: Frame, moment: Moment) -> None:
         """Publish what is known of a scan; a verdict that is another one than before, at once."""
         config, make, send = self._config, self._make, self._publisher.publish
-        before, self._frame = self._frame, frame
-        if before is None or _summaries(before, config) != _summaries(frame, config):
+        before, self._frame, self._statuses = self._statuses, frame, statuses(frame, config)
+        if [one[:3] for one in before] != [one[:3] for one in self._statuses]:
             self.diagnose(divmod(time.time_ns(), NANO))
         on_plan, where, placed = moment._replace(frame=config.map_frame), frame.where, frame.placed
         if where is not None and where.is_known and self._is_heard(self._pose):
@@ -108,7 +109,7 @@ class PlanTopics:
         """Publish verdicts on ``/diagnostics``."""
         if self._frame is None:
             return
-        for status in statuses(self._frame, self._config):
+        for status in self._statuses:
             if is_stale:
                 status = status._replace(level=3, summary="no scans")
             self._publisher.publish(status.message(self._make, self._config, DIAGNOSTICS, time))
@@ -122,7 +123,7 @@ class PlanTopics:
         config, placed, judgement = self._config, frame.placed, frame.judgement
         if judgement is None:
             return
-        *_, status = statuses(frame, config)
+        status = self._statuses[-1]
         stamp = on_plan.seconds, on_plan.nanoseconds
         if self._is_heard(topic := f"{config.judge_topic}/verdict"):
             self._publisher.publish(status.message(self._make, config, topic, stamp))
@@ -134,10 +135,6 @@ class PlanTopics:
 
     def _is_heard(self, topic: str) -> bool:
         return self._publisher.listeners(topic) > 0
-
-
-def _summaries(frame: Frame, config: LiveConfig) -> list[tuple[int, str]]:
-    return [(status.level, status.summary) for status in statuses(frame, config)]
 
 
 def statuses(frame: Frame, config: LiveConfig) -> list[Status]:

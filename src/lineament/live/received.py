@@ -3,14 +3,14 @@
 import time
 from collections import deque
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from threading import Condition
 from typing import NamedTuple, Protocol
 
-from ..limits import LIMITS, Limits
+from ..limits import Limits
 from ..rosmsg.grids import OccupancyGrid, occupancy_grid
 from ..rosmsg.poses import Odometry, StampedPose, odometry, stamped_poses
-from ..rosmsg.scans import Decoder, decoders
+from ..rosmsg.scans import decoders
 from ..rosmsg.wire import Buffer
 from ..scan import LaserScan
 from .config import LiveConfig
@@ -86,7 +86,7 @@ class Wanted(NamedTuple):
 def wanted(config: LiveConfig) -> list[Wanted]:
     """Return the topics that a node listens to: the scans, then what has to be known before."""
     kind, limits = f"sensor_msgs/{config.type}", Limits.of(config.limits)
-    decoder = _decoder(kind, config.echo, limits)
+    decoder = decoders(config.echo, None, limits)[kind]
     found = [Wanted(config.scan_topic, kind, SCAN, decoder)]
     if config.merge:  # A scanner is known by its topic, whoever sends.
         names = config.rig.topics
@@ -184,24 +184,3 @@ class Inbox:
             queues = list(self._waiting.values())
             self._waiting.clear()
         return sorted((one for queue in queues for one in queue), key=lambda one: one.arrived)
-
-
-def received_scan(
-    publisher: str,
-    data: Buffer,
-    encoding: str,
-    kind: str,
-    echo: str = "first",
-    limits: Limits = LIMITS,
-) -> Received:
-    """Return what a source gives of a serialised scan, of type `kind`, that has just arrived."""
-    read = partial(_decoder(kind, echo, limits), data, encoding)
-    return Received(publisher, read, time.monotonic())
-
-
-@cache
-def _decoder(kind: str, echo: str, limits: Limits) -> Decoder:
-    known = decoders(echo, None, limits)
-    if kind not in known:
-        raise ValueError(f"type of scans is {kind!r}, expected one of {', '.join(known)}")
-    return known[kind]

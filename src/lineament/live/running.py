@@ -17,10 +17,12 @@ from .counters import Report
 from .merging import MergingPipeline
 from .node import Node
 from .pipeline import Pipeline
-from .received import GUESS, JUDGED, LINKS, MOUNTINGS, ODOMETRY, Source, Wanted, wanted
+from .received import GUESS, JUDGED, LINKS, MOUNTINGS, ODOMETRY, Source, wanted
 from .replay import ReplaySource
 from .sinks import FoxgloveSink, RosSink, Sink
 from .terminal import Terminal
+
+_PLACING = (MOUNTINGS, LINKS, ODOMETRY, GUESS, JUDGED)
 
 
 def run_live(
@@ -114,7 +116,8 @@ def _ends(
             loop=config.loop,
             topic=config.log_topic,
             merge=config.rig.topics if config.merge else (),
-            heard=_heard(config),
+            # Of a bag whose localiser is judged, all that places the robot.
+            heard=[one for one in wanted(config) if config.is_localiser and one.what in _PLACING],
             pose_topic=config.poses,
             echo=config.echo,
             ring=config.ring,
@@ -146,12 +149,6 @@ def _ends(
         sinks.append(FoxgloveSink(server, foxglove.FoxgloveMessages(), config))
     assert source is not None  # `LiveConfig` requires a log where there is no ROS.
     return source, sinks
-
-
-def _heard(config: LiveConfig) -> list[Wanted]:
-    """Return what is heard of a bag whose localiser is judged: all that places the robot."""
-    kept = (MOUNTINGS, LINKS, ODOMETRY, GUESS, JUDGED) if config.is_localiser else ()
-    return [one for one in wanted(config) if one.what in kept]
 
 
 def _is_for_foxglove_alone(config: LiveConfig, write: Callable[[str], None]) -> bool:
