@@ -171,7 +171,7 @@ def test_a_process_that_dies_is_a_line_and_the_map_is_made_at_the_end(tmp_path):
         scans, _ = driven(12)
         pipeline("front", scans[0])
         assert not list(pipeline.problems())
-        pipeline._localiser._following.mapper._process.kill()
+        pipeline._localiser._mapper._process.kill()
         eventually(lambda: list(pipeline.problems()))
         (problem,) = pipeline.problems()
         assert problem.startswith("the process that closes loops has ended")

@@ -3,7 +3,8 @@
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, Protocol
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,20 +55,6 @@ class Placed(NamedTuple):
     base: Pose
     covariance: Array
     odom: Pose | None
-
-
-class Following(Protocol):
-    """What follows a scanner: a `Follower`, or what makes a map meanwhile."""
-
-    @property
-    def twist(self) -> Twist | None:
-        """Velocity of the sensor in the last scans; None if unknown."""
-
-    def __call__(self, features: Features, odometry: Pose | None, skew: Pose) -> Whereabouts:
-        """Take in the next scan."""
-
-    def suppose(self, pose: Pose, covariance: Array | None) -> None:
-        """Look for the sensor near a pose."""
 
 
 class Localiser:
@@ -145,15 +132,17 @@ class Localiser:
         mounting, travelled = self._mounting(scan), self._travelled(scan)
         if mounting is not None and mounting.is_upside_down:
             features = self._extract(straight.turned_over())
-        follower, laser = self._follower(scan.frame_id), scan.pose
+        laser = scan.pose
         if self._config.is_localiser:
             laser = None
             if mounting is not None and travelled is not None:
                 laser = compose(travelled, mounting.pose)
         mounted = (0.0, 0.0, 0.0) if mounting is None else mounting.pose
-        self._suppose(follower, travelled, mounted)
-        skew = _skew(scan, follower.twist) if straight is scan else (0.0, 0.0, 0.0)
-        where = self._known[scan.frame_id] = follower(features, laser, skew)
+        if (guess := self._guess) is not None and self._plan is not None:
+            base, self._guess = self._moved(guess, travelled), None
+            self._follower(scan.frame_id).suppose(compose(base, mounted), guess.covariance)
+        where = self._followed(features, scan, laser, is_deskewed=straight is not scan)
+        self._known[scan.frame_id] = where
         judgement = None
         if self._judge is not None and mounting is not None:
             claimed = self._claimed(travelled)
@@ -203,7 +192,15 @@ class Localiser:
             if where.is_known and frame in self._followers:
                 self._followers[frame].suppose(where.pose)
 
-    def _follower(self, frame: str) -> Following:
+    def _followed(
+        self, features: Features, scan: LaserScan, laser: Pose | None, *, is_deskewed: bool
+    ) -> Whereabouts:
+        """Follow a scanner to its next scan; where it is by odometry, if that is known."""
+        follower = self._follower(scan.frame_id)
+        skew = (0.0, 0.0, 0.0) if is_deskewed else _skew(scan, follower.twist)
+        return follower(features, laser, skew)
+
+    def _follower(self, frame: str) -> Follower:
         assert self._plan is not None
         if frame not in self._followers:
             if len(self._followers) >= _MOST_SCANNERS:
@@ -241,18 +238,13 @@ class Localiser:
         self._problems.pop(what, None)
         return found
 
-    def _suppose(self, follower: Following, travelled: Pose | None, mounting: Pose) -> None:
-        """Let a scanner be looked for where the robot is said to be, and has gone since."""
-        if (guess := self._guess) is None:
-            return
-        self._guess, base = None, guess.pose
+    def _moved(self, guess: StampedPose, travelled: Pose | None) -> Pose:
+        """Where the robot was said to be, and has gone since."""
         if travelled is not None:
-            try:
+            with suppress(LookupError):  # Who sends it by hand seldom gives a time: it holds now.
                 then = self._frames.find(self._odom, self._base, guess.stamp).pose
-                base = compose(base, relative(then, travelled))
-            except LookupError:
-                pass  # It holds for now: who sends it by hand seldom gives a time.
-        follower.suppose(compose(base, mounting), guess.covariance)
+                return compose(guess.pose, relative(then, travelled))
+        return guess.pose
 
     def _claimed(self, travelled: Pose | None) -> Pose | None:
         """Where somebody else believes the robot to be: at the last pose, and gone on since."""
