@@ -333,6 +333,15 @@ def test_twenty_scans_in_a_row_without_a_motion_are_a_line():
         assert len(list(pipeline.problems())) == (k >= 40)
 
 
+def test_what_is_docked_to_and_never_seen_is_a_line():
+    pipeline = Pipeline(LiveConfig(dock=(50.0, 50.0)))
+    for k in range(20):
+        assert not list(pipeline.problems())
+        pipeline("one", sweep(float(k)))
+    (line,) = pipeline.problems()
+    assert line.startswith("what is docked to is not seen in 20 scans in a row: expected it")
+
+
 def test_poses_give_the_motion_between_scans():
     pipeline = Pipeline(LiveConfig(deskew="poses", log="a.log"))
     poses = [

@@ -187,6 +187,12 @@ class Pipeline(InTurn):
                     tracks = kept.tracker.again(features)
             if kept.dock is not None:
                 dock = kept.dock(features, tracks, travel.pose, travel.covariance)
+                kept.undocked = kept.undocked + 1 if dock is None else 0
+                if kept.undocked >= _MANY:
+                    self._problems.add(
+                        f"what is docked to is not seen in {_MANY} scans in a row: "
+                        "expected it near dock, in the frame of the first scan, or of dock_track"
+                    )
         if not self._config.track:
             tracks = None
         frame = Frame(scan, straight, features, tracks, travel, dock)
@@ -309,5 +315,6 @@ class _Publisher:
         self.extractor = extractor_of(config)
         self.tracker = Tracker() if config.is_tracking else None
         self.odometer = Odometer()
+        self.undocked = 0
         self.dock = dock_of(config) if config.is_docking else None
         self.last: LaserScan | None = None
