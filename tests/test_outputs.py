@@ -368,6 +368,19 @@ def test_never_located_is_status_3_and_names_the_units_of_the_plan(files, capsys
     assert len((files / "a.tum").read_text().splitlines()) == 4
 
 
+@pytest.mark.parametrize("factor", [1, 1000])
+def test_odometry_in_millimetres_is_a_line(files, capsys, factor):
+    scans = []
+    for k in range(4):
+        scan = open_log(files / "log.npz").scan(0)
+        scans.append(scan.with_pose((factor * 0.02 * k, 0.0, 0.0)).stamped(0, k * 100_000_000))
+    save_log("mm.npz", scans)
+    run(["locate", "mm.npz", "--map", "plan.dxf", "-o", "a.csv"])
+    assert ("faster than 10 m/s: is it in millimetres?" in capsys.readouterr().err) == (factor > 1)
+    run(["locate", "mm.npz", "--map", "plan.dxf", "--no-odometry", "-o", "a.csv"])
+    assert "faster than" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("ending", [".dxf", ".parquet"])
 def test_a_plan_of_another_building_says_the_usual_causes(files, capsys, ending):
     walls = [[0, 0, 30, 0], [30, 0, 30, 4], [30, 4, 12, 9], [12, 9, 0, 0]]

@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..drawings import NAMES as UNITS
-from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line
+from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line, warn
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
@@ -25,7 +25,8 @@ from ..mapping.locate import LOCATED, UNOBSERVED
 from ..mapping.plans import is_a_building
 from ..output.figures import plot_walls
 from ..progress import Track, untracked
-from ..scan import LaserScan
+from ..rosmsg.frames import FASTEST
+from ..scan import LaserScan, Pose
 from .mapping import tum_written
 
 #: Formats of the poses.
@@ -154,9 +155,10 @@ def locate_log(
         tried = [bool(where) for _, where in followed(on, _TRIED)]
         return sum(tried) / len(tried)
 
-    found = [(scan.stamp, where) for scan, where in followed(drawn)]
+    found, moved = _taken(followed(drawn))
     if not found:
         raise LogError(log.name, "has no scans, expected some")
+    _check_odometry(log.name, moved if odometry else [])
     verdicts = {name: sum(w.verdict == name for _, w in found) for name in VERDICTS}
     if ending == ".tum":
         placed = [(stamp, where.pose) for stamp, where in found if where]
@@ -189,6 +191,31 @@ def locate_log(
         warning=warning,
         seconds=seconds,
     )
+
+
+def _taken(
+    followed: Iterable[tuple[LaserScan, Whereabouts]],
+) -> tuple[list[tuple[float, Whereabouts]], list[tuple[float, Pose]]]:
+    """Return where each scan is, and the odometry, where it is known, each with the stamp."""
+    found, moved = [], []
+    for scan, where in followed:
+        found.append((scan.stamp, where))
+        if scan.pose is not None:
+            moved.append((scan.stamp, scan.pose))
+    return found, moved
+
+
+def _check_odometry(name: str, moved: list[tuple[float, Pose]]) -> None:
+    """Warn if most steps of the odometry are faster than any robot."""
+    fast = [
+        math.dist(before[:2], pose[:2]) > FASTEST * (stamp - since) > 0
+        for (since, before), (stamp, pose) in pairwise(moved)
+    ]
+    if sum(fast) > len(fast) / 2:
+        warn(
+            f"{one_line(name)}: its odometry is mostly faster than {FASTEST:g} m/s: is it in "
+            "millimetres? --no-odometry leaves it out"
+        )
 
 
 def _units_that_fit(
