@@ -49,7 +49,7 @@ AREAS: dict[str, tuple[str, str]] = {
     "output": (
         "output",
         "output output_* plans* figures notebook writers_mcap ros_messages feature_points world "
-        "tables experiment_pictures experiment_definitions live_foxglove",
+        "tables experiment_pictures live_foxglove",
     ),
     "mapping": ("mapping", "mapping* locating* relocation"),
     "motion": (
@@ -60,7 +60,7 @@ AREAS: dict[str, tuple[str, str]] = {
     "evaluation": (
         "evaluation",
         "evaluation* ple partition* consistency liu* compare line_fits pooled_recordings "
-        "experiment_scans experiment_settings",
+        "experiment_scans",
     ),
     "simulation": ("simulation", "simulation scenes truth buildings world scanners"),
     "reproduce": ("reproduce compare.py", "experiment* reproduce compare"),

@@ -1,20 +1,20 @@
-"""The pictures of the experiments: what is drawn is what was computed, and where it is."""
+"""The pictures of the experiments: they are legible; what is drawn, if no approved text has it."""
 
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
 from handmade import features
 from lineament_lab.evaluation.arena import Arena
-from lineament_lab.reproduce import grid, layers, museum, noise, real, repetition, similarity
+from lineament_lab.reproduce import definitions, grid, layers, noise, real, repetition, similarity
 from lineament_lab.reproduce.findings import dot_chart, log_axis
-from lineament_lab.reproduce.two_corners import POSES, WORLD, A, B, _figure, draw_place
-from panels import angle_of, assert_apart, assert_legible, drawn, notes, texts_of
+from lineament_lab.reproduce.two_corners import POSES, WORLD, _figure
+from matplotlib.text import Text
 from small_experiments import PAPER
 
 import lineament as ln
 from lineament.output import canvas
-from lineament.scan.poses import compose
 from lineament.simulation import World, truth
 
 
@@ -26,9 +26,73 @@ def shown(monkeypatch):
     return figures
 
 
-def test_figures_2_and_3_are_legible(shown):
+def drawn(axes):
+    """The points of each line of a panel."""
+    return [np.array(line.get_xydata(), float) for line in axes.lines]
+
+
+def assert_legible(figure):
+    """Panels are of a size to see; their texts lie on no other text, and names within panels."""
+    canvas.settle(figure)
+    width, height = figure.get_size_inches()
+    assert 0.2 < height / width < 1.5
+    for axes in figure.axes:
+        panel = axes.get_window_extent()
+        assert panel.width > 1.2 * figure.dpi
+        assert panel.height > 0.8 * figure.dpi
+        for text in axes.texts:
+            if getattr(text, "xycoords", "data") == "data":
+                box = Text.get_window_extent(text)  # without the arrow
+                assert panel.x0 < box.x0, text
+                assert panel.x1 > box.x1, text
+                assert panel.y0 < box.y0, text
+                assert panel.y1 > box.y1, text
+    parts = [part for axes in figure.axes for part in axes.get_children()]
+    assert_apart(part for part in parts if isinstance(part, Text))
+
+
+def assert_apart(texts):
+    """No text lies on another one."""
+    texts = [text for text in texts if text.get_text().strip()]
+    boxes = [Text.get_window_extent(text).shrunk(0.9, 0.7) for text in texts]
+    for (one, box), (other, more) in combinations(zip(texts, boxes, strict=True), 2):
+        assert not box.overlaps(more), (one, other)
+
+
+@pytest.mark.parametrize("name", ["scan", "spacing", "chords", "parabolas", "tangent"])
+def test_figures_of_definitions_are_legible(name):
+    assert_legible(getattr(definitions, f"_{name}")()[1])
+
+
+def test_figures_2_3_and_13_are_legible(shown):
     noise._figure(0)
+    rng = np.random.default_rng(0)
+    _figure([(PAPER.scan(WORLD, pose, rng), truth(WORLD, pose, PAPER)) for pose in POSES])
+    for figure in shown:
+        assert_legible(figure)
+
+
+def test_figure_7_says_how_far_the_operator_is_off_where_it_is_worst(monkeypatch):
+    exact = definitions.corner_response
+    off = iter(np.linspace(0.0, 0.5, 17))
+    monkeypatch.setattr(definitions, "corner_response", lambda *a, **k: exact(*a, **k) + next(off))
+    assert definitions._parabolas()[2]["off"] == pytest.approx(0.5)
+
+
+def test_a_method_that_finds_no_corner_of_the_arena_has_no_panel(shown):
+    known = Arena([], [], World([[0, 0, 4, 0], [4, 0, 4, 3]]), np.array([(4.0, 0.0)]))
+    rates = {"recall": 0.5, "false": 0.25}
+    some = {f"m{k}": (rates, np.array([(4.0, 0.1 * k)])) for k in range(1, 6)}
+    figure = real.arena_figure("arena, static", known, some | {"none": (rates, np.empty((0, 2)))})
+    assert figure.name == "arena-static"
+    assert [axes.get_title(loc="left") for axes in shown[0].axes] == list(some)
     assert_legible(shown[0])
+
+
+def test_strips_of_errors_are_legible(monkeypatch):
+    scan = ln.LaserScan([5.0, 5.0, math.nan], -0.1, 0.1)
+    monkeypatch.setattr(similarity, "similarity_errors", lambda *_: np.array([0.02, 0.5, math.nan]))
+    assert_legible(similarity.error_strips(scan, {"a": features(3), "b": features(3)}))
 
 
 def test_figure_5_counts_the_clusters(shown):
@@ -36,7 +100,7 @@ def test_figure_5_counts_the_clusters(shown):
     found = {name: features(9, clusters=c) for name, c in (
         ("two", [0, 0, 0, -1, -1, 1, 1, 1, 1]), ("one", [0] * 9))}  # fmt: skip
     layers._clusters(scan, found)
-    titles = [(axes.get_title(loc="left"), texts_of(axes)) for axes in shown[0].axes]
+    titles = [(axes.get_title(loc="left"), axes.texts[0].get_text()) for axes in shown[0].axes]
     assert titles == [("two", "2 clusters"), ("one", "1 cluster")]
     for figure in shown:
         assert_legible(figure)
@@ -106,94 +170,12 @@ def test_curves_of_repeated_corners_begin_where_they_do_not_scatter(shown, logs)
         assert_legible(figure)
 
 
-def in_frame(pose, points):
-    """World coordinates of points of a scan, rounded."""
-    return [tuple(np.round(compose(pose, (*point, 0.0))[:2], 6)) for point in points]
-
-
-def test_figure_13_has_the_room_the_places_and_both_corners_in_each(shown):
-    rng = np.random.default_rng(0)
-    views = [(PAPER.scan(WORLD, pose, rng), truth(WORLD, pose, PAPER)) for pose in POSES]
-    _figure(views)
-    room, *panels = shown[0].axes
-    marks = [(text.strip(), at) for text, at in notes(room)]
-    assert [text for text, _ in marks] == ["A", "B", "1", "2", "3", "4", "5"]
-    np.testing.assert_allclose([at for _, at in marks[:2]], (A, B))
-    np.testing.assert_allclose([at for _, at in marks[2:]], [pose[:2] for pose in POSES])
-    corners = [tuple(np.round(corner, 6)) for corner in (A, B)]
-    for arrow, (x, y, theta) in zip(room.collections, POSES, strict=True):
-        assert arrow.XY.tolist() == [[x, y]]
-        assert angle_of([(arrow.U[0], arrow.V[0])]) == pytest.approx(math.degrees(theta))
-    for k, (axes, pose) in enumerate(zip(panels, POSES, strict=True), 1):
-        assert axes.get_title(loc="left") == f"Place {k}"
-        assert in_frame(pose, [at for text, at in notes(axes) if text in "AB"]) == corners
-    for figure in shown:
-        assert_legible(figure)
-
-
-def test_the_name_of_a_corner_stands_before_it_on_the_line_of_sight():
-    axes = canvas.new_figure(4, 4).subplots()
-    scan = ln.LaserScan([5.0] * 9, -0.4, 0.1)
-    draw_place(axes, 3, scan, features(9), np.array((4.0, 3.0)), np.array((0.0, -2.0)))
-    names = {text.get_text(): text for text in axes.texts}
-    for name, toward in (("A", (-0.8, -0.6)), ("B", (0.0, 1.0))):
-        off = np.array(names[name].xyann)
-        assert np.hypot(*off) == pytest.approx(30)  # points
-        np.testing.assert_allclose(off / np.hypot(*off), toward, atol=1e-12)
-
-
-def test_the_museums_places_are_at_equal_parts_of_the_way(shown):
-    scan = ln.LaserScan([5.0] * 9, -0.4, 0.1)
-    places = {7: (np.array((4.0, 3.0)), True), 9: (np.array((0.0, -2.0)), False)}
-    views = [museum.View(scan, features(9), way, places) for way in np.linspace(0, 4, 9)]
-    museum._places(views, 7, 9)
-    titles = [axes.get_title(loc="left") for axes in shown[0].axes]
-    assert titles == [f"Place {k}" for k in range(1, 6)]
-    for axes in shown[0].axes:
-        marks = {text: at for text, at in notes(axes) if text in "AB"}
-        assert marks == {"A": (4.0, 3.0), "B": (0.0, -2.0)}
-
-
-def test_corners_of_the_arena_are_drawn_for_each_method_that_found_some(shown):
-    walls = World([[0, 0, 4, 0], [4, 0, 4, 3]])
-    known = Arena([], [], walls, np.array([(4.0, 0.0)]))
-    some = {"recall": 0.5, "false": 0.25}
-    scores = {f"m{k}": (some, np.array([(4.0, 0.1 * k)])) for k in range(1, 6)}
-    figure = real.arena_figure("arena, static", known, scores | {"none": (some, np.empty((0, 2)))})
-    assert figure.name == "arena-static"
-    assert [axes.get_title(loc="left") for axes in shown[0].axes] == list(scores)
-    for axes, (_, found) in zip(shown[0].axes, scores.values(), strict=True):
-        assert "found 50 %, false 25 %" in texts_of(axes)
-        *drawn_walls, real_corners, positions = drawn(axes)
-        assert [wall.tolist() for wall in drawn_walls] == walls.segments.reshape(-1, 2, 2).tolist()
-        assert real_corners.tolist() == [[4, 0]]
-        np.testing.assert_array_equal(positions, found)
-    for figure in shown:
-        assert_legible(figure)
-
-
 @pytest.mark.parametrize(("count", "columns", "rows"), [(0, 4, 1), (1, 1, 1), (3, 3, 1), (4, 3, 2)])
 def test_panels_are_as_many_as_asked_for_and_as_wide_as_high(count, columns, rows):
     figure, panels = canvas.new_panels(count, columns)
     assert list(panels) == figure.axes
     assert len(panels) == count
     assert figure.get_size_inches().tolist() == [9, 9 * rows / columns]
-
-
-def test_errors_of_methods_are_strips_with_one_axis_below(monkeypatch):
-    scan = ln.LaserScan([5.0, 5.0, math.nan], -0.1, 0.1)
-    errors = iter([[0.02, 0.5, math.nan], [0.02, math.nan, math.nan]])
-    monkeypatch.setattr(similarity, "similarity_errors", lambda *_: np.array(next(errors)))
-    figure = similarity.error_strips(scan, {"a": features(3), "b": features(3)})
-    assert [axes.get_title(loc="right") for axes in figure.axes] == [
-        *("a: 100 % explained", "b: 50 % explained")]  # fmt: skip
-    assert [axes.get_xlabel() for axes in figure.axes] == ["", "bearing [°]"]
-    for axes in figure.axes:
-        _, paper = drawn(axes)
-        assert set(paper[:, 1]) == {0.01}
-        labels = [(label.get_position()[1], label.get_text()) for label in axes.get_yticklabels()]
-        assert labels == [(0.001, "1 mm"), (0.01, "1 cm"), (0.1, "0.1 m"), (1.0, "1 m")]
-    assert_legible(figure)
 
 
 def test_rows_of_a_chart_are_legible():

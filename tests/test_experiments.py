@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from handmade import features
-from lineament_lab.evaluation import Counts, FeatureScores, Scores, SimilarityScores
+from lineament_lab.evaluation import FeatureScores, Scores, SimilarityScores
 from lineament_lab.evaluation.consistency import NormalisedErrors
 from lineament_lab.methods import RIVALS, controls
 from lineament_lab.reproduce import (
@@ -22,7 +22,6 @@ from lineament_lab.reproduce import (
     run_experiments,
     scans,
     similarity,
-    success,
     tracking,
 )
 from lineament_lab.reproduce.seeds import Spread, merged
@@ -116,12 +115,6 @@ def test_without_recordings_nothing_is_measured(name, tmp_path):
         findings = run_experiments([name], setting, silent)[name]
         assert findings.text == ("The recordings are missing: nothing is measured.",)
         assert findings.tables == findings.figures == ()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("figure", ["fig1", "fig6"])
-def test_figures_of_definitions_show_what_is_there(figure):
-    assert definitions.measure(Setting(), silent).numbers[figure]["off"] < 0.01
 
 
 def test_operator_by_definition_is_that_of_the_code():
@@ -277,16 +270,6 @@ class TestTexts:
         text, _ = similarity.report({similarity.SIMULATED: found}, Setting())
         assert "nan" not in " ".join(text)
 
-    def test_table_of_similarity(self):
-        scores = SimilarityScores(np.array([0.01, 0.03, 0.005, 0.015]), 5)
-        true = similarity._numbers(SimilarityScores(np.array([0.0]), 1))
-        rows = {similarity.TRUE: true, "liu:paper": true, "iepf:paper": similarity._numbers(scores)}
-        _, (table,) = similarity.report({similarity.SIMULATED: rows}, Setting())
-        *_, row = table.rows
-        rms = math.sqrt((100 + 900 + 25 + 225) / 4)
-        assert row[:6] == ("iepf:paper", *map(pytest.approx, (80, 15, rms, 27.75, 30)))
-        assert row[6:] == ("up to 250 mm", 50)
-
     def test_mean_nees_is_compared_with_its_interval(self):
         """Two corners, each off by one σ along x: the mean NEES of four components is a half."""
         off = NormalisedErrors(np.array([[1.0, 0.0], [1.0, 0.0]]))
@@ -303,25 +286,6 @@ class TestTexts:
         assert all_methods._arcs(sensors).startswith("Arcs are found by none of the methods.")
         sensors["ld19"]["optimal"] = {"arc_precision": 0.5}
         assert all_methods._arcs(sensors).startswith("Arcs are found by optimal.")
-
-    def test_rows_of_table_3_have_the_papers_numbers(self):
-        counts = {"few": Counts(1, 2, 4), "many": Counts(3, 4, 6)}
-        none = FeatureScores.none("corners")
-        of = {
-            name: success._numbers(Scores(1, replace(none, by_gate=none.by_gate | {0.1: count})))
-            for name, count in counts.items()
-        }
-        of["seconds"] = np.array([3e-6, 1e-6])
-        row = success._row("iepf:paper", of, 2, "corners")
-        assert row["paper: success"] == 0.7251
-        assert (row["here: success, 2 frames"], row["corners in 2"]) == (0.25, "1 of 4")
-        assert (row["precision in 20"], row["F1 in 20"]) == (0.75, 0.6)
-        row = success._row("liu, no corners", of, 2, "clusters")
-        assert list(row.values())[-2:] == ["9.6 – 25.3", "1.0 – 3.0"]
-        assert success._row("hough", of, 2, "corners")["paper: success"] is None
-        of["seconds"] = merged([[3e-6, 1e-6], [4e-6, 2e-6]])
-        times = success._row("hough", of, 2, "corners")["here: time [µs]"]
-        assert times == "1.5 (1.0–2.0) – 3.5 (3.0–4.0)"
 
 
 @pytest.mark.parametrize("errors", [[0.0, 0.02, np.nan], [3.0, 0.1, 0.1], [np.nan] * 3])

@@ -21,9 +21,6 @@ import lineament as ln
 from lineament.methods.stages import bilateral_filter
 from lineament.simulation import truth
 
-#: A row of the table of choices.
-CHOICE = dict.fromkeys(("reading", "chosen_by", *repetition._COLUMNS.values()), 0)
-
 
 class TestRepetition:
     @pytest.fixture
@@ -63,15 +60,6 @@ class TestRepetition:
         made[Parameters("tangent", 8, 8, 0.66)]["half_sum"] = 0.95
         flat.remove("tangent, half-width 8")
         assert alike() == flat
-
-    def test_table_of_peaks_has_the_paper_beside_and_invents_nothing(self, made):
-        peaks = {criterion: repetition._peaks(made, criterion) for criterion in grid.CRITERIA}
-        _, tables = repetition.report({"peaks": peaks, "choices": [CHOICE]}, Setting())
-        rows = {name: cells for name, *cells in tables[1].rows}
-        assert rows["paper"] == [6, "lost", 0.66, "lost", "lost", "lost"]
-        assert rows["tangent, half-width 8"] == [8, 0.91, 0.66, 0.9, 0.9, 0.91]
-        assert rows["product, half-width 2"] == [8, 0.7, 0.5, 0.6, 0.1, 0.7]
-        assert rows["relative, half-width 2"] == [None, 0.0, 0.5, 0.0, 0.0, 0.0]
 
     def test_average_repetition_by_hand(self):
         turn = 0.002
@@ -145,28 +133,11 @@ class TestTwoCorners:
         monkeypatch.setattr(two_corners, "truth", lambda *_: features(corners=rows))
         assert two_corners.distance_bound((0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(13e-6))
 
-    def test_tables_by_hand(self):
-        found = {"liu": [np.array([DISTANCE - 0.0125] * 2), np.empty(0)], "iepf": [np.empty(0)] * 2}
-        n = {
-            "places": {name: [two_corners._numbers(d, 4) for d in of] for name, of in found.items()}
-        }
-        n["all"] = {
-            name: two_corners._numbers(np.concatenate(of), 20) for name, of in found.items()
-        }
-        n |= {"bound": np.array([0.003, 0.004]), "all_bound": math.sqrt(12.5e-6)}
-        text, (overall, off, spread, share) = two_corners.report(n, Setting())
-        assert text[-1] == "iepf: no scan has both corners."
-        liu, iepf, bound = (dict(zip(overall.columns, row, strict=True)) for row in overall.rows)
-        assert liu["paper: mean [m]"] == "2.302"
-        assert liu["here: mean [m]"] == "2.2895"
-        assert liu["RMS error ÷ bound"] == pytest.approx(12.5 / math.sqrt(12.5))
-        assert liu["share of scans with both"] == pytest.approx(2 / 20)
-        assert iepf["here: mean [m]"] is iepf["paper: mean [m]"] is None
-        assert bound["RMS error [mm]"] == pytest.approx(math.sqrt(12.5))
-        assert off.rows == (("liu", pytest.approx(-12.5), None), ("iepf", None, None))
-        assert off.columns == ("method", "place 1", "place 2")
-        assert spread.rows == (("liu", 0.0, None), ("iepf", None, None), ("bound", 3.0, 4.0))
-        assert share.rows == (("liu", 50.0, 0.0), ("iepf", 0.0, 0.0))
+    def test_a_method_that_never_finds_both_corners_is_named(self):
+        some, none = ([two_corners._numbers(np.array(d), 4)] for d in ([DISTANCE], []))
+        n = {"places": {"liu": some, "iepf": none}, "all": {"liu": some[0], "iepf": none[0]}}
+        n |= {"bound": np.array([0.003]), "all_bound": 0.003}
+        assert two_corners.report(n, Setting())[0][-1] == "iepf: no scan has both corners."
 
     def test_drawn_is_the_scan_with_the_median_error(self, monkeypatch):
         """Errors of 1, 3 and -2 cm, and one without both corners, which is the worst."""
@@ -218,18 +189,3 @@ class TestSensitivity:
         nothing = sensitivity._bands({"recall": 4.0}, {"c": alone["c"]})["recall"]
         assert math.isnan(nothing["low"])
         assert math.isnan(nothing["high"])
-
-    def test_two_parameters_together_are_a_table_of_both(self):
-        rows, columns = (list(sensitivity.OPEN[name]) for name in sensitivity.TOGETHER)
-        together = {
-            f"{row}, {column}": {"recall": 10 * i + k, "both": -1}
-            for i, row in enumerate(rows)
-            for k, column in enumerate(columns)
-        }
-        none = dict.fromkeys([key for key, _ in sensitivity.SHOWN.values()])
-        n = {"together": together, "alone": {}, "pdbs": {}, "iepf": {"none": {}, "fixed": {}}}
-        n |= {"default": none, "bands": {key: {} for key in none}}
-        _, (_, table, *_) = sensitivity.report(n, Setting())
-        assert table.columns[1:] == tuple(columns)
-        for i, (name, *cells) in enumerate(table.rows):
-            assert (name, cells) == (rows[i], [10 * i + k for k in range(len(columns))])

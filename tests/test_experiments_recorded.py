@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from lineament_lab.reproduce import (
     Setting,
-    contenders,
     museum,
     plans,
     real,
@@ -22,7 +21,6 @@ from small_experiments import silent, small  # noqa: F401
 
 import lineament as ln
 from lineament import LineamentError
-from lineament.logs import save_npz
 from lineament.mapping import LineMap
 from lineament.mapping.grids import Grid
 from lineament.scan.poses import relative
@@ -76,38 +74,6 @@ class TestMuseum:
         assert [scan.stamp for scan in frames] == stamps
         assert [scan.stamp for scan in in_row] == stamps[len(stamps) // 3 :]
 
-    def test_distances_by_hand(self, monkeypatch):
-        """Of nine views the first, the third, ... are the five places; a method may find none."""
-        monkeypatch.setattr(museum, "distance_found", lambda found, a, b: found + a - b)
-        corners = {1: (2.0, True), 2: (1.0, False)}
-        views = [museum.View(k, None, 0.1 * k, corners) for k in range(9)]
-        found = {
-            "two": [1.30, math.nan, 1.34, *[math.nan] * 6],
-            "one": [math.nan, 1.3, *[math.nan] * 7],
-            "none": [math.nan] * 9,
-        }
-        methods = {name: distances.__getitem__ for name, distances in found.items()}
-        two, one, none = museum._distances(views, 1, 2, methods).values()
-        assert (two["found"], two["mean"]) == pytest.approx((2 / 9, 2.32))
-        assert two["deviation"] == pytest.approx(0.04 / math.sqrt(2))
-        np.testing.assert_allclose(two["places"], [2.30, 2.34, *[math.nan] * 3])
-        assert (one["found"], one["mean"]) == pytest.approx((1 / 9, 2.3))
-        assert none["found"] == 0
-        assert [math.isnan(of["deviation"]) for of in (one, none)] == [True, True]
-        assert math.isnan(none["mean"])
-        n = {
-            "methods": {},
-            "scans": 2,
-            "views": 9,
-            "distance": {contenders.PAPER: two, "none": none},
-        }
-        _, (_, table) = museum.report(n, Setting())
-        first, last = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
-        assert (first["here: mean [m]"], first["place 1 [m]"]) == ("2.320", "2.300")
-        assert first["standard deviation [mm]"] == pytest.approx(40 / math.sqrt(2))
-        assert first["found in [%]"] == pytest.approx(200 / 9)
-        assert last["here: mean [m]"] is last["place 5 [m]"] is last["paper: mean [m]"] is None
-
     def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
         def view(way, **corners):
             places = {"a": (0, True), "b": (2, False), "c": (3.5, False), "f": (9, False)}
@@ -148,117 +114,35 @@ def test_the_museums_bag_is_not_overwritten_and_what_is_named_is_run(tmp_path):
     assert reports
 
 
-class TestTracking:
-    def test_synthetic_odometry_has_the_errors_that_are_stated(self):
-        poses = [(0.5 * i, 0.0, 0.0) for i in range(2000)]
-        way = tracking.stand_in_odometry(poses, seed=1)
-        steps = np.array([relative(a, b) for a, b in pairwise(way)])
-        np.testing.assert_allclose(steps.mean(axis=0), (0.5, 0.0, 0.0), atol=0.006)
-        np.testing.assert_allclose(steps.std(axis=0), (0.07, 0.07, 0.01), rtol=0.06)
-        assert way == tracking.stand_in_odometry(poses, seed=1)
-
-    @pytest.mark.slow
-    def test_a_small_log(self, tmp_path):
-        path = tmp_path / "small.npz"
-        save_npz(path, list(drive(room(), [(-2, 0), (1, 0)], SENSORS["lms361"], speed=1, rate=10)))
-        found = tracking.load_recording(path, 12, 0.5)
-        every = tracking.load_recording(path, 99)
-        assert found[0].stamp == every[len(every) // 2].stamp
-        numbers = tracking.measure_log("small", found, 0, silent)
-        motions, tracks = numbers["motion"], numbers["tracks"]
-        assert numbers["relations"] == numbers["near"] == numbers["far_apart"] == {}
-        assert list(motions) == [
-            *("odometry, synthetic", "features", "ICP"),
-            *("features, no odometry", "ICP, no odometry"),
-        ]
-        for name in ("features", "ICP", "features, no odometry"):
-            assert motions[name]["way_median"] < 0.01
-        assert motions["features"]["unobserved"] == 0
-        assert tracks["features"]["segments"]["kept"] > 0.95
+def test_synthetic_odometry_has_the_errors_that_are_stated():
+    poses = [(0.5 * i, 0.0, 0.0) for i in range(2000)]
+    way = tracking.stand_in_odometry(poses, seed=1)
+    steps = np.array([relative(a, b) for a, b in pairwise(way)])
+    np.testing.assert_allclose(steps.mean(axis=0), (0.5, 0.0, 0.0), atol=0.006)
+    np.testing.assert_allclose(steps.std(axis=0), (0.07, 0.07, 0.01), rtol=0.06)
+    assert way == tracking.stand_in_odometry(poses, seed=1)
 
 
-class TestReal:
-    """A right angle 2 m ahead, six times from one place and twice from others; and no log."""
-
-    @pytest.fixture
-    def folder(self, tmp_path, monkeypatch):
-        poses = [(0.0, 0.0, 0.0)] * 6 + [(0.4, 0.0, 0.0), (0.4, 0.4, 0.0)]
-        bearings = np.radians(np.arange(-45, 46))
-        rng, found = np.random.default_rng(5), []
-        for k, (x, y, theta) in enumerate(poses):
-            directions = np.column_stack((np.cos(bearings), np.sin(bearings)))
-            # The walls x + y = 2 and x - y = 2 meet at (2, 0).
-            ranges = np.minimum(*((2.0 - x - s * y) / (directions @ (1.0, s)) for s in (1.0, -1.0)))
-            ranges += rng.normal(0.0, 0.003, len(ranges))
-            beams = {"angle_min": bearings[0], "angle_increment": math.radians(1)}
-            found.append(ln.LaserScan(ranges, **beams, pose=(x, y, theta), stamp=0.1 * k))
-        save_npz(tmp_path / "wedge.npz", found)
-        np.savez(tmp_path / "other.npz", azimuth=np.zeros(3))
-        methods = {name: ln.Extractor(name) for name in ("optimal", "iepf")}
-        monkeypatch.setattr(real, "feature_methods", lambda *_: methods)
-        monkeypatch.setattr(real, "corner_methods", lambda *_: methods)
-        monkeypatch.setattr(real, "LOGS", {"Wedge": "wedge.npz", "Missing": "missing.npz"})
-        for name, value in (("SCANS", 1), ("PAIRS", 4), ("ARENA", 3), ("STILL", 4)):
-            monkeypatch.setattr(real, f"{name}_A_FRAME", value)
-        return tmp_path
-
-    def test_numbers_of_a_tiny_recording(self, folder):
-        findings = run_experiments(["real"], Setting(2, 0, folder), silent)["real"]
-        assert findings.text[-1] == "Left out, as they hold no scans: other.npz."
-        free = findings.numbers["free_space"]
-        assert list(free) == ["wedge.npz"]
-        assert free["wedge.npz"]["optimal"] == {
-            "phantom_in_100m": 0.0,
-            "longest_phantom": 0.0,
-            "phantom_scans": 0.0,
-            "covered": 1.0,
-        }
-        # The first five pairs in a row are from one place: each has two walls and their corner.
-        standing = findings.numbers["standing"]["wedge.npz"]["optimal"]
-        for kind, pairs in (("segments", 10), ("corners", 5)):
-            counts = [bins["pairs"] for bins in standing[kind].values()]
-            assert counts == [0, 0, 0, pairs, 0]
-            assert standing[kind]["30-99"]["found_again"] == 1.0
-            assert 0.1 < standing[kind]["30-99"]["nees_median"] < 5.0
-        # The first six are each paired with the next, that with the last, both ways: one corner
-        # and two walls each.
-        (repeats,) = findings.numbers["repeats"].values()
-        found = repeats["optimal"]
-        assert [found[name] for name in ("expected", "rate", "count", "chance")] == [14, 1, 14, 0]
-        assert math.isnan(found["auc"])
-        assert (found["count_without_edges"], found["corners_expected"]) == (14, 14)
-        assert (found["corners_per_scan"], found["corner_rate"], found["segment_rate"]) == (1, 1, 1)
-        assert found["segments_expected"] == 28
-        assert found["corner_rmse"] < 0.02
-        assert findings.numbers["arena"] == {}
-        measures = len(real.FREE_SPACE), 2 * len(real.STANDING_STILL), len(real.REPEATS), 1
-        pooled, tables = findings.tables[:2], findings.tables[2:]
-        assert [table.title for table in pooled] == list(real._POOLS.values())
-        assert repr(pooled[0].rows) == repr(pooled[1].rows)
-        assert len(tables) == sum(measures)
-        assert {table.columns for table in tables[:-1]} == {("recording", "optimal", "iepf")}
-        assert tables[3].rows[1][:2] == ("all", 100.0)
-        again = tables[6]
-        assert again.title == "Standing still, segments: found again [%]"
-        assert [row[:2] for row in again.rows[:1]] == [("wedge.npz", 100.0)]
-        json.dumps(findings.to_dict(), allow_nan=False)
-
-    @pytest.mark.slow
-    @pytest.mark.usefixtures("folder")
-    def test_all_recordings(self, data_dir, monkeypatch):
-        logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
-        monkeypatch.setattr(real, "LOGS", logs)
-        findings = run_experiments(["real"], Setting(1, 0, data_dir), silent)["real"]
-        assert len(findings.numbers["free_space"]) >= 20
-        unread = set(findings.text[-2].rstrip(".").split(": ")[1].split(", "))
-        doubles = findings.numbers["doubles"]
-        assert doubles["mcap/scans_demo.mcap"] == "rosbag1/scans_demo.bag"
-        assert len(doubles) >= 4
-        assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
-        assert set(scans.STANDING) < set(findings.numbers["standing"])
-        assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
-        assert list(findings.numbers["arena"]) == list(real.ARENAS)
-        json.dumps(findings.to_dict(), allow_nan=False)
+@pytest.mark.slow
+def test_all_recordings(data_dir, monkeypatch):
+    logs = {"Intel lab": "truth/intel_graph.npz", "ACES": "carmen/aces-corrected.log.gz"}
+    methods = {name: ln.Extractor(name) for name in ("optimal", "iepf")}
+    for name, value in (("SCANS", 1), ("PAIRS", 4), ("ARENA", 3), ("STILL", 4)):
+        monkeypatch.setattr(real, f"{name}_A_FRAME", value)
+    monkeypatch.setattr(real, "feature_methods", lambda *_: methods)
+    monkeypatch.setattr(real, "corner_methods", lambda *_: methods)
+    monkeypatch.setattr(real, "LOGS", logs)
+    findings = run_experiments(["real"], Setting(1, 0, data_dir), silent)["real"]
+    assert len(findings.numbers["free_space"]) >= 20
+    unread = set(findings.text[-2].rstrip(".").split(": ")[1].split(", "))
+    doubles = findings.numbers["doubles"]
+    assert doubles["mcap/scans_demo.mcap"] == "rosbag1/scans_demo.bag"
+    assert len(doubles) >= 4
+    assert {"benchmark/ple_real.npz", "benchmark/ple_sim.npz"} <= unread
+    assert set(scans.STANDING) < set(findings.numbers["standing"])
+    assert list(findings.numbers["repeats"]) == [*logs, *real.FURTHER_LOGS]
+    assert list(findings.numbers["arena"]) == list(real.ARENAS)
+    json.dumps(findings.to_dict(), allow_nan=False)
 
 
 class TestPlans:
