@@ -11,9 +11,7 @@ import pytest
 from approved import assert_approved, figure_lines, numbers_of
 from handmade import features as features_of
 from handmade import segment
-from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex, to_rgb
-from matplotlib.patches import Ellipse
 
 import lineament as ln
 from lineament import LineamentError
@@ -106,83 +104,6 @@ def test_endings(tmp_path, ending, start):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("n", "columns"), [(1, 1), (4, 3), (10, 4)])
-def test_one_panel_a_method_with_its_errors_below(n, columns):
-    scan, features = room()
-    names = [f"method $x {i}" for i in range(n)]
-    errors = {name: np.full(81, 0.001 * (i + 1)) for i, name in enumerate(names)}
-    figure = figures.scan_figure(scan, dict.fromkeys(names, features), errors)
-    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
-    strips = [axes for axes in figure.axes if axes not in panels]
-    assert [axes.get_title(loc="left") for axes in panels] == names
-    assert len(strips) == n
-    places = np.array([axes.get_position().bounds[:2] for axes in panels])
-    assert len(np.unique(places[:, 0].round(2))) == columns
-    for k, (panel, strip) in enumerate(zip(panels, strips, strict=True)):
-        (left, bottom, *_), below = panel.get_position().bounds, strip.get_position()
-        assert below.x0 <= left <= below.x1
-        assert 0 < bottom - below.y1 < 0.5 * panel.get_position().height
-        assert f"mean {k + 1}.0 mm" in texts_of(strip).pop()
-    without = figures.scan_figure(scan, dict.fromkeys(names, features))
-    assert len(without.axes) == n
-    assert without.get_figheight() < figure.get_figheight() - 1.5
-
-
-def test_scan_and_its_features(drawn):
-    """Where things are; how they look is in what was approved."""
-    scan, features = room()
-    figure = drawn(figures.plot_scan, scan, {"a": features})
-    (axes,) = figure.axes
-    counts = "2 segments · 1 corner · 1 edge · 1 arc · 2 breakpoints · 2 clusters"
-    assert texts_of(axes) == {counts, "0.88"}  # the quality; the edge has no number
-    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("x [m]", "y [m]", 1)
-    shown = by_label(axes)
-    for label, expected in (
-        ("noise", scan.points[60:61]),
-        ("sensor", [[0, 0]]),
-        ("corner", [[2, 2]]),
-        ("edge", scan.points[:1]),
-        ("breakpoint", scan.points[[0, -1]]),
-    ):
-        np.testing.assert_allclose(shown[label].get_xydata(), expected, err_msg=label)
-    (points,) = [c for c in axes.collections if len(c.get_offsets()) > 1]
-    known = features.clusters >= 0
-    np.testing.assert_allclose(points.get_offsets(), scan.points[known])
-    colors = [to_hex(color) for color in points.get_facecolors()]
-    assert colors == canvas.PALETTE[features.clusters[known]].tolist()
-    # Three deviations, the longer along y, cut.
-    (ellipse,) = [patch for patch in axes.patches if isinstance(patch, Ellipse)]
-    size = (ellipse.width, ellipse.height, ellipse.angle % 180)
-    assert size == pytest.approx((1.0, 0.6, 90))
-    seen = shown["arc"].get_xydata() - (1, 1)
-    np.testing.assert_allclose(np.hypot(*seen.T), 0.3)
-
-
-def test_nothing_came_back_from_shaded_sectors(drawn):
-    ranges = np.full(90, 2.0)
-    ranges[40:48] = 8.0
-    ranges[[10, 50, 51]] = np.nan  # two of them are at most 8 degrees from what is far
-    scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=math.radians(1))
-    axes = drawn(figures.plot_scan, scan, {"a": features_of(90)}).axes[0]
-    wedges = [path.vertices for path in by_label(axes)["no return"].get_paths()]
-    for wedge, bearings, reach in (
-        (wedges[0], [9.5, 10, 10.5], 2),
-        (wedges[1], [49.5, 50, 51, 51.5], 8),
-    ):
-        x, y = wedge[1 : 1 + len(bearings)].T
-        np.testing.assert_allclose(wedge[0], 0)
-        np.testing.assert_allclose(np.hypot(x, y), reach)
-        np.testing.assert_allclose(np.degrees(np.arctan2(y, x)), bearings)
-    assert len(wedges) == 2
-    counts = "0 segments · 0 corners · 0 arcs · 0 breakpoints · 1 cluster"  # not: 0 edges
-    assert texts_of(axes) == {counts}
-    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
-    for points in (scan.points[scan.valid], [(0, 0)]):
-        assert (points > low).all()
-        assert (points < high).all()
-
-
 def arena(width, height, x=0.0, y=0.0, n=720, noise=0.003) -> ln.LaserScan:
     """Scan a room of some size [m] from a place in it."""
     angles = np.linspace(-math.pi, math.pi, n, endpoint=False)
@@ -262,45 +183,9 @@ def test_every_scan_fills_its_panel_and_no_text_covers_another(name, tmp_path):
             assert share.min() > 0.2
 
 
-def test_a_corridor_is_drawn_larger_across_and_says_so():
-    for name, label, other, aspect in (
-        ("corridor along x", "y [m], drawn 20 ×", "x [m]", 20),
-        ("corridor along y", "x [m], drawn 50 ×", "y [m]", 1 / 50),
-        ("room", "x [m]", "y [m]", 1),
-    ):
-        scan = EXTREMES[name]
-        low, high = scan.points.min(axis=0), scan.points.max(axis=0)
-        found = features_of(len(scan), segments=[SLOPE, segment(low, high, 1, 100)])
-        (axes,) = figures.scan_figure(scan, {"a": found}).axes
-        assert {axes.get_xlabel(), axes.get_ylabel()} == {label, other}
-        assert axes.get_aspect() == pytest.approx(aspect)
-        # The marks across the ends of a segment stand across it on the paper.
-        mark = next(line.get_marker() for line in axes.lines if line.get_marker()[0] == 2)
-        assert mark[2] == pytest.approx(math.degrees(math.atan(aspect)))
-
-
 def test_a_plan_is_drawn_larger_by_the_round_factor_that_just_fills_it():
     shapes = [(1.0, 0.4 / 2.9), (1.0, 0.08), (1.0, 0.081), (1.0, 7.0), (1.0, 6.9)]
     assert [canvas._aspect(np.array(shape)) for shape in shapes] == [1, 5, 2, 1 / 5, 1 / 2]
-
-
-def test_a_few_beams_far_out_do_not_shrink_the_plan():
-    scan = EXTREMES["room"]
-    for far, label in (((), "x [m]"), ((100, 101), "x [m] · 2 beams farther out not shown")):
-        ranges = scan.ranges.copy()
-        ranges[list(far)] = 90.0
-        one = ln.LaserScan(ranges, angles=scan.angles)
-        (axes,) = figures.scan_figure(one, {"a": features_of(720)}).axes
-        assert axes.get_xlabel() == label
-        assert np.ptp(axes.get_xlim()) < 10
-    # What was found there is shown, and so are many beams.
-    wall = features_of(720, segments=[segment((0, 0), one.points[100], 1, 100)])
-    for start in (0, 180, 360, 540):  # few on each side, many in all
-        ranges[start : start + 30] = 90.0
-    many = ln.LaserScan(ranges, angles=scan.angles)
-    for shown, found in ((one, wall), (many, features_of(720))):
-        (axes,) = figures.scan_figure(shown, {"a": found}).axes
-        assert np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).max() > 70
 
 
 @pytest.mark.parametrize(
@@ -329,13 +214,6 @@ def test_dark_figures_have_light_marks(drawn):
             for text in figure.findobj(matplotlib.text.Text):
                 if text.get_text():
                     assert contrast(text.get_color(), theme.paper) > 3, text
-
-
-def test_clusters_of_a_picture_have_the_colours_of_its_theme():
-    scan, features = room()
-    (axes,) = figures.scan_figure(scan, {"a": features}, dark=True).axes
-    (points,) = [c for c in axes.collections if len(c.get_offsets()) > 1]
-    assert {to_hex(color) for color in points.get_facecolors()} == set(canvas.DARK.palette[:2])
 
 
 #: What people without one kind of cone see: Machado et al. 2009, in linear RGB, severity 1.
@@ -405,31 +283,12 @@ def test_narrow_panels_say_less_and_leave_out_what_is_far():
     assert max(*narrow.get_xlim(), *narrow.get_ylim()) < 11
 
 
-def test_numbers_do_not_lie_on_each_other_nor_outside(drawn):
-    scan, features = room()
-    features.corners = np.repeat(features.corners[:1], 8)
-    features.corners["position"] += np.linspace(0, 0.1, 8)[:, None]
-    axes = drawn(figures.plot_scan, scan, {"a": features}).axes[0]
-    boxes = [t.get_window_extent() for t in axes.texts if t.get_text() == "0.88"]
-    assert len(boxes) == 8
-    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
-    panel = axes.get_window_extent()
-    assert all(panel.containsx(x) for box in boxes for x in (box.x0, box.x1))
-
-
 def labels(positions, obstacles):
     """Texts beside the positions in a panel whose unit is a point of the paper."""
     axes = canvas.new_figure(4, 4).add_axes((0.25, 0.25, 0.5, 0.5), xlim=(-72, 72), ylim=(-72, 72))
     values = np.full(len(positions), 0.125)
     drawing.label_points(axes, np.array(positions, float), values, np.reshape(obstacles, (-1, 2)))
     return axes.texts
-
-
-def test_numbers_stay_away_from_other_corners():
-    positions = np.array([(0, 0), (15, 0)])
-    for text, position in zip(labels(positions, []), positions, strict=True):
-        apart = np.abs(position + text.get_position() - positions)
-        assert (apart >= (9.2, 4.5)).any(axis=1).all()
 
 
 @pytest.mark.parametrize(
@@ -452,86 +311,6 @@ def test_number_stands_where_it_hides_least(place, hidden, offset):
         assert is_near == (offset == "near")
     else:
         assert text.get_position() == pytest.approx(offset, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("width", "height", "inches"), [(1, 8, 1.4), (8, 1, 0.4), (4, 3, 0.9 * 3.24 / 4.32)]
-)
-def test_figures_have_the_shape_of_the_scan_within_reason(width, height, inches):
-    scan = arena(width, height, noise=0.0)
-    figure = figures.scan_figure(scan, dict.fromkeys("ab", features_of(len(scan))))
-    assert figure.get_figheight() - 1.6 == pytest.approx(5.6 * inches, rel=1e-2)  # without titles
-
-
-def test_numbers_without_room_are_left_out():
-    scan, features = room()
-    features.corners = np.repeat(features.corners[:1], 300)
-    features.corners["quality"] = np.linspace(0, 0.99, 300)
-    features.corners["quality"][7] = np.nan  # of a method that has none
-    (axes,) = figures.scan_figure(scan, {"a": features}).axes
-    numbers = [float(text.get_text()) for text in axes.texts[1:]]
-    assert 10 < len(numbers) < 150
-    assert max(numbers) == 0.99  # the best first
-    assert min(numbers) > 0.5
-
-
-def test_stages_of_a_trace(drawn):
-    scan, features = room()
-    trace = trace_of(scan, features)
-    trace.spacing[5] = 0.0  # a log axis has no place for it
-    figure = drawn(stages.plot_trace, trace)
-    filter_, spacing, *_, clusters, found = figure.axes
-    assert texts_of(filter_) == {f"{scan.valid.sum()} valid beams of 81"}
-    np.testing.assert_allclose(by_label(filter_)["no return"].get_xdata(), np.arange(15, 20))
-    # A new cluster begins at beam 41, noise at 60, and what follows is no noise.
-    lines = [line for line in spacing.lines if line.get_color() == canvas.EDGE_COLOR]
-    assert [line.get_xdata()[0] for line in lines] == [41, 60, 61]
-    expected = np.where(trace.spacing > 0, trace.spacing, np.nan)
-    np.testing.assert_array_equal(by_label(spacing)["spacing"].get_ydata(), expected)
-    for axes in figure.axes:
-        box = axes.get_legend().get_window_extent()
-        assert box.y1 <= axes.get_window_extent().y0  # below its panel
-    np.testing.assert_allclose(clusters.get_xlim(), found.get_xlim(), atol=0.05)
-
-
-def test_trace_shows_the_stages_that_a_method_has():
-    """No filter, density or candidates for one that has none of them; evidence where it has."""
-    trace = ln.trace(EXTREMES["room"])
-    figure = stages.trace_figure(trace)
-    names = [axes.get_title(loc="left") for axes in figure.axes]
-    assert names == ["Ranges", "Spacing", "Evidence", "Clusters", "Features"]
-    evidence = by_label(figure.axes[2])
-    beams, rises = evidence["corner"].get_xydata().T
-    np.testing.assert_array_equal(beams, trace.features.corners["beam"])
-    np.testing.assert_array_equal(rises, trace.evidence["corners"])
-    beams = evidence["segment"].get_xdata()
-    for segment_, beam in zip(trace.features.segments, beams, strict=True):
-        first, last = segment_["first_beam"], segment_["last_beam"]
-        assert first <= beam <= last if first <= last else beam >= first or beam <= last
-    figure = stages.trace_figure(replace(trace, evidence={}))
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [*names[:2], *names[3:]]
-
-
-def test_map_moves_features_by_their_poses(drawn):
-    scan, features = room()
-    poses = [(0.0, 0.0, 0.0), (10.0, 0.0, math.pi / 2)]
-    figure = drawn(figures.plot_map, ((pose, features) for pose in poses), title="Here")
-    (axes,) = figure.axes
-    assert axes.get_title(loc="left") == "Here"
-    assert texts_of(axes) == {"2 scans · 4 segments · 2 corners · 2 edges · 2 arcs"}
-    lines, circles = (c.get_segments() for c in axes.collections if isinstance(c, LineCollection))
-    np.testing.assert_allclose([lines[0][1], lines[2][1]], [[2, 2], [8, 2]], atol=1e-12)
-    np.testing.assert_allclose([c.mean(axis=0) for c in circles], [[1, 1], [9, 1]], atol=0.02)
-    path = by_label(axes)["path of the sensor"].get_xydata()
-    np.testing.assert_allclose(path, [[0, 0], [10, 0]])
-    points = {to_hex(of.get_color()): of.get_xydata() for of in axes.lines if of.get_alpha()}
-    np.testing.assert_allclose(points[canvas.CORNER_COLOR], [[2, 2], [8, 2]], atol=1e-12)
-    x, y = scan.points[0]
-    np.testing.assert_allclose(points[canvas.EDGE_COLOR], [[x, y], [10 - y, x]], atol=1e-12)
-    # Walls seen by many scans come out dark by lying on each other.
-    figures_of = (drawn(figures.plot_map, [((0.0, 0.0, 0.0), features)] * n) for n in (2, 120))
-    alphas = [figure.axes[0].collections[0].get_alpha() for figure in figures_of]
-    assert alphas == pytest.approx([0.9, 0.5])
 
 
 @pytest.mark.slow

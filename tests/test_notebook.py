@@ -165,13 +165,6 @@ def test_points_become_the_scan_that_they_came_from(scan):
         assert (again.stamp, again.range_max) == (1.5, 5.0)
 
 
-def test_points_behind_the_sensor_are_not_torn():
-    angles = np.linspace(math.pi - 1, math.pi + 1, 51)
-    points = np.column_stack((np.cos(angles), np.sin(angles)))
-    again = ln.LaserScan.from_points(points)
-    np.testing.assert_allclose(again.angles, angles)
-
-
 def test_of_points_with_one_bearing_the_nearest_stays():
     points = [(3, 3), (0, 0), (1, 1), (2, 2), (math.nan, 1), (math.inf, 0), (1, -1)]
     again = ln.LaserScan.from_points(points)
@@ -201,17 +194,6 @@ def test_a_doorway_between_points_parts_the_wall():
 
 
 # len, bool, iteration, indexing
-
-
-def test_features_are_tables_by_name(scan):
-    features = ln.extract(scan)
-    assert list(features) == [*TABLES]
-    assert all(features[name] is getattr(features, name) for name in features)
-    assert len(features) == sum(len(features[name]) for name in features) > 4
-    assert bool(features)
-    assert not ln.extract(ln.LaserScan([], 0.0, 0.1))
-    assert features.scan is scan
-    assert features.transform(0, 0, 1).scan is None
 
 
 def test_beams_of_a_scan(scan):
@@ -259,25 +241,7 @@ def test_parts_of_a_batch(scan):
         batch[::2]
 
 
-def test_scans_of_a_log(log):
-    assert log[3].pose == log.scan(3).pose == (3.0, 0.0, 0.0)
-    assert log[-1].pose == log[np.int64(4)].pose == (4.0, 0.0, 0.0)
-    assert [scan.pose for scan in log[1:4:2]] == [(1.0, 0.0, 0.0), (3.0, 0.0, 0.0)]
-    assert [scan.pose for scan in log[-1:]] == [(4.0, 0.0, 0.0)]
-    for index in (5, -6):
-        with pytest.raises(IndexError, match=f"has no scan {index}, expected 0 to 4"):
-            log[index]
-    with pytest.raises(ValueError, match="forwards"):
-        log[::-1]
-
-
 # Tables
-
-
-def test_scans_are_numbered_in_tables(scan):
-    features = ln.extract(scan)
-    assert set(features.to_arrow()["scan"].to_pylist()) == {0}
-    assert set(features.to_arrow(scan=7)["scan"].to_pylist()) == {7}
 
 
 @pytest.mark.parametrize("package", ["pandas", "polars"])
@@ -313,28 +277,6 @@ def parsed(html):
     return found
 
 
-def test_features_in_a_notebook(scan):
-    features = ln.extract(scan)
-    html = features._repr_html_()
-    found = parsed(html)
-    layers = {group.get("class"): group for group in found["g"]}
-    assert len(layers["corners"]) == features.counts()["corners"] == 4
-    assert len(layers["walls"]) == len(found["line"]) == len(features.segments)
-    matrix = [float(x) for x in layers[None].get("transform")[7:-1].split()]
-    ends = [[float(e.get(name)) for name in ("x1", "y1", "x2", "y2")] for e in found["line"]]
-    assert np.ravel(ends) == pytest.approx(
-        np.ravel(np.hstack((features.segments["start"], features.segments["end"]))), abs=1e-6
-    )
-    assert matrix[0] == -matrix[3] > 0  # up is up, and as large as across
-    assert matrix[1:3] == [0, 0]
-    assert "arcs" not in "".join(found["text"][0].itertext())
-    rows = [[cell.text for cell in row] for row in found["tr"][1:]]
-    longest = features.segments[features.segments["length"].argmax()]
-    assert rows[0][3].startswith(f"{longest['length']:.3f} m")
-    assert rows[0][4] == f"{1000 * math.sqrt(longest['covariance'][0, 0]):.1f}"
-    assert "more" not in html
-
-
 def test_notebooks_show_what_was_approved(scan, log):
     """A scan with each kind of feature, a log, nothing, and what `plot` draws."""
     found = ln.extract(scan)
@@ -366,39 +308,6 @@ def test_ellipses_that_a_diamond_hides_are_not_drawn(scan, pixels, shown):
     corners["covariance"] = (pixels / metre) ** 2 / (-2 * math.log(0.05)) * np.eye(2)
     html = notebook.svg(scan, replace(found, corners=corners))
     assert html.count("<ellipse") == shown
-
-
-def test_the_longest_and_best_come_first_and_the_others_are_counted(scan):
-    features = ln.extract(scan)
-    corners = np.repeat(features.corners[:1], 8)
-    corners["quality"] = np.linspace(0.1, 0.8, 8)
-    html = replace(features, corners=corners)._repr_html_()
-    quality = [float(q) for q in re.findall(r"quality ([\d.]+)", html)]
-    assert quality[:5] == [0.8, 0.7, 0.6, 0.5, 0.4]
-    left = 8 - notebook.MOST_ROWS + len(features.segments) - min(len(features.segments), 5)
-    assert f"<p>{left} more: <code>.to_pandas()</code></p>" in html
-
-
-def test_up_is_up_and_a_far_point_shrinks_nothing(scan):
-    def places(*more):
-        ranges = np.concatenate((scan.ranges, more))
-        far = ln.LaserScan(ranges, FRAME["angle_min"], FRAME["angle_increment"] * 0.99)
-        found = parsed(notebook.svg(far))
-        points = re.findall(r"M([-\d.]+) ([-\d.]+)h0", found["path"][0].get("d"))
-        return np.array(points, float), found["svg"][0]
-
-    near, svg = places()
-    far, same = places(500.0)
-    assert np.ptp(far[:-1], axis=0) == pytest.approx(np.ptp(near, axis=0), rel=0.02)
-    assert svg.get("viewBox") == same.get("viewBox")
-    assert np.ptp(near, axis=0).max() > 350
-    wall = ln.LaserScan([1.0, 1.0, 1.0], angle_min=1.4, angle_increment=0.1)  # to the left
-    path = parsed(notebook.svg(wall))["path"]
-    (_, dot), (_, sensor) = (
-        map(float, re.match(r"M([-\d.]+) ([-\d.]+)", element.get("d")).groups())
-        for element in (path[0], path[1])
-    )
-    assert dot < sensor
 
 
 @pytest.mark.parametrize("size", [0.02, 1.0, 200.0, 1e6])
@@ -442,11 +351,6 @@ def test_what_is_not_finite_by_half_is_left_out_of_a_picture(bad):
     assert legend.count("tspan") == 10
 
 
-def test_a_scan_in_a_notebook_has_the_picture_and_the_table_of_its_features(scan):
-    for part in ln.extract(scan)._repr_html_().split("<svg", 1)[1].split("<table"):
-        assert part.removesuffix("</div>") in scan._repr_html_()
-
-
 def test_control_characters_of_names_do_not_reach_a_page():
     hostile = ln.LaserScan([1.0] * 9, -0.5, 0.05, frame_id="a\x1b]0;b\x07\u202e<b>")
     html = hostile._repr_html_()
@@ -484,15 +388,6 @@ def test_plot_of_features_scans_and_logs(scan, log):
     assert ln.plot(scan, method=ln.methods.Liu()).get_title(loc="left") == "laser · liu"
 
 
-def test_plot_of_features_without_a_scan_takes_one(scan):
-    row = ln.Extractor().batch([scan.ranges], **FRAME)[0]
-    alone, over = row.plot(), row.plot(scan=scan)
-    assert "no return" not in alone.get_legend_handles_labels()[1]
-    assert "no return" in over.get_legend_handles_labels()[1]
-    with pytest.raises(ValueError, match="scan has 10 beams, expected the 360"):
-        row.plot(scan=scan[:10])
-
-
 @pytest.mark.parametrize(("walls", "is_flat"), [(3, False), (4, True)])
 def test_features_alone_are_drawn_with_the_sensor(walls, is_flat):
     """Their ends, corners and the sensor: where these are fewer than nine, no plan is flat."""
@@ -524,14 +419,6 @@ def test_parameters_are_listed_with_units_defaults_and_bounds(name, capsys):
         unit, bounds = field.metadata["unit"], str(field.metadata["bounds"])
         row = rf"^{field.name} +{re.escape(shown)} +{re.escape(unit)} *{re.escape(bounds)}$"
         assert re.search(row, out, re.MULTILINE)
-
-
-def test_units_are_those_of_the_parameters(capsys):
-    assert run(["methods", "liu"]) == 0
-    assert re.search(r"^sigma_r +0.3 +m +a number > 0$", capsys.readouterr().out, re.MULTILINE)
-    assert "Width of the filter in range [m]; a number > 0." in ln.methods.Liu.__doc__
-    assert run(["methods", "lui"]) == 2
-    assert "method 'lui' is unknown, expected one of: optimal" in capsys.readouterr().err
 
 
 # Reprs
