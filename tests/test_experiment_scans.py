@@ -5,43 +5,20 @@ import math
 import numpy as np
 import pytest
 from handmade import corner, features
-from lineament_lab.evaluation import arena, evaluate
-from lineament_lab.evaluation.arena import ARENAS, arena_scores, load_arena
+from lineament_lab.evaluation import arena
+from lineament_lab.evaluation.arena import arena_scores, load_arena
 from lineament_lab.reproduce import Setting, scans
 from lineament_lab.reproduce.scans import (
-    batch_of,
     frame_times,
     interleaved_times,
     scan_pairs,
-    scene_numbers,
-    simulated_frames,
     still_pairs,
     time_ratio,
 )
 
 from lineament import Extractor, LaserScan
 from lineament.logs import save_npz
-from lineament.simulation import SENSORS, Sensor, World, building, drive, truth
-
-
-def test_frames_are_of_the_kinds_in_turn_and_can_be_repeated():
-    numbers = scene_numbers(3, 2)
-    assert list(numbers) == [50_000, 50_001, 50_002]
-    frames = list(simulated_frames(SENSORS["ld19"], ["room", "star"], numbers))
-    again = list(simulated_frames(SENSORS["ld19"], ["room", "star"], numbers))
-    for one, other in zip(frames, again, strict=True):
-        assert np.array_equal(one.scan.ranges, other.scan.ranges)
-    alone = next(simulated_frames(SENSORS["ld19"], ["star"], numbers[1:2]))
-    assert np.array_equal(alone.scan.ranges, frames[1].scan.ranges)
-    assert evaluate(frames[0].truth, frames[0].truth).corners.counts.f1 == 1.0
-
-
-def test_scans_at_once_give_what_each_alone_gives():
-    some = [f.scan for f in simulated_frames(SENSORS["utm30lx"], ["room"], range(3))]
-    extractor = Extractor("iepf")
-    for scan, found in zip(some, batch_of(extractor, some), strict=True):
-        assert np.array_equal(found.corners, extractor(scan).corners)
-        assert np.array_equal(found.clusters, extractor(scan).clusters)
+from lineament.simulation import Sensor, World, truth
 
 
 def test_methods_are_timed_in_turns(monkeypatch):
@@ -118,20 +95,6 @@ def test_pairs_of_a_sensor_that_stands(tmp_path):
     assert stamps(10, standing=True) == [(k, k + 1) for k in range(8)]
     assert stamps(3) == [still[0], still[2], still[5]]
     assert stamps(0) == []
-
-
-def test_the_simulated_building_and_the_speed_of_a_drive_are_those_of_the_results():
-    world, way = building()
-    for part, total in (
-        (world.segments, 1488.1661717670454),
-        (world.circles, 54.63541666666666),
-        (way, 128.0544117647059),
-    ):
-        values = np.ravel(part)
-        weights = np.arange(1, len(values) + 1) / len(values)
-        assert values @ weights == pytest.approx(total, rel=1e-12)
-    (scan, *_, last) = drive(world, [(0, 0), (3, 0), (3, 0.6)], SENSORS["lms181"], rate=10)
-    assert (scan.stamp, last.stamp) == (0.0, pytest.approx(5.0 + math.pi / 2 + 1.0, abs=0.1))
 
 
 #: A room of 4 m x 3 m whose fitted walls leave gaps at two corners; a board ends on a wall.
@@ -217,9 +180,3 @@ def test_scores_of_found_corners_worked_by_hand(recording):
     assert numbers["median_error"] == pytest.approx(0.03)
     assert numbers["corners_per_scan"] == 3
     np.testing.assert_allclose(positions, [(0.03, 0), (2, 3), (2, 0)], atol=1e-12)
-
-
-def test_methods_find_the_corners_of_the_recorded_arena(data_dir):
-    loaded = load_arena(data_dir / ARENAS["arena, static"], 10)
-    assert len(loaded.corners) == 6  # Five listed ones, and a wall that ends on another.
-    assert arena_scores(loaded, Extractor("region_growing"))[0]["recall"] > 0.8

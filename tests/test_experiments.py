@@ -1,14 +1,11 @@
 """The experiments: each from end to end on little, and its parts by hand."""
 
 import json
-import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from handmade import features
-from lineament_lab.evaluation import FeatureScores, Scores, SimilarityScores
-from lineament_lab.evaluation.consistency import NormalisedErrors
+from lineament_lab.evaluation import SimilarityScores
 from lineament_lab.methods import RIVALS, controls
 from lineament_lab.reproduce import (
     EXPERIMENTS,
@@ -24,14 +21,13 @@ from lineament_lab.reproduce import (
     similarity,
     tracking,
 )
-from lineament_lab.reproduce.seeds import Spread, merged
+from lineament_lab.reproduce.seeds import Spread
 from small_experiments import PAPER, silent, small  # noqa: F401
 
 import lineament as ln
 from lineament.logs import save_npz
 from lineament.methods.stages import corner_response
-from lineament.output import canvas, drawing
-from lineament.simulation import SENSORS, room, truth
+from lineament.simulation import SENSORS, room
 
 
 @pytest.fixture
@@ -176,17 +172,6 @@ class TestMethods:
             (found,) = ln.Extractor(method, noise=noise)(corner).corners
             np.testing.assert_allclose(found["position"], (2.0, 0.0), atol=1e-6)
 
-    def test_each_cluster_has_a_line(self):
-        bearings = 0.02 * np.arange(10)
-        ranges = np.where(bearings < 0.1, 2.0, 4.0) / np.cos(bearings)
-        scan = ln.LaserScan(ranges, angle_min=0.0, angle_increment=0.02)
-        lines = contenders.region_lines(scan, ln.extract(scan, method="pdbs")).segments
-        assert lines["first_beam"].tolist() == [0, 5]
-        assert lines["last_beam"].tolist() == [4, 9]
-        assert lines["cluster"].tolist() == [0, 1]
-        np.testing.assert_allclose(lines["centroid"][:, 0], [2.0, 4.0])
-        np.testing.assert_allclose(np.abs(np.sin(lines["angle"])), 1.0)
-
     def test_two_beams_are_a_line_and_one_is_none(self):
         scan, labels = ln.LaserScan([2.0] * 9, 0.0, 0.02), [0, -1, 1, 1, -1, 2, 2, 2, 3]
         for n in (0, 1, 9):
@@ -209,38 +194,6 @@ class TestNoise:
     def test_beams_around_a_mark(self):
         marks = np.array([0, 0, 0, 1, 0, 0, 0], dtype=bool)
         assert np.flatnonzero(noise._near(marks, 1, 2)).tolist() == [2, 3, 4, 5]
-
-    def test_errors_are_of_the_beams_of_each_place(self):
-        """Ranges of two flat frames that are off by known amounts."""
-        angles = {"angle_min": -0.1, "angle_increment": 0.01}
-        true = 2.0 / np.cos(-0.1 + 0.01 * np.arange(21))
-        off = np.zeros(21)
-        off[4], off[12] = 0.02, 1.5
-        scan = ln.LaserScan(true + off, **angles)
-        places = {"small": off == 0.02, "large": off == 1.5, "none": off > 9}
-        found = noise._ranges([noise._Frame(scan, features(21), true, places)] * 2)
-        assert (found["small"]["beams"], found["large"]["beams"]) == (2, 2)
-        assert found["small"]["raw"] == pytest.approx(0.02)
-        assert found["small"]["filtered"] < 0.01
-        assert found["large"]["raw"] == pytest.approx(1.5)
-        assert (found["small"]["off_after"], found["large"]["off_after"]) == (0.0, 1.0)
-        assert (found["small"]["labelled"], found["large"]["labelled"]) == (0.0, 1.0)
-        assert math.isnan(found["none"]["raw"])
-
-    def test_places_of_a_frame(self):
-        """A wall, a nearer one, and noise points: what is an edge, a corner, a plane."""
-        frame = noise._frame(room(), (0.0, 0.0, 0.3), 5)
-        errors = abs(frame.scan.ranges - frame.true)
-        sizes = [frame.places[noise._size(*size)] for size in noise.SIZES]
-        for (low, high), place in zip(noise.SIZES, sizes, strict=True):
-            assert ((errors[place] > low) & (errors[place] <= high)).all()
-        noisy = np.logical_or.reduce(sizes)
-        assert (noisy == (frame.scan.valid & (errors > noise.OFF))).all()
-        assert not (frame.places["planes"] & noisy).any()
-        corners = truth(room(), (0.0, 0.0, 0.3), noise.SENSOR).corners["beam"]
-        assert set(np.flatnonzero(frame.places["corners"])) <= set(corners.tolist())
-        near = np.abs(np.flatnonzero(frame.places["planes"])[:, np.newaxis] - corners)
-        assert near.min() >= noise.HALF_WIDTH - 1
 
 
 class TestTexts:
@@ -270,28 +223,8 @@ class TestTexts:
         text, _ = similarity.report({similarity.SIMULATED: found}, Setting())
         assert "nan" not in " ".join(text)
 
-    def test_mean_nees_is_compared_with_its_interval(self):
-        """Two corners, each off by one σ along x: the mean NEES of four components is a half."""
-        off = NormalisedErrors(np.array([[1.0, 0.0], [1.0, 0.0]]))
-        within = Scores(1, replace(FeatureScores.none("corners"), consistency=off)).summary()
-        beyond = within | {"corner_nees": within["corner_nees_high"] + 0.1}
-        text = all_methods._consistency({"lms181": {"liu": within, "iepf": beyond, "pdbs": {}}})
-        assert text == "The mean NEES lies within its 95 % interval in 1 of 2 rows for corners."
-        both = {"lms181": {"liu": merged([within, beyond]), "iepf": merged([within, {}])}}
-        text = all_methods._consistency(both)
-        assert text.endswith("in 1 (0–2) of 2 (1–2) rows for corners.")
-
     def test_methods_with_arcs_are_named(self):
         sensors = {"lms181": {"liu": {}, "optimal": {}}, "ld19": {"liu": {}}}
         assert all_methods._arcs(sensors).startswith("Arcs are found by none of the methods.")
         sensors["ld19"]["optimal"] = {"arc_precision": 0.5}
         assert all_methods._arcs(sensors).startswith("Arcs are found by optimal.")
-
-
-@pytest.mark.parametrize("errors", [[0.0, 0.02, np.nan], [3.0, 0.1, 0.1], [np.nan] * 3])
-def test_axis_of_errors_is_the_same_for_all_methods(errors):
-    axes = canvas.new_figure(4, 3).subplots()
-    drawing.draw_errors(axes, ln.LaserScan([1.0, 1.0, 1.0], 0.0, 0.1), np.array(errors))
-    assert axes.get_ylim() == (1e-4, 10.0)
-    drawn = axes.lines[0].get_ydata()
-    np.testing.assert_array_equal(drawn, np.maximum(errors, drawing.LEAST_ERROR))

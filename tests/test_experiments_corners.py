@@ -10,7 +10,6 @@ from lineament_lab.reproduce import (
     grid,
     repetition,
     scans,
-    sensitivity,
     two_corners,
 )
 from lineament_lab.reproduce.grid import Parameters
@@ -75,14 +74,6 @@ class TestRepetition:
             views = features(corners=[before.corners[0]] * n), features(corners=[corner(9, 9)] * m)
             assert grid.average_repetition(*views, 0.0) == 0.0
 
-    def test_everything_a_corner_repeats_well_and_is_wrong(self):
-        everywhere = grid.repetition(Parameters("tangent", 8, 6, 0.0), range(1))
-        assert everywhere["repetition"] > 0.9
-        assert everywhere["precision"] < 0.1
-        assert everywhere["corners_per_view"] > 100
-        nothing = grid.repetition(Parameters("relative", 8, 6, 5.0), range(1))
-        assert [nothing[name] for name in (*grid.CRITERIA, "corners_per_view")] == [0.0] * 3
-
     def test_parameters_are_chosen_on_scenes_that_are_not_reported(self):
         setting = Setting(frames=50, seed=3)
         chosen_on, reported = (grid.repetition_scenes(setting, reported=r) for r in (False, True))
@@ -123,47 +114,15 @@ class TestTwoCorners:
         found = two_corners.found_distances(views, (0.0, 0.0, 0.0))
         assert found == pytest.approx([DISTANCE + 0.01, DISTANCE + 0.24])
 
-    def test_bound_is_that_of_both_corners_along_their_line(self, monkeypatch):
-        """Variances of 4 and 9 mm² along the line from A to B add up, those across do not count."""
-        along = (B - A) / DISTANCE
-        across = np.array((-along[1], along[0]))
-        rows = [corner(*A), corner(*B)]
-        for row, variance in zip(rows, (4e-6, 9e-6), strict=True):
-            row["covariance"] = variance * np.outer(along, along) + 1e-2 * np.outer(across, across)
-        monkeypatch.setattr(two_corners, "truth", lambda *_: features(corners=rows))
-        assert two_corners.distance_bound((0.0, 0.0, 0.0)) == pytest.approx(math.sqrt(13e-6))
-
     def test_a_method_that_never_finds_both_corners_is_named(self):
         some, none = ([two_corners._numbers(np.array(d), 4)] for d in ([DISTANCE], []))
         n = {"places": {"liu": some, "iepf": none}, "all": {"liu": some[0], "iepf": none[0]}}
         n |= {"bound": np.array([0.003]), "all_bound": 0.003}
         assert two_corners.report(n, Setting())[0][-1] == "iepf: no scan has both corners."
 
-    def test_drawn_is_the_scan_with_the_median_error(self, monkeypatch):
-        """Errors of 1, 3 and -2 cm, and one without both corners, which is the worst."""
-        along, (x, y, turn) = (B - A) / DISTANCE, POSES[0]
-        rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-        found = [
-            features(corners=[corner(*((place - (x, y)) @ rotation)) for place in places])
-            for places in [(A, B + off * along) for off in (0.01, 0.03, -0.02)] + [(A,)]
-        ]
-        monkeypatch.setattr(two_corners, "batch_of", lambda *_: found)
-        assert two_corners._median_view(None, range(4), POSES[0]) == (2, found[2])
-
-    @pytest.mark.slow
-    def test_good_method_spreads_like_the_bound_and_none_spreads_less(self):
-        pose, rng = POSES[4], np.random.default_rng(2)
-        seen = [PAPER.scan(WORLD, pose, rng) for _ in range(200)]
-        extract = ln.Extractor("ransac", noise=PAPER.noise)
-        distances = two_corners.found_distances(scans.batch_of(extract, seen), pose)
-        assert len(distances) > 190
-        error = np.sqrt(np.mean((distances - DISTANCE) ** 2))
-        # 4 standard deviations of a standard deviation of 190 draws are 0.2 of it.
-        assert 0.8 < error / two_corners.distance_bound(pose) < 1.4
-
 
 class TestSensitivity:
-    """What the paper leaves open: its filter more than once, and bands by hand."""
+    """What the paper leaves open: its filter more than once."""
 
     def test_ranges_are_filtered_so_many_times(self):
         scan = ln.LaserScan([2.0, 2.0, 2.05, 2.0, 2.0, 2.1], -0.3, 0.1, range_min=0.2, range_max=9)
@@ -175,17 +134,3 @@ class TestSensitivity:
             assert np.abs(found.ranges - scan.ranges).max() > 0.01
             assert (found.angle_min, found.angle_increment) == (-0.3, 0.1)
             assert (found.range_min, found.range_max) == (0.2, 9.0)
-
-    def test_bands_by_hand(self):
-        """The first parameter goes from 2 to 5, the second from 1 to 3, the third is unknown."""
-        alone = {
-            "a": {"x": {"recall": 5.0}, "y": {"recall": 2.0}, "z": {"recall": math.nan}},
-            "b": {"x": {"recall": 3.0}, "y": {"recall": 1.0}},
-        }
-        bands = sensitivity._bands({"recall": 4.0}, alone)
-        assert bands == {"recall": {"low": 1.0, "high": 5.0, "by": "a"}}
-        alone["c"] = {"x": {"recall": math.nan}}
-        assert sensitivity._bands({"recall": 4.0}, alone) == bands
-        nothing = sensitivity._bands({"recall": 4.0}, {"c": alone["c"]})["recall"]
-        assert math.isnan(nothing["low"])
-        assert math.isnan(nothing["high"])

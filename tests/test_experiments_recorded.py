@@ -68,12 +68,6 @@ class TestMuseum:
         assert (np.diff([scan.stamp for scan in in_row]) > 0.09).all()
         assert in_row[0].stamp > frames[0].stamp
 
-    def test_more_scans_than_there_are_are_all(self, bag):
-        stamps = [scan.stamp for scan in ln.open_log(bag, topic=museum.TOPIC)]
-        frames, in_row = museum.read(bag, 10 * len(stamps))
-        assert [scan.stamp for scan in frames] == stamps
-        assert [scan.stamp for scan in in_row] == stamps[len(stamps) // 3 :]
-
     def test_two_corners_are_a_convex_and_a_concave_one_seen_over_the_longest_way(self):
         def view(way, **corners):
             places = {"a": (0, True), "b": (2, False), "c": (3.5, False), "f": (9, False)}
