@@ -196,6 +196,17 @@ def test_a_doorway_between_points_parts_the_wall():
 # len, bool, iteration, indexing
 
 
+def test_features_are_tables_by_name(scan):
+    features = ln.extract(scan)
+    assert list(features) == [*TABLES]
+    assert all(features[name] is getattr(features, name) for name in features)
+    assert len(features) == sum(len(features[name]) for name in features) > 4
+    assert bool(features)
+    assert not ln.extract(ln.LaserScan([], 0.0, 0.1))
+    assert features.scan is scan
+    assert features.transform(0, 0, 1).scan is None
+
+
 def test_beams_of_a_scan(scan):
     assert scan[3] == (scan.angles[3], scan.ranges[3])
     assert scan[-1] == scan[359]
@@ -239,6 +250,16 @@ def test_parts_of_a_batch(scan):
     assert batch[2:].to_arrow(scan=2).equals(batch.to_arrow().slice(len(batch[:2].to_arrow())))
     with pytest.raises(ValueError, match="step is 2"):
         batch[::2]
+
+
+def test_scans_of_a_log(log):
+    assert log[np.int64(-2)].pose == (3.0, 0.0, 0.0)
+    assert [scan.pose for scan in log[1:4:2]] == [(1.0, 0.0, 0.0), (3.0, 0.0, 0.0)]
+    for index in (5, -6):
+        with pytest.raises(IndexError, match=f"has no scan {index}, expected 0 to 4"):
+            log[index]
+    with pytest.raises(ValueError, match="forwards"):
+        log[::-1]
 
 
 # Tables
@@ -386,6 +407,15 @@ def test_plot_of_features_scans_and_logs(scan, log):
     assert title == "drive.npz · scan 4 · iepf"
     assert ln.plot(log.path).get_title(loc="left") == "drive.npz · scan 0 · optimal"
     assert ln.plot(scan, method=ln.methods.Liu()).get_title(loc="left") == "laser · liu"
+
+
+def test_plot_of_features_without_a_scan_takes_one(scan):
+    row = ln.Extractor().batch([scan.ranges], **FRAME)[0]
+    alone, over = row.plot(), row.plot(scan=scan)
+    assert "no return" not in alone.get_legend_handles_labels()[1]
+    assert "no return" in over.get_legend_handles_labels()[1]
+    with pytest.raises(ValueError, match="scan has 10 beams, expected the 360"):
+        row.plot(scan=scan[:10])
 
 
 @pytest.mark.parametrize(("walls", "is_flat"), [(3, False), (4, True)])

@@ -149,18 +149,13 @@ def test_killed_process_leaves_nothing_under_the_name(tmp_path, ending):
 
 
 def test_scans_do_not_wait_where_a_format_does_not_say_so(tmp_path):
-    class Counting(Writer):
-        def _open(self, temporary, files):
-            files.enter_context(temporary.open("w"))
+    class Each(Chunks):
+        chunk = Writer.chunk
 
-        def _write(self, found, first_scan):
-            came.append((len(found), first_scan))
-
-    came = []
-    with Counting(tmp_path / "a.txt") as writer:
-        for k in range(3):
-            writer.write(FOUND)
-            assert came == [(1, i) for i in range(k + 1)]
+    with Each(tmp_path / "a") as writer:
+        for i in range(3):
+            writer.write(i, SCAN)
+            assert writer.chunks[i:] == [(i, [(i, None)])]
 
 
 def test_endings(tmp_path):

@@ -13,7 +13,6 @@ from worlds import (
     NOISE,
     STEP,
     degenerate_scans,
-    fan,
     full_circle,
     random_scan,
     room,
@@ -189,19 +188,6 @@ def test_covariance_is_that_of_moved_measurements(fit, seed):
     expected = second_order(first_order, line["centroid"], line["angle"])
     scale = np.sqrt(np.outer(*[np.diag(expected)] * 2))
     np.testing.assert_allclose(line["covariance"] / scale, expected / scale, atol=2e-3)
-
-
-@pytest.mark.parametrize("fit", FITS)
-@pytest.mark.parametrize("normal", [0, 45, 90, 135, 180, 270])
-def test_walls_of_any_direction_fit_exactly(fit, normal):
-    angles = math.radians(normal) + fan(30)
-    line = stages.fit_line(polar(wall(angles, 2.0, normal), angles), fit=fit)
-    across = np.array([math.cos(math.radians(normal)), math.sin(math.radians(normal))])
-    for name in ("start", "end", "centroid"):
-        assert line[name] @ across == pytest.approx(2.0, abs=1e-12)
-    turn = line["angle"] - math.radians(normal) - math.pi / 2
-    assert math.remainder(turn, 2 * math.pi) == pytest.approx(0, abs=1e-12)
-    assert line["rms"] < 1e-12
 
 
 @pytest.mark.parametrize("fit", FITS)
