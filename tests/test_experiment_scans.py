@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from handmade import corner, features
 from lineament_lab.evaluation import arena
-from lineament_lab.evaluation.arena import arena_scores, load_arena
+from lineament_lab.evaluation.arena import ARENAS, arena_scores, load_arena
 from lineament_lab.reproduce import Setting, scans
 from lineament_lab.reproduce.scans import (
     frame_times,
@@ -180,3 +180,9 @@ def test_scores_of_found_corners_worked_by_hand(recording):
     assert numbers["median_error"] == pytest.approx(0.03)
     assert numbers["corners_per_scan"] == 3
     np.testing.assert_allclose(positions, [(0.03, 0), (2, 3), (2, 0)], atol=1e-12)
+
+
+def test_methods_find_the_corners_of_the_recorded_arena(data_dir):
+    loaded = load_arena(data_dir / ARENAS["arena, static"], 10)
+    assert len(loaded.corners) == 6  # Five listed ones, and a wall that ends on another.
+    assert arena_scores(loaded, Extractor("region_growing"))[0]["recall"] > 0.8
