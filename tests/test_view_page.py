@@ -271,15 +271,11 @@ def test_the_page_says_what_it_waits_for(page, log, monkeypatch):
         assert page.text("h1") == "corner.npz"  # of a single log no list
 
 
-def test_scrubbing_keys_and_playing_change_the_scan(page):
+def test_scrubbing_and_playing_change_the_scan(page):
     page.change("#slider", 17, "input")
     shown(page, 17)
     page.wait("document.querySelector('#position').textContent === 'scan 17 / 24, 0.85 s'")
     page.wait("location.hash.startsWith('#log=corner.npz&scan=17&method=')")
-    keys = {Keys.ARROW_RIGHT: 18, Keys.ARROW_LEFT: 17, Keys.END: 24, Keys.HOME: 0}
-    for key, index in keys.items():
-        page.press(key)
-        shown(page, index)
     page.press(" ")
     assert page.run("return document.querySelector('#play').ariaLabel") == "Pause"
     shown(page, 24)
@@ -334,15 +330,11 @@ def test_a_beam_is_asked_for_by_its_number(page):
     assert page.text("#why .summary") == "Invalid: the range is NaN, no measurement."
 
 
-def test_methods_are_switched_and_shown_side_by_side(page):
+def test_a_method_is_chosen_and_another_shown_beside_it(page):
     page.change(".panel select", "pdbs", "change")
     page.wait("document.querySelector('.panel span').textContent.startsWith('0 segments')")
     page.click("#compare")
-    page.wait("document.querySelectorAll('.panel').length === 2")
     page.wait("document.querySelector('.panel:nth-child(2) span').textContent.includes('1 corner')")
-    page.wait("location.hash.includes('with=liu')")
-    page.click("#compare")
-    page.wait("document.querySelectorAll('.panel').length === 1")
 
 
 def test_wheel_and_drag_move_the_view(page):
@@ -454,6 +446,8 @@ KEYS = [
     (",", "app.timeline.speed.value", "1"),
     (Keys.ARROW_RIGHT, "app.timeline.index", 1),
     (Keys.ARROW_LEFT, "app.timeline.index", 0),
+    (Keys.END, "app.timeline.index", 24),
+    (Keys.HOME, "app.timeline.index", 0),
     ("b", "document.activeElement.id", "beam"),
     ("7" + Keys.ENTER, "app.asked?.beam", 7),
     ("s", "document.querySelector('dialog[open]')?.id", "sharing"),

@@ -10,21 +10,6 @@ from lineament.logs import open_log
 
 __all__ = ["browser", "pytestmark"]
 FRONT, REAR = MOUNTINGS
-#: How many pixels of the first panel have a colour of the theme, by an expression.
-PIXELS = """
-return import("/main.js").then(({ app }) => {
-  const c = app.panels[0].canvas, copy = new OffscreenCanvas(c.width, c.height);
-  const ctx = copy.getContext("2d", { willReadFrequently: true });
-  ctx.drawImage(c, 0, 0);
-  const d = ctx.getImageData(0, 0, c.width, c.height).data;
-  const of = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
-  return app.theme.scanners.slice(0, 2).map(of).map((rgb) => {
-    let count = 0;
-    for (let i = 0; i < d.length; i += 4) count += rgb.every((v, k) => v === d[i + k]);
-    return count;
-  });
-});
-"""
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +33,9 @@ def drawn(page):
     page.run(
         "return new Promise((next) => requestAnimationFrame(() => requestAnimationFrame(next)))"
     )
-    return page.run(PIXELS)
+    colors = page.seen("app.theme.scanners.slice(0, 2)")
+    pixels = page.pixels()[..., :3]
+    return [(pixels == [*bytes.fromhex(color[1:])]).all(axis=-1).sum() for color in colors]
 
 
 def topics(page):
