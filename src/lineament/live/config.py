@@ -229,7 +229,9 @@ class LiveConfig:
             raise ValueError("ros is 0, which leaves nothing to listen to; expected a log")
 
     def _check_mapping(self) -> None:
-        """Check what goes with a map that is made."""
+        """Check what goes with a map that is sent, or made."""
+        if self.map_topic is not None and (self.layers or self.units is not None):
+            raise ValueError(f"layers and units are of a DXF, expected none for {self.map!r}")
         if self.mapping is None:
             return
         for name in ("map", "judge"):
