@@ -140,7 +140,7 @@ def main() -> None:
     logs = {}
     for name in names:
         if (path := DATA / LOGS[name]).exists():
-            scans = sorted(open_log(path), key=lambda scan: scan.stamp)
+            scans = list(open_log(path))
             logs[name] = surveyed(scans)
     (fit if chosen.fit else report)(logs)
 

@@ -144,7 +144,7 @@ def real() -> None:
     on from there as the robot does.
     """
     for name in ("ACES", "Intel lab"):
-        scans = sorted(open_log(DATA / LOGS[name]), key=lambda scan: scan.stamp)
+        scans = list(open_log(DATA / LOGS[name]))
         plan, at = mapped(scans[::2])
         follower, judge, extract = Follower(plan), Judge(plan), ln.Extractor()
         rng, there, counts = np.random.default_rng(0), len(at), {False: Counter(), True: Counter()}

@@ -276,7 +276,7 @@ def main() -> None:
     for name, (path, relations) in LOGS.items():
         if chosen.log not in (None, name) or not (DATA / path).exists():
             continue
-        scans = sorted(open_log(DATA / path), key=lambda scan: scan.stamp)
+        scans = list(open_log(DATA / path))
         stamps = np.array([scan.stamp for scan in scans])
         verified = relations and read_relations(DATA / relations, stamps)
         truth = [scan.pose for scan in scans]

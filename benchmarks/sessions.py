@@ -236,7 +236,7 @@ def real(pictures: Path | None) -> None:
         path = DATA / LOGS[name][0]
         if not path.exists():
             continue
-        scans = sorted(open_log(path), key=lambda scan: scan.stamp)
+        scans = list(open_log(path))
         halves = []
         for half in (scans[: len(scans) // 2], scans[len(scans) // 2 :]):
             found = drive(half, odometry=False)

@@ -17,6 +17,7 @@ from lineament.cli import run
 from lineament.logs import open_log
 from lineament.logs.base import Head
 from lineament.logs.rosbag2 import Rosbag2Log
+from lineament.mapping import LineMap
 
 FORMATS = {"rosbag1": "rosbag1", "sqlite3": "rosbag2", "mcap": "mcap"}
 STAMPS = [i / 4 for i in range(30)]
@@ -55,6 +56,17 @@ def test_what_is_written_comes_back(tmp_path, kind):
     rear = open_log(path, "/rear")
     assert (len(rear), stamps_of(rear)) == (15, STAMPS[1::2])
     assert rear.scan(2).stamp == 1.25
+
+
+@pytest.mark.parametrize(
+    "command", ["map LOG -o m.svg", "locate LOG --map P.dxf -o a.csv", "calibrate LOG"]
+)
+def test_what_follows_a_scanner_refuses_the_scans_of_two(tmp_path, monkeypatch, refused, command):
+    path = write(tmp_path, "mcap", two_scanners("mcap"))
+    monkeypatch.chdir(tmp_path)
+    LineMap.from_lines(np.array([(0.0, 0.0, 5.0, 0.0)])).write("P.dxf")
+    said = refused(command.replace("LOG", path.name))
+    assert "has scans of /front, /rear, expected those of one: choose it" in said
 
 
 @every_kind

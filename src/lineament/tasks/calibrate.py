@@ -197,8 +197,7 @@ def calibrate_log(
 def _read(path: str | os.PathLike[str], reading: dict[str, Any]) -> tuple[Log, list[LaserScan]]:
     """Read the scans of a topic, with poses as the log has them."""
     log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
-    if log.topic is None and len(log.topics) > 1:
-        raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
+    log.check_one_topic()
     scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
     if len(scans) > 1 and len({scan.stamp for scan in scans}) == 1:
         stamp = scans[0].stamp

@@ -139,8 +139,7 @@ def locate_log(
     drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
-    if log.topic is None and len(log.topics) > 1:
-        raise LogError(log.name, f"has scans of {', '.join(log.topics)}, expected one of them")
+    log.check_one_topic()
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened

@@ -141,8 +141,8 @@ def map_log(
     Raises
     ------
     LineamentError
-        If the log cannot be read or has no scans, no walls are found, the drive is not on the plan,
-        or an output cannot be written or is one of the files that are read.
+        If the log cannot be read, has no scans or those of several topics, no walls are found, the
+        drive is not on the plan, or an output cannot be written or is one of the files read.
     ValueError
         If it is to be merged, and there is no plan.
 
@@ -169,22 +169,22 @@ def map_log(
     plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
+    log.check_one_topic()
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
-    drive = Drive()
-    # In the order of time, which is not that of every log: scans are all held in memory for that.
-    scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
-    for scan in track(scans, Path(log.name).name, scans):
+    drive, stamps = Drive(), []
+    # In the order of the log: a clock that is set back, or none, does not change where it was.
+    for _, scan in track(log.measured(), Path(log.name).name, log):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
-    if not scans:
+        stamps.append(scan.stamp)
+    if not stamps:
         raise LogError(log.name, "has no scans, expected a drive")
     made, merged = make_map(drive.frames, drive.scans), None
     if plan is not None:
         found = placements(made, plan)
         merged = merge_onto(made, plan, found) if merge else None
         made = onto_plan(made, plan, found) if merged is None else merged.made
-    stamps = [scan.stamp for scan in scans]
     placed = nullcontext() if poses is None else tum_written(poses, stamps, made.poses)
     with placed:  # All files, or none.
         made.write(output)
@@ -195,7 +195,7 @@ def map_log(
     return Mapping(
         log=str(path),
         output=str(output),
-        scans=len(scans),
+        scans=len(stamps),
         frames=len(drive.frames),
         lost=sum(frame.is_lost for frame in drive.frames),
         loops=len(made.loops),
