@@ -258,7 +258,9 @@ def real(pictures: Path | None) -> None:
                 off = [relative(b, compose(frame, a)) for a, b in zip(both, truth, strict=True)]
                 rms = math.sqrt(np.square(np.array(off)[:, :2]).sum(axis=1).mean())
                 cells[2] = f"placed, off by {rms:.3f} m (RMS)"
-                cells += [f"{ate(alone, truth):.3f} m", f"{ate(at + both, true + truth):.3f} m"]
+                parts = len(found.made.located)  # drawn beside each other: no common error
+                by_itself = f"{ate(alone, truth):.3f} m" if parts == 1 else f"in {parts} parts"
+                cells += [by_itself, f"{ate(at + both, true + truth):.3f} m"]
                 united = found.made.map
                 cells += [f"{doubled(united):.1f} m", f"{length(united):.0f} m"]
                 if pictures is not None:
