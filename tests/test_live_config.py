@@ -58,6 +58,7 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"judge": "a", "map": "b", "log": "c", "poses": "/d"}, "poses are not used with judge"),
         ({"judge": "a", "map": "b", "log": "c", "deskew": "poses"}, "poses are not used with jud"),
         ({"deskew": "odom", "log": "a.bag"}, "deskew is 'odom', but a log is played; expected"),
+        ({"map": "/map", "log": "a.bag"}, "map is '/map', a topic, but a log is played; expected"),
         ({"map": "/map", "units": "mm"}, "layers and units are of a DXF, expected none for '/map'"),
         ({"map": "map", "layers": "A"}, "layers and units are of a DXF, expected none for 'map'"),
         ({"noise": 10**400}, "0, expected 0 to 1000"),

@@ -60,6 +60,7 @@ def test_each_format_is_found_by_content(write, kind, n, topics, name, pack):
         ("a", zipped(readme="hello"), "is no log that lineament knows"),
         # The ending shows which reader's error helps.
         ("a.log", b"hello\n", r"is no log of CARMEN \(FLASER"),
+        ("a.json", b'{"a": 1}', r"in JSON that lineament knows: .* \(CSM\), or .* \(RPLIDAR\)$"),
         ("a.npz", b"hello\n", "is no whole npz archive"),
         ("a.npz", zipped(readme="hello"), "expected the keys"),
         ("a\nb", b"hello\n", r"a\\nb: is no log"),
@@ -259,9 +260,9 @@ NO_LOG = {
     "graph/intel-lab.relations": "is no log that lineament knows",
     "mcap/nav2_turtlebot_no_scan.mcap": "has no LaserScan or MultiEchoLaserScan; topics there "
     r"are: /amcl_pose \(geometry_msgs/PoseWithCovarianceStamped, 135\), .*, /tf_static \(.*, 1\)$",
-    "text/rplidar_kitchenette/circle1.json": "is no CSM log",
-    "text/rplidar_kitchenette/circle2.json": "is no CSM log",
-    "text/rplidar_kitchenette/transforms.json": "is no CSM log",
+    "text/rplidar_kitchenette/circle1.json": "is no log in JSON that lineament knows",
+    "text/rplidar_kitchenette/circle2.json": "is no log in JSON that lineament knows",
+    "text/rplidar_kitchenette/transforms.json": "is no log in JSON that lineament knows",
 }
 #: Parts of bags, which their folders stand for, and what sqlite keeps beside databases.
 PARTS = ("metadata.yaml", "-shm", "-wal")

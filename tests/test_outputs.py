@@ -381,6 +381,18 @@ def test_odometry_in_millimetres_is_a_line(files, capsys, factor):
     assert "faster than" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("headings", "said"), [((0, 91, 183, 274), 3), ((0, 2, 4, -1.5), 0)])
+def test_headings_in_degrees_are_a_line(files, capsys, headings, said):
+    scan = open_log(files / "log.npz").scan(0)
+    save_log("turned.npz", [scan.with_pose((0.0, 0.0, float(turn))) for turn in headings])
+    for command in ("locate turned.npz --map plan.dxf -o a.csv", "map turned.npz -o a.svg"):
+        run(command.split())
+        line = "lineament: turned.npz: headings of its odometry jump by more than a turn, 3 times: "
+        assert capsys.readouterr().err.count(f"{line}are they in degrees?") == (said > 0)
+        run([*command.split(), "--no-odometry"])
+        assert "odometry" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("ending", [".dxf", ".parquet"])
 def test_a_plan_of_another_building_says_the_usual_causes(files, capsys, ending):
     walls = [[0, 0, 30, 0], [30, 0, 30, 4], [30, 4, 12, 9], [12, 9, 0, 0]]

@@ -58,15 +58,38 @@ def test_what_is_written_comes_back(tmp_path, kind):
     assert rear.scan(2).stamp == 1.25
 
 
-@pytest.mark.parametrize(
+COMMANDS = pytest.mark.parametrize(
     "command", ["map LOG -o m.svg", "locate LOG --map P.dxf -o a.csv", "calibrate LOG"]
 )
+
+
+@COMMANDS
 def test_what_follows_a_scanner_refuses_the_scans_of_two(tmp_path, monkeypatch, refused, command):
     path = write(tmp_path, "mcap", two_scanners("mcap"))
     monkeypatch.chdir(tmp_path)
     LineMap.from_lines(np.array([(0.0, 0.0, 5.0, 0.0)])).write("P.dxf")
     said = refused(command.replace("LOG", path.name))
     assert "has scans of /front, /rear, expected those of one: choose it" in said
+
+
+@COMMANDS
+@pytest.mark.parametrize("frames", ["front rear", "front  front", "front front rear"])
+def test_what_follows_a_scanner_refuses_two_on_one_topic(
+    tmp_path, monkeypatch, capsys, command, frames
+):
+    # A scanner without a name in some scans, or renamed once, is one.
+    names = frames.split(" ")
+    messages = ros_bags.Messages(2)
+    scans = [
+        ("/scan", 1000 * i, messages.scan(i / 4, ranges_of(i), frame=names[i % len(names)]))
+        for i in range(3)
+    ]
+    path = write(tmp_path, "mcap", scans)
+    monkeypatch.chdir(tmp_path)
+    LineMap.from_lines(np.array([(0.0, 0.0, 5.0, 0.0)])).write("P.dxf")
+    run(command.replace("LOG", path.name).split())
+    line = "has scans of frames front and rear by turns on /scan, expected those of one scanner"
+    assert (line in capsys.readouterr().err) == (frames == "front rear")
 
 
 @every_kind

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--track",
     "track_width",
-    type=click.FloatRange(min=0, min_open=True),
+    type=click.FloatRange(0, 10, min_open=True),
     metavar="METRES",
     help="Distance between the wheels by which the odometry was computed: radii and track are "
     "found instead of scales.",

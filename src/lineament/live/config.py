@@ -87,7 +87,7 @@ class LiveConfig:
         within 0.5 m of `dock`.
     map : str, optional
         A plan on which the sensor is followed: its pose goes to ``TOPIC/pose``. A name without an
-        ending, ``/map``, is a topic of ``nav_msgs/OccupancyGrid``, unless a log is played.
+        ending, ``/map``, is a topic of ``nav_msgs/OccupancyGrid``; a log that is played has none.
     mapping : str, optional
         Where the map is written that is made of the scans, once it stops: ``.dxf``, ``.svg``,
         ``.parquet`` or ``.yaml``. Meanwhile the sensor is followed on it as on a plan, and its
@@ -230,6 +230,10 @@ class LiveConfig:
 
     def _check_mapping(self) -> None:
         """Check what goes with a map that is sent, or made."""
+        if self.map_topic is not None and self.log is not None:
+            raise ValueError(
+                f"map is {self.map!r}, a topic, but a log is played; expected the file of a plan"
+            )
         if self.map_topic is not None and (self.layers or self.units is not None):
             raise ValueError(f"layers and units are of a DXF, expected none for {self.map!r}")
         if self.mapping is None:
@@ -293,8 +297,9 @@ class LiveConfig:
     @property
     def map_topic(self) -> str | None:
         """Full name of the topic of the plan, where it is one."""
-        is_topic = self.map is not None and self.log is None and not Path(self.map).suffix
-        return self.resolved(self.map) if is_topic and self.map is not None else None
+        if self.map is None or Path(self.map).suffix:
+            return None
+        return self.resolved(self.map)
 
     @property
     def judge_topic(self) -> str | None:

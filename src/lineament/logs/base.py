@@ -328,12 +328,6 @@ class Log(Pictured, ABC):
         if self.topic is not None and self.topic not in self.topics:
             raise self._no_such_topic(self.topics)
 
-    def check_one_topic(self) -> None:
-        """Report a log with scans of several topics, of which none is chosen, as a LogError."""
-        if self.topic is None and len(self.topics) > 1:
-            several = ", ".join(self.topics)
-            raise LogError(self.name, f"has scans of {several}, expected those of one: choose it")
-
     def _no_such_topic(self, topics: list[str]) -> LogError:
         known = ", ".join(topics) or "none that carries scans"
         return LogError(self.name, f"has no topic {self.topic!r}; topics there are: {known}")

@@ -33,7 +33,12 @@ class CsmLog(Log):
         if isinstance(first, LogError):
             self._fault(first)
         elif first is None or "readings" not in first:
-            raise LogError(self.source, "is no CSM log, expected JSON objects with readings")
+            # Of a name that ends with .json, what it begins with fits no other format either.
+            raise LogError(
+                self.source,
+                "is no log in JSON that lineament knows: expected objects with readings (CSM), or "
+                "with lists of [range, angle] or [x, y] of units (RPLIDAR)",
+            )
 
     @classmethod
     def recognises(cls, head: Head) -> bool:

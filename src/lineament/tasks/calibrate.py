@@ -14,15 +14,15 @@ from ..extractor import Extractor, load_kernels
 from ..features import Features
 from ..files import check_outputs
 from ..logs import Log, open_log
+from ..logs.drives import one_scanner
 from ..motion import Calibration, Tracker, beam_times, calibrate, deskew
-from ..motion.calibration import FEWEST, joined
+from ..motion.calibration import FEWEST, UNITS, joined
 from ..motion.steps import Carried, Steps, shared_walls, steps_of
 from ..output.calibrations import plot_calibration
 from ..output.canvas import check_ending
 from ..progress import Track, untracked
 from ..scan import LaserScan, Pose
 
-_UNITS = {"x": "m", "y": "m", "theta": "rad", "track": "m", "drift": "rad/m"}
 _LABELS = {
     "way": "ways, times",
     "turn": "turns, times",
@@ -68,7 +68,7 @@ class Calibrated:
                 lines.append(f"  {label:<18} not known: {found.unknown[name]}")
                 continue
             value, deviation = found.values[name], found.deviations[name]
-            text = f"  {label:<18} {value:8.4f} ± {deviation:.4f} {_UNITS.get(name, '')}".rstrip()
+            text = f"  {label:<18} {value:8.4f} ± {deviation:.4f}{UNITS.get(name, '')}"
             degrees = f"  ({math.degrees(value):.2f}° ± {math.degrees(deviation):.2f}°)"
             lines.append(text + (degrees if name == "theta" else ""))
         return "\n".join([*lines, *([f"  {self.laser_pose}"] if self.laser_pose else [])])
@@ -197,8 +197,7 @@ def calibrate_log(
 def _read(path: str | os.PathLike[str], reading: dict[str, Any]) -> tuple[Log, list[LaserScan]]:
     """Read the scans of a topic, with poses as the log has them."""
     log = open_log(path, **reading, laser_pose=(0.0, 0.0, 0.0))
-    log.check_one_topic()
-    scans = sorted((scan for _, scan in log.measured()), key=lambda scan: scan.stamp)
+    scans = sorted(one_scanner(log, odometry=False), key=lambda scan: scan.stamp)
     if len(scans) > 1 and len({scan.stamp for scan in scans}) == 1:
         stamp = scans[0].stamp
         raise LogError(log.name, f"all stamps are {stamp}, expected stamps that increase")

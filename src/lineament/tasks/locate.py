@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from ..drawings import NAMES as UNITS
-from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line, warn
+from ..errors import LineamentError, LogError, NothingFoundError, heard, one_line
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, ending_of, naming_errors, written_beside
 from ..logs import open_log
+from ..logs.drives import one_scanner
 from ..mapping import VERDICTS, LineMap
 from ..mapping.following import Whereabouts, follow
 from ..mapping.grids import all_files
@@ -25,8 +26,7 @@ from ..mapping.locate import LOCATED, UNOBSERVED
 from ..mapping.plans import is_a_building
 from ..output.figures import plot_walls
 from ..progress import Track, untracked
-from ..rosmsg.frames import FASTEST
-from ..scan import LaserScan, Pose
+from ..scan import LaserScan
 from .mapping import tum_written
 
 #: Formats of the poses.
@@ -139,25 +139,24 @@ def locate_log(
     drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
-    log.check_one_topic()
+    scans = one_scanner(log, odometry=odometry)
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
 
-    def followed(on: LineMap, most: int | None = None) -> Iterator[tuple[LaserScan, Whereabouts]]:
-        items = islice(log.items(), most) if most else log.measured()
-        scans = (scan for _, scan in items)
-        shown = scans if most else track(scans, Path(log.name).name, log)
-        return follow(shown, on, extractor, odometry=odometry, deskewed=deskewed)
+    def followed(
+        scans: Iterable[LaserScan], on: LineMap
+    ) -> Iterator[tuple[LaserScan, Whereabouts]]:
+        return follow(scans, on, extractor, odometry=odometry, deskewed=deskewed)
 
     def located(on: LineMap) -> float:
-        tried = [bool(where) for _, where in followed(on, _TRIED)]
+        tried = [bool(where) for _, where in followed(islice(log, _TRIED), on)]
         return sum(tried) / len(tried)
 
-    found, moved = _taken(followed(drawn))
+    shown = track(scans, Path(log.name).name, log)
+    found = [(scan.stamp, where) for scan, where in followed(shown, drawn)]
     if not found:
         raise LogError(log.name, "has no scans, expected some")
-    _check_odometry(log.name, moved if odometry else [])
     verdicts = {name: sum(w.verdict == name for _, w in found) for name in VERDICTS}
     if ending == ".tum":
         placed = [(stamp, where.pose) for stamp, where in found if where]
@@ -190,31 +189,6 @@ def locate_log(
         warning=warning,
         seconds=seconds,
     )
-
-
-def _taken(
-    followed: Iterable[tuple[LaserScan, Whereabouts]],
-) -> tuple[list[tuple[float, Whereabouts]], list[tuple[float, Pose]]]:
-    """Return where each scan is, and the odometry, where it is known, each with the stamp."""
-    found, moved = [], []
-    for scan, where in followed:
-        found.append((scan.stamp, where))
-        if scan.pose is not None:
-            moved.append((scan.stamp, scan.pose))
-    return found, moved
-
-
-def _check_odometry(name: str, moved: list[tuple[float, Pose]]) -> None:
-    """Warn if most steps of the odometry are faster than any robot."""
-    fast = [
-        math.dist(before[:2], pose[:2]) > FASTEST * (stamp - since) > 0
-        for (since, before), (stamp, pose) in pairwise(moved)
-    ]
-    if sum(fast) > len(fast) / 2:
-        warn(
-            f"{one_line(name)}: its odometry is mostly faster than {FASTEST:g} m/s: is it in "
-            "millimetres? --no-odometry leaves it out"
-        )
 
 
 def _units_that_fit(

@@ -14,6 +14,7 @@ from ..errors import LogError, needed_by
 from ..extractor import Extractor, load_kernels
 from ..files import check_outputs, naming_errors, written_beside
 from ..logs import open_log
+from ..logs.drives import one_scanner
 from ..mapping import LineMap
 from ..mapping.drive_map import Drive
 from ..mapping.grids import GRID_ENDINGS, all_files
@@ -169,13 +170,13 @@ def map_log(
     plan = None if onto is None else LineMap.read(onto, limits=reading.get("limits"))
     started = time.perf_counter()
     log = open_log(path, **reading)
-    log.check_one_topic()
+    scans = one_scanner(log, odometry=odometry)
     opened = time.perf_counter()
     load_kernels([extractor])
     started += time.perf_counter() - opened
     drive, stamps = Drive(), []
     # In the order of the log: a clock that is set back, or none, does not change where it was.
-    for _, scan in track(log.measured(), Path(log.name).name, log):
+    for scan in track(scans, Path(log.name).name, log):
         drive.add(scan, extractor(scan), scan.pose if odometry else None)
         stamps.append(scan.stamp)
     if not stamps:

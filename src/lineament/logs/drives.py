@@ -1,0 +1,63 @@
+"""A log as the drive of one scanner: what maps, places and mountings are found by."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from ..errors import LogError, one_line, warn
+from ..rosmsg.frames import FASTEST
+from ..scan import LaserScan, Pose
+from .base import Log
+
+#: Headings that jump by more than a turn and a half, so often, are in no radians: those of a turn
+#: at most jump by a turn where they begin again, those that go on do not jump.
+_JUMP, _JUMPS = 3 * math.pi, 3
+
+
+def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
+    """Return the scans of a log; a LogError if those of several topics, or scanners, are in it.
+
+    That several scanners share a topic is known by their frames, to which it comes back. One that
+    is renamed within a log stays one. At the end of the log, a warning says if `odometry`, its
+    poses, is in other units.
+    """
+    if log.topic is None and len(log.topics) > 1:
+        several = ", ".join(log.topics)
+        raise LogError(log.name, f"has scans of {several}, expected those of one: choose it")
+    return _of_one_frame(log, odometry=odometry)
+
+
+def _of_one_frame(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
+    frame, before = "", dict.fromkeys([""])
+    moved = []
+    for topic, scan in log.measured():
+        if scan.frame_id and scan.frame_id != frame:
+            if scan.frame_id in before:
+                frames = " and ".join(sorted(filter(None, before)))
+                problem = f"has scans of frames {frames} by turns on {topic}"
+                raise LogError(log.name, f"{problem}, expected those of one scanner")
+            frame = scan.frame_id
+            before[frame] = None
+        if odometry and scan.pose is not None:
+            moved.append((scan.stamp, scan.pose))
+        yield scan
+    _check_units(one_line(log.name), moved)
+
+
+def _check_units(name: str, moved: list[tuple[float, Pose]]) -> None:
+    """Warn if most steps of the odometry are faster than any robot, or if headings jump."""
+    fast = jumps = 0
+    for (since, before), (stamp, pose) in pairwise(moved):
+        fast += math.dist(before[:2], pose[:2]) > FASTEST * (stamp - since) > 0
+        jumps += abs(pose[2] - before[2]) > _JUMP
+    way_out = "--no-odometry leaves it out"
+    if fast > len(moved) / 2:
+        warn(
+            f"{name}: its odometry is mostly faster than {FASTEST:g} m/s: is it in millimetres? "
+            f"{way_out}"
+        )
+    if jumps >= _JUMPS:
+        warn(
+            f"{name}: headings of its odometry jump by more than a turn, {jumps} times: are they "
+            f"in degrees? {way_out}"
+        )
