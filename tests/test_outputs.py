@@ -18,6 +18,7 @@ from lineament.files import check_outputs, spare_inputs, written_beside
 from lineament.logs import open_log, save_log
 from lineament.mapping import LineMap
 from lineament.simulation import SENSORS, room, scene
+from lineament.tasks.extract import extract_log
 
 
 def names_of(folder):
@@ -391,6 +392,23 @@ def test_headings_in_degrees_are_a_line(files, capsys, headings, said):
         assert capsys.readouterr().err.count(f"{line}are they in degrees?") == (said > 0)
         run([*command.split(), "--no-odometry"])
         assert "odometry" not in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+def test_names_that_are_no_text_are_written_and_drawn(files):
+    odd = os.fsdecode(b"\xff")
+    (files / "log.npz").rename(files / f"{odd}.npz")
+    for command in (
+        *(f"extract {odd}.npz -o {odd}{ending}" for ending in (".csv", ".parquet", ".svg")),
+        f"locate {odd}.npz --map plan.dxf -o {odd}.csv --picture {odd}.png",
+        f"plot {odd}.npz -o {odd}.pdf",
+    ):
+        assert run([*command.split(), "-q"]) == 0
+    names = {f"{odd}{ending}" for ending in (".csv", ".parquet", ".svg", ".png", ".pdf")}
+    assert names <= set(names_of(files))
+    (files / odd).mkdir()
+    with pytest.raises(LineamentError, match=r"written: its path is no text in UTF-8$"):
+        extract_log(f"{odd}.npz", f"{odd}/a.csv", ln.Extractor())
 
 
 @pytest.mark.parametrize("ending", [".dxf", ".parquet"])

@@ -67,7 +67,9 @@ def _made_beside(path: str | os.PathLike[str], target: Path) -> Path:
         if target.exists() and not os.access(target, os.W_OK):  # To rename needs no permission.
             raise LineamentError(f"{path}: is read-only, expected a file that may be replaced")
         # mkstemp would make the file private to its owner; this one follows the umask.
-        temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+        # Arrow and other writers take no name that is no text.
+        name = target.name.encode(errors="ignore").decode()
+        temporary = target.with_name(f".{name}.{secrets.token_hex(4)}.part")
         temporary.touch(exist_ok=False)
     return temporary
 
@@ -218,9 +220,14 @@ def alone_in(folder: str | os.PathLike[str]) -> Iterator[None]:
 
 @contextmanager
 def naming_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn an OSError into a LineamentError of one line that names `path`."""
+    """Turn an OSError into a LineamentError of one line that names `path`.
+
+    And what writers raise that take no folder whose name is no text.
+    """
     try:
         yield
+    except UnicodeEncodeError as error:
+        raise LineamentError(f"{path}: cannot be written: its path is no text in UTF-8") from error
     except OSError as error:
         reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
         raise LineamentError(f"{path}: cannot be written: {reason}") from error

@@ -171,7 +171,15 @@ def fitting(text: str, size: float, width: float) -> float:
 
 
 def _fill(figure: Figure) -> None:
-    """Let the plans of a figure show more than they must where that fills their places."""
+    """Let the plans of a figure show more than they must where that fills their places.
+
+    What no encoding knows, of the name of a file, is a mark: matplotlib draws text alone.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        text.set_text(text.get_text().encode(errors="replace").decode())
     for axes in figure.axes:
         if axes.get_aspect() != "auto":
             axes.get_xlim()  # which are settled by this, and not scaled again
