@@ -17,7 +17,7 @@ from lineament.cli.options import Place
 from lineament.files import check_outputs, spare_inputs, written_beside
 from lineament.logs import open_log, save_log
 from lineament.mapping import LineMap
-from lineament.simulation import SENSORS, room, scene
+from lineament.simulation import SENSORS, drive, room, scene
 from lineament.tasks.extract import extract_log
 
 
@@ -380,6 +380,20 @@ def test_odometry_in_millimetres_is_a_line(files, capsys, factor):
     assert ("faster than 10 m/s: is it in millimetres?" in capsys.readouterr().err) == (factor > 1)
     run(["locate", "mm.npz", "--map", "plan.dxf", "--no-odometry", "-o", "a.csv"])
     assert "faster than" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("way", "pose"), [(4, 0), (4, 1), (0, 0)])
+def test_odometry_that_stands_while_the_scanner_moves_is_a_line(files, capsys, way, pose):
+    plan = files / "plan.dxf"
+    driven = list(drive(room(), [(-2, 0), (2, 0)], SENSORS["lms181"], speed=1, rate=2))
+    seen = driven if way else driven[:1] * len(driven)
+    save_log("still.npz", [s.with_pose((0.1 * pose * k, 0, 0)) for k, s in enumerate(seen)])
+    for command in (f"locate still.npz --map {plan} -o a.csv", "map still.npz -o a.svg"):
+        run(command.split())
+        line = (
+            "still.npz: its odometry stands still, and the scanner does not: --no-odometry leaves"
+        )
+        assert (line in capsys.readouterr().err) == (way > 0 and pose == 0)
 
 
 @pytest.mark.parametrize(("headings", "said"), [((0, 91, 183, 274), 3), ((0, 2, 4, -1.5), 0)])

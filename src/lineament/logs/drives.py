@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+import numpy as np
+
 from ..errors import LogError, one_line, warn
 from ..rosmsg.frames import FASTEST
 from ..scan import LaserScan, Pose
@@ -12,6 +14,10 @@ from .base import Log
 #: Headings that jump by more than a turn and a half, so often, are in no radians: those of a turn
 #: at most jump by a turn where they begin again, those that go on do not jump.
 _JUMP, _JUMPS = 3 * math.pi, 3
+#: Where a scanner stands, half of its ranges do not change by so much [m]: people are less. So many
+#: scans in which they do are of one that moves.
+_CHANGE, _CHANGES = 0.3, 3
+_WAY_OUT = "--no-odometry leaves it out"
 
 
 def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
@@ -19,7 +25,7 @@ def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
 
     That several scanners share a topic is known by their frames, to which it comes back. One that
     is renamed within a log stays one. At the end of the log, a warning says if `odometry`, its
-    poses, is in other units.
+    poses, is in other units, or stands still while the scanner moves.
     """
     if log.topic is None and len(log.topics) > 1:
         several = ", ".join(log.topics)
@@ -29,7 +35,8 @@ def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
 
 def _of_one_frame(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
     frame, before = "", dict.fromkeys([""])
-    moved = []
+    moved: list[tuple[float, Pose]] = []
+    first, changes, has_moved = None, 0, False
     for topic, scan in log.measured():
         if scan.frame_id and scan.frame_id != frame:
             if scan.frame_id in before:
@@ -40,8 +47,23 @@ def _of_one_frame(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
             before[frame] = None
         if odometry and scan.pose is not None:
             moved.append((scan.stamp, scan.pose))
+            first = scan if first is None else first
+            has_moved = has_moved or scan.pose != first.pose
+            changes += not has_moved and _is_elsewhere(first, scan)
         yield scan
-    _check_units(one_line(log.name), moved)
+    name = one_line(log.name)
+    if changes >= _CHANGES and not has_moved:
+        warn(f"{name}: its odometry stands still, and the scanner does not: {_WAY_OUT}")
+    _check_units(name, moved)
+
+
+def _is_elsewhere(first: LaserScan, scan: LaserScan) -> bool:
+    """Whether half of the beams that are valid in both see something else."""
+    if len(first) != len(scan):
+        return False
+    both = first.valid & scan.valid
+    off = abs(scan.ranges[both] - first.ranges[both])
+    return bool(2 * np.count_nonzero(off > _CHANGE) > len(off))
 
 
 def _check_units(name: str, moved: list[tuple[float, Pose]]) -> None:
@@ -50,14 +72,13 @@ def _check_units(name: str, moved: list[tuple[float, Pose]]) -> None:
     for (since, before), (stamp, pose) in pairwise(moved):
         fast += math.dist(before[:2], pose[:2]) > FASTEST * (stamp - since) > 0
         jumps += abs(pose[2] - before[2]) > _JUMP
-    way_out = "--no-odometry leaves it out"
     if fast > len(moved) / 2:
         warn(
             f"{name}: its odometry is mostly faster than {FASTEST:g} m/s: is it in millimetres? "
-            f"{way_out}"
+            f"{_WAY_OUT}"
         )
     if jumps >= _JUMPS:
         warn(
             f"{name}: headings of its odometry jump by more than a turn, {jumps} times: are they "
-            f"in degrees? {way_out}"
+            f"in degrees? {_WAY_OUT}"
         )
