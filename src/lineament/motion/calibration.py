@@ -25,10 +25,6 @@ _NAMES, _OF_WHEELS = ("x", "y", "theta", "way", "turn", "drift"), ("left", "righ
 #: What is not known better than this is not known at all: deviations, as the names.
 _KNOWN = {"x": 0.05, "y": 0.05, "theta": 0.035, "way": 0.03, "turn": 0.03, "drift": 0.03}
 _KNOWN |= {"left": 0.03, "right": 0.03, "track": 0.03}
-#: Units of those that are no factors.
-UNITS = {"x": " m", "y": " m", "theta": " rad", "track": " m", "drift": " rad/m"}
-#: No robot is wider [m].
-WIDEST = 10.0
 #: What goes with something that is not known by such a correlation is not known either.
 _COUPLED = 0.9
 #: Odometry of less than this share of the scanner's motions stands still.
@@ -110,8 +106,7 @@ def calibrate(
         Of the scanner, from the first scan of each step to the last. Best are steps of 0.3 m, or
         20°: in shorter ones there is more noise, in longer ones the way is not known.
     track : float
-        Distance between the wheels by which the odometry was computed, 10 m at most; 0 if it is not
-        known.
+        Distance between the wheels by which the odometry was computed [m]; 0 if it is not known.
     wheels : bool
         Whether odometry is by wheels, whose radii and track may be wrong; otherwise the mounting
         alone is estimated.
@@ -119,7 +114,7 @@ def calibrate(
     Raises
     ------
     ValueError
-        If there are fewer than 8 motions, their numbers differ, a number cannot be, or the two
+        If there are fewer than 8 motions, their numbers differ, a number is not finite, or the two
         do not go together, as where the odometry is another robot's or in other units.
 
     Examples
@@ -137,8 +132,8 @@ def calibrate(
     """
     if len(odometry) != len(motions):
         raise ValueError(f"odometry has {len(odometry)} steps, expected {len(motions)}")
-    if not 0 <= track <= WIDEST:
-        raise ValueError(f"track is {track:g} m, expected 0 to {WIDEST:g} m")
+    if not 0 <= track < math.inf:
+        raise ValueError(f"track is {track}, expected a finite length ≥ 0")
     if len(motions) < FEWEST:
         raise ValueError(f"there are {len(motions)} motions, expected at least {FEWEST}")
     model = Model.of(odometry, motions, track)
@@ -248,7 +243,7 @@ def _unknown(
         why |= dict.fromkeys(("x", "y", "turn", "track"), "the drive hardly turns")
     for name, deviation in deviations.items():
         if deviation > _KNOWN[name] and name not in why:
-            why[name] = f"the drive shows it to ± {deviation:.2g}{UNITS.get(name, '')} only"
+            why[name] = f"the drive shows it to ± {deviation:.2g} only"
     if "theta" in why:  # They turn with it.
         why = dict.fromkeys(("x", "y"), "the drive shows it only together with theta") | why
     names = list(deviations)

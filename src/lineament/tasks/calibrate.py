@@ -16,13 +16,15 @@ from ..files import check_outputs
 from ..logs import Log, open_log
 from ..logs.drives import one_scanner
 from ..motion import Calibration, Tracker, beam_times, calibrate, deskew
-from ..motion.calibration import FEWEST, UNITS, joined
+from ..motion.calibration import FEWEST, joined
 from ..motion.steps import Carried, Steps, shared_walls, steps_of
 from ..output.calibrations import plot_calibration
 from ..output.canvas import check_ending
 from ..progress import Track, untracked
 from ..scan import LaserScan, Pose
 
+#: Units of those that are no factors.
+_UNITS = {"x": " m", "y": " m", "theta": " rad", "track": " m", "drift": " rad/m"}
 _LABELS = {
     "way": "ways, times",
     "turn": "turns, times",
@@ -68,7 +70,7 @@ class Calibrated:
                 lines.append(f"  {label:<18} not known: {found.unknown[name]}")
                 continue
             value, deviation = found.values[name], found.deviations[name]
-            text = f"  {label:<18} {value:8.4f} ± {deviation:.4f}{UNITS.get(name, '')}"
+            text = f"  {label:<18} {value:8.4f} ± {deviation:.4f}{_UNITS.get(name, '')}"
             degrees = f"  ({math.degrees(value):.2f}° ± {math.degrees(deviation):.2f}°)"
             lines.append(text + (degrees if name == "theta" else ""))
         return "\n".join([*lines, *([f"  {self.laser_pose}"] if self.laser_pose else [])])
