@@ -227,6 +227,8 @@ def naming_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except UnicodeEncodeError as error:
+        if str(path) == str(path).encode(errors="ignore").decode():
+            raise  # It is about what is written.
         raise LineamentError(f"{path}: cannot be written: its path is no text in UTF-8") from error
     except OSError as error:
         reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
