@@ -421,7 +421,7 @@ def test_names_that_are_no_text_are_written_and_drawn(files):
     names = {f"{odd}{ending}" for ending in (".csv", ".parquet", ".svg", ".png", ".pdf")}
     assert names <= set(names_of(files))
     (files / odd).mkdir()
-    with pytest.raises(LineamentError, match=r"written: its path is no text in UTF-8$"):
+    with pytest.raises(LineamentError, match=r"written: its path is not text in UTF-8$"):
         extract_log(f"{odd}.npz", f"{odd}/a.csv", ln.Extractor())
 
 

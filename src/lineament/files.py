@@ -67,7 +67,7 @@ def _made_beside(path: str | os.PathLike[str], target: Path) -> Path:
         if target.exists() and not os.access(target, os.W_OK):  # To rename needs no permission.
             raise LineamentError(f"{path}: is read-only, expected a file that may be replaced")
         # mkstemp would make the file private to its owner; this one follows the umask.
-        # Arrow and other writers take no name that is no text.
+        # Arrow and other writers refuse a name that is not text in UTF-8.
         name = target.name.encode(errors="ignore").decode()
         temporary = target.with_name(f".{name}.{secrets.token_hex(4)}.part")
         temporary.touch(exist_ok=False)
@@ -222,14 +222,14 @@ def alone_in(folder: str | os.PathLike[str]) -> Iterator[None]:
 def naming_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     """Turn an OSError into a LineamentError of one line that names `path`.
 
-    And what writers raise that take no folder whose name is no text.
+    So is the UnicodeEncodeError of a writer that refuses a path that is not text in UTF-8.
     """
     try:
         yield
     except UnicodeEncodeError as error:
         if str(path) == str(path).encode(errors="ignore").decode():
-            raise  # It is about what is written.
-        raise LineamentError(f"{path}: cannot be written: its path is no text in UTF-8") from error
+            raise  # The path is text: it is about what is written.
+        raise LineamentError(f"{path}: cannot be written: its path is not text in UTF-8") from error
     except OSError as error:
         reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
         raise LineamentError(f"{path}: cannot be written: {reason}") from error

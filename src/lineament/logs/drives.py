@@ -1,4 +1,4 @@
-"""A log as the drive of one scanner: what maps, places and mountings are found by."""
+"""A log as the drive of one scanner, as `map`, `locate` and `calibrate` take it."""
 
 import math
 from collections.abc import Iterator
@@ -11,11 +11,11 @@ from ..rosmsg.frames import FASTEST
 from ..scan import LaserScan, Pose
 from .base import Log
 
-#: Headings that jump by more than a turn and a half, so often, are in no radians: those of a turn
-#: at most jump by a turn where they begin again, those that go on do not jump.
+#: Headings in radians jump by a turn at most, where they wrap. Headings that jump by more than a
+#: turn and a half, so often, are in degrees.
 _JUMP, _JUMPS = 3 * math.pi, 3
-#: Where a scanner stands, half of its ranges do not change by so much [m]: people are less. So many
-#: scans in which they do are of one that moves.
+#: Where a scanner stands, less than half of its ranges change by so much [m], people included. If
+#: more do in so many scans, it moves.
 _CHANGE, _CHANGES = 0.3, 3
 _WAY_OUT = "--no-odometry leaves it out"
 
@@ -23,9 +23,9 @@ _WAY_OUT = "--no-odometry leaves it out"
 def one_scanner(log: Log, *, odometry: bool) -> Iterator[LaserScan]:
     """Return the scans of a log; a LogError if those of several topics, or scanners, are in it.
 
-    That several scanners share a topic is known by their frames, to which it comes back. One that
-    is renamed within a log stays one. At the end of the log, a warning says if `odometry`, its
-    poses, is in other units, or stands still while the scanner moves.
+    Scanners share a topic if it returns to a frame that it left; a scanner may be renamed within a
+    log. At the end of the log, a warning says if its poses, where they are `odometry`, are in other
+    units, or stand still while the scanner moves.
     """
     if log.topic is None and len(log.topics) > 1:
         several = ", ".join(log.topics)

@@ -173,7 +173,7 @@ def fitting(text: str, size: float, width: float) -> float:
 def _fill(figure: Figure) -> None:
     """Let the plans of a figure show more than they must where that fills their places.
 
-    What no encoding knows, of the name of a file, is a mark: matplotlib draws text alone.
+    Bytes of a file's name that are not text become question marks, as matplotlib draws text alone.
     """
     from matplotlib.text import Text
 
