@@ -327,7 +327,7 @@ def test_a_guess_that_somebody_says_is_as_sure_as_on_a_drawing(monkeypatch):
         assert sum(looks) == expected
 
 
-@pytest.mark.parametrize(("sigma", "least"), [(0.0, 0.0), (0.045, -2.0)])
+@pytest.mark.parametrize(("sigma", "least"), [(0.0, 0.0), (0.045, -8.0)])
 def test_a_scan_that_chance_explains_as_well_is_not_of_the_place(monkeypatch, sigma, least):
     found, extract = Follower(LineMap(plan_of(RING).walls, sigma=sigma)), Extractor()
     scan = next(scans_on([0.0]))

@@ -16,6 +16,7 @@ from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
 from ..scan.fields import covariance_of_pose
 from ..scan.poses import Twist, compose, twist_between
+from .consistency import is_consistent
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
 from .local_map import LocalMap, beams_of, thinned
@@ -35,7 +36,7 @@ MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says, nor is one
 #: that is less likely than by chance [nats]: on a drawing; on a map, through whose walls more beams
 #: pass where the pose is right.
-DENIED, DENIED_ON_MAP = (0.12, 0.0), (0.3, -2.0)
+DENIED, DENIED_ON_MAP = (0.12, 0.0), (0.3, -8.0)
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
 #: Errors of a motion beside its covariance: those of motions that follow each other add up [m/√m].
@@ -123,6 +124,7 @@ class Follower(InTurn):
         self._most, self._least = DENIED_ON_MAP if plan.is_mapped else DENIED
         self._stamp = math.nan
         self._odometry: Pose | None = None
+        self._scan: LaserScan | None = None
         self._restart()
 
     def _restart(self) -> None:
@@ -176,7 +178,11 @@ class Follower(InTurn):
         if self._is_torn(features.stamp, odometry):
             self._restart()
         self._stamp, self._odometry = features.stamp, odometry
-        was_known, tracks = self.is_known, self._tracker(features, odometry)
+        tracks = self._tracker(features, odometry)
+        if tracks.motion is not None and not self._goes_on(features, tracks.motion.pose):
+            self._restart()
+            tracks = self._tracker(features, odometry)
+        self._scan, was_known = features.scan, self.is_known
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
@@ -204,6 +210,11 @@ class Follower(InTurn):
         if odometry is None or self._odometry is None:
             return duration > GAP or duration < 0
         return duration < 0 or math.dist(self._odometry[:2], odometry[:2]) > JUMP
+
+    def _goes_on(self, features: Features, motion: Pose) -> bool:
+        """Whether a scan shows what the last one did, but for the motion."""
+        before, scan = self._scan, features.scan
+        return before is None or scan is None or is_consistent(before, scan, motion)
 
     def _move(self, motion: Pose, covariance: Array) -> None:
         """Go on by a motion."""
