@@ -1,6 +1,7 @@
 """Whether two scans may show one place: by hand, against a naive twin, and on drives."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,3 +126,20 @@ def test_a_robot_that_looks_through_what_it_saw_is_lost_though_the_plan_goes_wit
         scan = SENSORS["ld19"].scan(World(np.array(lines)), (-0.5, 0.2, 0.1), rng)
         verdicts.append(follower(extract(scan.stamped("first", k * 10**8)), HERE).verdict)
     assert verdicts[-2:] == ["located", "ambiguous"]
+
+
+def test_without_a_clock_nothing_says_how_far_it_went_along_a_corridor():
+    """From the end of a corridor into its middle, where a scanner of 8 m sees neither end."""
+    walls = [(0, -1, 40, -1), (40, -1, 40, 1), (40, 1, 0, 1), (0, 1, 0, -1)]
+    world, plan = World(np.array(walls)), LineMap.from_lines(walls, sigma=0.045)
+    sensor = replace(SENSORS["rplidar"], range_max=8.0)
+    follower, extract, rng = Follower(plan), ln.Extractor(), np.random.default_rng(5)
+    follower.suppose((4.0, 0.1, 0.0))
+    verdicts = []
+    for x in np.arange(4.0, 20.0, 0.5):
+        scan = sensor.scan(world, (x, 0.1, 0.0), rng).stamped("first", 0)
+        where = follower(extract(scan))
+        verdicts.append(where.verdict)
+        assert where.verdict != "located" or abs(where.pose[0] - x) < 0.3
+    assert (verdicts[0], verdicts[1]) == ("located", "direction unobserved")
+    assert "located" not in verdicts[-10:]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._copies import InTurn, in_turn
 from ..extractor import Extractor
 from ..features import Features
-from ..motion import Tracker
+from ..motion import Tracker, Tracks
 from ..motion.deskew import beam_times, deskew
 from ..motion.odometry import compose_jacobians
 from ..scan import Array, LaserScan, Pose
@@ -19,7 +19,7 @@ from ..scan.poses import Twist, compose, twist_between
 from .consistency import is_consistent
 from .evidence import Evidence, evidence_of
 from .line_map import LineMap
-from .local_map import LocalMap, beams_of, thinned
+from .local_map import FASTEST, LocalMap, beams_of, thinned
 from .locate import GUESS, LOCATED, LOST, SURE, UNKNOWN, UNOBSERVED, Location, locate
 
 #: The plan is looked at after so much way, turn or time [m, rad, s].
@@ -34,8 +34,8 @@ WORST, WORST_TURN, UNSURE = 0.75, 0.15, 0.3
 #: otherwise takes back a part of one.
 MOST_MISSED, TAKEN_BACK = 2.0, 0.25
 #: A scan that is contradicted by a larger share of its beams is not where the pose says, nor is one
-#: that is less likely than by chance [nats]: on a drawing; on a map, through whose walls more beams
-#: pass where the pose is right.
+#: that is so likely over chance, or less [nats]: on a drawing; on a map, through whose walls more
+#: beams pass where the pose is right, and in whose clutter chance does as well.
 DENIED, DENIED_ON_MAP = (0.12, 0.0), (0.3, -8.0)
 #: So many looks are taken near a pose that somebody says, before the whole plan is.
 GUESSED = 3
@@ -98,8 +98,9 @@ class Follower(InTurn):
 
     The last metres are looked for on the whole plan until they are located. From then on the pose
     moves on with the tracker, and each few decimetres the plan is looked at near it. The sensor is
-    lost where look after look contradicts the plan, and where nothing fixes the pose any more: its
-    covariance grows. It is then looked for on the whole plan again, by what was seen since.
+    lost where a scan does not go on from the last one (it was carried away), where look after look
+    contradicts the plan, and where nothing fixes the pose any more: its covariance grows. It is
+    then looked for on the whole plan again, by what was seen since.
 
     Parameters
     ----------
@@ -175,14 +176,7 @@ class Follower(InTurn):
         skew : (x, y, theta)
             What the scan as a whole may be off, as the sensor moved while it swept [m, m, rad].
         """
-        if self._is_torn(features.stamp, odometry):
-            self._restart()
-        self._stamp, self._odometry = features.stamp, odometry
-        tracks = self._tracker(features, odometry)
-        if tracks.motion is not None and not self._goes_on(features, tracks.motion.pose):
-            self._restart()
-            tracks = self._tracker(features, odometry)
-        self._scan, was_known = features.scan, self.is_known
+        tracks, was_known = self._tracked(features, odometry), self.is_known
         self._local.add(features, tracks, odometry)
         if tracks.motion is not None:
             self._move(tracks.motion.pose, tracks.motion.covariance)
@@ -204,17 +198,30 @@ class Follower(InTurn):
         verdict = LOST if self._is_denied(evidence) else self._verdict
         return Whereabouts(verdict, self._pose, self._covariance + blurred, evidence, location)
 
-    def _is_torn(self, stamp: float, odometry: Pose | None) -> bool:
+    def _tracked(self, features: Features, odometry: Pose | None) -> Tracks:
+        """Track the features of a scan; begin anew if the motion since the last one is unknown."""
+        duration = features.stamp - self._stamp
+        if self._is_torn(duration, odometry):
+            self._restart()
+        before, self._scan = self._scan, features.scan
+        self._stamp, self._odometry = features.stamp, odometry
+        tracks = self._tracker(features, odometry)
+        if (motion := tracks.motion) is None or before is None or features.scan is None:
+            return tracks
+        if not is_consistent(before, features.scan, motion.pose):
+            self._restart()
+            return self._tracker(features, odometry)
+        if odometry is None and duration == 0:
+            # Without a clock nothing says how far it went where no wall does.
+            unknown = FASTEST**2 * motion.unobserved.T @ motion.unobserved
+            motion = replace(motion, covariance=motion.covariance + unknown)
+        return replace(tracks, motion=motion)
+
+    def _is_torn(self, duration: float, odometry: Pose | None) -> bool:
         """Whether the motion since the last scan is unknown."""
-        duration = stamp - self._stamp
         if odometry is None or self._odometry is None:
             return duration > GAP or duration < 0
         return duration < 0 or math.dist(self._odometry[:2], odometry[:2]) > JUMP
-
-    def _goes_on(self, features: Features, motion: Pose) -> bool:
-        """Whether a scan shows what the last one did, but for the motion."""
-        before, scan = self._scan, features.scan
-        return before is None or scan is None or is_consistent(before, scan, motion)
 
     def _move(self, motion: Pose, covariance: Array) -> None:
         """Go on by a motion."""
