@@ -258,16 +258,14 @@ def test_the_picture_shows_where_the_way_is_not_known(monkeypatch):
     assert not axes.lines  # Never located: the plan alone.
 
 
-def test_a_picture_does_not_replace_the_image_of_the_grid(files, capsys):
+def test_a_picture_does_not_replace_the_image_of_the_grid(files, refused):
     plan_of(room()).write(files / "map.yaml")
     about = (files / "map.yaml").read_text().replace("map.pgm", "map.png")
     (files / "map.yaml").write_text(about)
     (files / "map.pgm").rename(files / "map.png")
     before = (files / "map.png").read_bytes()
-    given = ["locate", str(files / "log.npz"), "--map", str(files / "map.yaml")]
-    given += ["-o", str(files / "a.csv"), "--picture", str(files / "map.png")]
-    assert run(given) == 1
-    assert "map.png: would replace" in capsys.readouterr().err
+    given = ["locate", files / "log.npz", "--map", files / "map.yaml", "-o", files / "a.csv"]
+    assert "map.png: would replace" in refused([*given, "--picture", files / "map.png"])
     assert (files / "map.png").read_bytes() == before
 
 
