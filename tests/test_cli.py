@@ -417,24 +417,6 @@ def test_warmup_takes_methods_and_says_how_long(monkeypatch, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize(
-    ("code", "heavy"),
-    [
-        ("from lineament.cli import run; run(['--help'])", "numpy rich"),
-        (
-            "import lineament as ln, lineament.logs; ln.LaserScan([1.0], 0, 1);"
-            "import lineament.output.figures, lineament.output.page",
-            "rosbags mcap ezdxf rerun",
-        ),
-    ],
-)
-def test_imports_are_light(code, heavy):
-    heavy = f"numba pyarrow matplotlib lineament.tasks.bulk {heavy}".split()
-    code = f"import sys; {code}; print(sorted({{*{heavy}}} & set(sys.modules)))"
-    done = subprocess.check_output([sys.executable, "-c", code], text=True)
-    assert done.splitlines()[-1] == "[]"
-
-
 def test_reproduce_runs_what_is_asked_for_on_the_recordings_of_the_environment(
     tmp_path, monkeypatch, capsys, refused
 ):
