@@ -122,9 +122,10 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
     A slow machine also has lines of the progress and of the compiler.
     """
 
-    def line_of(command: str | Sequence[str], status: int = 1) -> str:
+    def line_of(command: str | Sequence[object], status: int = 1) -> str:
         capsys.readouterr()
-        assert run(command.split() if isinstance(command, str) else list(command)) == status
+        words = command.split() if isinstance(command, str) else [str(word) for word in command]
+        assert run(words) == status
         output, errors = capsys.readouterr()
         assert output == ""
         assert "Traceback" not in errors

@@ -34,6 +34,9 @@ from lineament.tasks.mapping import tum_written
 
 THREADS = 4
 
+#: A way to give the first of some scans to a used extractor: what it finds, or all that it finds.
+Form = Callable[[Extractor, list[LaserScan]], Any]
+
 
 def words_of(features: Features) -> list[bytes]:
     """Everything that was found, as bytes."""
@@ -75,13 +78,46 @@ class Forms(Target):
         "log": lambda scan: there_and_back(scan),
         "message": lambda scan: fields_of(scan, narrow(scan.ranges)),
     }
-    FORMS: ClassVar[dict[str, Callable[[Extractor, list[LaserScan]], Any]]] = {}
+    #: Those that are more than a line are added below.
+    FORMS: ClassVar[dict[str, Form]] = {
+        "again": lambda used, scans: used(scans[0]),
+        "pickled": lambda used, scans: dumped(used)(dumped(scans[0])),
+        "deep copy": lambda used, scans: copy.deepcopy(used)(copy.deepcopy(scans[0])),
+        "batch": lambda used, scans: [
+            *batch_of(used, np.stack([scans[0].ranges] * 3), scans[0], workers=2)
+        ],
+        "masked": lambda used, scans: alone_and_in_a_batch(used, scans[0], hidden(scans[0])),
+        "list of numbers": lambda used, scans: used(
+            fields_of(scans[0], [None if math.isnan(r) else r for r in scans[0].ranges.tolist()])
+        ),
+        "other memory": lambda used, scans: [
+            used(fields_of(scans[0], ranges))
+            for ranges in (np.repeat(scans[0].ranges, 2)[::2], scans[0].ranges.astype(">f8"))
+        ],
+        "single precision": lambda used, scans: used(
+            fields_of(scans[0], narrow(scans[0].ranges).astype(np.float64))
+        ),
+        # Ranges alone are in millimetres; limits stay in metres.
+        "millimetres": lambda used, scans: alone_and_in_a_batch(
+            used, scans[0], milli(scans[0]), scale=1e-3
+        ),
+        "scaled": lambda used, scans: used(fields_of(scans[0], milli(scans[0]), 1e3).scaled(1e-3)),
+    }
 
 
-def form(function: Callable[[Extractor, list[LaserScan]], Any]) -> Any:
+def form(function: Form) -> Form:
     """Add a way to give a scan; the underscores of its name are spaces."""
-    Forms.FORMS[function.__name__.strip("_").replace("_", " ")] = function
+    Forms.FORMS[function.__name__.replace("_", " ")] = function
     return function
+
+
+def dumped(of: Any) -> Any:
+    return pickle.loads(pickle.dumps(of))
+
+
+def hidden(scan: LaserScan) -> Any:
+    """Return ranges of which those that are not valid are masked."""
+    return np.ma.masked_array(np.where(scan.valid, scan.ranges, 1.0), ~scan.valid)
 
 
 def narrow(ranges: Any) -> Any:
@@ -91,11 +127,14 @@ def narrow(ranges: Any) -> Any:
 
 def fields_of(scan: LaserScan, ranges: Any, factor: float = 1.0, **given: Any) -> LaserScan:
     """Return the same scan with other ranges, and limits that are rounded by a factor."""
+    return LaserScan(ranges, **frame_of(scan, factor), **given)
+
+
+def frame_of(scan: LaserScan, factor: float = 1.0) -> dict[str, Any]:
     bearings: dict[str, Any] = {"angles": scan.angles}
     if scan.is_regular:
         bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-    limits = {"range_min": factor * scan.range_min, "range_max": factor * scan.range_max}
-    return LaserScan(ranges, **bearings, **limits, **given)
+    return bearings | {"range_min": factor * scan.range_min, "range_max": factor * scan.range_max}
 
 
 def milli(scan: LaserScan) -> Any:
@@ -110,26 +149,12 @@ def there_and_back(scan: LaserScan) -> LaserScan:
 
 
 def batch_of(extractor: Extractor, rows: Any, scan: LaserScan, **given: Any) -> Any:
-    bearings: dict[str, Any] = {"angles": scan.angles}
-    if scan.is_regular:
-        bearings = {"angle_min": scan.angle_min, "angle_increment": scan.angle_increment}
-    limits = {"range_min": scan.range_min, "range_max": scan.range_max}
-    return extractor.batch(rows, **bearings, **limits, **given)
+    return extractor.batch(rows, **frame_of(scan), **given)
 
 
-@form
-def again(used: Extractor, scans: list[LaserScan]) -> Any:
-    return used(scans[0])
-
-
-@form
-def pickled(used: Extractor, scans: list[LaserScan]) -> Any:
-    return pickle.loads(pickle.dumps(used))(pickle.loads(pickle.dumps(scans[0])))
-
-
-@form
-def deep_copy(used: Extractor, scans: list[LaserScan]) -> Any:
-    return copy.deepcopy(used)(copy.deepcopy(scans[0]))
+def alone_and_in_a_batch(used: Extractor, scan: LaserScan, ranges: Any, **given: Any) -> Any:
+    one, (row,) = fields_of(scan, ranges, **given), batch_of(used, ranges[None], scan, **given)
+    return [used(one), row]
 
 
 @form
@@ -148,19 +173,6 @@ def threads(used: Extractor, scans: list[LaserScan]) -> Any:
     for scan, features in zip(scans, found, strict=False):
         assert words_of(features) == words_of(used(scan))
     return found[::THREADS]
-
-
-@form
-def batch(used: Extractor, scans: list[LaserScan]) -> Any:
-    scan = scans[0]
-    return list(batch_of(used, np.stack([scan.ranges] * 3), scan, workers=2))
-
-
-@form
-def masked(used: Extractor, scans: list[LaserScan]) -> Any:
-    scan = scans[0]
-    ranges = np.ma.masked_array(np.where(scan.valid, scan.ranges, 1.0), ~scan.valid)
-    return [used(fields_of(scan, ranges)), batch_of(used, ranges[None], scan)[0]]
 
 
 @form
@@ -194,37 +206,6 @@ def sector(used: Extractor, scans: list[LaserScan]) -> Any:
         (read,) = open_log(path, mask=[(low, high)])
     assert words_of(used(read)) == expected
     return used(scan)
-
-
-@form
-def list_of_numbers(used: Extractor, scans: list[LaserScan]) -> Any:
-    ranges = [None if math.isnan(r) else r for r in scans[0].ranges.tolist()]
-    return used(fields_of(scans[0], ranges))
-
-
-@form
-def other_memory(used: Extractor, scans: list[LaserScan]) -> Any:
-    scan = scans[0]
-    strided = np.repeat(scan.ranges, 2)[::2]
-    return [used(fields_of(scan, r)) for r in (strided, scan.ranges.astype(">f8"))]
-
-
-@form
-def single_precision(used: Extractor, scans: list[LaserScan]) -> Any:
-    return used(fields_of(scans[0], narrow(scans[0].ranges).astype(np.float64)))
-
-
-@form
-def millimetres(used: Extractor, scans: list[LaserScan]) -> Any:
-    """Ranges alone are in millimetres; limits stay in metres."""
-    scan, given = scans[0], {"scale": 1e-3}
-    plain = milli(scan)
-    return [used(fields_of(scan, plain, **given)), batch_of(used, plain[None], scan, **given)[0]]
-
-
-@form
-def scaled(used: Extractor, scans: list[LaserScan]) -> Any:
-    return used(fields_of(scans[0], milli(scans[0]), 1e3).scaled(1e-3))
 
 
 @form

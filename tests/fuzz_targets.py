@@ -199,21 +199,8 @@ class Viewer(Target):
     }
     PATHS = (*NEEDED, "/api", "/", "/../etc/passwd")
     NAMES = ("i", "method", "beam", "first", "step", "count", "log", "x", "")
-    VALUES = (
-        "0",
-        "1",
-        "3",
-        "-1",
-        "99999",
-        "9" * 30,
-        "1.5",
-        "nan",
-        "",
-        "optimal",
-        "liu",
-        "%00",
-        "é",
-    )
+    VALUES = ("0", "1", "3", "-1", "99999", "9" * 30, "1.5", "nan")
+    VALUES += ("", "optimal", "liu", "%00", "é")
 
     def __init__(self, folder: Path) -> None:
         rng = np.random.default_rng(0)

@@ -39,15 +39,10 @@ def samples(tmp_path_factory):
     return opened
 
 
+@pytest.mark.parametrize("tries", [12, pytest.param(300, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_reader(samples, kind):
-    check_log(open_log, samples[kind], **claims(kind), tries=12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_reader_by_many_cuts(samples, kind):
-    check_log(open_log, samples[kind], **claims(kind), tries=300)
+def test_every_reader(samples, kind, tries):
+    check_log(open_log, samples[kind], **claims(kind), tries=tries)
 
 
 @pytest.mark.slow

@@ -110,12 +110,32 @@ assert run(["map", log, "-o", "a.svg", "-q"]) == 1
     # Kernels may have to be compiled, which is said.
     lines = [line for line in done.stderr.splitlines() if not line.startswith("compil")]
     assert [line for line in lines if "lineament[" in line] == lines
-    assert [re.search(r"lineament\[\w+\]", line)[0] for line in lines] == [
-        "lineament[cad]",
-        "lineament[mapping]",
-    ]
+    named = [re.search(r"lineament\[\w+\]", line)[0] for line in lines]
+    assert named == ["lineament[cad]", "lineament[mapping]"]
     assert not (tmp_path / "a.dxf").exists()
     assert (tmp_path / "demo" / "index.html").exists()
+
+
+OF_TF = "R().schema('tf2_msgs/msg/TFMessage')"
+
+
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("from lineament.cli import run; run(['--help'])", "numpy rich"),
+        ("import lineament as ln; ln.LaserScan([1.0], 0, 1)", "rosbags mcap ezdxf rerun"),
+        ("import lineament.logs", "rosbags mcap lineament.logs.npz lineament.logs.carmen"),
+        ("import lineament.output.figures, lineament.output.page", "rosbags mcap ezdxf rerun"),
+        (f"from lineament.output.ros_messages import RosMessages as R; {OF_TF}", "rosbags mcap"),
+        ("import lineament.simulation", "scipy shapely"),
+        ("import lineament_lab.evaluation", "scipy shapely"),
+    ],
+)
+def test_imports_are_light(code, heavy):
+    heavy = f"numba pyarrow matplotlib lineament.tasks.bulk {heavy}".split()
+    code = f"import sys; {code}; print(sorted({{*{heavy}}} & set(sys.modules)))"
+    done = subprocess.check_output([sys.executable, "-c", code], text=True)
+    assert done.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("ending", ["parquet", "csv"])

@@ -10,21 +10,13 @@ from hypothesis import strategies as st
 from worlds import ring_sensor
 
 import lineament as ln
-from lineament.motion.deskew import _bearing, beam_times
+from lineament.motion.deskew import _bearing
 from lineament.scan import RangeNoise
 from lineament.simulation import SENSORS, cast_rays, room
 from lineament.simulation.placing import clearance
 
 NAN, MOVING = math.nan, (1.0, 2.0, 3.0)
 QUIET = replace(SENSORS["utm30lx"], noise=RangeNoise(), mixed_pixel=0.0, outlier=0.0, rate=10.0)
-
-
-def test_times_of_beams():
-    scan = ln.LaserScan([1.0] * 3, 0.0, 0.5, time_increment=0.01, scan_time=9.0)
-    np.testing.assert_allclose(beam_times(scan), [0, 0.01, 0.02])
-    # Half a circle in half the time of a turn, whatever the beams between.
-    scan = ln.LaserScan([1.0] * 3, angles=[-1.0, 0.0, math.pi - 1.0], scan_time=0.2)
-    np.testing.assert_allclose(beam_times(scan), [0, 0.1 / math.pi, 0.1])
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """All scores together: what must hold for any features."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -84,13 +82,3 @@ def test_hostile_features_raise_no_warning_and_figures_are_json():
     for some in (scores, Scores(), evaluate(empty, empty), evaluate(features(200), truth)):
         summary = some.summary()
         assert json.loads(json.dumps(summary, allow_nan=False)) == summary
-
-
-@pytest.mark.parametrize("package", ["lineament_lab.evaluation", "lineament.simulation"])
-def test_import_is_light(package):
-    code = (
-        f"import sys, {package};"
-        "heavy = {'numba', 'scipy', 'pyarrow', 'matplotlib', 'shapely'} & sys.modules.keys();"
-        "sys.exit(f'imported: {heavy}' if heavy else 0)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -10,12 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "lab" / "src").rglob("*.py")])
-PAGES = [
-    *SOURCES,
-    *sorted((ROOT / "src").rglob("*.js")),
-    *sorted((ROOT / "docs").glob("*.md")),
-    ROOT / "README.md",
-]
+TEXTS = [*(ROOT / "src").rglob("*.js"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
+PAGES = [*SOURCES, *sorted(TEXTS)]
 #: Words that a roboticist would have to translate; the glossary in CONTRIBUTING has the field's.
 PRIVATE = re.compile(
     r"\b([Tt]ells?(?! apart)|[Tt]old|(?<!there )is none|of (its|their) own|made straight)\b"

@@ -43,17 +43,11 @@ def test_a_wall_without_noise(name, normal):
 
 def test_only_the_algebraic_fit_depends_on_the_unit():
     points = wall(3.0, 0.4, -20, 60, np.random.default_rng(3), 0.05)
-    millimetres = RangeNoise(sigma=50.0)
-    one, other = (
-        conformal_fit(points, RangeNoise(sigma=0.05)),
-        conformal_fit(1e3 * points, millimetres),
-    )
-    assert other.angle == pytest.approx(one.angle, abs=1e-12)
-    one, other = (
-        algebraic_fit(points, RangeNoise(sigma=0.05)),
-        algebraic_fit(1e3 * points, millimetres),
-    )
-    assert abs(other.angle - one.angle) > 1e-6
+    turned = []
+    for fit in (conformal_fit, algebraic_fit):
+        metres, millimetres = (fit(k * points, RangeNoise(sigma=0.05 * k)) for k in (1.0, 1e3))
+        turned.append(abs(millimetres.angle - metres.angle))
+    assert turned[0] < 1e-12 < 1e-6 < turned[1]
 
 
 @pytest.mark.parametrize("name", FITS)

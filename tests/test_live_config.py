@@ -10,7 +10,7 @@ from lineament.errors import LineamentError
 from lineament.limits import LIMITS
 from lineament.live import LiveConfig, read_config
 
-_NAME = "expected a name of letters, digits, _ and /"
+_NAME, _TWO = "expected a name of letters, digits, _ and /", {"merge": ("/a",)}
 
 
 @pytest.mark.parametrize(
@@ -79,6 +79,23 @@ def test_odometry_is_a_topic_in_the_namespace():
         ({"track": 1}, "track is 1, expected true or false"),
         ({"parameters": 3}, "parameters is 3, expected a table"),
         ({"limits": {"none": 3}}, "limit 'none' is unknown, expected one of "),
+        ({"merge": ("scan",)}, "topics are /scan, /scan, expected each of them once"),
+        ({"merge": ("a b",)}, f"merge is ('a b',), {_NAME}"),
+        ({"merge": "rear"}, "merge is 'rear', expected names"),
+        ({"merge": (7,)}, f"merge is (7,), {_NAME}"),
+        ({"mountings": {"/a": (0, 0, 0)}}, "mountings are given, expected several topics"),
+        ({**_TWO, "mountings": {"/b": (0, 0, 0)}}, "the mounting is of /b, expected one of"),
+        ({**_TWO, "mountings": {"/a": (0, 0)}}, "mounting of /a: pose is (0, 0), expected"),
+        ({**_TWO, "unsure": (-1, 0)}, "unsure is (-1, 0), expected two numbers"),
+        ({**_TWO, "unsure": (1,)}, "unsure is (1,), expected two finite numbers"),
+        ({**_TWO, "tolerance": -1}, "tolerance is -1, expected 0 to 10"),
+        ({**_TWO, "deskew": "scans"}, "deskew is 'scans', expected odometry or poses"),
+        ({**_TWO, "laser_pose": (1, 0, 0)}, "laser_pose is of one scanner"),
+        ({**_TWO, "upside_down": True}, "upside_down is of one scanner"),
+        ({**_TWO, "log": "a.bag", "log_topic": "/b"}, "log_topic is of one scanner"),
+        ({"map": "a.dxf", "mapping": "b.dxf"}, "map and mapping are given"),
+        ({"judge": "/amcl_pose", "mapping": "b.dxf"}, "judge and mapping are given"),
+        ({"mapping": "b.png"}, "mapping is 'b.png', expected an ending of .dxf"),
     ],
 )
 def test_what_makes_no_sense_is_named(given, message):
@@ -169,14 +186,8 @@ def test_numbers_are_taken_up_to_their_bounds(name):
 
 @pytest.mark.parametrize("name", TIMES_AND_SIZES)
 def test_how_long_is_waited_and_how_much_is_kept(name):
-    extra = {
-        "dds": "cyclonedds",
-        "raw_dds": "cyclonedds",
-        "participant": "cyclonedds",
-        "foxglove": "foxglove",
-    }
-    if name in extra:
-        pytest.importorskip(extra[name])
+    if name in ("dds", "raw_dds", "participant", "foxglove"):
+        pytest.importorskip("foxglove" if name == "foxglove" else "cyclonedds")
     room = "rosmsg" if name == "frames" else "live"
     module = importlib.import_module(f"lineament.{room}.{name}")
     kept = {key: getattr(module, key) for key in TIMES_AND_SIZES[name]}

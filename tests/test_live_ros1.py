@@ -312,10 +312,8 @@ def test_what_keeps_scans_away_is_reported(node, scanner, topic, monkeypatch):
 
 def test_messages_are_read_by_a_genuine_listener(node, scanner, topic):
     # What each message holds is tested in test_ros_messages.
-    publisher, config = (
-        Ros1Publisher(node),
-        LiveConfig(topic=topic, log="played.npz", dock=(2.0, 1.0)),
-    )
+    config = LiveConfig(topic=topic, log="played.npz", dock=(2.0, 1.0))
+    publisher = Ros1Publisher(node)
     sink = RosSink(publisher, RosMessages("ros1"), config)
     kinds = {
         topic: SCAN,

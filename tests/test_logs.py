@@ -5,8 +5,6 @@ import gzip
 import json
 import math
 import os
-import subprocess
-import sys
 from contextlib import suppress
 
 import numpy as np
@@ -106,13 +104,6 @@ def test_a_log_that_grows_while_it_is_read(write):
             file.write(FLASER * 2)
         count += 1
     assert (count, len(list(log))) == (3, 9)
-
-
-def test_import_is_light():
-    heavy = ("numba", "pyarrow", "matplotlib", *(f"lineament.logs.{x}" for x in ("npz", "carmen")))
-    code = f"import sys, lineament.logs; print([m for m in {heavy} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 # Lines and pieces

@@ -269,16 +269,8 @@ def test_the_walls_of_one_scan_are_as_sure_as_its_segments():
 @pytest.mark.parametrize("off", [0.0, 0.03, 0.06])
 def test_a_pair_that_contradicts_the_others_is_left_out(off):
     """Six walls of a room, each known to 1 mm; a cupboard in front of one of them is not it."""
-    plan = LineMap.from_lines(
-        [
-            [-4, -3, 0, -3],
-            [0, -3, 4, -3],
-            [4, -3, 4, 3],
-            [4, 3, 0, 3],
-            [0, 3, -4, 3],
-            [-4, 3, -4, -3],
-        ]
-    )
+    ring = np.array([(-4, -3), (0, -3), (4, -3), (4, 3), (0, 3), (-4, 3)])
+    plan = LineMap.from_lines(np.column_stack((ring, np.roll(ring, -1, axis=0))))
     walls = plan.walls.copy()
     walls["covariance"] = np.diag((0.001, 0.001)) ** 2
     walls["centroid"][0, 1] += off

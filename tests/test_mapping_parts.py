@@ -137,11 +137,16 @@ def test_a_wall_along_another_is_hidden_by_it_up_to_10_degrees():
         assert len(single(walls)) == left
 
 
+def begun():
+    """A drive of one scan, and what was found in it."""
+    (scan,), placed = scans_on([0.0]), Drive()
+    placed.add(scan, found := Extractor()(scan))
+    return placed, found
+
+
 def test_turns_and_places_that_are_tried():
     """Five places each way, by a deviation of 10 to 30 cm; seven turns, by half of one."""
-    placed, extract = Drive(), Extractor()
-    for scan in scans_on([0.0]):
-        placed.add(scan, found := extract(scan))
+    placed, found = begun()
     for way, turn, step, angle in (
         (0.02, 0.02, 0.1, 0.05), (0.2, 0.16, 0.2, 0.08), (9.0, 3.0, 0.3, 0.1)
     ):  # fmt: skip
@@ -155,9 +160,7 @@ def test_turns_and_places_that_are_tried():
 
 def test_poses_near_the_expected_one_are_tried():
     """Wherever within two deviations the pose is, one is tried within reach of refinement."""
-    placed, extract = Drive(), Extractor()
-    for scan in scans_on([0.0]):
-        placed.add(scan, found := extract(scan))
+    placed, found = begun()
     rng, prior = np.random.default_rng(0), (0.2, -0.1, 0.3)
     for way, turn in ((0.02, 0.02), (0.1, 0.1), (0.3, 0.2)):
         tried = placed._tried(found, prior, way, turn)
@@ -168,9 +171,7 @@ def test_poses_near_the_expected_one_are_tried():
 
 def going(steps, pace, count=60):
     """A drive whose scans come at a pace, which went on by the same step from each to the next."""
-    placed = Drive()
-    for scan in scans_on([0.0]):
-        placed.add(scan, Extractor()(scan))
+    placed, _ = begun()
     for k in range(1, count + 1):
         x, y, theta = np.multiply(steps, k)
         placed._go_on(pace * k, (x, y, theta))

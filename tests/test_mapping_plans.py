@@ -52,14 +52,11 @@ def test_segments_are_one_wall_by_chi_square(other, walls):
 
 
 def test_joint_line_is_the_least_squares_one():
-    first, second = (
-        line((0, 0), (2, 0), 0.01, 0.01),
-        line((2.1, 0.01), (5, 0.03), 0.02, 0.004),
-    )
-    wall = LineMap.from_features([features(segments=[one]) for one in (first, second)]).walls[0]
+    both = line((0, 0), (2, 0), 0.01, 0.01), line((2.1, 0.01), (5, 0.03), 0.02, 0.004)
+    wall = LineMap.from_features([features(segments=[one]) for one in both]).walls[0]
     # By definition: offset at x = 0 and slope of least χ².
     rows, values, weights = [], [], []
-    for s in (first, second):
+    for s in both:
         x, y = s["centroid"]
         rows += [[1.0, x], [0.0, 1.0]]
         values += [y, s["angle"]]
@@ -221,10 +218,8 @@ def test_written_maps_are_read_again(tmp_path, ending):
     plan = LineMap.from_features(map(extract, scans), [scan.pose for scan in scans])
     plan.write(tmp_path / f"a.{ending}")
     again = LineMap.read(tmp_path / f"a.{ending}")
-    np.testing.assert_allclose(
-        np.sort(again.ends.reshape(-1, 4), axis=0), np.sort(plan.ends.reshape(-1, 4), axis=0),
-        atol=1e-5,
-    )  # fmt: skip
+    was, read = (np.sort(one.ends.reshape(-1, 4), axis=0) for one in (plan, again))
+    np.testing.assert_allclose(read, was, atol=1e-5)
     if ending == "parquet":
         order = [w["centroid"].tolist() for w in plan.walls]
         back = {tuple(np.round(w["centroid"], 5)): w["covariance"] for w in again.walls}
@@ -246,38 +241,26 @@ def test_table_of_extract_in_the_world_is_a_plan(tmp_path):
     assert 4 <= len(often) <= 12
 
 
+LINES, SEEN, EMPTY, EYE = LineMap.from_lines, LineMap.from_features, features(), np.eye(3)
+
+
 @pytest.mark.parametrize(
-    ("given", "problem"),
+    ("call", "given", "problem"),
     [
-        (
-            lambda: LineMap.from_lines([[0, 0], [1, 1]]),
-            r"lines have shape \(2, 2\), expected \(n, 4\)",
-        ),
-        (lambda: LineMap.from_lines([0, 0, 1, 1]), r"lines have shape \(4,\)"),
-        (
-            lambda: LineMap.from_lines(ROOM, [[1, 1]]),
-            r"columns have shape \(1, 2\), expected \(n, 3\)",
-        ),
-        (
-            lambda: LineMap.from_features([features()] * 2, [(0, 0, 0)]),
-            "poses are 1, expected 2, one for each scan",
-        ),
-        (
-            lambda: LineMap.from_features([features()], [(0, 0, 0)], [np.eye(3)] * 2),
-            "pose_covariances are 2, expected 1",
-        ),
-        (lambda: features().transform(0, math.nan, 0), "pose is .* expected three finite numbers"),
-        (lambda: features().transform("0", 0, 0), "pose is .* expected three finite numbers"),
-        (
-            lambda: locate(features(), LineMap.from_lines(ROOM), covariance=np.eye(3)),
-            "a covariance is given without a guess",
-        ),
-        (lambda: office(1, (30_000, 20_000)), "expected 20 m x 16 m to 300 m x 300 m"),
+        (LINES, [[[0, 0], [1, 1]]], r"lines have shape \(2, 2\), expected \(n, 4\)"),
+        (LINES, [[0, 0, 1, 1]], r"lines have shape \(4,\)"),
+        (LINES, [ROOM, [[1, 1]]], r"columns have shape \(1, 2\), expected \(n, 3\)"),
+        (SEEN, [[EMPTY] * 2, [(0, 0, 0)]], "poses are 1, expected 2, one for each scan"),
+        (SEEN, [[EMPTY], [(0, 0, 0)], [EYE] * 2], "pose_covariances are 2, expected 1"),
+        (EMPTY.transform, [0, math.nan, 0], "pose is .* expected three finite numbers"),
+        (EMPTY.transform, ["0", 0, 0], "pose is .* expected three finite numbers"),
+        (locate, [EMPTY, LINES(ROOM), None, EYE], "a covariance is given without a guess"),
+        (office, [1, (30_000, 20_000)], "expected 20 m x 16 m to 300 m x 300 m"),
     ],
 )
-def test_what_would_be_half_taken_is_refused(given, problem):
+def test_what_would_be_half_taken_is_refused(call, given, problem):
     with pytest.raises(ValueError, match=problem):
-        given()
+        call(*given)
 
 
 def test_pairs_of_ends_are_lines():

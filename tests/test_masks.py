@@ -123,10 +123,9 @@ def test_what_is_no_mask_is_refused(tmp_path, mask, message):
         drive_of("paper", 1)[0].masked(mask)
 
 
-def test_the_command_line_refuses_degrees(tmp_path, capsys):
+def test_the_command_line_refuses_degrees(tmp_path, refused):
     save_npz(tmp_path / "a.npz", drive_of("paper", 1))
-    assert run(["info", str(tmp_path / "a.npz"), "--mask", "-90", "30"]) == 2
-    assert "are they in degrees?" in capsys.readouterr().err
+    assert "are they in degrees?" in refused(f"info {tmp_path / 'a.npz'} --mask -90 30", 2)
 
 
 def test_the_node_masks_as_logs_do():

@@ -263,15 +263,15 @@ def test_scans_of_nothing(scan):
 
 def test_features_that_cannot_be_merged():
     found = ln.extract(LaserScan([2.0] * 9, -0.04, 0.01))
-    with pytest.raises(ValueError, match="1 mountings of 2 features, expected one each"):
-        merge_features([found, found], AT_ROBOT[:1])
-    with pytest.raises(ValueError, match="0 mountings of 0 features"):
-        merge_features([], [])
-    with pytest.raises(ValueError, match="have no scan"):
-        merge_features([found, found.transform(0, 0, 1)], AT_ROBOT)
-    with pytest.raises(ValueError, match="three finite numbers"):
-        merge_features([found, found], [(0, 0, 0), (math.nan, 0, 0)])
+    two, moved = [found, found], [found, found.transform(0, 0, 1)]
+    for problem, *given in (
+        ("1 mountings of 2 features, expected one each", two, AT_ROBOT[:1]),
+        ("0 mountings of 0 features", [], []),
+        ("have no scan", moved, AT_ROBOT),
+        ("three finite numbers", two, [(0, 0, 0), (math.nan, 0, 0)]),
+        ("covariance", two, AT_ROBOT, np.eye(2)),
+    ):
+        with pytest.raises(ValueError, match=problem):
+            merge_features(*given)
     with pytest.raises(ValueError, match="between 0 and 1"):
-        merge_features([found, found], AT_ROBOT, gate=1.0)
-    with pytest.raises(ValueError, match="covariance"):
-        merge_features([found, found], AT_ROBOT, np.eye(2))
+        merge_features(two, AT_ROBOT, gate=1.0)

@@ -348,10 +348,13 @@ def test_no_wall_is_status_3(files, refused):
 
 #: Metres of the units that a plan may be drawn in.
 UNITS = {"ft": 0.3048, "in": 0.0254, "cm": 0.01, "m": 1.0}
+#: Units that a plan is drawn in, and those that are said: tried often, and seldom.
+OFTEN, SELDOM = [("m", "mm")], [("ft", "m"), ("in", "m"), ("cm", "m"), ("m", "ft")]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("drawn", "given"), [("ft", "m"), ("in", "m"), ("cm", "m"), ("m", "ft")])
+@pytest.mark.parametrize(
+    ("drawn", "given"), [*OFTEN, *(pytest.param(*two, marks=pytest.mark.slow) for two in SELDOM)]
+)
 def test_never_located_is_status_3_and_names_the_units_of_the_plan(files, capsys, drawn, given):
     LineMap.from_lines(room().segments / UNITS[drawn]).write(files / "drawn.dxf")
     command = f"locate log.npz --map drawn.dxf -o a.tum -q --units {given}".split()
@@ -359,9 +362,9 @@ def test_never_located_is_status_3_and_names_the_units_of_the_plan(files, capsys
     *size, never = complaints(capsys.readouterr().err)
     shows = f"shows where the scans were if it is drawn in {drawn}: --units {drawn}"
     assert never == f"lineament: log.npz: never located: drawn.dxf: {shows}"
-    # A room of 6 m, of 20 if feet are taken for metres, may be one; 600 and 1.8 m are none.
+    # A room of 6 m, of 20 if feet are taken for metres, may be one; 600, 1.8 and 0.006 m are none.
     assert [said.endswith("drawn in other units? (units=, --units)") for said in size] == (
-        [True] if (drawn, given) in (("cm", "m"), ("m", "ft")) else []
+        [True] if (drawn, given) in (("cm", "m"), ("m", "ft"), ("m", "mm")) else []
     )
     assert (files / "a.tum").read_text() == ""
     assert run([*command[:-1], drawn]) == 0
@@ -431,7 +434,7 @@ def test_a_plan_of_another_building_says_the_usual_causes(files, capsys, ending)
     LineMap.from_lines(walls).write(files / f"other{ending}")
     assert run(f"locate log.npz --map other{ending} -o a.csv".split()) == 3
     said = capsys.readouterr()
-    assert "never located" in said.out
+    assert said.out.count("never located") == 1
     (line,) = complaints(said.err)
     or_units = ", or in other units (--units)" if ending == ".dxf" else ""
     assert f"never located: other{ending}: is it another building{or_units}?" in line

@@ -141,7 +141,7 @@ def test_blocks_stand_where_their_inserts_say(tmp_path):
     np.testing.assert_allclose((x / 0.5) ** 2 + (y / 0.25) ** 2, 1)
 
 
-def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys):
+def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys, refused):
     log, path, poses = (str(tmp_path / name) for name in ("a.npz", "a.parquet", "a.tum"))
     save_log(log, drive(room(), [(-2, 0), (-1.8, 0)], SENSORS["utm30lx"], rate=5))
     table(Path(path), change=put("length", [None]))
@@ -153,8 +153,8 @@ def test_rows_without_numbers_are_left_out_and_said(tmp_path, capsys):
     assert "1 walls or columns have impossible numbers" in capsys.readouterr().err
     found = str(tmp_path / "found.parquet")
     for command in (["locate", log, "--map", path], ["map", log, "--onto", path]):
-        assert run([*command, "-o", found, "--limit", "entities=2"]) == 1
-        assert "a.parquet: has 8 entities, rows" in capsys.readouterr().err
+        said = refused([*command, "-o", found, "--limit", "entities=2"])
+        assert "a.parquet: has 8 entities, rows" in said
 
 
 # Corners, and what lists walls

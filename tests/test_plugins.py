@@ -35,34 +35,28 @@ def test_a_command_of_another_package(install, capsys):
         ("1 / 0\n", "ZeroDivisionError: division by zero"),
     ],
 )
-def test_a_broken_command_costs_no_other(code, why, install, capsys):
+def test_a_broken_command_costs_no_other(code, why, install, capsys, refused):
     install(code, "[lineament.commands]\nhello = stranger:hello\n")
-    assert run(["hello", "--loud", "x"]) == 1
-    line = f"lineament: hello cannot be loaded from stranger:hello: {why}\n"
-    assert capsys.readouterr().err == line
+    line = f"lineament: hello cannot be loaded from stranger:hello: {why}"
+    assert refused("hello --loud x") == line
     assert run(["--help"]) == 0
     assert "cannot be loaded" in capsys.readouterr().out
     assert run(["methods"]) == 0
 
 
-def test_our_own_commands_cannot_be_replaced(install, capsys):
+def test_our_own_commands_cannot_be_replaced(install, refused):
     install(
         "import click\ninfo = click.Command('info')\n", "[lineament.commands]\ninfo = stranger:info"
     )
-    assert run(["info", "nowhere.npz"]) == 1
-    assert "nowhere.npz" in capsys.readouterr().err
+    assert "nowhere.npz" in refused("info nowhere.npz")
 
 
-def test_without_the_laboratory_its_package_is_named(monkeypatch, capsys):
+def test_without_the_laboratory_its_package_is_named(monkeypatch, capsys, refused):
     monkeypatch.setattr("lineament.cli.plugins", lambda _: {})
-    assert run(["reproduce", "-o", "x"]) == 2
-    said = capsys.readouterr().err
-    assert said == (
-        "lineament: reproduce is part of lineament-lab, which is not installed: "
-        "pip install lineament-lab\n"
-    )
-    assert run(["fly"]) == 2
-    assert "No such command 'fly'" in capsys.readouterr().err
+    missing = "which is not installed: pip install lineament-lab"
+    said = refused("reproduce -o x", 2)
+    assert said == f"lineament: reproduce is part of lineament-lab, {missing}"
+    assert "No such command 'fly'" in refused("fly", 2)
     assert run(["--help"]) == 0
     assert "reproduce" not in capsys.readouterr().out
 

@@ -2,9 +2,6 @@
 
 import io
 import math
-import subprocess
-import sys
-import textwrap
 
 import numpy as np
 import pytest
@@ -271,18 +268,3 @@ def test_all_that_is_published_is_read_by_rosbags(make):
     for message in publisher.messages:
         assert message.kind == publisher.kinds[message.topic]
         read(make, message)
-
-
-def test_an_unknown_encoding():
-    with pytest.raises(ValueError, match="encoding is 'xml', expected ros1 or cdr"):
-        RosMessages("xml")
-
-
-def test_messages_and_definitions_need_no_packages():
-    script = """
-        import sys
-        from lineament.output.ros_messages import RosMessages
-        RosMessages().schema("tf2_msgs/msg/TFMessage")
-        assert not {"rosbags", "mcap", "numba", "pyarrow"} & set(sys.modules)
-    """
-    subprocess.run([sys.executable, "-c", textwrap.dedent(script)], check=True)

@@ -37,6 +37,16 @@ def scans(messages, *stamps, time=None):
         yield "/scan", stamp if time is None else time, messages.scan(stamp, [1.0, 2.0])
 
 
+def beside(x, *stamps):
+    """Odometry at 1 s that is at x, and scans."""
+
+    def make(messages):
+        yield "/odom", 1.0, messages.odometry(1.0, x, 0.0, 0.0)
+        yield from scans(messages, *stamps)
+
+    return make
+
+
 @both
 @pytest.mark.parametrize("maker", ["odometry", "pose_stamped", "pose_with_covariance"])
 def test_between_two_poses(tmp_path, kind, maker):
@@ -205,12 +215,7 @@ def test_a_scan_with_the_stamp_of_a_pose_does_not_wait(tmp_path, monkeypatch):
             return []
 
     monkeypatch.setattr("lineament.logs.ros_poses.PoseFinder", Finder)
-
-    def make(messages):
-        yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)
-        yield from scans(messages, 1.0, 1.5)
-
-    poses(write(tmp_path, "mcap", make), "/odom")
+    poses(write(tmp_path, "mcap", beside(7.0, 1.0, 1.5)), "/odom")
     assert learned == [1, 0]
 
 
@@ -243,11 +248,7 @@ def test_scans_do_not_wait_for_ever(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("x", [math.nan, math.inf, -1e308, 1e100])
 def test_a_pose_without_measure_is_reported(tmp_path, x):
-    def make(messages):
-        yield "/odom", 1.0, messages.odometry(1.0, x, 0.0, 0.0)
-        yield from scans(messages, 1.0)
-
-    path = write(tmp_path, "mcap", make)
+    path = write(tmp_path, "mcap", beside(x, 1.0))
     with pytest.raises(LogError, match=r"/odom message 0: pose is \(.*, 0.0, 0.0\), expected"):
         poses(path, "/odom")
     log = open_log(path, pose_topic="/odom", keep_going=True, laser_pose=AT_BODY)
@@ -256,11 +257,7 @@ def test_a_pose_without_measure_is_reported(tmp_path, x):
 
 
 def test_scans_that_wait_where_a_bag_breaks_are_returned(tmp_path):
-    def make(messages):
-        yield "/odom", 1.0, messages.odometry(1.0, 7.0, 0.0, 0.0)
-        yield from scans(messages, 1.0, 2.0, 3.0)
-
-    path = write(tmp_path, "mcap-plain", make)
+    path = write(tmp_path, "mcap-plain", beside(7.0, 1.0, 2.0, 3.0))
     data = path.read_bytes()
     path.write_bytes(data[: data.rindex(b"laser") + 20])
     found = []
@@ -281,11 +278,7 @@ def test_scans_that_wait_where_a_bag_breaks_are_returned(tmp_path):
     ],
 )
 def test_topics_that_have_no_poses(tmp_path, pose_topic, problem):
-    def make(messages):
-        yield "/odom", 1.0, messages.odometry(1.0, 0.0, 0.0, 0.0)
-        yield from scans(messages, 1.0)
-
-    path = write(tmp_path, "mcap", make)
+    path = write(tmp_path, "mcap", beside(0.0, 1.0))
     check_refused(problem, path, pose_topic=pose_topic)
 
 

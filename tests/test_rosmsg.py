@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lineament import LaserScan
+from lineament.output.ros_messages import RosMessages
 from lineament.rosmsg import definitions
 from lineament.rosmsg.poses import Odometry, odometry, turn_of
 from lineament.rosmsg.scans import laser_scan, multi_echo_scan, ring_scan
@@ -98,7 +99,7 @@ def test_what_is_written_is_read(encoding, stamp, fields):
 
 
 def test_unknown_encodings():
-    for make in (WireWriter, partial(WireReader, b""), partial(laser_scan, b"")):
+    for make in (WireWriter, partial(WireReader, b""), partial(laser_scan, b""), RosMessages):
         with pytest.raises(ValueError, match="encoding is 'xcdr2', expected ros1 or cdr"):
             make("xcdr2")
     for data in (b"\0\7\0\0", b"\0\1\0"):

@@ -140,32 +140,20 @@ def test_another_building_is_refused_and_nothing_is_written(sessions, tmp_path, 
     assert [of.name for of in tmp_path.iterdir()] == ["other.svg"]
 
 
-def test_merging_is_for_a_plan(tmp_path):
+def test_merging_is_for_a_plan(refused, tmp_path):
     (tmp_path / "log.npz").touch()
-    given = ["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "a.svg"), "--merge"]
-    result = CliRunner().invoke(cli, given)
-    assert result.exit_code == 2
-    assert "--merge is for the plan of --onto" in result.output
+    given = ["map", tmp_path / "log.npz", "-o", tmp_path / "a.svg", "--merge"]
+    assert "--merge is for the plan of --onto" in refused(given, 2)
     with pytest.raises(ValueError, match="merge is for a plan"):
         map_log(tmp_path / "log.npz", tmp_path / "a.svg", merge=True)
 
 
 def test_parts_that_are_not_on_the_plan_are_named():
-    about = {
-        "log": "a",
-        "output": "b",
-        "scans": 9,
-        "frames": 9,
-        "lost": 0,
-        "loops": 0,
-        "refused": 0,
-    }
-    about |= {"known": [0.1] * 3, "unsure": [], "map": None, "seconds": 1.0}
+    about = {"log": "a", "output": "b", "scans": 9, "frames": 9, "lost": 0, "loops": 0}
+    about |= {"refused": 0, "known": [0.1] * 3, "unsure": [], "map": None, "seconds": 1.0}
     made = Mapping(ways=[30.0, 8.0, 11.0], located=(0, 2), **about)
-    assert (
-        made.warning
-        == "parts of the drive are not found on the plan, and lie beside it: 8 m of way"
-    )
+    beside = "parts of the drive are not found on the plan, and lie beside it: 8 m of way"
+    assert made.warning == beside
     assert Mapping(ways=[30.0, 8.0], located=(0, 1), **about).warning == ""
     assert Mapping(ways=[30.0], **about).warning == ""
     assert "in 2 parts" in Mapping(ways=[30.0, 8.0], **about).warning

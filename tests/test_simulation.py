@@ -334,13 +334,8 @@ def test_scanners_are_those_of_their_data_sheets():
         assert scan.valid.mean() > 0.95
         assert scan.is_full_circle == (field == 360)
         steps = beams if field == 360 else beams - 1
-        assert (s.name, len(scan), s.range_min, s.range_max, s.rate) == (
-            name,
-            beams,
-            low,
-            high,
-            rate,
-        )
+        assert [s.name, len(scan), s.range_min, s.range_max] == [name, beams, low, high]
+        assert s.rate == rate
         assert scan.angles[0] == pytest.approx(-np.radians(field) / 2)
         assert s.angle_increment * steps == pytest.approx(np.radians(field))
         assert (s.noise.sigma, s.noise.quantum) == (sigma, quantum)

@@ -111,5 +111,6 @@ def test_beams_are_timed_from_the_one_whose_time_the_stamp_is():
     for beam in (-1, 3):  # outside, by the mean step
         times = beam_times(others.stamped(beam))
         np.testing.assert_allclose(times, np.array((0.0, 0.3, 0.4)) - 0.2 * beam, atol=1e-12)
-    each = LaserScan([1.0] * 3, 0.0, 0.1, time_increment=0.01).stamped("last")
-    np.testing.assert_allclose(beam_times(each), (-0.02, -0.01, 0.0), atol=1e-12)
+    each = LaserScan([1.0] * 3, 0.0, 0.1, time_increment=0.01, scan_time=9.0)
+    np.testing.assert_allclose(beam_times(each), (0.0, 0.01, 0.02), atol=1e-12)
+    np.testing.assert_allclose(beam_times(each.stamped("last")), (-0.02, -0.01, 0.0), atol=1e-12)

@@ -484,21 +484,6 @@ def test_a_closed_store_ends_its_reading():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "status", "words"),
-    [
-        (["{log}x", "--no-browser"], 1, "there is no such"),
-        (["{log}", "-m", "lui"], 2, "method 'lui' is unknown"),
-        (["{log}", "--set", "a=1"], 2, "'a'"),
-        (["{log}", "--port", "70000"], 2, "70000"),
-        (["{log}", "-m", "pdbs", "--no-browser", "--host", "256.1.1.1"], 1, "cannot listen there"),
-        (["{log}", "-m", "pdbs", "--topic", "scan"], 1, "has no topic 'scan'"),
-    ],
-)
-def test_what_is_wrong_is_one_line(log, arguments, status, words, refused):
-    assert words in refused(["view", *(text.format(log=log) for text in arguments)], status)
-
-
-@pytest.mark.parametrize(
     ("host", "name"),
     [("127.0.0.1", "127.0.0.1"), ("localhost", "localhost"), ("0.0.0.0", "localhost")],
 )
