@@ -7,6 +7,9 @@ Counted are, of each time that it was located rightly before: the seconds until 
 "located" any more, or is so at the new place, and until it is that; and transforms that are
 published after it and are wrong, by 0.3 m or 3°. The robot may have been put down just behind a
 scan: the first scan of the new place counts as one period after it.
+
+With ``--real``, real logs are followed on grids of maps of themselves, with their poses as
+odometry: as they are, and in pieces of 25 to 60 scans, each somewhere else.
 """
 
 import argparse
@@ -14,10 +17,14 @@ import math
 import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
+from evidence import DATA, LOGS, mapped
 from grids import grid_of, viewpoints
 from judging import PEOPLE, SOON, SPEED, moved
 
@@ -26,7 +33,9 @@ from lineament.live import Frame, LiveConfig
 from lineament.live.localiser import Localiser
 from lineament.live.plan_topics import statuses
 from lineament.live.received import LINKS, MOUNTINGS
+from lineament.logs import open_log
 from lineament.mapping import LineMap
+from lineament.mapping.following import Follower
 from lineament.rosmsg.poses import StampedPose
 from lineament.scan import LaserScan, Pose
 from lineament.scan.poses import compose, relative
@@ -141,6 +150,55 @@ class Robot:
         return where.verdict == "located" and status.level < 2, sent
 
 
+def real(name: str) -> str:
+    """Follow a log on the grid of its map, as it is and carried away; return a row of the table."""
+    scans = [scan for scan in open_log(DATA / LOGS[name]) if scan.pose is not None]
+    made, truth = mapped(scans)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "map.yaml"
+        made.write(path)
+        plan = LineMap.read(path)
+    extract, rng = ln.Extractor(), np.random.default_rng(5)
+    features = [extract(scan) for scan in scans]
+    cells = [name]
+    for carried in (False, True):
+        order = list(in_pieces(truth, rng)) if carried else [(k, False) for k in range(len(scans))]
+        follower, believed, verdicts, kidnapped = Follower(plan), HERE, [], []
+        is_counted = was_right = False
+        for i, (k, is_carried) in enumerate(order):
+            if i and not is_carried:
+                believed = compose(believed, relative(scans[order[i - 1][0]].pose, scans[k].pose))
+            where = follower(replace(features[k], stamp=0.5 * i), believed)
+            is_right = not _is_wrong(where.pose, truth[k])
+            lies = where.is_known and not is_right
+            if is_carried:
+                is_counted = was_right
+                if is_counted:
+                    kidnapped.append([not lies, True])
+            if is_counted and lies:
+                kidnapped[-1][1] = False
+            was_right = bool(where) and is_right
+            verdicts.append((bool(where), bool(where) and not is_right))
+        located, wrong = np.mean(verdicts, axis=0)[0], np.sum(verdicts, axis=0)[1]
+        cells += [f"{100 * located:.1f} %", f"{wrong}"]
+    noticed, honest = np.sum(kidnapped, axis=0)
+    return "| " + " | ".join([*cells, f"{len(kidnapped)}", f"{noticed}", f"{honest}"]) + " |"
+
+
+def in_pieces(truth: list[Pose], rng: np.random.Generator) -> Iterator[tuple[int, bool]]:
+    """Yield as many scans as there are, in pieces, and whether the robot was carried there."""
+    k, left, last = 0, 0, None
+    for _ in truth:
+        is_carried = not left and last is not None
+        if not left:
+            left = int(rng.integers(25, 60))
+            k = int(rng.integers(len(truth) - left))
+            while last is not None and math.dist(truth[k][:2], truth[last][:2]) < FAR:
+                k = int(rng.integers(len(truth) - left))
+        yield k, is_carried
+        k, left, last = k + 1, left - 1, k
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--storeys", type=int, default=20)
@@ -149,7 +207,16 @@ def main() -> None:
     parser.add_argument("--sensor", default="lms181")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--rate", type=float, default=5.0, help="scans a second")
+    parser.add_argument("--real", action="store_true", help="real logs instead")
     options = parser.parse_args()
+    if options.real:
+        print(
+            "| log | located | wrong | carried: located | wrong | kidnapped | noticed at once "
+            "| no wrong pose |\n|---|--:|--:|--:|--:|--:|--:|--:|"
+        )
+        for name in LOGS:
+            print(real(name), flush=True)
+        return
     drive = partial(kidnapped, sensor=options.sensor, rate=options.rate, times=options.times)
     seeds = range(options.seed, options.seed + options.storeys)
     with ProcessPoolExecutor(options.workers) as pool:
