@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -38,6 +38,17 @@ def during(doing: str) -> Iterator[None]:
         where = f"{Path(frame.filename).name}:{frame.lineno}"
         problem = f"{doing}: raised {type(error).__name__}: {error} ({where})"
         raise AssertionError(one_line(shortened(problem))) from error
+
+
+def claim_raises(kind: type[Exception], call: Callable[[], object], doing: str) -> None:
+    """Raise an AssertionError unless a call raises an error of this kind, of one line."""
+    try:
+        call()
+    except kind as error:
+        is_line = str(error) and str(error).isprintable()
+        claim(is_line, f"{doing}: {kind.__name__} is not one line")
+    else:
+        claim(False, f"{doing} is no {kind.__name__}")
 
 
 @contextmanager

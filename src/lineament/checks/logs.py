@@ -21,7 +21,7 @@ from ..files import StrPath
 from ..logs import Log
 from ..logs.base import Topic
 from ..scan import LaserScan
-from .claims import claim, during, taking_turns, without_warnings
+from .claims import claim, claim_raises, during, taking_turns, without_warnings
 
 #: Opens a log by its path; ``keep_going=True`` has it skip what is faulty.
 Reader = Callable[..., Log]
@@ -127,9 +127,9 @@ def _read_in_every_way(opened: Callable[..., Log]) -> Words:
     for topic in log.topics:
         with during(f"topic {topic!r}"):
             claim(topic in dict(items), "has no scans")
-    _raises(IndexError, lambda: log[n], f"log[{n}]")
-    _raises(LogError, lambda: log.scan(-1), "log.scan(-1)")
-    _raises(LogError, lambda: log.scan(n), f"log.scan({n})")
+    claim_raises(IndexError, lambda: log[n], f"log[{n}]")
+    claim_raises(LogError, lambda: log.scan(-1), "log.scan(-1)")
+    claim_raises(LogError, lambda: log.scan(n), f"log.scan({n})")
     middle = n // 2
     ways: dict[str, Callable[[], object]] = {
         "a second reading": lambda: _words(log),
@@ -137,8 +137,8 @@ def _read_in_every_way(opened: Callable[..., Log]) -> Words:
             _words_of(scan) for scan, _ in zip_longest(log, log, fillvalue=items[0][1])
         ],
         "a slice": lambda: [_words_of(scan) for scan in (*log[:middle], *log[middle:])],
-        "indices": lambda: [*whole[:-1], _words_of(log[-1])],
-        "scan": lambda: [*map(_words_of, (log.scan(0), log[0]))][:1] + whole[1:],
+        "an index": lambda: [*whole[:-1], _words_of(log[-1])],
+        "scan": lambda: [_words_of(log.scan(0)), *whole[1:]],
         "a copy": lambda: _words(copy.copy(log)),
         "a pickled copy": lambda: _words(pickle.loads(pickle.dumps(log))),
         "keep_going": lambda: _words(opened(keep_going=True)),
@@ -151,15 +151,6 @@ def _read_in_every_way(opened: Callable[..., Log]) -> Words:
         found = list(pool.map(_words, [log] * _THREADS))
         claim(found == [whole] * _THREADS, "that read one log get other scans")
     return whole
-
-
-def _raises(kind: type[Exception], call: Callable[[], object], doing: str) -> None:
-    try:
-        call()
-    except kind as error:
-        claim(str(error).isprintable(), f"{doing}: {kind.__name__} is not one line")
-    else:
-        claim(False, f"{doing} is no {kind.__name__}")
 
 
 def _problem(scan: object) -> str:
