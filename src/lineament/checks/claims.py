@@ -1,4 +1,4 @@
-"""How a check says what broke: one line, by an AssertionError, also under ``python -O``."""
+"""How a check says what broke: by an AssertionError of one line, also under ``python -O``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,20 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..errors import LineamentWarning, one_line, shortened
+from ..scan import LaserScan
+
+#: What is compared of a scan besides its arrays.
+_OF_SCANS = (
+    *("stamp_ns", "frame_id", "pose"),
+    *("range_min", "range_max", "scan_time", "time_increment"),
+)
 
 
 def claim(holds: object, problem: str) -> None:
@@ -70,3 +81,17 @@ def taking_turns() -> Iterator[None]:
         yield
     finally:
         sys.setswitchinterval(before)
+
+
+def words_of(value: Any) -> object:
+    """Return a value so that it can be compared; NaN is equal to NaN."""
+    if isinstance(value, LaserScan):
+        arrays = map(words_of, (value.ranges, value.angles, value.intensities))
+        return repr([getattr(value, name) for name in _OF_SCANS]), *arrays
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, Iterator | list | tuple):
+        return tuple(map(words_of, value))
+    if is_dataclass(value):
+        return tuple(words_of(getattr(value, field.name)) for field in fields(value))
+    return repr(value) if isinstance(value, float) else value

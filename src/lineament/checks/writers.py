@@ -21,6 +21,7 @@ from ..output import ENDINGS, Writer, open_writer
 from ..scan import LaserScan
 from .claims import claim, claim_raises, during, without_warnings
 from .scans import plain_scans
+from .sound import ends_of
 
 #: Makes a writer of a file, as a subclass of `Writer` does.
 Maker = Callable[..., Writer]
@@ -130,13 +131,9 @@ def _appears_whole(make: Maker, path: Path, found: Found, read: Reading | None) 
         if read is not None:
             with during("read again"):
                 ends = read(path)
-                own = np.vstack([_ends_of(features) for features, _ in found])
+                own = np.vstack([ends_of(features) for features, _ in found])
                 same = ends is None or (len(ends) == len(own) and np.allclose(ends, own))
                 claim(same, "the segments are not those that were written")
-
-
-def _ends_of(features: Features) -> Any:
-    return np.hstack((features["segments"]["start"], features["segments"]["end"]))
 
 
 def _takes_nothing(make: Maker, path: Path, _: Found) -> None:
