@@ -5,7 +5,6 @@ from typing import Any
 
 import click
 
-from .mapping import LAYERS, UNITS
 from .options import (
     HUSH,
     LOG,
@@ -19,10 +18,11 @@ from .options import (
     check_ending,
     make_extractor,
     methods_option,
+    of_plan,
+    on_robot,
     reading,
     wrong_usage,
 )
-from .options import on_robot as of_scanners
 
 
 @click.command()
@@ -107,9 +107,8 @@ def plot(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
 @click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
-@LAYERS
-@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
-@of_scanners
+@of_plan
+@on_robot
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(

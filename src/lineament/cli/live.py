@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .mapping import UNITS
 from .options import (
     LASER_POSE,
     LIMITS,
@@ -22,6 +21,7 @@ from .options import (
     SCALE_HELP,
     SET,
     TEXT_PATH,
+    UNIT,
     complain,
     mountings,
     settings_of,
@@ -87,7 +87,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Make a map, and write it at the end: .dxf, .svg, .parquet or .yaml.",
 )
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
-@click.option("--units", type=UNITS, help="Units of the plan.  [default: those that it names]")
+@click.option("--units", type=UNIT, help="Units of the plan.  [default: those that it names]")
 @click.option(
     "--odometry", metavar="TOPIC", help="Odometry of the robot on the plan.  [default: /tf]"
 )

@@ -65,11 +65,12 @@ LASER_POSE = click.option(
 )
 
 
-def _sectors(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[tuple[float, float], ...],
-) -> tuple[tuple[float, float], ...]:
+def _turned_into(convert: Callable[[Any], Any]) -> Callable[[Any, Any, Any], Any]:
+    """Return the callback of an option whose value a function of it alone converts."""
+    return lambda _context, _option, given: convert(given)
+
+
+def _sectors(given: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     from ..scan.changes import checked_mask
 
     with wrong_usage():
@@ -82,17 +83,13 @@ MASK = click.option(
     nargs=2,
     multiple=True,
     metavar="FROM TO",
-    callback=_sectors,
+    callback=_turned_into(_sectors),
     help="Leave out the beams from one bearing counter-clockwise to another [rad], such as those "
     "that see the robot itself; may be given again.",
 )
 
 
-def _mountings(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[str, ...],
-) -> dict[str, tuple[float, float, float]]:
+def _mountings(given: tuple[str, ...]) -> dict[str, tuple[float, float, float]]:
     found = {}
     for topic, value in map(_split, given):
         try:
@@ -110,7 +107,7 @@ _MOUNTINGS = click.option(
     "mountings",
     multiple=True,
     metavar="TOPIC=X,Y,DEGREES",
-    callback=_mountings,
+    callback=_turned_into(_mountings),
     help="Where the scanner of a topic is on the robot [m, m, °]; may be given again."
     "  [default: as in /tf_static]",
 )
@@ -119,11 +116,9 @@ _UNSURE = click.option(
     type=click.FloatRange(min=0),
     nargs=2,
     metavar="METRES DEGREES",
-    callback=lambda _context, _option, given: given and (given[0], math.radians(given[1])),
+    callback=_turned_into(lambda given: given and (given[0], math.radians(given[1]))),
     help="How well mountings are known, a standard deviation.  [default: 0.01 0.5]",
 )
-
-
 BASE_FRAME = click.option(
     "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
 )
@@ -139,14 +134,27 @@ def on_robot(command: F) -> F:
     return _MOUNTINGS(BASE_FRAME(command))
 
 
+UNIT = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
+_UNITS = click.option(
+    "--units", type=UNIT, help="Of the DXF.  [default: those that it names, or m]"
+)
+_LAYERS = click.option(
+    "--layers",
+    metavar="NAMES",
+    callback=_turned_into(lambda names: names.split(",") if names else None),
+    help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
+)
+
+
+def of_plan(command: F) -> F:
+    """Add the options of how a plan is read that is a DXF: `layers` and `units`."""
+    return _LAYERS(_UNITS(command))
+
+
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
-def _limits(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[str, ...],
-) -> dict[str, int] | None:
+def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
     with wrong_usage():
@@ -167,7 +175,7 @@ LIMITS = click.option(
     "limits",
     metavar="NAME=VALUE",
     multiple=True,
-    callback=_limits,
+    callback=_turned_into(_limits),
     help="Another limit of what is read, such as beams=200000; may be given again.",
 )
 
@@ -234,11 +242,22 @@ reading_topics = _reading(
 )
 
 
-def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = False) -> None:
-    """Refuse a file whose ending is not one of these, before anything is computed for it."""
-    if output.suffix.lower() not in endings:
+def check_ending(output: Path | None, endings: Iterable[str], *, or_folder: bool = False) -> None:
+    """Refuse a file, if given, with another ending, before anything is computed for it."""
+    if output is not None and output.suffix.lower() not in endings:
         wanted = "a folder or an ending" if or_folder else "an ending"
         raise click.UsageError(f"{output}: expected {wanted} of {', '.join(endings)}")
+
+
+#: Formats that hold features alone; the others show scans at their poses.
+_TABLES = (".parquet", ".csv", ".jsonl")
+WORLD = click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
+
+
+def check_world(world: bool, ending: str) -> None:
+    """Refuse features in the world for a format that draws scans."""
+    if world and ending not in _TABLES:
+        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
 
 
 @contextmanager
@@ -283,10 +302,7 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
 
     name = DEFAULT_METHOD if method is None else method
     with wrong_usage():
-        return Extractor(
-            get_method(name, **settings_of(settings)),
-            noise=noise,
-        )
+        return Extractor(get_method(name, **settings_of(settings)), noise=noise)
 
 
 def extracting(command: Callable[..., None]) -> Callable[..., None]:
