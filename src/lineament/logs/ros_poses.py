@@ -10,11 +10,11 @@ import numpy as np
 
 from ..errors import one_line, warn
 from ..limits import LIMITS, Limits
-from ..rosmsg.frames import frame_of
+from ..rosmsg.frames import Place, chained, frame_of
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.wire import Buffer
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import carried, compose
+from ..scan.poses import carried
 from .ros_bag import Connection
 
 #: The topic of the frames that do not move in each other.
@@ -160,20 +160,16 @@ class PoseFinder:
     def _pose(
         self, stamp: float, mounting: Iterable[StampedPose]
     ) -> tuple[Pose | None, Array | None]:
-        pose, covariance, side = (0.0, 0.0, 0.0), None, 1
+        places, covariance = [], None
         for track in self._tracks.values():
-            link = track.at(stamp)
-            if link is None:
+            known = track.at(stamp)
+            if known is None:
                 return None, None
-            # Only messages that are no links have a covariance.
-            (x, y, theta), covariance = link
-            pose = compose(pose, (x, side * y, side * theta))
-            side = -side if track.is_upside_down else side
-        body = pose
-        for fixed in mounting:
-            x, y, theta = fixed.pose
-            pose = compose(pose, (x, side * y, side * theta))
-            side = -side if fixed.is_upside_down else side
+            pose, covariance = known  # only messages that are no links have a covariance
+            places.append(Place(pose, track.is_upside_down))
+        body = chained(places).pose
+        places += [Place(link.pose, link.is_upside_down) for link in mounting]
+        pose = chained(places).pose
         if covariance is not None and pose != body:
             covariance = carried(covariance, body, pose)
         return pose, covariance
