@@ -42,11 +42,6 @@ _MANY = 20
 CHANGEABLE = ("method", "parameters", "noise", "scale", "stamp", "mask")
 
 
-def time_of(scan: LaserScan) -> tuple[int, int]:
-    """Seconds and nanoseconds of the stamp of a scan, clipped to what a message can hold."""
-    return stamp_of(scan.stamp_ns)
-
-
 def stamp_of(nanoseconds: int) -> tuple[int, int]:
     """Seconds and nanoseconds of a time, clipped to what a message can hold."""
     return divmod(min(max(nanoseconds, 0), _LATEST), NANO)

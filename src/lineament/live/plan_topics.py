@@ -60,10 +60,10 @@ class PlanTopics:
     messages : RosMessages
         Makes the messages.
     config : LiveConfig
-        The pose of the scanner goes to ``TOPIC/pose``. That of the robot goes to ``amcl_pose``, and
-        the transform from `map_frame` to `odom_frame` to ``/tf``, the walls of a map that is made
-        to ``TOPIC/plan``; or the verdict on each pose of
-        the topic `judge` to ``JUDGE/verdict``, and where it is wrong ours to ``JUDGE/ours``.
+        The pose of the scanner goes to ``TOPIC/pose``, the walls of a map that is made to
+        ``TOPIC/plan``. The pose of the robot goes to ``amcl_pose``, and the transform from
+        `map_frame` to `odom_frame` to ``/tf``; or the verdict on each pose of the topic `judge` to
+        ``JUDGE/verdict``, and where it is wrong ours to ``JUDGE/ours``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
