@@ -71,15 +71,15 @@ class PlanTopics:
         self._pose = f"{config.scan_topic}/pose"
         self._frame: Frame | None = None
         self._statuses: list[Status] = []
-        self._topics = {self._pose: _PLACED}
+        topics = {self._pose: _PLACED}
         if (judged := config.judge_topic) is not None:
-            self._topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
+            topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
         elif config.is_broadcasting:
-            self._topics["/tf"] = "tf2_msgs/TFMessage"
+            topics["/tf"] = "tf2_msgs/TFMessage"
         self._walls = f"{config.scan_topic}/plan"
         if config.mapping is not None:
-            self._topics[self._walls] = "visualization_msgs/MarkerArray"
-        for topic, kind in self._topics.items():
+            topics[self._walls] = "visualization_msgs/MarkerArray"
+        for topic, kind in topics.items():
             publisher.advertise(topic, messages.kind(kind))
         if judged is None:  # As of AMCL, whose listeners ask for the last one.
             publisher.advertise(

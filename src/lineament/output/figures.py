@@ -229,18 +229,6 @@ def corner_figure(
     return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, dark, None)
 
 
-def plot_map(
-    posed: Iterable[tuple[Pose, Features]],
-    path: str | os.PathLike[str],
-    title: str = "Map",
-    *,
-    dark: bool = False,
-) -> None:
-    """Write the picture that `map_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file."""
-    canvas.check_ending(path)
-    canvas.save(map_figure(posed, title, dark=dark), path)
-
-
 def map_figure(
     posed: Iterable[tuple[Pose, Features]], title: str = "Map", *, dark: bool = False
 ) -> Figure:
