@@ -1,4 +1,4 @@
-"""The commands. Each imports what it calls when it runs: ``--help`` stays quick."""
+"""Commands that show things. Each imports what it calls when it runs: ``--help`` stays quick."""
 
 from pathlib import Path
 from typing import Any

@@ -38,7 +38,7 @@ class FloorPlan:
     Attributes
     ----------
     every : int
-        Walls are those of every so manieth scan: of all, but for logs of more than `MOST_SEGMENTS`.
+        Walls are those of one scan in so many: of all, but for logs of more than `MOST_SEGMENTS`.
     """
 
     def __init__(self) -> None:

@@ -84,8 +84,7 @@ def extract_log(
     track : callable
         ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
-        As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
-        ``limits``, ``scale``.
+        As for `lineament.open_log`.
 
     Raises
     ------

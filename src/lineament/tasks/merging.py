@@ -158,6 +158,8 @@ def merge_log(
     LineamentError
         If the log cannot be read, has no such topic, does not say where a scanner is, or a scanner
         has no scans at the times of the first; or the output cannot be written.
+    ValueError
+        If they are to be in the world, but the output draws scans.
 
     Examples
     --------
