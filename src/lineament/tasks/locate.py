@@ -228,7 +228,8 @@ def draw(
     located = [np.array(where.pose[:2]) for where in places if where]
     plot_walls(
         plan.ends,
-        *(plan.columns["center"], plan.columns["radius"], picture),
+        plan.columns,
+        picture,
         title=title,
         about=about,
         ways={name: np.reshape(steps, (-1, 2, 2)) for name, steps in ways.items()},
