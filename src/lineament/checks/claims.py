@@ -18,7 +18,7 @@ from ..scan import LaserScan
 
 #: What is compared of a scan besides its arrays.
 _OF_SCANS = (
-    *("stamp_ns", "frame_id", "pose"),
+    *("stamp_ns", "stamp_beam", "frame_id", "pose"),
     *("range_min", "range_max", "scan_time", "time_increment"),
 )
 
