@@ -98,7 +98,8 @@ PAGE_DPI, PAGE_WIDTH = 200, 9.0
 #: `_OUT_OF_SHAPE` has its shorter side drawn larger, by a round factor.
 _LEAST_SHAPE, _LARGEST_SHAPE, _OUT_OF_SHAPE = 0.4, 1.4, 3.0
 _FEW = 9
-_FACTORS = [step * 10.0**power for power in range(9) for step in (1, 2, 5)]
+#: Round numbers: of scales, of factors, and of lengths of bars.
+ROUND = [step * 10.0**power for power in range(-4, 11) for step in (1, 2, 5)]
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
@@ -276,7 +277,7 @@ def _aspect(extent: Array) -> float:
     excess = max(_LEAST_SHAPE / shape, shape / _LARGEST_SHAPE)
     if excess < _OUT_OF_SHAPE:
         return 1.0
-    factor = max(factor for factor in _FACTORS if factor <= excess)
+    factor = max(factor for factor in ROUND if factor <= excess)
     return factor if shape < 1 else 1 / factor
 
 

@@ -16,10 +16,10 @@ from ..features import Features
 from ..logs import Log, open_log
 from ..methods import DEFAULT_METHOD, Method
 from ..output import canvas, drawing
-from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
+from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, ROUND, count
 from ..output.markers import Markers, markers_of
 from ..output.markup import escape
-from ..output.svg import ROUND, layers
+from ..output.svg import layers
 from ..scan import Array, LaserScan, NoiseLike
 
 if TYPE_CHECKING:
