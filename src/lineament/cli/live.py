@@ -14,16 +14,14 @@ from .options import (
     LASER_POSE,
     LIMITS,
     MASK,
-    METHOD,
-    NOISE,
     PATH,
     QUIET,
     SCALE_HELP,
-    SET,
     TEXT_PATH,
     UNIT,
     complain,
     mountings,
+    of_method,
     settings_of,
     wrong_usage,
 )
@@ -62,9 +60,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     "--reliability", type=_RELIABILITIES, help="Of the subscription.  [default: best-effort]"
 )
 @click.option("--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.")
-@METHOD
-@SET
-@NOISE
+@of_method
 @click.option(
     "--deskew",
     metavar="off|scans|poses|TOPIC",

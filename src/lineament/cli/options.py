@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..extractor import Extractor
 
 F = TypeVar("F", bound=Callable[..., Any])
+_Command = Callable[..., None]
 
 
 class Place(click.Path):
@@ -157,17 +158,13 @@ _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of t
 def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
+    found: dict[str, Any] = dict(map(_split, given))
+    for name, value in found.items():
+        with suppress(ValueError):  # `Limits` refuses what is no number.
+            found[name] = int(value)
     with wrong_usage():
-        found = {name: _whole(name, value) for name, value in map(_split, given)}
         Limits.of(found)
     return found or None
-
-
-def _whole(name: str, value: str) -> int:
-    try:
-        return int(value)
-    except ValueError:
-        raise ValueError(f"limit {name} is {value!r}, expected a whole number") from None
 
 
 LIMITS = click.option(
@@ -203,10 +200,8 @@ _READING = (
 )  # fmt: skip
 
 
-def _reading(
-    poses: Callable[[Any], Any], topic: Callable[[Any], Any] = TOPIC
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    def adding(command: Callable[..., None]) -> Callable[..., None]:
+def _reading(poses: Any, topic: Any = TOPIC) -> Callable[[_Command], _Command]:
+    def adding(command: _Command) -> _Command:
         """Add the options of a log; the command gets them as ``open_log(log, **reading)``."""
 
         @wraps(command)
@@ -269,7 +264,25 @@ def wrong_usage() -> Iterator[None]:
         raise click.UsageError(str(error)) from None
 
 
-METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+_METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+_SET = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A parameter of the method; may be given again.",
+)
+_NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+
+
+def of_method(command: F) -> F:
+    """Add the options of a method: `method`, `settings`, `noise`."""
+    return _METHOD(_SET(_NOISE(command)))
 
 
 def methods_option(about: str) -> Callable[[F], F]:
@@ -277,22 +290,9 @@ def methods_option(about: str) -> Callable[[F], F]:
     return click.option("-m", "--method", "methods", multiple=True, help=about)
 
 
-METHODS = methods_option(
-    "Name of the method; may be given again, side by side.  [default: optimal]"
-)
-SET = click.option(
-    "--set",
-    "settings",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="A parameter of the method; may be given again.",
-)
-NOISE = click.option(
-    "--noise",
-    type=click.FloatRange(min=0),
-    metavar="SIGMA",
-    help="Noise of the ranges [m].  [default: estimated from each scan]",
-)
+def of_methods(about: str) -> Callable[[F], F]:
+    """Add the options of several methods: `methods`, `settings`, `noise`."""
+    return lambda command: methods_option(about)(_SET(_NOISE(command)))
 
 
 def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
@@ -305,7 +305,7 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
         return Extractor(get_method(name, **settings_of(settings)), noise=noise)
 
 
-def extracting(command: Callable[..., None]) -> Callable[..., None]:
+def extracting(command: _Command) -> _Command:
     """Add the options of a method; the command gets the extractor that they ask for."""
 
     @wraps(command)
@@ -314,7 +314,7 @@ def extracting(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         command(extractor=make_extractor(method, settings, noise), **given)
 
-    return METHOD(SET(NOISE(making)))
+    return of_method(making)
 
 
 def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:
