@@ -88,7 +88,7 @@ def hostile() -> dict[str, tuple[ln.LaserScan, Features]]:
 def test_endings(tmp_path, ending, start):
     path, files = tmp_path / f"a{ending}", []
     for _ in range(2):
-        figures.plot_map([((0.0, 0.0, 0.0), room()[1])], path)
+        canvas.save(figures.map_figure([((0.0, 0.0, 0.0), room()[1])]), path)
         files.append(path.read_bytes())
     assert files[0].startswith(start)
     assert files[0] == files[1]
@@ -197,7 +197,7 @@ def test_dark_figures_have_light_marks(drawn):
         for figure in (
             drawn(figures.plot_scan, scan, {"a": features}, title="A", dark=dark),
             drawn(stages.plot_trace, trace_of(scan, features), title="A", dark=dark),
-            drawn(figures.plot_map, [((0.0, 0.0, 0.0), features)], title="A", dark=dark),
+            figures.map_figure([((0.0, 0.0, 0.0), features)], "A", dark=dark),
         ):
             assert to_hex(figure.get_facecolor()) == theme.paper
             for axes in figure.axes:
@@ -314,8 +314,8 @@ def test_hostile_scans_are_drawn(tmp_path, case, monkeypatch):
     for plot in (
         lambda: figures.plot_scan(scan, {"liu": features}, path),
         lambda: stages.plot_trace(trace_of(scan, features), path),
-        lambda: figures.plot_map([((0.0, 0.0, 0.0), features)], path),
-        lambda: figures.plot_map([], path),
+        lambda: canvas.save(figures.map_figure([((0.0, 0.0, 0.0), features)]), path),
+        lambda: canvas.save(figures.map_figure([]), path),
     ):
         plot()
         assert matplotlib.image.imread(path)[..., :3].std() > 0.01, "blank"
@@ -337,7 +337,7 @@ def test_wrong_arguments(tmp_path):
     ending = r"the ending '\.gif' is not known, expected one of \.png, \.svg, \.pdf"
     for name, problem in (("a.gif", ending), ("a", "has no ending"), ("no/a.png", "not exist")):
         with pytest.raises(LineamentError, match=problem):
-            figures.plot_map([], tmp_path / name)
+            figures.plot_scan(scan, {"a": features}, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 

@@ -9,6 +9,7 @@ from text_logs import flaser, robotlaser
 from lineament import LaserScan
 from lineament.logs import LogInfo, info, open_log, save_npz, summarize
 from lineament.logs.base import Topic
+from lineament.rosmsg.poses import POSE_TYPES, TRANSFORMS
 
 
 @pytest.fixture
@@ -160,13 +161,15 @@ def test_several_topics(write):
     assert lines.count("topic    ROBOTLASER1") == 1
 
 
-def test_what_holds_poses_is_named(summary):
+@pytest.mark.parametrize("kind", [*POSE_TYPES, *TRANSFORMS])
+def test_what_holds_poses_is_named(summary, kind):
     (topic,) = summary([LaserScan([1.0], 0.0, 0.1)]).topics
     scan = Topic("/scan", "sensor_msgs/LaserScan", 1, 2)
-    lines = LogInfo("a.bag", "rosbag1", (topic,), (scan, Topic("/odom", "x/Odometry", 7))).lines()
+    lines = LogInfo("a.bag", "rosbag1", (topic,), (scan, Topic("/odom", kind, 7))).lines()
+    width = max(len(kind), len(scan.type))
     assert lines[1:3] == [
-        "holds    /scan  sensor_msgs/LaserScan  1, 2 publishers",
-        "         /odom  x/Odometry             7",
+        f"holds    /scan  {scan.type:<{width}}  1, 2 publishers",
+        f"         /odom  {kind:<{width}}  7",
     ]
     assert lines[-1] == "         poses are in /odom: choose with --poses"
     many = tuple(Topic(f"/t{i}", "x/Y", 1) for i in range(25))

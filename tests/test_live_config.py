@@ -150,18 +150,17 @@ BOUNDS = {"depth": (1, 1000), "rate": (0, 1e6), "noise": (0, 1000), "scale": (1e
 FRACTIONS = "rate", "noise", "transform_tolerance", "tolerance"
 TIMES_AND_SIZES = {
     "counters": {"_MOST": 4096},
-    "dds": {"NANO": 10**9, "PATIENCE": 10**6, "MOST_PUBLISHERS": 1000},
+    "dds": {"PATIENCE": 10**6, "MOST_PUBLISHERS": 1000},
     "foxglove": {"_BACKLOG": 64},
     "frames": {"_MOST_FRAMES": 1000, "_MOST_POSES": 1000, "GAP": 0.5, "LATE": 0.2,
                "_SET_BACK": 1.0},
-    "merging": {"_MANY": 20},
-    "localiser": {"_MOST_SCANNERS": 8, "_MANY": 20, "_SENT": 50},
+    "localiser": {"_MOST_SCANNERS": 8, "_SENT": 50},
     "node": {"_WAIT": 0.1, "_EACH": 1.0, "_PATIENCE": 2.0, "_MOST_FAULTY": 64},
     "participant": {"LAST_DOMAIN": 232},
     "pipeline": {"_LATEST": 2147483647_999999999, "_MOST_PUBLISHERS": 8, "_OLDEST": 0.5,
-                 "_LONGEST": 1.0, "_MANY": 20},
+                 "_LONGEST": 1.0},
     "raw_dds": {"_DATA": 2},
-    "received": {"_MOST_PUBLISHERS": 64, "FARTHEST": 1e9},
+    "received": {"MANY": 20, "_MOST_PUBLISHERS": 64, "FARTHEST": 1e9},
     "replay": {"_LEAP": 10.0, "_STEP": 0.1, "_PUNCTUAL": 0.01, "_MOST": 64},
     "ros1": {"_PATIENCE": 3.0, "_LEAP": 10000},
 }  # fmt: skip

@@ -22,7 +22,7 @@ import lineament as ln
 from lineament.cli import cli
 from lineament.errors import LineamentError
 from lineament.live import LiveConfig, Pipeline
-from lineament.live.pipeline import time_of
+from lineament.live.pipeline import stamp_of
 from lineament.live.plan_topics import PlanTopics
 from lineament.live.received import LINKS, MOUNTINGS, SCAN, wanted
 from lineament.logs import save_log
@@ -140,7 +140,7 @@ def test_a_node_publishes_poses_and_walls_and_saves_the_map(tmp_path):
             pipeline.hear([StampedPose(scan.stamp, "odom", "base_link", base)], LINKS)
             bare = scan.with_pose(None)
             frame = pipeline("scanner", bare)
-            topics.publish(frame, Moment(*time_of(bare), "laser", "odom"))
+            topics.publish(frame, Moment(*stamp_of(bare.stamp_ns), "laser", "odom"))
             return frame
 
         for k, scan in enumerate(scans):

@@ -334,7 +334,7 @@ def test_ellipses_that_a_diamond_hides_are_not_drawn(scan, pixels, shown):
 @pytest.mark.parametrize("size", [0.02, 1.0, 200.0, 1e6])
 def test_scans_of_any_size_fill_their_picture(size):
     ranges = size * np.array(room(RING, BOX))
-    svg = notebook.svg(ln.LaserScan(ranges, **FRAME))
+    svg = notebook.svg(ln.LaserScan(ranges, **FRAME), features(len(ranges)))
     points = np.array(re.findall(r"M([-\d.]+) ([-\d.]+)h0", svg), float)
     assert np.ptp(points, axis=0).max() > 350
     length = float(re.search(r">([\d.e+-]+) m", svg)[1])

@@ -17,6 +17,7 @@ from lineament.cli import run
 from lineament.logs import open_log, save_npz
 from lineament.mapping import LineMap
 from lineament.simulation import SENSORS, drive, room
+from lineament.tasks.bulk import Manifest
 from lineament.tasks.extract import extract_log, in_world
 
 POSE, SPREAD = (3.0, -1.0, 2.5), np.array([[4, 1, 0.5], [1, 9, -0.6], [0.5, -0.6, 1.0]]) * 1e-4
@@ -118,6 +119,8 @@ def test_many_logs_in_the_world(tmp_path, log):
     assert before.schema.equals(after.schema)
     assert after.num_rows < before.num_rows
     assert 3 not in set(after["scan"].to_pylist())
+    (row,) = Manifest(out).rows.values()
+    assert row.unplaced == sum(scan.pose is None for scan in open_log(log)) > 0
 
 
 def test_the_world_needs_poses_and_a_table(tmp_path, log, refused):

@@ -21,13 +21,13 @@ from ..files import StrPath
 from ..logs import Log
 from ..logs.base import Topic
 from ..scan import LaserScan
-from .claims import claim, during, taking_turns, without_warnings
+from .claims import claim, claim_raises, during, taking_turns, without_warnings, words_of
 
 #: Opens a log by its path; ``keep_going=True`` has it skip what is faulty.
 Reader = Callable[..., Log]
 
 #: Scans, each so that it can be compared.
-Words = list[tuple[object, ...]]
+Words = list[object]
 
 _THREADS = 4
 
@@ -100,23 +100,15 @@ def check_log(
                 _damaged(reader, path)
 
 
-def _words_of(scan: LaserScan) -> tuple[object, ...]:
-    """Return what a scan is, so that it can be compared."""
-    numbers = scan.range_min, scan.range_max, scan.scan_time, scan.time_increment
-    arrays = (scan.ranges, scan.angles, *(() if scan.intensities is None else [scan.intensities]))
-    stamp, frame = scan.stamp_ns, scan.frame_id
-    return stamp, frame, scan.pose, *numbers, *(array.tobytes() for array in arrays)
-
-
 def _words(log: Log) -> Words:
-    return [_words_of(scan) for scan in log]
+    return [words_of(scan) for scan in log]
 
 
 def _read_in_every_way(opened: Callable[..., Log]) -> Words:
     """Return the scans of a log without faults."""
     log = opened()
     items, n = list(log.items()), len(log)
-    whole = [_words_of(scan) for _, scan in items]
+    whole = [words_of(scan) for _, scan in items]
     claim(n > 0, "has no scans: they are few to check")
     claim(len(items) == n, f"len is {n}, and {len(items)} scans come")
     for k, (topic, scan) in enumerate(items):
@@ -127,18 +119,18 @@ def _read_in_every_way(opened: Callable[..., Log]) -> Words:
     for topic in log.topics:
         with during(f"topic {topic!r}"):
             claim(topic in dict(items), "has no scans")
-    _raises(IndexError, lambda: log[n], f"log[{n}]")
-    _raises(LogError, lambda: log.scan(-1), "log.scan(-1)")
-    _raises(LogError, lambda: log.scan(n), f"log.scan({n})")
+    claim_raises(IndexError, lambda: log[n], f"log[{n}]")
+    claim_raises(LogError, lambda: log.scan(-1), "log.scan(-1)")
+    claim_raises(LogError, lambda: log.scan(n), f"log.scan({n})")
     middle = n // 2
     ways: dict[str, Callable[[], object]] = {
         "a second reading": lambda: _words(log),
         "two readings at once": lambda: [
-            _words_of(scan) for scan, _ in zip_longest(log, log, fillvalue=items[0][1])
+            words_of(scan) for scan, _ in zip_longest(log, log, fillvalue=items[0][1])
         ],
-        "a slice": lambda: [_words_of(scan) for scan in (*log[:middle], *log[middle:])],
-        "indices": lambda: [*whole[:-1], _words_of(log[-1])],
-        "scan": lambda: [*map(_words_of, (log.scan(0), log[0]))][:1] + whole[1:],
+        "a slice": lambda: [words_of(scan) for scan in (*log[:middle], *log[middle:])],
+        "an index": lambda: [*whole[:-1], words_of(log[-1])],
+        "scan": lambda: [words_of(log.scan(0)), *whole[1:]],
         "a copy": lambda: _words(copy.copy(log)),
         "a pickled copy": lambda: _words(pickle.loads(pickle.dumps(log))),
         "keep_going": lambda: _words(opened(keep_going=True)),
@@ -151,15 +143,6 @@ def _read_in_every_way(opened: Callable[..., Log]) -> Words:
         found = list(pool.map(_words, [log] * _THREADS))
         claim(found == [whole] * _THREADS, "that read one log get other scans")
     return whole
-
-
-def _raises(kind: type[Exception], call: Callable[[], object], doing: str) -> None:
-    try:
-        call()
-    except kind as error:
-        claim(str(error).isprintable(), f"{doing}: {kind.__name__} is not one line")
-    else:
-        claim(False, f"{doing} is no {kind.__name__}")
 
 
 def _problem(scan: object) -> str:
@@ -196,7 +179,7 @@ def _until_error(reader: Reader, path: Path, keep: bool) -> tuple[Words, str, in
         for scan in log:
             problem = _problem(scan)
             claim(not problem, f"scan {len(scans)}: {problem}")
-            scans.append(_words_of(scan))
+            scans.append(words_of(scan))
     except LogError as error:
         line = str(error)
         claim(line.isprintable() and len(line) < 2000, f"the error is not one line: {line!r:.200}")

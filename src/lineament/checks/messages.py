@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from random import Random
 from typing import Any
@@ -14,8 +13,7 @@ import numpy as np
 from ..rosmsg.poses import POSE_TYPES, odometry, stamped_poses
 from ..rosmsg.scans import decoders
 from ..rosmsg.wire import WireWriter
-from ..scan import LaserScan
-from .claims import claim, during, without_warnings
+from .claims import claim, during, without_warnings, words_of
 
 #: What a length or a number must not be believed to be.
 _WORDS = (0, 1, 255, 2**16, 2**28, 2**31 - 1, 2**31, 2**32 - 1, 0x7F800001, 0x7FC00000)
@@ -84,9 +82,9 @@ def check_message(
 
 def _decoded(decode: Decoder, data: bytes, encoding: str, tries: int) -> object:
     """Return what a whole message gives."""
-    whole = _words_of(decode(data, encoding))
-    claim(_words_of(decode(data, encoding)) == whole, "the same bytes give another value")
-    claim(_words_of(decode(memoryview(data), encoding)) == whole, "a memoryview gives another one")
+    whole = words_of(decode(data, encoding))
+    claim(words_of(decode(data, encoding)) == whole, "the same bytes give another value")
+    claim(words_of(decode(memoryview(data), encoding)) == whole, "a memoryview gives another one")
     for size in range(len(data)):
         with during(f"cut off after {size} of {len(data)} bytes"):
             given = _given(decode, data[:size], encoding)
@@ -104,7 +102,7 @@ def _decoded(decode: Decoder, data: bytes, encoding: str, tries: int) -> object:
 def _given(decode: Decoder, data: bytes, encoding: str) -> object:
     """Return what comes of a damaged message, None if it is a ValueError."""
     try:
-        return _words_of(decode(data, encoding))
+        return words_of(decode(data, encoding))
     except ValueError as error:
         claim(str(error).isprintable(), "the ValueError is not one line")
         claim(type(error) is ValueError, f"raised {type(error).__name__}: {error}")
@@ -124,21 +122,6 @@ class _little_memory:  # noqa: N801  (as contextlib's)
             most = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
             claim(kind or most < _MOST, f"a damaged message of a few bytes takes {most >> 20} MB")
-
-
-def _words_of(value: Any) -> object:
-    """Return a value so that it can be compared; NaN is equal to NaN."""
-    if isinstance(value, LaserScan):
-        numbers = value.range_min, value.range_max, value.scan_time, value.time_increment
-        arrays = map(_words_of, (value.ranges, value.angles, value.intensities))
-        return value.stamp_ns, value.frame_id, repr(numbers), *arrays
-    if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, value.tobytes()
-    if isinstance(value, Iterator | list | tuple):
-        return tuple(map(_words_of, value))
-    if is_dataclass(value):
-        return tuple(_words_of(getattr(value, field.name)) for field in fields(value))
-    return repr(value) if isinstance(value, float) else value
 
 
 # Those that lineament knows

@@ -34,6 +34,11 @@ def difference(one: Features, other: Features) -> str:
     return "" if one.clusters.tobytes() == other.clusters.tobytes() else "clusters differ"
 
 
+def ends_of(features: Features) -> NDArray[np.float64]:
+    """Return the ends of all segments, shape (n, 4)."""
+    return np.hstack((features["segments"]["start"], features["segments"]["end"]))
+
+
 def _problems(features: Features, scan: LaserScan) -> Iterator[str]:
     n, clusters = len(scan), features.clusters
     if clusters.shape != (n,):

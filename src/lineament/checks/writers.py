@@ -19,8 +19,9 @@ from ..features import Features
 from ..logs import open_log
 from ..output import ENDINGS, Writer, open_writer
 from ..scan import LaserScan
-from .claims import claim, during, without_warnings
+from .claims import claim, claim_raises, during, without_warnings
 from .scans import plain_scans
+from .sound import ends_of
 
 #: Makes a writer of a file, as a subclass of `Writer` does.
 Maker = Callable[..., Writer]
@@ -43,8 +44,8 @@ def check_writer(
     Through a link, the file behind it is replaced, and the link stays. No scans, and scans without
     features, make a file; names of files, frames and topics may have any letters. It refuses what
     it cannot take by a ValueError: a scan outside its block, or none where it needs one; and to be
-    copied while it is open. What is written is read again where a reader is
-    known. That a writer is given a file that is read, it cannot know: commands ask
+    copied while it is open, by a TypeError. What is written is read again where a reader is known.
+    That a writer is given a file that is read, it cannot know: commands ask
     `lineament.files.check_outputs`.
 
     Parameters
@@ -130,13 +131,9 @@ def _appears_whole(make: Maker, path: Path, found: Found, read: Reading | None) 
         if read is not None:
             with during("read again"):
                 ends = read(path)
-                own = np.vstack([_ends_of(features) for features, _ in found])
+                own = np.vstack([ends_of(features) for features, _ in found])
                 same = ends is None or (len(ends) == len(own) and np.allclose(ends, own))
                 claim(same, "the segments are not those that were written")
-
-
-def _ends_of(features: Features) -> Any:
-    return np.hstack((features["segments"]["start"], features["segments"]["end"]))
 
 
 def _takes_nothing(make: Maker, path: Path, _: Found) -> None:
@@ -205,23 +202,14 @@ def _names_what_cannot_be(make: Maker, path: Path, found: Found) -> None:
 def _refuses(make: Maker, path: Path, found: Found) -> None:
     (features, scan), topic = found[0], _TOPICS[0]
     writer = make(path)
-    _raises(ValueError, lambda: writer.write(features, scan, topic), "a scan before its block")
+    claim_raises(ValueError, lambda: writer.write(features, scan, topic), "a scan before its block")
     with writer:
-        _raises(TypeError, lambda: copy.deepcopy(writer), "a copy of it while it is open")
+        claim_raises(TypeError, lambda: copy.deepcopy(writer), "a copy of it while it is open")
         if writer.needs_scan:
-            _raises(ValueError, lambda: writer.write(features, None, topic), "no scan")
+            claim_raises(ValueError, lambda: writer.write(features, None, topic), "no scan")
         else:
             writer.write(features, None, topic)
-    _raises(ValueError, lambda: writer.write(features, scan, topic), "a scan after its block")
-
-
-def _raises(kind: type[Exception], call: Callable[[], object], doing: str) -> None:
-    try:
-        call()
-    except kind as error:
-        claim(str(error), f"{doing}: {kind.__name__} says nothing")
-    else:
-        claim(False, f"{doing} is no {kind.__name__}")
+    claim_raises(ValueError, lambda: writer.write(features, scan, topic), "a scan after its block")
 
 
 # Our own formats, read again

@@ -53,8 +53,7 @@ def calibrate(
     from ..tasks.calibrate import calibrate_log
     from .progress import tracker
 
-    if output is not None:
-        check_ending(output, PICTURE_ENDINGS)
+    check_ending(output, PICTURE_ENDINGS)
     if against is not None and reading["topic"] is None:
         raise click.UsageError("--against: expected --topic, too: that whose mounting is found")
     if reading.pop("laser_pose") is not None:

@@ -1,28 +1,26 @@
-"""The commands. Each imports what it calls when it runs: ``--help`` stays quick."""
+"""Commands that show things. Each imports what it calls when it runs: ``--help`` stays quick."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .mapping import LAYERS, UNITS
 from .options import (
     HUSH,
     LOG,
     LOG_PATH,
-    METHODS,
-    NOISE,
     PATH,
     QUIET,
     SCAN,
-    SET,
     check_ending,
     make_extractor,
     methods_option,
+    of_methods,
+    of_plan,
+    on_robot,
     reading,
     wrong_usage,
 )
-from .options import on_robot as of_scanners
 
 
 @click.command()
@@ -52,9 +50,7 @@ def info(log: Path | str, reading: dict[str, Any], quiet: bool) -> None:
 @LOG
 @SCAN
 @click.option("-o", "--output", required=True, type=PATH, help="A picture: .png, .svg or .pdf.")
-@METHODS
-@SET
-@NOISE
+@of_methods("Name of the method; may be given again, side by side.  [default: optimal]")
 @click.option("--trace", is_flag=True, help="Draw the stages of the (first) method instead.")
 @click.option("--dark", is_flag=True, help="Draw on black.")
 @reading
@@ -98,18 +94,15 @@ def plot(
 
 @click.command()
 @click.argument("logs", nargs=-1, required=True, type=LOG_PATH)
-@methods_option("A method to choose from; may be given again.  [default: all; with --set, optimal]")
-@SET
-@NOISE
+@of_methods("A method to choose from; may be given again.  [default: all; with --set, optimal]")
 @reading
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: any that is free]"
 )
 @click.option("--map", "plan", type=PATH, help="A plan on which the logs are located.")
-@LAYERS
-@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
-@of_scanners
+@of_plan
+@on_robot
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 @HUSH
 def view(

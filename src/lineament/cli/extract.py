@@ -14,7 +14,9 @@ from .options import (
     LOG_PATH,
     QUIET,
     TEXT_PATH,
+    WORLD,
     check_ending,
+    check_world,
     complain,
     extracting,
     reading,
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
 
     from ..extractor import Extractor
 
-#: Formats that hold features alone; the others show scans at their poses.
-_TABLES = (".parquet", ".csv", ".jsonl")
 _COUNT = click.IntRange(min=1)
 
 
@@ -42,10 +42,7 @@ _COUNT = click.IntRange(min=1)
 @extracting
 @reading
 @click.option(
-    "--format",
-    "ending",
-    metavar="ENDING",
-    help="Format of the files in a folder.  [default: parquet]",
+    "--format", metavar="ENDING", help="Format of the files in a folder.  [default: parquet]"
 )
 @click.option("--resume", is_flag=True, help="Skip logs whose files in the folder are complete.")
 @click.option(
@@ -53,7 +50,7 @@ _COUNT = click.IntRange(min=1)
 )
 @click.option("--threads", type=_COUNT, help="Work in so many threads of one process.")
 @click.option("--dask", metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")
-@click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
+@WORLD
 @QUIET
 def extract(
     logs: tuple[Path | str, ...],
@@ -72,21 +69,14 @@ def extract(
     from ..output import ENDINGS
 
     # Not Path.is_dir, which raises where a name is too long.
-    is_folder = output.endswith(("/", os.sep)) or os.path.isdir(output)  # noqa: PTH112
-    if not is_folder:
-        check_ending(Path(output), ENDINGS, or_folder=True)
-        for name, value in bulk.items():
-            if value:
-                name = {"ending": "format"}.get(name, name)
-                raise click.UsageError(f"--{name}: expected a folder as output, FOLDER/")
-    ending = f".{(bulk['ending'] or 'parquet').removeprefix('.')}"
-    ending = ending if is_folder else Path(output).suffix.lower()
-    if world and ending not in _TABLES:
-        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
-    reading = reading | {"world": world}
-    if is_folder:
-        _extract_into_folder(logs, output, extractor, reading, quiet, **bulk)
+    if output.endswith(("/", os.sep)) or os.path.isdir(output):  # noqa: PTH112
+        _extract_into_folder(logs, output, extractor, reading, world, quiet, **bulk)
         return
+    check_ending(Path(output), ENDINGS, or_folder=True)
+    check_world(world, Path(output).suffix.lower())
+    for name, value in bulk.items():
+        if value:
+            raise click.UsageError(f"--{name}: expected a folder as output, FOLDER/")
     from ..logs import find_logs
     from ..tasks.extract import check_found, extract_log
     from .progress import tracker
@@ -94,7 +84,9 @@ def extract(
     found = find_logs(logs, reading["limits"])
     if len(found) > 1:
         raise LineamentError(f"{output}: is no folder, expected one for {len(found)} logs")
-    extraction = extract_log(found[0], output, extractor, track=tracker(quiet), **reading)
+    extraction = extract_log(
+        found[0], output, extractor, world=world, track=tracker(quiet), **reading
+    )
     if not quiet:
         click.echo(str(extraction))
     check_found(extraction.log, extraction.scans, extraction.features, extractor.method)
@@ -105,24 +97,27 @@ def _extract_into_folder(
     output: str,
     extractor: Extractor,
     reading: dict[str, Any],
+    world: bool,
     quiet: bool,
     *,
-    ending: str | None,
     resume: bool,
-    **workers: Any,
+    **given: Any,
 ) -> None:
     from ..tasks.bulk import extract_logs
     from ..tasks.extract import check_found
     from .progress import status
 
-    with _executor(**workers) as executor, status(quiet) as show:
+    ending = f".{(given.pop('format') or 'parquet').removeprefix('.')}"
+    check_world(world, ending)
+    with _executor(**given) as executor, status(quiet) as show:
         bulk = extract_logs(
             logs,
             output,
             extractor,
             executor=executor,
-            ending=f".{(ending or 'parquet').removeprefix('.')}",
+            ending=ending,
             resume=resume,
+            world=world,
             show=show,
             **reading,
         )

@@ -10,20 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .mapping import UNITS
 from .options import (
     LASER_POSE,
     LIMITS,
     MASK,
-    METHOD,
-    NOISE,
     PATH,
     QUIET,
     SCALE_HELP,
-    SET,
     TEXT_PATH,
+    UNIT,
     complain,
     mountings,
+    of_method,
     settings_of,
     wrong_usage,
 )
@@ -62,9 +60,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     "--reliability", type=_RELIABILITIES, help="Of the subscription.  [default: best-effort]"
 )
 @click.option("--depth", type=click.IntRange(1, 1000), help="Messages kept for slow readers.")
-@METHOD
-@SET
-@NOISE
+@of_method
 @click.option(
     "--deskew",
     metavar="off|scans|poses|TOPIC",
@@ -87,7 +83,7 @@ _FLAG: dict[str, Any] = {"is_flag": True, "default": None}
     help="Make a map, and write it at the end: .dxf, .svg, .parquet or .yaml.",
 )
 @click.option("--layers", metavar="NAMES", help="Layers of the plan that hold walls, by commas.")
-@click.option("--units", type=UNITS, help="Units of the plan.  [default: those that it names]")
+@click.option("--units", type=UNIT, help="Units of the plan.  [default: those that it names]")
 @click.option(
     "--odometry", metavar="TOPIC", help="Odometry of the robot on the plan.  [default: /tf]"
 )

@@ -15,26 +15,13 @@ from .options import (
     check_ending,
     complain,
     extracting,
+    of_plan,
 )
 from .options import reading_odometry as reading
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
 
-MAP = click.option(
-    "--map",
-    "plan",
-    type=PATH,
-    required=True,
-    help="The plan: .dxf, .yaml of nav2, .parquet, .svg.",
-)
-LAYERS = click.option(
-    "--layers",
-    metavar="NAMES",
-    callback=lambda _context, _option, names: names.split(",") if names else None,
-    help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
-)
-UNITS = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
 _NO_ODOMETRY = click.option("--no-odometry", is_flag=True, help="Leave the poses of the log aside.")
 #: Formats that a map is written in.
 _ENDINGS = (".dxf", ".svg", ".parquet", ".yaml")
@@ -77,10 +64,8 @@ def map_command(
     from .progress import tracker
 
     check_ending(output, _ENDINGS)
-    if poses is not None:
-        check_ending(poses, (".tum", ".txt"))
-    if picture is not None:
-        check_ending(picture, _PICTURES)
+    check_ending(poses, (".tum", ".txt"))
+    check_ending(picture, _PICTURES)
     if merge and onto is None:
         raise click.UsageError("--merge is for the plan of --onto, which is not given")
     done = map_log(
@@ -103,11 +88,15 @@ def map_command(
 
 @click.command()
 @LOG
-@MAP
+@click.option(
+    *("--map", "plan"),
+    type=PATH,
+    required=True,
+    help="The plan: .dxf, .yaml of nav2, .parquet, .svg.",
+)
 @click.option("-o", "--output", required=True, type=PATH, help="Poses: .tum, .csv or .parquet.")
 @click.option("--picture", type=PATH, help="The way on the plan: .png, .svg or .pdf.")
-@LAYERS
-@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@of_plan
 @_NO_ODOMETRY
 @click.option("--no-deskew", is_flag=True, help="The scans of the log are deskewed already.")
 @extracting
@@ -134,8 +123,7 @@ def locate(
     from .progress import tracker
 
     check_ending(output, ENDINGS)
-    if picture is not None:
-        check_ending(picture, _PICTURES)
+    check_ending(picture, _PICTURES)
     found = locate_log(
         log,
         plan,
@@ -158,8 +146,7 @@ def locate(
 @click.command()
 @click.argument("plan", type=PATH)
 @click.option("-o", "--output", required=True, type=PATH, help="Another plan, or a picture.")
-@LAYERS
-@click.option("--units", type=UNITS, help="Of the DXF.  [default: those that it names, or m]")
+@of_plan
 @click.option(
     "--resolution",
     type=click.FloatRange(min=0, min_open=True),

@@ -12,7 +12,9 @@ from .options import (
     LOG,
     PATH,
     QUIET,
+    WORLD,
     check_ending,
+    check_world,
     extracting,
     mountings,
     wrong_usage,
@@ -21,9 +23,6 @@ from .options import reading_topics as reading
 
 if TYPE_CHECKING:
     from ..extractor import Extractor
-
-#: Formats that hold features alone; the others show scans at their poses.
-_TABLES = (".parquet", ".csv", ".jsonl")
 
 
 @click.command()
@@ -39,7 +38,7 @@ _TABLES = (".parquet", ".csv", ".jsonl")
 )
 @extracting
 @reading
-@click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
+@WORLD
 @QUIET
 def merge(
     log: Path | str,
@@ -65,8 +64,7 @@ def merge(
     from .progress import tracker
 
     check_ending(output, ENDINGS)
-    if world and output.suffix.lower() not in _TABLES:
-        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}")
+    check_world(world, output.suffix.lower())
     if reading.pop("laser_pose") is not None:
         raise click.UsageError(
             "--laser-pose: expected --mounting TOPIC=X,Y,DEGREES of each scanner"

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..extractor import Extractor
 
 F = TypeVar("F", bound=Callable[..., Any])
+_Command = Callable[..., None]
 
 
 class Place(click.Path):
@@ -65,11 +66,12 @@ LASER_POSE = click.option(
 )
 
 
-def _sectors(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[tuple[float, float], ...],
-) -> tuple[tuple[float, float], ...]:
+def _turned_into(convert: Callable[[Any], Any]) -> Callable[[Any, Any, Any], Any]:
+    """Return the callback of an option whose value a function of it alone converts."""
+    return lambda _context, _option, given: convert(given)
+
+
+def _sectors(given: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     from ..scan.changes import checked_mask
 
     with wrong_usage():
@@ -82,17 +84,13 @@ MASK = click.option(
     nargs=2,
     multiple=True,
     metavar="FROM TO",
-    callback=_sectors,
+    callback=_turned_into(_sectors),
     help="Leave out the beams from one bearing counter-clockwise to another [rad], such as those "
     "that see the robot itself; may be given again.",
 )
 
 
-def _mountings(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[str, ...],
-) -> dict[str, tuple[float, float, float]]:
+def _mountings(given: tuple[str, ...]) -> dict[str, tuple[float, float, float]]:
     found = {}
     for topic, value in map(_split, given):
         try:
@@ -110,7 +108,7 @@ _MOUNTINGS = click.option(
     "mountings",
     multiple=True,
     metavar="TOPIC=X,Y,DEGREES",
-    callback=_mountings,
+    callback=_turned_into(_mountings),
     help="Where the scanner of a topic is on the robot [m, m, °]; may be given again."
     "  [default: as in /tf_static]",
 )
@@ -119,11 +117,9 @@ _UNSURE = click.option(
     type=click.FloatRange(min=0),
     nargs=2,
     metavar="METRES DEGREES",
-    callback=lambda _context, _option, given: given and (given[0], math.radians(given[1])),
+    callback=_turned_into(lambda given: given and (given[0], math.radians(given[1]))),
     help="How well mountings are known, a standard deviation.  [default: 0.01 0.5]",
 )
-
-
 BASE_FRAME = click.option(
     "--base-frame", default="base_link", show_default=True, help="Frame of the robot in the log."
 )
@@ -139,27 +135,36 @@ def on_robot(command: F) -> F:
     return _MOUNTINGS(BASE_FRAME(command))
 
 
+UNIT = click.Choice(["m", "dm", "cm", "mm", "ft", "in"])
+_UNITS = click.option(
+    "--units", type=UNIT, help="Of the DXF.  [default: those that it names, or m]"
+)
+_LAYERS = click.option(
+    "--layers",
+    metavar="NAMES",
+    callback=_turned_into(lambda names: names.split(",") if names else None),
+    help="Layers of the DXF that hold walls, by commas; * is anything.  [default: *wall*, or all]",
+)
+
+
+def of_plan(command: F) -> F:
+    """Add the options of how a plan is read that is a DXF: `layers` and `units`."""
+    return _LAYERS(_UNITS(command))
+
+
 _POSES = click.option("--poses", "pose_topic", metavar="TOPIC", help="Topic of the poses.")
 
 
-def _limits(
-    context: click.Context,  # noqa: ARG001
-    parameter: click.Parameter,  # noqa: ARG001
-    given: tuple[str, ...],
-) -> dict[str, int] | None:
+def _limits(given: tuple[str, ...]) -> dict[str, int] | None:
     from ..limits import Limits
 
+    found: dict[str, Any] = dict(map(_split, given))
+    for name, value in found.items():
+        with suppress(ValueError):  # `Limits` refuses what is no number.
+            found[name] = int(value)
     with wrong_usage():
-        found = {name: _whole(name, value) for name, value in map(_split, given)}
         Limits.of(found)
     return found or None
-
-
-def _whole(name: str, value: str) -> int:
-    try:
-        return int(value)
-    except ValueError:
-        raise ValueError(f"limit {name} is {value!r}, expected a whole number") from None
 
 
 LIMITS = click.option(
@@ -167,7 +172,7 @@ LIMITS = click.option(
     "limits",
     metavar="NAME=VALUE",
     multiple=True,
-    callback=_limits,
+    callback=_turned_into(_limits),
     help="Another limit of what is read, such as beams=200000; may be given again.",
 )
 
@@ -195,10 +200,8 @@ _READING = (
 )  # fmt: skip
 
 
-def _reading(
-    poses: Callable[[Any], Any], topic: Callable[[Any], Any] = TOPIC
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    def adding(command: Callable[..., None]) -> Callable[..., None]:
+def _reading(poses: Any, topic: Any = TOPIC) -> Callable[[_Command], _Command]:
+    def adding(command: _Command) -> _Command:
         """Add the options of a log; the command gets them as ``open_log(log, **reading)``."""
 
         @wraps(command)
@@ -234,11 +237,22 @@ reading_topics = _reading(
 )
 
 
-def check_ending(output: Path, endings: Iterable[str], *, or_folder: bool = False) -> None:
-    """Refuse a file whose ending is not one of these, before anything is computed for it."""
-    if output.suffix.lower() not in endings:
+def check_ending(output: Path | None, endings: Iterable[str], *, or_folder: bool = False) -> None:
+    """Refuse a file, if given, with another ending, before anything is computed for it."""
+    if output is not None and output.suffix.lower() not in endings:
         wanted = "a folder or an ending" if or_folder else "an ending"
         raise click.UsageError(f"{output}: expected {wanted} of {', '.join(endings)}")
+
+
+#: Formats that hold features alone; the others show scans at their poses.
+_TABLES = (".parquet", ".csv", ".jsonl")
+WORLD = click.option("--world", is_flag=True, help="Features in the frame of the poses; of tables.")
+
+
+def check_world(world: bool, ending: str) -> None:
+    """Refuse features in the world for a format that draws scans."""
+    if world and ending not in _TABLES:
+        raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
 
 
 @contextmanager
@@ -250,7 +264,25 @@ def wrong_usage() -> Iterator[None]:
         raise click.UsageError(str(error)) from None
 
 
-METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+_METHOD = click.option("-m", "--method", help="Name of the method.  [default: optimal]")
+_SET = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A parameter of the method; may be given again.",
+)
+_NOISE = click.option(
+    "--noise",
+    type=click.FloatRange(min=0),
+    metavar="SIGMA",
+    help="Noise of the ranges [m].  [default: estimated from each scan]",
+)
+
+
+def of_method(command: F) -> F:
+    """Add the options of a method: `method`, `settings`, `noise`."""
+    return _METHOD(_SET(_NOISE(command)))
 
 
 def methods_option(about: str) -> Callable[[F], F]:
@@ -258,22 +290,9 @@ def methods_option(about: str) -> Callable[[F], F]:
     return click.option("-m", "--method", "methods", multiple=True, help=about)
 
 
-METHODS = methods_option(
-    "Name of the method; may be given again, side by side.  [default: optimal]"
-)
-SET = click.option(
-    "--set",
-    "settings",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help="A parameter of the method; may be given again.",
-)
-NOISE = click.option(
-    "--noise",
-    type=click.FloatRange(min=0),
-    metavar="SIGMA",
-    help="Noise of the ranges [m].  [default: estimated from each scan]",
-)
+def of_methods(about: str) -> Callable[[F], F]:
+    """Add the options of several methods: `methods`, `settings`, `noise`."""
+    return lambda command: methods_option(about)(_SET(_NOISE(command)))
 
 
 def make_extractor(method: str | None, settings: tuple[str, ...], noise: float | None) -> Extractor:
@@ -283,13 +302,10 @@ def make_extractor(method: str | None, settings: tuple[str, ...], noise: float |
 
     name = DEFAULT_METHOD if method is None else method
     with wrong_usage():
-        return Extractor(
-            get_method(name, **settings_of(settings)),
-            noise=noise,
-        )
+        return Extractor(get_method(name, **settings_of(settings)), noise=noise)
 
 
-def extracting(command: Callable[..., None]) -> Callable[..., None]:
+def extracting(command: _Command) -> _Command:
     """Add the options of a method; the command gets the extractor that they ask for."""
 
     @wraps(command)
@@ -298,7 +314,7 @@ def extracting(command: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         command(extractor=make_extractor(method, settings, noise), **given)
 
-    return METHOD(SET(NOISE(making)))
+    return of_method(making)
 
 
 def settings_of(settings: tuple[str, ...]) -> dict[str, Any]:

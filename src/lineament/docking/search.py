@@ -159,13 +159,18 @@ def _is_seen(one: Fit) -> bool:
     return is_solid and one.reached >= LEAST_SEEN * total
 
 
+def _between(one: Pose, other: Pose) -> tuple[float, float]:
+    """Distance and turn from one pose to another [m, rad]."""
+    turn = abs(math.remainder(one[2] - other[2], 2 * math.pi))
+    return math.dist(one[:2], other[:2]), turn
+
+
 def _is_other(one: Fit, other: Fit) -> bool:
-    turn = abs(math.remainder(one.pose[2] - other.pose[2], 2 * math.pi))
-    return math.dist(one.pose[:2], other.pose[:2]) > _APART[0] or turn > _APART[1]
+    way, turn = _between(one.pose, other.pose)
+    return way > _APART[0] or turn > _APART[1]
 
 
 def _is_within(pose: Pose, guess: Pose, reach: Pose) -> bool:
-    turn = abs(math.remainder(pose[2] - guess[2], 2 * math.pi))
-    if not _is_in_front(np.array([pose]))[0]:
-        return False
-    return math.dist(pose[:2], guess[:2]) < math.hypot(*reach[:2]) + 0.1 and turn < reach[2] + 0.1
+    way, turn = _between(pose, guess)
+    is_near = way < math.hypot(*reach[:2]) + 0.1 and turn < reach[2] + 0.1
+    return is_near and bool(_is_in_front(np.array([pose]))[0])

@@ -26,19 +26,25 @@ if TYPE_CHECKING:
     from .sinks import Sink as Sink
     from .toml import read_config as read_config
 
-_HOMES = {
-    "config": "LiveConfig",
-    "counters": "Counts Report",
-    "merging": "MergingPipeline",
-    "node": "Node",
-    "pipeline": "Frame Pipeline",
-    "received": "Odometry Received Source",
-    "replay": "ReplaySource",
-    "running": "make_pipeline run_live",
-    "sinks": "FoxgloveSink RosSink Sink",
-    "toml": "read_config",
+_HOME = {
+    "Counts": "counters",
+    "FoxgloveSink": "sinks",
+    "Frame": "pipeline",
+    "LiveConfig": "config",
+    "MergingPipeline": "merging",
+    "Node": "node",
+    "Odometry": "received",
+    "Pipeline": "pipeline",
+    "Received": "received",
+    "ReplaySource": "replay",
+    "Report": "counters",
+    "RosSink": "sinks",
+    "Sink": "sinks",
+    "Source": "received",
+    "make_pipeline": "running",
+    "read_config": "toml",
+    "run_live": "running",
 }
-_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
 __all__ = [*_HOME]
 

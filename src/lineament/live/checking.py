@@ -5,15 +5,17 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..drawings import NAMES
+from ..logs.base import ECHOES
 from ..scan.fields import STAMPS
 
 _CHOICES: dict[str, tuple[object, ...]] = {
     "type": ("LaserScan", "MultiEchoLaserScan"),
-    "echo": ("first", "last", "strongest"),
+    "echo": ECHOES,
     "stamp": STAMPS,
     "reliability": ("best-effort", "reliable"),
     "ros": (0, 1, 2),
-    "units": ("m", "dm", "cm", "mm", "ft", "in"),
+    "units": tuple(NAMES),
 }
 _BOUNDS: dict[str, tuple[float, float]] = {
     "depth": (1, 1000),

@@ -32,7 +32,7 @@ class LiveConfig:
         Topics of further scanners of the robot: what they see is merged with what that of `topic`
         does, in the frame `base_frame`; see `lineament.mapping.merge_features`.
     mountings : dict
-        Where a scanner is on the robot [m, m, rad] by its topic, where ``/tf_static`` has it not.
+        Where a scanner is on the robot [m, m, rad], by its topic; else ``/tf_static`` says it.
     unsure : (float, float)
         Standard deviations of the mountings [m, rad].
     tolerance : float

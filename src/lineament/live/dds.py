@@ -6,13 +6,13 @@ from cyclonedds.qos import Policy, Qos
 
 from ..errors import one_line
 from ..output.scene import Message
+from ..scan.fields import NANO
 from .config import LiveConfig
 from .participant import Participant, ros_type, type_hash, wire_topic, wire_type
 from .publisher import Publisher
 from .raw_dds import ANY_STATE, RawReader, RawWriter
 from .received import SCAN, Received, Wanted, wanted
 
-NANO = 1_000_000_000
 #: A writer waits this long for a slow reader [ns], then drops the message.
 PATIENCE = NANO // 1000
 #: Publishers that are examined at once.
@@ -86,12 +86,11 @@ class _Subscription:
     def __init__(
         self, participant: Participant, wanted: Wanted, reliability: str, depth: int
     ) -> None:
-        self._wanted, self._topic = wanted, wanted.topic
-        self.is_scan = wanted.what == SCAN
+        self._wanted, self.is_scan = wanted, wanted.what == SCAN
         self._kind = kind = wanted.kind.replace("/", "/msg/")
         # Not to keep all of what is reliable: that would make the publisher wait.
         policies = [Policy.Reliability.Reliable(PATIENCE), Policy.History.KeepLast(depth)]
-        if wanted.what == SCAN and reliability == "best-effort":
+        if self.is_scan and reliability == "best-effort":
             policies = [Policy.Reliability.BestEffort, Policy.History.KeepAll]
             policies.append(Policy.ResourceLimits(max_samples=depth))
         elif reliability == "best-effort" and not wanted.is_command:
@@ -109,11 +108,11 @@ class _Subscription:
         ]
 
     def problems(self, found: list[tuple[str, str]]) -> list[str]:
-        name = wire_topic(self._topic)
+        name = self._wanted.topic
         lines = [
-            f"{self._topic} is published as {one_line(ros_type(kind))}, expected {self._kind}"
+            f"{name} is published as {one_line(ros_type(kind))}, expected {self._kind}"
             for topic, kind in found
-            if topic == name and kind != wire_type(self._kind)
+            if topic == wire_topic(name) and kind != wire_type(self._kind)
         ]
         status = self.reader.get_requested_incompatible_qos_status()
         if status.total_count_change:
@@ -123,7 +122,7 @@ class _Subscription:
                 if status.last_policy_id == _RELIABILITY
                 else f"with another QoS policy {status.last_policy_id}, expected {expected}"
             )
-            lines.append(f"{self._topic} is published {why}")
+            lines.append(f"{name} is published {why}")
         return lines
 
 

@@ -21,12 +21,10 @@ from ..rosmsg.poses import Odometry, StampedPose
 from ..scan import Array, LaserScan, Pose
 from ..scan.poses import Twist, carried, compose, inverse, relative
 from .config import LiveConfig
-from .received import GUESS, JUDGED, MOUNTINGS, RELOCATE, Heard
+from .received import GUESS, JUDGED, MANY, MOUNTINGS, RELOCATE, Heard
 
 #: Scanners that are followed; a robot has fewer, unless names are made up.
 _MOST_SCANNERS = 8
-#: Scans in a row of which the mounting, or the odometry, is not known before this is a message.
-_MANY = 20
 #: Cells of a map on a topic are occupied from, and free up to, such values: as of map_server.
 _SURE = 65, 25
 #: Where they should come from.
@@ -230,7 +228,7 @@ class Localiser:
             found = self._frames.find(parent, child, stamp)
         except LookupError as error:
             self._missing[what] += 1
-            if self._missing[what] >= _MANY:
+            if self._missing[what] >= MANY:
                 done = "judged" if what == "pose to judge" else "placed"
                 self._problems[what] = f"the robot is not {done}: {error}, {_WHENCE[what]}"
             return None
@@ -252,7 +250,7 @@ class Localiser:
             then = self._find("pose to judge", self._odom, self._base, claim.stamp)
             if then is not None:
                 self._claim, self._claimed_odom = None, compose(claim.pose, inverse(then.pose))
-            elif self._missing["pose to judge"] >= _MANY:
+            elif self._missing["pose to judge"] >= MANY:
                 return None
         if travelled is None or self._claimed_odom is None:
             return None

@@ -12,10 +12,7 @@ from ..scan import LaserScan, Pose
 from ..scan.poses import Twist, compose, poses_along, relative
 from .config import LiveConfig
 from .pipeline import Frame, Pipeline
-from .received import MOUNTINGS, ODOMETRY, Heard
-
-#: Scans in a row that are left out before this is a message.
-_MANY = 20
+from .received import MANY, MOUNTINGS, ODOMETRY, Heard
 
 
 class Seen(NamedTuple):
@@ -111,7 +108,7 @@ class MergingPipeline(Pipeline):
 
     def _note_alone(self, topic: str, why: str) -> None:
         self._alone[topic] = self._alone.get(topic, 0) + 1
-        if self._alone[topic] >= _MANY:
+        if self._alone[topic] >= MANY:
             self._why[topic] = f"scans of {topic} are left out: {why}"
 
 

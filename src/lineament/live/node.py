@@ -6,6 +6,7 @@ from itertools import chain
 
 from ..errors import one_line
 from ..scan import LaserScan
+from ..scan.fields import NANO
 from .counters import Counters, Report
 from .pipeline import Pipeline
 from .received import SCAN, Received, Source
@@ -145,7 +146,7 @@ class Node:
             lost=self._source.lost,
             unsent=sum(sink.unsent for sink in self._sinks),
         )
-        stamp = divmod(time.time_ns(), 1_000_000_000)
+        stamp = divmod(time.time_ns(), NANO)
         for sink in self._sinks:
             sink.diagnose(report, stamp)
         self._show(report)

@@ -19,7 +19,7 @@ from ..scan.fields import NANO
 from ..scan.poses import Twist, twist_between
 from .config import LiveConfig
 from .configured import dock_of, extractor_of, plan_of
-from .received import ODOMETRY, Heard
+from .received import MANY, ODOMETRY, Heard
 
 if TYPE_CHECKING:
     from ..docking import ShapePose
@@ -36,15 +36,8 @@ _MOST_PUBLISHERS = 8
 _OLDEST = 0.5
 #: Poses farther apart in time give no velocity [s].
 _LONGEST = 1.0
-#: Scans in a row without a known motion after which this is a message: odometry may begin late.
-_MANY = 20
 #: Fields of `LiveConfig` that may change while a node runs.
 CHANGEABLE = ("method", "parameters", "noise", "scale", "stamp", "mask")
-
-
-def time_of(scan: LaserScan) -> tuple[int, int]:
-    """Seconds and nanoseconds of the stamp of a scan, clipped to what a message can hold."""
-    return stamp_of(scan.stamp_ns)
 
 
 def stamp_of(nanoseconds: int) -> tuple[int, int]:
@@ -188,9 +181,9 @@ class Pipeline(InTurn):
             if kept.dock is not None:
                 dock = kept.dock(features, tracks, travel.pose, travel.covariance)
                 kept.undocked = kept.undocked + 1 if dock is None else 0
-                if kept.undocked >= _MANY:
+                if kept.undocked >= MANY:
                     self._problems.add(
-                        f"what is docked to is not seen in {_MANY} scans in a row: "
+                        f"what is docked to is not seen in {MANY} scans in a row: "
                         "expected it near dock, in the frame of the first scan, or of dock_track"
                     )
         if not self._config.track:
@@ -267,7 +260,7 @@ class Pipeline(InTurn):
         self._unmoved = self._unmoved + 1 if twist is None else 0
         if beam_times(scan) is None:
             why = "they have neither time_increment nor scan_time"
-        elif self._unmoved < _MANY:
+        elif self._unmoved < MANY:
             return
         elif how == "poses":
             why = "the log has no poses less than a second apart"

@@ -60,10 +60,10 @@ class PlanTopics:
     messages : RosMessages
         Makes the messages.
     config : LiveConfig
-        The pose of the scanner goes to ``TOPIC/pose``. That of the robot goes to ``amcl_pose``, and
-        the transform from `map_frame` to `odom_frame` to ``/tf``, the walls of a map that is made
-        to ``TOPIC/plan``; or the verdict on each pose of
-        the topic `judge` to ``JUDGE/verdict``, and where it is wrong ours to ``JUDGE/ours``.
+        The pose of the scanner goes to ``TOPIC/pose``, the walls of a map that is made to
+        ``TOPIC/plan``. The pose of the robot goes to ``amcl_pose``, and the transform from
+        `map_frame` to `odom_frame` to ``/tf``; or the verdict on each pose of the topic `judge` to
+        ``JUDGE/verdict``, and where it is wrong ours to ``JUDGE/ours``.
     """
 
     def __init__(self, publisher: Publisher, messages: RosMessages, config: LiveConfig) -> None:
@@ -71,15 +71,15 @@ class PlanTopics:
         self._pose = f"{config.scan_topic}/pose"
         self._frame: Frame | None = None
         self._statuses: list[Status] = []
-        self._topics = {self._pose: _PLACED}
+        topics = {self._pose: _PLACED}
         if (judged := config.judge_topic) is not None:
-            self._topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
+            topics |= {f"{judged}/verdict": _STATUSES, f"{judged}/ours": _PLACED}
         elif config.is_broadcasting:
-            self._topics["/tf"] = "tf2_msgs/TFMessage"
+            topics["/tf"] = "tf2_msgs/TFMessage"
         self._walls = f"{config.scan_topic}/plan"
         if config.mapping is not None:
-            self._topics[self._walls] = "visualization_msgs/MarkerArray"
-        for topic, kind in self._topics.items():
+            topics[self._walls] = "visualization_msgs/MarkerArray"
+        for topic, kind in topics.items():
             publisher.advertise(topic, messages.kind(kind))
         if judged is None:  # As of AMCL, whose listeners ask for the last one.
             publisher.advertise(

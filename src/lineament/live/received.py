@@ -20,6 +20,9 @@ SCAN, ODOMETRY, LINKS, MOUNTINGS = "a scan", "an odometry", "a transform", "a mo
 GUESS, RELOCATE, JUDGED = "an initial pose", "a call to relocate", "a pose to judge"
 MAP = "a map"
 
+#: Scans in a row that lack something before this is a message: it may begin late.
+MANY = 20
+
 Heard = LaserScan | Odometry | OccupancyGrid | list[StampedPose] | None
 #: Poses are nearer [m]: what is computed from them stays finite.
 FARTHEST = 1e9

@@ -97,12 +97,10 @@ class Ros1Source:
     def __init__(self, node: Ros1Node, config: LiveConfig) -> None:
         self._node, self._inbox = node, Inbox(config.depth)
         self._numbers: dict[str, int] = {}
-        self._subscribed = {
-            one.topic: (one.kind, node.subscribe(one.topic, one.kind, partial(self._put, one)))
+        self._subscribed = [
+            (one, node.subscribe(one.topic, one.kind, partial(self._put, one)))
             for one in wanted(config)
-        }
-        scans = [one.topic for one in wanted(config) if one.what == SCAN]
-        self._scans = [self._subscribed[topic][1] for topic in scans]
+        ]
         self._service = None
         if config.can_relocate:  # The service that AMCL has.
             name = config.resolved("global_localization")
@@ -121,7 +119,8 @@ class Ros1Source:
     @property
     def publishers(self) -> int:
         """Number of publishers of scans that are connected."""
-        return sum(int(one.get_num_connections()) for one in self._scans)
+        scans = (subscription for one, subscription in self._subscribed if one.what == SCAN)
+        return sum(int(one.get_num_connections()) for one in scans)
 
     def receive(self, timeout: float) -> list[Received]:
         """Wait up to `timeout` seconds, and return all messages that came, oldest first."""
@@ -129,11 +128,7 @@ class Ros1Source:
 
     def problems(self) -> list[str]:
         """Return why topics have no publishers: another type, or the master does not answer."""
-        silent = {
-            topic: kind
-            for topic, (kind, subscription) in self._subscribed.items()
-            if not subscription.get_num_connections()
-        }
+        silent = [one for one, of in self._subscribed if not of.get_num_connections()]
         if not silent or self.ended:
             return []
         try:
@@ -141,20 +136,20 @@ class Ros1Source:
         except LineamentError as error:
             return [str(error)]
         return [
-            f"{topic} is published as {published[topic]}, expected {kind}"
-            for topic, kind in silent.items()
-            if published.get(topic, kind) != kind
+            f"{one.topic} is published as {published[one.topic]}, expected {one.kind}"
+            for one in silent
+            if published.get(one.topic, one.kind) != one.kind
         ]
 
     def close(self) -> None:
         """Stop listening."""
-        for _, subscription in self._subscribed.values():
+        for _, subscription in self._subscribed:
             subscription.unregister()
         if self._service is not None:
             self._service.shutdown()
 
     def _put(self, wanted: Wanted, message: Any) -> None:
-        publisher = _publisher(message)
+        publisher = message._connection_header.get("callerid", "somebody")
         came = wanted.received(publisher, message.raw, "ros1")
         missing = self._missing(publisher, message.raw) if wanted.what == SCAN else 0
         self._inbox.put(came, missing)
@@ -224,12 +219,6 @@ def _raw(kind: str) -> Any:
 def _no_type(kind: str) -> LineamentError:
     package = kind.partition("/")[0]
     return LineamentError(f"ROS 1 has no {kind}: its package {package} is not installed")
-
-
-def _publisher(message: Any) -> str:
-    """Name of the node that sent a message."""
-    name: str = message._connection_header.get("callerid", "somebody")
-    return name
 
 
 class _Hasty(xmlrpc.client.Transport):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from ..output.markers import markers_of
 from ..output.ros_messages import RosMessages
-from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of
+from ..output.scene import LASER_FRAME, WORLD_FRAME, Layer, Message, Moment, layers_of, world_of
 from .config import LiveConfig
 from .configured import plan_of
 from .counters import Report
-from .pipeline import Frame, time_of
+from .pipeline import Frame, stamp_of
 from .plan_topics import DIAGNOSTICS, PlanTopics, Status, plan_layers
 from .publisher import Publisher
 
@@ -184,4 +184,4 @@ class FoxgloveSink:
 
 def _moment(frame: Frame, name: str) -> Moment:
     """Make the moment of a scan, with the exact stamp of its message and this frame."""
-    return Moment(*time_of(frame.scan), name, "world" if name == WORLD_FRAME else WORLD_FRAME)
+    return Moment(*stamp_of(frame.scan.stamp_ns), name, world_of(name))

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ..errors import one_line
+from ..rosmsg.poses import POSE_TYPES, TRANSFORMS
 from ..scan import LaserScan, Pose
 from ..scan.changes import Mask
 from ..scan.units import FAR
@@ -17,8 +18,6 @@ from .own import OwnParts
 
 #: How many frames, topics and kinds of messages are listed.
 _FRAMES, _TOPICS, _LISTED = 16, 32, 20
-#: Ends of the types of messages that poses can be taken from.
-_POSE_TYPES = ("/PoseStamped", "/PoseWithCovarianceStamped", "/Odometry", "/TFMessage")
 #: Stamps between these are seconds since 1970, and make a date (1990 to 2100).
 _LONG_AGO, _FAR_OFF = 631_152_000.0, 4_102_444_800.0
 #: Stamps make a rate when at least this share of their steps goes forward, and at most that share
@@ -132,7 +131,8 @@ class LogInfo:
             if len(self.topics) > 1:
                 rows += [("", ""), ("topic", topic.name)]
             rows += topic.rows()
-        poses = [kind.name for kind in self.contents if kind.type.endswith(_POSE_TYPES)]
+        posed = {*POSE_TYPES, *TRANSFORMS}
+        poses = [topic.name for topic in self.contents if topic.type in posed]
         if poses and not any(topic.poses for topic in self.topics):
             rows.append(("", f"poses are in {', '.join(poses[:_LISTED])}: choose with --poses"))
         if not self.topics:

@@ -15,8 +15,8 @@ from ..scan import LaserScan
 from .base import Head, Log, Topic
 from .lines import numbered_lines
 
-#: Of so short words there are few, as of ranges in centimetres: so many are kept. Every so manieth
-#: word of a list shows whether it has such.
+#: Of so short words there are few, as of ranges in centimetres: so many are kept. One word in so
+#: many of a list shows whether it has such.
 _SHORT, _MOST, _EVERY = 5, 1 << 14, 16
 
 #: What may stand before the first word.

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..errors import one_line, warn
 from ..limits import LIMITS, Limits
-from ..rosmsg.frames import frame_of
+from ..rosmsg.frames import Place, chained, frame_of
 from ..rosmsg.poses import POSE_TYPES, TRANSFORMS, StampedPose, stamped_poses
 from ..rosmsg.wire import Buffer
 from ..scan import Array, LaserScan, Pose
-from ..scan.poses import carried, compose
+from ..scan.poses import carried
 from .ros_bag import Connection
 
 #: The topic of the frames that do not move in each other.
@@ -42,21 +42,20 @@ class PoseFinder:
     The scans of a frame that is upside down are turned over: their pose is that of a frame with the
     same x axis, whose z axis points up.
 
-    Where the frame of the scans is in that of the poses is looked up among `mountings`, the topics
-    of transforms of the log; where it is not known, that is warned of, and the poses are taken for
-    those of the scanner. With `is_given`, whoever asks knows it. A link of a chain that never came
-    is warned of at the end: no scan has a pose then.
+    Where the frame of the scans is in that of the poses is looked up in the static transforms of
+    the log, if they are among its `mountings`, the topics of transforms; where it is not known,
+    that is warned of, and the poses are taken for those of the scanner. Without `mountings` it is
+    not looked up: the poses are moved by a `laser_pose`, or not at all. A link of a chain that
+    never came is warned of at the end: no scan has a pose then.
     """
 
     def __init__(
         self,
         wanted: str,
         limits: Limits = LIMITS,
-        mountings: Collection[str] = (),
-        *,
-        is_given: bool = True,
+        mountings: Collection[str] | None = None,
     ) -> None:
-        self._limits, self._is_given = limits, is_given
+        self._limits, self._is_looked_up = limits, mountings is not None
         self.topic, _, chain = wanted.partition(":")
         frames = [frame_of(name) for name in chain.split("->")] if chain else []
         if chain and (len(frames) < 2 or not all(frames)):
@@ -65,8 +64,9 @@ class PoseFinder:
             )
         static = f"{self.topic}_static" if chain else STATIC
         #: Whether links that hold at all times may still come.
-        self._is_static_ahead = static in mountings
-        self.topics = (self.topic, static) if chain or static in mountings else (self.topic,)
+        self._is_static_ahead = static in (mountings or ())
+        is_read = chain or self._is_static_ahead
+        self.topics = (self.topic, static) if is_read else (self.topic,)
         self._is_chain = bool(chain)
         #: What poses are of, "" if that is not known; and links that hold at all times, by child.
         self._body = frames[-1] if chain else ""
@@ -140,7 +140,7 @@ class PoseFinder:
     def _mounting(self, laser: str) -> list[StampedPose] | None:
         """Links from what poses are of to the frame of a scan; None if they are not known."""
         links: list[StampedPose] = []
-        while not self._is_given and (not self._body or laser != self._body):
+        while self._is_looked_up and (not self._body or laser != self._body):
             link = self._links.get(laser)
             if link is None or len(links) > len(self._links):
                 return None
@@ -160,20 +160,16 @@ class PoseFinder:
     def _pose(
         self, stamp: float, mounting: Iterable[StampedPose]
     ) -> tuple[Pose | None, Array | None]:
-        pose, covariance, side = (0.0, 0.0, 0.0), None, 1
+        places, covariance = [], None
         for track in self._tracks.values():
-            link = track.at(stamp)
-            if link is None:
+            known = track.at(stamp)
+            if known is None:
                 return None, None
-            # Only messages that are no links have a covariance.
-            (x, y, theta), covariance = link
-            pose = compose(pose, (x, side * y, side * theta))
-            side = -side if track.is_upside_down else side
-        body = pose
-        for fixed in mounting:
-            x, y, theta = fixed.pose
-            pose = compose(pose, (x, side * y, side * theta))
-            side = -side if fixed.is_upside_down else side
+            pose, covariance = known  # only messages that are no links have a covariance
+            places.append(Place(pose, track.is_upside_down))
+        body = chained(places).pose
+        places += [Place(link.pose, link.is_upside_down) for link in mounting]
+        pose = chained(places).pose
         if covariance is not None and pose != body:
             covariance = carried(covariance, body, pose)
         return pose, covariance

@@ -122,7 +122,7 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
             raise ValueError(f"scan {i} has other bearings than scan 0, expected the same for all")
         if (scan.intensities is None) != (first.intensities is None):
             raise ValueError(f"scan {i} and scan 0: only one of them has intensities")
-    arrays = {"ranges": _lossless(np.stack([scan.ranges for scan in scans]))}
+    arrays = {"ranges": lossless(np.stack([scan.ranges for scan in scans]))}
     bearings = ("angle_min", "angle_increment") if first.is_regular else ("angles",)
     arrays |= {name: np.asarray(getattr(first, name)) for name in bearings}
     arrays["stamps"] = np.array([scan.stamp for scan in scans])
@@ -132,14 +132,14 @@ def _pack(scans: list[LaserScan]) -> dict[str, NDArray[Any]]:
         values = np.array([getattr(scan, key) for scan in scans])
         arrays[key] = values[0] if (values == values[0]).all() else values
     if first.intensities is not None:
-        arrays["intensities"] = _lossless(np.array([scan.intensities for scan in scans]))
+        arrays["intensities"] = lossless(np.array([scan.intensities for scan in scans]))
     if any(scan.pose is not None for scan in scans):
         unknown = (np.nan, np.nan, np.nan)
         arrays["poses"] = np.array([scan.pose or unknown for scan in scans])
     return arrays
 
 
-def _lossless(values: NDArray[np.float64]) -> NDArray[Any]:
+def lossless(values: NDArray[np.float64]) -> NDArray[Any]:
     """Return the values as float32 where none changes, as most sensors report them."""
     with np.errstate(over="ignore"):
         small = values.astype(np.float32)

@@ -45,25 +45,40 @@ class Theme(NamedTuple):
 #: Colours of Paul Tol's schemes, which stay apart with colour blindness: "vibrant" for marks,
 #: "muted" for clusters on white, "light" on black (https://personal.sron.nl/~pault).
 LIGHT = Theme(
-    *("#ffffff", "#1b1f24", "#57606a", "#9aa1a9", "#e9ecef", "#d0d7de", "#f1f3f5"),
-    *("#cc3311", "#eb9f8f", "#7a5200", "#aa3377", "#0077bb"),
-    np.array(
-        [
-            *("#332288", "#cc6677", "#88ccee", "#117733", "#aa4499"),
-            *("#999933", "#882255", "#ddcc77", "#44aa99"),
-        ]
-    ),
-)
+    paper="#ffffff",
+    ink="#1b1f24",
+    text="#57606a",
+    faint="#9aa1a9",
+    grid="#e9ecef",
+    frame="#d0d7de",
+    gap="#f1f3f5",
+    corner="#cc3311",
+    edge="#eb9f8f",
+    breakpoint="#7a5200",
+    arc="#aa3377",
+    way="#0077bb",
+    palette=np.array([
+        "#332288", "#cc6677", "#88ccee", "#117733", "#aa4499", "#999933", "#882255", "#ddcc77",
+        "#44aa99",
+    ]),
+)  # fmt: skip
 DARK = Theme(
-    *("#0d1117", "#e6edf3", "#9aa4af", "#6e7681", "#21262d", "#30363d", "#1a2029"),
-    *("#ee7733", "#94552f", "#ffd37a", "#ee3377", "#33bbee"),
-    np.array(
-        [
-            *("#77aadd", "#ee8866", "#99ddff", "#aaaa00"),
-            *("#ffaabb", "#bbcc33", "#44bb99", "#eedd88"),
-        ]
-    ),
-)
+    paper="#0d1117",
+    ink="#e6edf3",
+    text="#9aa4af",
+    faint="#6e7681",
+    grid="#21262d",
+    frame="#30363d",
+    gap="#1a2029",
+    corner="#ee7733",
+    edge="#94552f",
+    breakpoint="#ffd37a",
+    arc="#ee3377",
+    way="#33bbee",
+    palette=np.array([
+        "#77aadd", "#ee8866", "#99ddff", "#aaaa00", "#ffaabb", "#bbcc33", "#44bb99", "#eedd88",
+    ]),
+)  # fmt: skip
 INK, FAINT, GRID = LIGHT.ink, LIGHT.faint, LIGHT.grid
 CORNER_COLOR, EDGE_COLOR, ARC_COLOR = LIGHT.corner, LIGHT.edge, LIGHT.arc
 BREAK_COLOR, PALETTE = LIGHT.breakpoint, LIGHT.palette
@@ -83,7 +98,8 @@ PAGE_DPI, PAGE_WIDTH = 200, 9.0
 #: `_OUT_OF_SHAPE` has its shorter side drawn larger, by a round factor.
 _LEAST_SHAPE, _LARGEST_SHAPE, _OUT_OF_SHAPE = 0.4, 1.4, 3.0
 _FEW = 9
-_FACTORS = [step * 10.0**power for power in range(9) for step in (1, 2, 5)]
+#: Round numbers: of scales, of factors, and of lengths of bars.
+ROUND = [step * 10.0**power for power in range(-4, 11) for step in (1, 2, 5)]
 
 
 def check_ending(path: str | os.PathLike[str]) -> str:
@@ -261,7 +277,7 @@ def _aspect(extent: Array) -> float:
     excess = max(_LEAST_SHAPE / shape, shape / _LARGEST_SHAPE)
     if excess < _OUT_OF_SHAPE:
         return 1.0
-    factor = max(factor for factor in _FACTORS if factor <= excess)
+    factor = max(factor for factor in ROUND if factor <= excess)
     return factor if shape < 1 else 1 / factor
 
 

@@ -61,8 +61,7 @@ def plot_scan(
 
 def plot_walls(
     lines: Array,
-    centers: Array,
-    radii: Array,
+    columns: NDArray[np.void],
     path: str | os.PathLike[str],
     *,
     title: str = "",
@@ -71,7 +70,7 @@ def plot_walls(
     ways: Mapping[str, Array] | None = None,
     spots: Mapping[str, Array] | None = None,
 ) -> None:
-    """Draw walls (n, 2, 2) and round columns of a plan [m] as a picture.
+    """Draw walls (n, 2, 2) and round columns, by `center` and `radius`, of a plan [m] as a picture.
 
     `about` is a line above it; `ways` are steps of a way (n, 2, 2) by the names in `_WAYS`, and
     `spots` its ends (2,), by what they are called.
@@ -80,11 +79,11 @@ def plot_walls(
     from matplotlib.patches import Circle
 
     canvas.check_ending(path)
-    points = np.concatenate((lines.reshape(-1, 2), centers))
+    points = np.concatenate((lines.reshape(-1, 2), columns["center"]))
     wide = canvas.PAGE_WIDTH
     figure = canvas.new_figure(wide, canvas.plane_height(points, wide), dark=dark)
     axes = figure.subplots()
-    counts = f"{count(len(lines), 'wall')}, {count(len(radii), 'column')}"
+    counts = f"{count(len(lines), 'wall')}, {count(len(columns), 'column')}"
     canvas.style_plane(axes, title, about or counts, points)
     theme = canvas.theme_of(axes)
     axes.add_collection(LineCollection(list(lines), colors=theme.ink, linewidths=0.8))
@@ -97,8 +96,8 @@ def plot_walls(
         axes.plot(*spot, mark, color=theme.way, ms=7, mec=theme.paper, label=name, zorder=4)
     if axes.get_legend_handles_labels()[0]:
         canvas.add_legend(figure)
-    for center, radius in zip(centers.tolist(), radii.tolist(), strict=True):
-        axes.add_patch(Circle(center, radius, fill=False, color=theme.arc))
+    for column in columns:
+        axes.add_patch(Circle(column["center"], column["radius"], fill=False, color=theme.arc))
     canvas.save(figure, path)
 
 
@@ -227,18 +226,6 @@ def corner_figure(
     points = np.array([(x - reach, y - reach), (x + reach, y + reach)])
     name, error = f"Corner at ({x:.3f}, {y:.3f}) m", f"1 σ of its position: {1e3 * sigma:.1f} mm"
     return _shots_figure([Shot(name, error, scan, features, points, 0)], None, title, dark, None)
-
-
-def plot_map(
-    posed: Iterable[tuple[Pose, Features]],
-    path: str | os.PathLike[str],
-    title: str = "Map",
-    *,
-    dark: bool = False,
-) -> None:
-    """Write the picture that `map_figure` makes to a ``.png``, ``.svg`` or ``.pdf`` file."""
-    canvas.check_ending(path)
-    canvas.save(map_figure(posed, title, dark=dark), path)
 
 
 def map_figure(

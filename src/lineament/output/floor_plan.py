@@ -38,7 +38,7 @@ class FloorPlan:
     Attributes
     ----------
     every : int
-        Walls are those of every so manieth scan: of all, but for logs of more than `MOST_SEGMENTS`.
+        Walls are those of one scan in so many: of all, but for logs of more than `MOST_SEGMENTS`.
     """
 
     def __init__(self) -> None:
@@ -115,14 +115,12 @@ def _sure(segments: Records) -> Records:
     ends = np.stack((segments["start"], segments["end"], segments["centroid"]), axis=1)
     others = np.stack([segments[name] for name in ("angle", "misfit", "rms")], axis=1)
     segments = segments[is_drawn(ends) & is_drawn(others)]
-    length, (of_offset, both, of_angle) = segments["length"], _parts(segments["covariance"])
+    length: Array = segments["length"]
+    spread: Array = segments["covariance"]
+    of_offset, both, of_angle = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
     sure = (length >= SHORTEST) & (length <= LONGEST)  # NaN is neither
     sure &= (of_offset >= 0) & (of_angle >= 0) & (both**2 <= of_offset * of_angle)
     return segments[sure & (of_offset + (length / 2) ** 2 * of_angle <= SURE**2)]
-
-
-def _parts(covariances: Array) -> tuple[Array, Array, Array]:
-    return covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
 
 
 def most_seen(views: NDArray[np.int64]) -> NDArray[np.intp]:

@@ -14,12 +14,10 @@ def escape(text: str) -> str:
     >>> escape("a < b\x1b[31m")
     'a &lt; b\\x1b[31m'
     """
-    return html.escape("".join(letter if _is_shown(letter) else _named(letter) for letter in text))
-
-
-def _is_shown(letter: str) -> bool:
-    return letter in "\n\t" or not unicodedata.category(letter).startswith("C")
-
-
-def _named(letter: str) -> str:
-    return ascii(letter)[1:-1]
+    shown = (
+        letter
+        if letter in "\n\t" or not unicodedata.category(letter).startswith("C")
+        else ascii(letter)[1:-1]
+        for letter in text
+    )
+    return html.escape("".join(shown))

@@ -87,7 +87,7 @@ class RosMessages(SceneMessages):
         return self._message(topic, "geometry_msgs/PoseWithCovarianceStamped", writer)
 
     def scan(self, topic: str, moment: Moment, scan: LaserScan) -> Message:
-        """``sensor_msgs/LaserScan``; its first beam is at the stamp, or it is the one nearer to."""
+        """``sensor_msgs/LaserScan``; the end that is nearer to the stamp comes first."""
         last = scan.angle_min + (len(scan) - 1) * scan.angle_increment
         steps = np.array((scan.angle_increment, scan.time_increment, scan.scan_time))
         bearings, order = (scan.angle_min, last), 1

@@ -91,13 +91,17 @@ class Moment(NamedTuple):
                 "messages hold no other"
             )
         frame = scan.frame_id or LASER_FRAME
-        world = "world" if frame == WORLD_FRAME else WORLD_FRAME
-        return cls(*divmod(scan.stamp_ns, NANO), frame, world)
+        return cls(*divmod(scan.stamp_ns, NANO), frame, world_of(frame))
 
     @property
     def time(self) -> int:
         """The stamp [ns]."""
         return self.seconds * NANO + self.nanoseconds
+
+
+def world_of(frame: str) -> str:
+    """Name the frame of poses: ``map``, or ``world`` where the frame of the scan is called so."""
+    return "world" if frame == WORLD_FRAME else WORLD_FRAME
 
 
 class SceneMessages(ABC):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..scan import Array
-from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK
+from .canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, INK, ROUND
 from .markers import Markers
 from .markup import escape
 from .plans import Plan, PlanWriter
@@ -16,8 +16,6 @@ from .plans import Plan, PlanWriter
 WIDTH, HEIGHT, FOOT, MARGIN = 400.0, 260.0, 17.0, 10.0
 #: Widths of lines and radius of a corner on paper [mm].
 WALL_LINE, THIN_LINE, CORNER_DOT = 0.45, 0.2, 0.4
-#: Scales, and lengths of the bar.
-ROUND = [step * 10.0**power for power in range(-4, 11) for step in (1, 2, 5)]
 
 
 class SvgWriter(PlanWriter):

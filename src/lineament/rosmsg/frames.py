@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_left
 from collections import deque
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from ..scan import Pose
@@ -30,6 +31,15 @@ class Place(NamedTuple):
 
     pose: Pose
     is_upside_down: bool = False
+
+
+def chained(places: Iterable[Place]) -> Place:
+    """Return where the last of some frames is in the first, each in the one before it."""
+    pose, side = (0.0, 0.0, 0.0), 1
+    for (x, y, theta), is_upside_down in places:
+        pose = compose(pose, (x, side * y, side * theta))
+        side = -side if is_upside_down else side
+    return Place(pose, side < 0)
 
 
 class Frames:
@@ -66,19 +76,15 @@ class Frames:
 
         LookupError, with the reason, if that is not known.
         """
-        links: list[tuple[_Link, Pose]] = []
+        places: list[Place] = []
         frame = child
         while frame != parent:
             link = self._links.get(frame)
-            if link is None or len(links) > len(self._links):
+            if link is None or len(places) > len(self._links):
                 raise LookupError(f"no transforms lead from {parent} to {child}")
-            links.append((link, link.at(stamp, frame)))
+            places.append(Place(link.at(stamp, frame), link.is_upside_down))
             frame = link.parent
-        pose, side = (0.0, 0.0, 0.0), 1
-        for link, (x, y, theta) in reversed(links):
-            pose = compose(pose, (x, side * y, side * theta))
-            side = -side if link.is_upside_down else side
-        return Place(pose, side < 0)
+        return chained(reversed(places))
 
 
 class _Link:

@@ -1,1 +1,1 @@
-"""What the commands do, one call each: a log or many into tables, a demonstration, a warm-up."""
+"""What the commands do, one call each: from a log, many logs, or a plan to files."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,18 +119,16 @@ def _draw(
     method, drive = extractor.method.name, Path(log).name
     title = figures.scan_title(log, index, scan)
 
-    def drawn(name: str, caption: str, draw: Callable[..., Figure], *given: Any, title: str) -> Any:
+    def drawn(name: str, caption: str, draw: Callable[..., Figure]) -> tuple[str, Path, bytes]:
         path = target / f"{name}.png"
-        canvas.save(draw(*given, title=title), path)
-        dark = canvas.figure_bytes(draw(*given, title=title, dark=True), canvas.DPI)
-        return caption, path, dark
+        canvas.save(draw(), path)
+        return caption, path, canvas.figure_bytes(draw(dark=True), canvas.DPI)
 
     yield drawn(
         "scan",
         "What the scanner saw, and what was found in it: points have the colour of their cluster, "
         "lines are segments, diamonds are corners; nothing came back from shaded sectors.",
-        *(figures.scan_figure, scan, {method: features}),
-        title=title,
+        partial(figures.scan_figure, scan, {method: features}, title=title),
     )
     corners = features.corners
     quality = np.where(corners["kind"] == "corner", corners["quality"], 0.0)
@@ -138,29 +137,28 @@ def _draw(
         caption = "How sure it is: the corner of the highest quality, close up."
         if features.noise is not None:
             caption += f" Ranges scatter by {1e3 * features.noise.sigma:.1f} mm."
-        given = figures.corner_figure, scan, features, k
-        yield drawn("corner", caption, *given, title=f"{title} · {method}")
+        close_up = partial(figures.corner_figure, scan, features, k, title=f"{title} · {method}")
+        yield drawn("corner", caption, close_up)
     yield drawn(
         "trace",
         "How it was found: beams farther apart than the threshold begin a new cluster, and each "
         "corner explains the measurements better, by more than a threshold, than a line would.",
-        *(trace_figure, extractor.trace(scan)),
-        title=f"{title} · {method}",
+        partial(trace_figure, extractor.trace(scan), title=f"{title} · {method}"),
     )
+    found = {name: Extractor(name)(scan) for name in DEMO_METHODS}
     yield drawn(
         "methods",
         "Other methods on that scan. The last panel has the parameters of the paper: with the "
         "response in metres, the threshold 0.66 finds only the corners of distant walls, and one "
         "line is fitted to a cluster without corners.",
-        *(figures.scan_figure, scan, {name: Extractor(name)(scan) for name in DEMO_METHODS}),
-        title=title,
+        partial(figures.scan_figure, scan, found, title=title),
     )
     if posed:
         caption = "The whole drive: all scans, at the poses of the log."
-        yield drawn("map", caption, figures.map_figure, posed, title=drive)
+        yield drawn("map", caption, partial(figures.map_figure, posed, title=drive))
     else:
         caption = "Scans from the first to the last; the log has no poses for a map."
-        yield drawn("scans", caption, figures.scans_figure, moments, title=drive)
+        yield drawn("scans", caption, partial(figures.scans_figure, moments, title=drive))
 
 
 def _drive(

@@ -15,7 +15,7 @@ from ..features import TABLES, Features, make_records
 from ..files import check_outputs
 from ..logs import open_log
 from ..methods import Method
-from ..output import open_writer
+from ..output import Writer, open_writer
 from ..progress import Track, untracked
 from ..scan import LaserScan
 
@@ -84,8 +84,7 @@ def extract_log(
     track : callable
         ``track(items, name, whole)`` yields the scans and shows the progress.
     **reading
-        As for `lineament.open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
-        ``limits``, ``scale``.
+        As for `lineament.open_log`.
 
     Raises
     ------
@@ -105,7 +104,7 @@ def extract_log(
     >>> extract_log(folder / "log.npz", folder / "features.parquet", Extractor("liu")).scans
     5
     """
-    open_writer(output)  # Imports what its format needs, which is no part of the speed.
+    writer = writer_of(output, world=world)  # imports its format, which is no part of the speed
     check_outputs([output], [path])
     started = time.perf_counter()
     log = open_log(path, **reading)
@@ -115,9 +114,6 @@ def extract_log(
     topics: dict[str, None] = {}
     scans, beams, valid, unplaced = 0, 0, 0, 0
     found = dict.fromkeys(TABLES, 0)
-    writer = open_writer(output)
-    if world and writer.needs_scan:
-        raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
     with writer:
         for topic, scan in track(log.measured(), Path(log.name).name, log):
             features = extractor(scan)
@@ -145,6 +141,14 @@ def extract_log(
         unplaced=unplaced,
         faults=list(log.faults),
     )
+
+
+def writer_of(output: str | os.PathLike[str], *, world: bool) -> Writer:
+    """Make the writer of a file; a ValueError if it draws scans, and features are in the world."""
+    writer = open_writer(output)
+    if world and writer.needs_scan:
+        raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
+    return writer
 
 
 def check_found(name: str, scans: int, features: Mapping[str, int], method: Method) -> None:

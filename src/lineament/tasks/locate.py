@@ -3,7 +3,7 @@
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -136,7 +136,8 @@ def locate_log(
     outputs = [output] if picture is None else [output, picture]
     check_outputs(outputs, [path, *all_files(plan, is_read=True)])
     extractor = Extractor() if extractor is None else extractor
-    drawn = LineMap.read(plan, layers, units=units, limits=reading.get("limits"))
+    read = partial(LineMap.read, plan, layers, limits=reading.get("limits"))
+    drawn = read(units=units)
     started = time.perf_counter()
     log = open_log(path, **reading)
     scans = one_scanner(log, odometry=odometry)
@@ -169,15 +170,10 @@ def locate_log(
             draw([w for _, w in found], drawn, picture, title, _shares(verdicts))
     stamps, known = [stamp for stamp, _ in found], [bool(where) for _, where in found]
     seconds, warning = time.perf_counter() - started, ""
-    if sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf":
-        others = {
-            name: partial(LineMap.read, plan, layers, units=name, limits=reading.get("limits"))
-            for name in UNITS
-        }
-        best = _units_that_fit(others, drawn, located)
-        if best:
-            hint = f"shows where the scans were if it is drawn in {best}: --units {best}"
-            warning = one_line(f"{plan}: {hint}")
+    is_doubtful = sum(known) < _HARDLY * len(known) and Path(plan).suffix.lower() == ".dxf"
+    if is_doubtful and (best := _units_that_fit(read, drawn, located)):
+        hint = f"shows where the scans were if it is drawn in {best}: --units {best}"
+        warning = one_line(f"{plan}: {hint}")
     return Located(
         log=str(path),
         plan=str(plan),
@@ -192,19 +188,17 @@ def locate_log(
 
 
 def _units_that_fit(
-    plans: Mapping[str, Callable[[], LineMap]],
-    drawn: LineMap,
-    located: Callable[[LineMap], float],
+    read: Callable[..., LineMap], drawn: LineMap, located: Callable[[LineMap], float]
 ) -> str:
     """Return the units in which the most of the first scans are located on a plan, or "".
 
-    `plans` read it in each unit; `located` returns the share of scans that are located on one.
+    `read` reads the plan in some `units`; `located` returns the share of scans that are located.
     """
     best, most = "", _HARDLY
-    for name, read in plans.items():
+    for name in UNITS:
         with suppress(LineamentError):  # Larger than any building, say.
             with heard():  # What is only tried is not warned of.
-                other = read()
+                other = read(units=name)
             is_same = math.isclose(max(other.size), max(drawn.size))
             if not is_same and is_a_building(max(other.size)) and (share := located(other)) > most:
                 best, most = name, share
@@ -234,7 +228,8 @@ def draw(
     located = [np.array(where.pose[:2]) for where in places if where]
     plot_walls(
         plan.ends,
-        *(plan.columns["center"], plan.columns["radius"], picture),
+        plan.columns,
+        picture,
         title=title,
         about=about,
         ways={name: np.reshape(steps, (-1, 2, 2)) for name, steps in ways.items()},

@@ -190,9 +190,9 @@ def map_log(
     with placed:  # All files, or none.
         made.write(output)
         if picture is not None:
-            rings = made.map.columns["center"], made.map.columns["radius"]
             ways = dict(zip(("way", "not sure"), made.way, strict=True))
-            plot_walls(made.map.ends, *rings, picture, title=Path(log.name).name, ways=ways)
+            title = Path(log.name).name
+            plot_walls(made.map.ends, made.map.columns, picture, title=title, ways=ways)
     return Mapping(
         log=str(path),
         output=str(output),

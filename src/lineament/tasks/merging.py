@@ -15,12 +15,11 @@ from ..files import check_outputs
 from ..logs import open_log
 from ..mapping import merge_features
 from ..motion.rig import TOGETHER, Rig, fixed, period_of
-from ..output import open_writer
 from ..progress import Track, untracked
 from ..rosmsg.frames import Place
 from ..scan import LaserScan, Pose
 from ..scan.poses import compose, relative
-from .extract import in_world
+from .extract import in_world, writer_of
 
 #: So many scans of each topic show its frame, and the time from scan to scan.
 _FIRST = 100
@@ -159,6 +158,8 @@ def merge_log(
     LineamentError
         If the log cannot be read, has no such topic, does not say where a scanner is, or a scanner
         has no scans at the times of the first; or the output cannot be written.
+    ValueError
+        If they are to be in the world, but the output draws scans.
 
     Examples
     --------
@@ -171,7 +172,7 @@ def merge_log(
     >>> merge_log(folder / "two.log", folder / "f.csv", rig, Extractor("liu")).partners
     {'RLASER': 5}
     """
-    open_writer(output)  # Imports what its format needs, which is no part of the speed.
+    writer = writer_of(output, world=world)  # imports its format, which is no part of the speed
     check_outputs([output], [path])
     load_kernels([extractor])
     started = time.perf_counter()
@@ -180,9 +181,6 @@ def merge_log(
     if tolerance is None:
         tolerance = _tolerance(scanners)
     log, unplaced, found = scanners[0].log, 0, dict.fromkeys(TABLES, 0)
-    writer = open_writer(output)
-    if world and writer.needs_scan:
-        raise ValueError(f"world is for tables; {output} has scans at their poses in any case")
     with writer:
         for parts in _together(scanners, tolerance, track):
             features = _merged(parts, extractor, rig)

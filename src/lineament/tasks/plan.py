@@ -70,8 +70,7 @@ def convert_plan(
         return f"{path} -> {output}: {grid.cells.size} cells of {grid.resolution:g} m"
     plan = LineMap.read(path, layers, units=units, limits=limits)
     if ending in PICTURES:
-        rings = plan.columns["center"], plan.columns["radius"]
-        plot_walls(plan.ends, *rings, output, title=Path(path).name, dark=dark)
+        plot_walls(plan.ends, plan.columns, output, title=Path(path).name, dark=dark)
     elif ending in GRID_ENDINGS:
         plan.to_grid(resolution).write(output)
     elif is_grid and ending == ".geojson":

@@ -95,12 +95,16 @@ def _split(target: str) -> tuple[str, dict[str, str]]:
 def _numbers(text: str) -> tuple[int, ...]:
     """Return the numbers of topics, each once."""
     parts = text.split(",")
-    if not all(part.isascii() and part.isdigit() and len(part) < _MOST_DIGITS for part in parts):
+    if not all(map(_is_whole, parts)):
         raise RequestError(400, f"topics is {text[:40]!r}, expected whole numbers, as in 0,2")
     found = tuple(map(int, parts))
     if len({*found}) < len(found):
         raise RequestError(400, f"topics is {text[:40]!r}, expected each of them once")
     return found
+
+
+def _is_whole(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
 
 
 def _value(session: Session, name: str, query: dict[str, str]) -> int | str:
@@ -113,6 +117,6 @@ def _value(session: Session, name: str, query: dict[str, str]) -> int | str:
             known = ", ".join(session.extractors)
             raise RequestError(404, f"method {text[:40]!r} is not there, expected one of: {known}")
         return text
-    if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+    if not _is_whole(text):
         raise RequestError(400, f"{name} is {text[:40]!r}, expected a whole number ≥ 0")
     return int(text)

@@ -16,10 +16,10 @@ from ..features import Features
 from ..logs import Log, open_log
 from ..methods import DEFAULT_METHOD, Method
 from ..output import canvas, drawing
-from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, count
+from ..output.canvas import ARC_COLOR, CORNER_COLOR, EDGE_COLOR, PALETTE, ROUND, count
 from ..output.markers import Markers, markers_of
 from ..output.markup import escape
-from ..output.svg import ROUND, layers
+from ..output.svg import layers
 from ..scan import Array, LaserScan, NoiseLike
 
 if TYPE_CHECKING:
@@ -150,17 +150,15 @@ def picture(shown: Features | LaserScan | Log) -> str:
     return _page(shown.name, drawn, _facts(facts))
 
 
-def svg(scan: LaserScan | None, features: Features | None = None) -> str:
+def svg(scan: LaserScan | None, features: Features) -> str:
     """Draw the beams of a scan by cluster, and features over them, as SVG for light and dark.
 
     A few points that are much farther than the others are left outside.
     """
     points = np.zeros((0, 2)) if scan is None else scan.points
     valid = np.isfinite(points).all(axis=1)
-    labels = np.zeros(len(points), np.int32) if features is None else features.clusters
-    marks = Markers(*[np.zeros((0, *s)) for s in ((2, 2), (2,), (2,), (5,), (5,))])
-    if features is not None:
-        marks = markers_of(features, scan)
+    labels = features.clusters[: len(points)]
+    marks = markers_of(features, scan)
     near = np.vstack(
         [points[valid], marks.segments.reshape(-1, 2), marks.corners, np.zeros((1, 2))]
     )
@@ -177,23 +175,23 @@ def svg(scan: LaserScan | None, features: Features | None = None) -> str:
         return np.asarray((at - middle) * (scale, -scale) + size / 2)
 
     width, height = size.round().astype(int).tolist()
+    rings = features.breakpoints["position"]
+    rings = place(rings[np.isfinite(rings).all(axis=1)])
+    x, y = place(np.zeros(2))
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height + _FOOT:.0f}" '
         f'viewBox="0 0 {width} {height + _FOOT:.0f}" style="max-width:100%" role="img">',
         f'<svg width="{width}" height="{height}">',  # cuts off what is too far away
         *_dots(place(points[valid]), labels[valid]),
         *_features(marks, place(np.zeros(2)), scale),
+        *(
+            f'<circle cx="{u:.1f}" cy="{v:.1f}" r="2" fill="none" stroke="{_BREAK_COLOR}"/>'
+            for u, v in rings
+        ),
+        f'<path d="M{x - 4:.1f} {y - 4:.1f}l10 4l-10 4z" fill="currentColor"/></svg>',
+        *_foot(height, width / scale, scale, features),
+        "</svg>",
     ]
-    if features is not None:
-        rings = features.breakpoints["position"]
-        rings = place(rings[np.isfinite(rings).all(axis=1)])
-        parts += [
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2" fill="none" stroke="{_BREAK_COLOR}"/>'
-            for x, y in rings
-        ]
-    x, y = place(np.zeros(2))
-    parts += [f'<path d="M{x - 4:.1f} {y - 4:.1f}l10 4l-10 4z" fill="currentColor"/></svg>']
-    parts += [*_foot(height, width / scale, scale, features), "</svg>"]
     return "\n".join(parts)
 
 
@@ -234,12 +232,12 @@ def _diamond(x: float, y: float, size: float) -> str:
     return f'<path d="M{x:.6f} {y - size:.6f}l{s} {s}l-{s} {s}l-{s} -{s}z"/>'
 
 
-def _foot(top: float, across: float, scale: float, features: Features | None) -> Iterator[str]:
+def _foot(top: float, across: float, scale: float, features: Features) -> Iterator[str]:
     """Draw a bar of a round length, and a legend of what there is."""
     length = max(length for length in ROUND if length <= across / 5)
     y, end = top + 12, MARGIN + scale * length
     yield f'<path d="M{MARGIN} {y - 4}v4H{end:.1f}v-4" fill="none" stroke="currentColor"/>'
-    counts = {} if features is None else features.counts()
+    counts = features.counts()
     legend = [
         f'<tspan fill="{color}" dx="9">{sign}</tspan> {name}'
         for name, sign, color in (
@@ -249,7 +247,7 @@ def _foot(top: float, across: float, scale: float, features: Features | None) ->
             ("arcs", "\u2312", ARC_COLOR),
             ("breakpoints", "\u25cb", _BREAK_COLOR),
         )
-        if counts.get(name)
+        if counts[name]
     ]
     yield (
         f'<text x="{end + 6:.1f}" y="{y:.0f}" font-family="sans-serif" font-size="11" '

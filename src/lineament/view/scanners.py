@@ -107,15 +107,12 @@ class Together:
         self.missing: list[str] = []
         for topic, one in zip(rig.topics, shown, strict=True):
             at = index if one is shown[0] else one.near(first.stamp)
-            scan = None if at is None else one.store.item(at)[1]
-            if (
-                at is None
-                or scan is None
-                or abs(scan.stamp - first.stamp) > TOGETHER * max(periods)
-            ):
-                self.missing.append(topic)
-                continue
-            self.parts.append((topic, at, scan, _on_robot(scan, one, first, shown[0])))
+            if at is not None:
+                _, scan = one.store.item(at)
+                if abs(scan.stamp - first.stamp) <= TOGETHER * max(periods):
+                    self.parts.append((topic, at, scan, _on_robot(scan, one, first, shown[0])))
+                    continue
+            self.missing.append(topic)
         self.features = [extractor(scan) for _, _, scan, _ in self.parts]
         poses = [pose for *_, pose in self.parts]
         self.merged: Features = merge_features(

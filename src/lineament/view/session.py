@@ -61,7 +61,7 @@ class Session:
         # By log, and by topic in it; the one that was asked for last is the last.
         self._open: dict[int, dict[int | None, ShownLog]] = {}
         self._scanners: dict[int, Scanners] = {}
-        self._opening, self._ended = threading.Lock(), False
+        self._opening, self._ended = threading.RLock(), False
         if len(self._paths) == 1:
             topics: list[int | None] = [*self.chosen(0)]
             for topic in topics or [None]:
@@ -80,29 +80,29 @@ class Session:
 
     def log(self, number: int, topic: int | None = None) -> ShownLog:
         """Return a log, or one of its topics, opened if it is not; ValueError if there is none."""
-        scanners = None if topic is None else self.scanners(number)
         self._check(number)
         with self._opening:
             if self._ended:
                 raise ValueError("the viewer has ended")
             topics = self._open.pop(number, {})
-            self._open[number] = topics
-            if topic not in topics:
-                room, reading, place = ROOM // min(len(self._paths), KEPT), self._reading, None
-                if scanners is not None and topic is not None:
-                    room //= len(scanners)
-                    reading = reading | {"topic": scanners.topics[topic]}
-                    place = scanners.place(topic)
-                try:
-                    shown = ShownLog(self._paths[number], room, reading, self._plan, place)
-                finally:
-                    if not topics:
-                        del self._open[number]
-                topics[topic] = shown
-                self._open[number] = topics
+            try:
+                if topic not in topics:
+                    topics[topic] = self._opened(number, topic)
+            finally:
+                if topics:
+                    self._open[number] = topics
             if len(self._open) > KEPT:
                 self._close(next(iter(self._open)))
             return topics[topic]
+
+    def _opened(self, number: int, topic: int | None) -> ShownLog:
+        room, reading, place = ROOM // min(len(self._paths), KEPT), self._reading, None
+        if topic is not None:
+            scanners = self.scanners(number)
+            room //= len(scanners)
+            reading = reading | {"topic": scanners.topics[topic]}
+            place = scanners.place(topic)
+        return ShownLog(self._paths[number], room, reading, self._plan, place)
 
     def scanners(self, number: int) -> Scanners:
         """Return the scanners of a log; ValueError if there is no log of that number."""

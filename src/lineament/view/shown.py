@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import LineamentError
 from ..extractor import Extractor
 from ..kernels import FARTHEST
-from ..logs import open_log, save_npz
+from ..logs import Log, open_log, save_npz
 from ..rosmsg.frames import Place
 from ..scan import LaserScan
 from .store import Item, ScanStore
@@ -82,8 +82,8 @@ class ShownLog:
         """Return poses and points of every `step`-th scan, for a picture of the whole drive.
 
         The points [m] are in the world frame, x and y in turn, at most `MOST_POINTS` of a scan, and
-        none that is farther than any scanner sees.
-        Scans without a pose, and those that have not been read, are left out.
+        none that is farther than any scanner sees. Scans without a pose, and those that have not
+        been read, are left out.
         """
         scans = []
         for index in range(first, min(first + step * count, len(self.store)), step):
@@ -106,7 +106,7 @@ class ShownLog:
             return path.read_bytes()
 
     def near(self, stamp: float) -> int | None:
-        """Return which scan is nearest to a time [s], once the log was read so far; None: none."""
+        """Return which scan is nearest to a time [s], once the log is read so far; None if none."""
         while not self.wait(_SOON):
             last = self.store.stamps(max(len(self.store) - 1, 0), 1)
             if last and last[0] > stamp:
@@ -134,7 +134,7 @@ class ShownLog:
             }
             yield topic, scan.with_pose(where.pose if where.is_known else None)
 
-    def _fill(self, log: Any) -> None:
+    def _fill(self, log: Log) -> None:
         try:
             self._about["total"] = len(log)
             items = self._upright(log.measured())

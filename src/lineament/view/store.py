@@ -11,6 +11,7 @@ from itertools import islice
 
 import numpy as np
 
+from ..logs.saving import lossless
 from ..scan import LaserScan
 
 #: A scan with its topic.
@@ -118,14 +119,9 @@ class ScanStore:
 def _pack(topic: str, scan: LaserScan) -> bytes:
     """Serialise a scan and its topic; of what a log may hold, the pose's covariance is lost."""
     fields = {name: getattr(scan, name) for name in _FIELDS}
-    for name in ("ranges", "intensities"):
-        values = getattr(scan, name)
-        if values is not None:
-            # Most sensors report single precision.
-            with np.errstate(over="ignore"):
-                single = values.astype(np.float32)
-            is_single = np.array_equal(single, values, equal_nan=True)
-            fields[name] = single if is_single else values
+    fields["ranges"] = lossless(scan.ranges)
+    if scan.intensities is not None:
+        fields["intensities"] = lossless(scan.intensities)
     names = ("angle_min", "angle_increment") if scan.is_regular else ("angles",)
     fields.update((name, getattr(scan, name)) for name in names)
     return pickle.dumps((topic, fields, (scan.stamp_beam, scan.stamp_ns)))

@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from ...logs.sources import is_address
 from ...methods import Method
 from ...progress import Track
 from ...scan import RangeNoise
-from ..extract import extract_log
+from ..extract import Extraction, extract_log
 from .manifest import Row
 
 #: Called as ``report(scans, total)``.
@@ -24,8 +24,8 @@ Report = Callable[[int, int], None]
 #: Seconds between two reports.
 _PERIOD = 0.2
 
-#: What a row keeps of an extraction.
-_FOUND = ("topics", "scans", "features", "invalid", "skipped", "faults")
+#: What a row takes of an extraction; its log, output and time are its own.
+_FOUND = {field.name for field in fields(Extraction)} - {"log", "output", "seconds"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,8 +105,7 @@ def extract_logs(
     show : callable
         ``show(text)`` is called twice a second with the progress.
     **reading
-        As for `open_log`: ``topic``, ``keep_going``, ``echo``, ``ring``, ``pose_topic``,
-        ``limits``.
+        As for `lineament.open_log`.
 
     Raises
     ------

@@ -106,12 +106,10 @@ export class Drawing {
   /** The ellipse of three deviations about the sensor, at least as large as can be seen. */
   pose(where) {
     if (!where?.covariance) return;
-    const [[xx, xy], [, yy]] = where.covariance, middle = (xx + yy) / 2;
-    const spread = Math.hypot((xx - yy) / 2, xy), turn = Math.atan2(2 * xy, xx - yy) / 2;
-    const radii = [middle + spread, middle - spread].map((v) => Math.max(3 * Math.sqrt(Math.max(v, 0)) * this.plane.scale, 4));
-    const { x, y } = this.frame, [u, v] = this.plane.toPixels([x, y], this.size);
+    const { major, minor, direction } = ellipseOf(where.covariance);
+    const radii = [major, minor].map((sigma) => Math.max(3 * sigma * this.plane.scale, 4));
     this.ctx.beginPath();
-    this.ctx.ellipse(u, v, ...radii, -turn, 0, 2 * Math.PI);
+    this.ctx.ellipse(...this.at([0, 0]), ...radii, -direction, 0, 2 * Math.PI);
     this.#pen(where.verdict === "located" ? this.theme.accent : this.theme.edge, 2);
     this.ctx.stroke();
   }

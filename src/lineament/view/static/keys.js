@@ -26,7 +26,7 @@ const KEYS = [
   [[","], ",", "play slower", next(list("speed"), -1)],
   [["["], "[", "the log before", next(list("log"), -1)],
   [["]"], "]", "the next log", next(list("log"))],
-  [["t"], "t", "one scanner of several after the other, then all", (app) => app.turnTopics()],
+  [["t"], "t", "one scanner of several after the other, then all", ({ topics }) => topics.turn()],
   [["m"], "m", "the next method", next((app) => app.panels[0].select)],
   [["M"], "M", "the method before", next((app) => app.panels[0].select, -1)],
   [["c"], "c", "compare two methods, or stop", click("compare")],

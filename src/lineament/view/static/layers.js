@@ -3,7 +3,7 @@
 import { element } from "./details.js";
 
 /**
- * From the lowest to the highest. `draw(drawing, scene, isShown)` draws a layer of a scene: the
+ * From the lowest to the highest. `draw(isShown, drawing, scene)` draws a layer of a scene: the
  * scan (null where it has no place), the drive, how large covariances are.
  */
 export const LAYERS = [

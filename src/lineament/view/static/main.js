@@ -142,10 +142,6 @@ class App {
     return this.open(this.number, { topics: names, scan: part?.index ?? this.timeline.index, world, view });
   }
 
-  turnTopics() {
-    this.topics.turn();
-  }
-
   addPanel(method) {
     this.panels.push(new Panel(this, method));
     $("panels").append(this.panels.at(-1).element);
