@@ -13,7 +13,7 @@ import lineament as ln
 from lineament.cli import run
 from lineament.drawings import UNITS
 from lineament.logs import save_log
-from lineament.mapping import LineMap, locate
+from lineament.mapping import Grid, LineMap, locate
 from lineament.simulation import SENSORS, drive, office, room
 
 
@@ -254,6 +254,26 @@ def test_table_of_extract_in_the_world_is_a_plan(tmp_path):
             r"lines have shape \(2, 2\), expected \(n, 4\)",
         ),
         (lambda: LineMap.from_lines([0, 0, 1, 1]), r"lines have shape \(4,\)"),
+        (
+            lambda: LineMap.from_lines("plan.dxf"),
+            r"^lines are 'plan.dxf', expected numbers of shape \(n, 4\) or \(n, 2, 2\)$",
+        ),
+        (
+            lambda: LineMap.from_lines(ROOM, [[1, 1, 1], [1, 1]]),
+            r"^columns are \[\[1, 1, 1\], \[1, 1\]\], expected numbers of shape \(n, 3\)$",
+        ),
+        (lambda: LineMap.from_lines(ROOM, side=2), "^side is 2, expected 0 or 1$"),
+        (lambda: LineMap.from_lines(ROOM, sigma=-0.1), "^sigma is -0.1, expected a length ≥ 0$"),
+        (lambda: LineMap.from_lines(ROOM, sigma=math.nan), "^sigma is nan, expected a length ≥ 0$"),
+        (
+            lambda: LineMap.read("plan.dxf", layers="A-WALL*"),
+            r"^layers are 'A-WALL\*', expected a list of names$",
+        ),
+        (
+            lambda: Grid(np.zeros((3, 3)), 0.05),
+            r"^cells are float64 of shape \(3, 3\), expected int8 in rows and columns$",
+        ),
+        (lambda: Grid(np.zeros((3, 3), np.int8), 0), "^resolution is 0, expected a length > 0$"),
         (
             lambda: LineMap.from_lines(ROOM, [[1, 1]]),
             r"columns have shape \(1, 2\), expected \(n, 3\)",

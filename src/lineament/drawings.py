@@ -94,6 +94,8 @@ def read_drawing(
     """Return what is drawn on some layers of a DXF; see `LineMap.read`."""
     if units is not None and units not in NAMES:
         raise ValueError(f"units are {units!r}, expected one of {', '.join(NAMES)}")
+    if isinstance(layers, str):  # Its letters are no layers, and a * among them is every layer.
+        raise ValueError(f"layers are {layers!r}, expected a list of names")
     with needed_by(f"{path}:"):
         import ezdxf
     # Else what it ignores of a damaged file stands on the screen.
