@@ -1,6 +1,8 @@
 """Plans: walls from features, from DXF, from tables; what is no plan; written and read again."""
 
 import math
+import os
+import sys
 
 import ezdxf
 import numpy as np
@@ -189,6 +191,18 @@ def test_layers_and_units_are_of_a_dxf(tmp_path, ending):
     for asked in ({"layers": ["walls"]}, {"units": "mm"}):
         with pytest.raises(ln.LineamentError, match=rf"plan\{ending}: \w+ are of a DXF, expected"):
             LineMap.read(path, **asked)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux alone")
+@pytest.mark.parametrize("ending", [".dxf", ".svg", ".parquet"])
+def test_a_plan_whose_path_is_no_text_is_read(tmp_path, ending):
+    path = tmp_path / (os.fsdecode(b"plan-\xff") + ending)
+    LineMap.from_lines(ROOM, side=1).write(path)
+    assert len(LineMap.read(path).walls) == len(ROOM)
+    path.write_bytes(b"")
+    with pytest.raises(ln.LineamentError) as caught:
+        LineMap.read(path)
+    assert str(caught.value).count("plan-") == 1
 
 
 def test_layer_that_is_not_there_names_those_that_are(tmp_path):

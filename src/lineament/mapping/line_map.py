@@ -284,7 +284,7 @@ class LineMap(ReadOnly):
             plan.left_out += left_out
             len(plan.corners)  # refuses more walls beside each other than a building has
         except LineamentError as error:
-            problem = str(error).removeprefix(f"{path}: ")
+            problem = str(error).removeprefix(one_line(f"{path}: "))
             raise plan_error(path)(problem) from None
         if doubt := doubts(plan.size, plan.left_out, ending in GRID_ENDINGS):
             warn(one_line(f"{path}: {doubt}"))
