@@ -15,7 +15,7 @@ from lineament.cli import cli, run
 from lineament.errors import LineamentError
 from lineament.features import SEGMENT
 from lineament.logs import save_log
-from lineament.mapping import LineMap
+from lineament.mapping import LineMap, hypotheses
 from lineament.mapping.adjust import edges_of, errors_of_motions, optimise
 from lineament.mapping.drive_map import Drive
 from lineament.mapping.making import make_map, roughness, single, widened
@@ -286,6 +286,20 @@ def test_what_makes_no_map_is_one_line(tmp_path, monkeypatch, capsys, scans, giv
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / given[1]).exists()
+
+
+def test_a_map_with_too_many_walls_beside_each_other_is_not_called_a_plan(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(hypotheses, "_MOST_PAIRS", 20)
+    monkeypatch.setattr(hypotheses, "_FEW", 3)
+    scans = drive(room(), [(-2, 0), (-1, 0.5)], SENSORS["lms181"], speed=0.5, rate=1)
+    save_log(tmp_path / "log.npz", list(scans))
+    assert run(["map", str(tmp_path / "log.npz"), "-o", str(tmp_path / "m.svg"), "-q"]) == 1
+    error = capsys.readouterr().err
+    assert re.search(r"^lineament: \d+ pairs of \d+ walls lie beside each other", error)
+    assert "plan" not in error
+    assert error.count("\n") == 1
 
 
 def test_one_scan_is_a_map():
