@@ -8,7 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -19,7 +21,7 @@ from text_logs import FLASER
 
 import lineament as ln
 from lineament import LogError, files
-from lineament.cli import cli, run
+from lineament.cli import cli, run, terminating
 from lineament.cli.options import Place
 from lineament.live import LiveConfig, Node, Pipeline, ReplaySource
 from lineament.logs import open_log, save_npz
@@ -211,6 +213,36 @@ def test_a_signal_that_is_lost_in_a_callback_comes_again(capsys, monkeypatch):
     monkeypatch.setattr("lineament.methods.describe", wait)
     assert run(["methods"]) == 128 + signal.SIGTERM
     assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+
+@posix
+def test_a_signal_that_compiled_code_clears_comes_again(capsys, monkeypatch):
+    def wait(*_, **__):
+        for _ in range(3):
+            with suppress(BaseException):  # as PyErr_Clear does
+                signal.raise_signal(signal.SIGTERM)
+        time.sleep(10)
+
+    monkeypatch.setattr("lineament.methods.describe", wait)
+    assert run(["methods"]) == 128 + signal.SIGTERM
+    assert capsys.readouterr() == ("", "lineament: stopped\n")
+
+
+@posix
+def test_a_signal_that_was_lost_does_not_come_after_the_command(monkeypatch):
+    def swallow(*_, **__):
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        return "found"
+
+    monkeypatch.setattr("lineament.methods.describe", swallow)
+    monkeypatch.setattr(sys.modules[terminating.__module__], "_PATIENCE", 5)
+    came, threads = [], threading.active_count()
+    monkeypatch.setattr(os, "kill", lambda *signal: came.append(signal))
+    assert run(["methods"]) == 0
+    while threading.active_count() > threads:
+        time.sleep(0.01)
+    assert came == []
 
 
 # Full disks, closed pipes
