@@ -4,6 +4,7 @@ import errno
 import io
 import os
 import re
+import runpy
 import shutil
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import threading
 import time
 from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
 
 import click
 import pytest
@@ -196,6 +198,18 @@ def test_a_signal_leaves_no_half_file(command, name, work, monkeypatch, capsys):
     left = whole_files(work) - there
     assert {path.name for path in left} <= {"_manifest.jsonl", "features.parquet"}
     assert {n: signal.getsignal(n) for n in before} == before
+
+
+def test_ctrl_c_while_the_command_is_imported(monkeypatch, capsys):
+    class Interrupted(ModuleType):
+        def __getattr__(self, _):
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "lineament.cli", Interrupted("lineament.cli"))
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("lineament", run_name="__main__")
+    assert ended.value.code == 130
+    assert capsys.readouterr() == ("", "lineament: stopped\n")
 
 
 @posix
