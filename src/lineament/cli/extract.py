@@ -81,6 +81,8 @@ def extract(
                 raise click.UsageError(f"--{name}: expected a folder as output, FOLDER/")
     ending = f".{(bulk['ending'] or 'parquet').removeprefix('.')}"
     ending = ending if is_folder else Path(output).suffix.lower()
+    if ending not in ENDINGS:
+        raise click.UsageError(f"--format {ending}: expected one of {', '.join(ENDINGS)}")
     if world and ending not in _TABLES:
         raise click.UsageError(f"--world: expected a table, {', '.join(_TABLES)}, not {ending}")
     reading = reading | {"world": world}
