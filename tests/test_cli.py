@@ -449,6 +449,9 @@ def test_imports_are_light(code, heavy):
             "calibrate a.bag --topic /a --against /b --odometry /o",
             "--odometry: is of wheels, expected none beside --against",
         ),
+        ("extract a.bag -o b.csv --set evidence=6 --set evidence=24", "evidence is given twice"),
+        ("info a.bag --limit beams=6 --limit beams=24", "'beams=24': beams is given twice"),
+        ("merge a.bag -o b.csv --mounting a=0,0,0 --mounting a=1,0,0", "a is given twice"),
         ("extract a.bag -o out/ --format pdf", "--format .pdf: expected one of .parquet, .csv"),
     ],
 )
